@@ -54,7 +54,9 @@ def shown(seconds: float, folder: Path, *settings: str, has_browser: bool = True
 
 def _watched(command: list[str], seconds: float, *, has_browser: bool = False) -> tuple[float, tuple[int, int]]:
     """Run a command; processor share [%] of its processes in the middle of it, and when [ns]."""
-    process = subprocess.Popen([sys.executable, "-m", "teleop_core.cli", *command], stdout=subprocess.PIPE, text=True)
+    process = subprocess.Popen(
+        [sys.executable, "-m", "teleop_core.commands.cli", *command], stdout=subprocess.PIPE, text=True
+    )
     assert process.stdout is not None
     for line in process.stdout:
         if "operator is ready" in line:

@@ -48,7 +48,7 @@ def run_session(kind: str, folder: Path, duration: float) -> End:
     """Run one session of some seconds in a directory of its own."""
     temporary = folder / "tmp"
     temporary.mkdir(parents=True)
-    command = [sys.executable, "-m", "teleop_core.cli", "live", "--out", str(folder / "bag")]
+    command = [sys.executable, "-m", "teleop_core.commands.cli", "live", "--out", str(folder / "bag")]
     command += ["--duration", f"{duration}", "--set", "operator.approach_time=0.1"]
     command += ["--set", "operator.patience=0.0", *KINDS[kind]]
     begin = time.monotonic()

@@ -128,7 +128,7 @@ def live(seconds: float, *options: str) -> dict[str, float]:
     """Run a live session for some seconds; the same numbers from its recording."""
     with tempfile.TemporaryDirectory() as folder:
         bag = Path(folder) / "bag"
-        command = [sys.executable, "-u", "-m", "teleop_core.cli", "live", "--scenario"]
+        command = [sys.executable, "-u", "-m", "teleop_core.commands.cli", "live", "--scenario"]
         command += ["coarse_box", "--duration", str(seconds), "--out", str(bag), *options]
         with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
             cpu = _watch(process)

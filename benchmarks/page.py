@@ -9,6 +9,7 @@ the session is measured by `benchmarks/console.py`.
 """
 
 import argparse
+import logging
 import random
 import sys
 import tempfile
@@ -68,6 +69,7 @@ def stops(port: int, presses: int) -> list[float]:
 
     The pages have processes of their own: in this one they would keep the clock waiting.
     """
+    logging.getLogger("websockets").setLevel(logging.CRITICAL)  # what is killed says no goodbye
     context, found = get_context("spawn"), list[float]()
     seeds = [range(first, first + PAGES) for first in range(0, HOSTILE, PAGES)]
     others = [context.Process(target=attackers, args=(port, some), daemon=True) for some in seeds]
@@ -88,6 +90,8 @@ def stops(port: int, presses: int) -> list[float]:
 def attackers(port: int, seeds: range) -> None:
     """Be some hostile pages, until this process is killed."""
     attacks = sorted(set(hostile.HOSTILE) - set(hostile.STOPPING), key=lambda attack: attack.__name__)
+
+    logging.getLogger("websockets").setLevel(logging.CRITICAL)
 
     def attack(seed: int, driver: PageClient) -> None:
         chosen = random.Random(seed)

@@ -14,7 +14,7 @@ from pathlib import Path
 
 _RUN = """
 import json, resource, sys, time
-from teleop_core import cli
+from teleop_core.commands import cli
 begin = time.perf_counter()
 code = cli.main(sys.argv[1:])
 used = resource.getrusage(resource.RUSAGE_SELF)
@@ -64,7 +64,7 @@ def print_scores(folder: Path) -> None:
     for scenario in ("coarse_box", "fine_box"):
         bags.append(str(folder / scenario))
         run("sim", "--scenario", scenario, "--out", bags[-1])
-    subprocess.run([sys.executable, "-m", "teleop_core.cli", "evaluate", *bags], check=True)
+    subprocess.run([sys.executable, "-m", "teleop_core.commands.cli", "evaluate", *bags], check=True)
 
 
 def main() -> None:

@@ -113,7 +113,7 @@ def one_stop(tap: Tap) -> float:
 
 def session(folder: Path, domain: str, priority: int, processes: str) -> subprocess.Popen[bytes]:
     """Start a session in which the hand never rests."""
-    command = [sys.executable, "-m", "teleop_core.cli", "live", "--out", str(folder / "bag")]
+    command = [sys.executable, "-m", "teleop_core.commands.cli", "live", "--out", str(folder / "bag")]
     command += ["--scenario", "free_motion", "--duration", "3600"]
     for setting in (f"real_time.priority={priority}", "operator.approach_time=1.0", "operator.patience=0.0"):
         command += ["--set", setting]

@@ -11,7 +11,7 @@ from typing import Any
 from docutils import nodes
 
 import teleop_core
-from teleop_core.cli import main
+from teleop_core.commands.cli import main
 
 HERE = Path(__file__).parent
 sys.path.insert(0, str(HERE))

@@ -12,8 +12,8 @@ from itertools import chain
 from pathlib import Path
 
 from teleop_core.base.parameters import specs
-from teleop_core.chain.filters.tremor_filter import TREMOR_FILTER
-from teleop_core.chain.fixtures.remote_centre import REMOTE_CENTRE_STAGE
+from teleop_core.coupling.filters.tremor_filter import TREMOR_FILTER
+from teleop_core.coupling.fixtures.remote_centre import REMOTE_CENTRE_STAGE
 from teleop_core.evaluation import key_table
 from teleop_core.graph.graph import Graph, Link, build_graph
 from teleop_core.graph.layers import declared_groups
@@ -28,6 +28,7 @@ from teleop_core.graph.topics import (
     OPERATOR_SERVO_CP,
     PASSIVITY_TOPICS,
     PORTS_BETWEEN_ARMS,
+    TASK_TOPICS,
     Kind,
     Topic,
 )
@@ -102,6 +103,9 @@ def topics_page(graph: Graph) -> str:
     with_centre = build_graph(stages=["remote_centre"])
     writer = "[remote_centre](remote_centre.md), a further stage"
     rows += [topic_row(topic, writer, with_centre) for topic in REMOTE_CENTRE_STAGE.writes]
+    with_task = build_graph(stages=["display", "task"])
+    writers = {t: member.name for member in with_task.members for t in member.writes}
+    rows += [topic_row(t, f"{writers[t]}, a further stage ([tasks](tasks.md))", with_task) for t in TASK_TOPICS]
     with_jaw = build_graph(stages=["network", "jaw_command", "jaw", "jaw_sim"])
     writers = {t: member.name for member in with_jaw.members for t in member.writes}
     rows += [topic_row(t, f"{writers[t]}, with a [jaw](gripper.md)", with_jaw) for t in JAW_TOPICS]

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from teleop_core.chain.passivity.port import DRIFT, IN, OUT, ROUND
+from teleop_core.coupling.passivity.port import DRIFT, IN, OUT, ROUND
 from teleop_core.graph.topics import OPERATION
 from teleop_core.kernels.geometry import Array
 from teleop_core.session.configuration import configure

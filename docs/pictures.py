@@ -141,7 +141,7 @@ def seek(tab: Tab, moment: float) -> None:
 
 def moving(folder: Path) -> None:
     """Take a recorded session frame by frame, each at its time of the replay, and join them."""
-    recorded = folder / "session"
+    recorded = folder / "moved"
     tc.run(SCENARIO, duration=TO, out=recorded, settings=LARGE)
     with served(folder, recorded) as console, Tab(folder / "moving", 900, 540) as tab:
         tab.visit(console.url + SHARP)

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from importlib import import_module
 from pathlib import Path
 
-from teleop_core.cli import _parser
+from teleop_core.commands.cli import _parser
 
 ROOT = Path(__file__).resolve().parents[1]
 TITLES = {

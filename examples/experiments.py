@@ -2,7 +2,7 @@
 
 import teleop_lab as lab
 from teleop_lab import experiments
-from teleop_lab.experiments import Bench, Findings, Row, factor
+from teleop_lab.experiments import Bench, Comparison, Findings, factor
 
 
 def measure(bench: Bench) -> Findings:
@@ -13,7 +13,7 @@ def measure(bench: Bench) -> Findings:
         session = bench.session("fine_box", settings=settings)
         errors[name] = session.score.position_error_mm.rms or 0.0
     rows = [
-        Row(
+        Comparison(
             quantity="position error, RMS",
             unit="mm",
             published=0.293,

@@ -14,8 +14,8 @@ Array = NDArray[np.float64]
 class BothParameters:
     """What ``--set reflection.both.slack=...`` sets; the push gets these in their order."""
 
-    stiffness: float = tc.parameter(300.0, unit="N/m", lower=0.0, upper=5000.0, doc="of the spring")
-    slack: float = tc.parameter(2e-3, unit="m", lower=0.0, upper=0.1, doc="lag that is not felt")
+    stiffness: float = tc.parameter(300.0, tc.Within(0.0, 5000.0, "N/m"), "of the spring")
+    slack: float = tc.parameter(2e-3, tc.Within(0.0, 0.1, "m"), "lag that is not felt")
 
 
 @tc.kernel

@@ -5,13 +5,13 @@ teleop console --parts examples/own_control.py --set operator=remote
 
 import teleop_console
 from teleop_console.controls import CONTROLS, Answers
-from teleop_console.link import Link
+from teleop_console.link import SessionLink
 
 GENTLE, USUAL = 0.02, 0.0
 """Largest speeds of the tip [m/s]; 0: what its joints make."""
 
 
-def be_gentle(link: Link, arm: str) -> Answers:
+def be_gentle(link: SessionLink, arm: str) -> Answers:
     """Limit the speed of the tip, or go back to the usual limit, while the session runs."""
     node = f"{arm}/slave" if arm else "slave"
     known = link.parameters().get((node, "operation.tool_speed"))

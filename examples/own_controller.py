@@ -14,7 +14,7 @@ Array = NDArray[np.float64]
 class FollowingParameters:
     """What ``--set controller.following.bandwidth=...`` sets."""
 
-    bandwidth: float = tc.parameter(80.0, unit="rad/s", lower=1.0, upper=200.0, doc="double pole")
+    bandwidth: float = tc.parameter(80.0, tc.Within(1.0, 200.0, "rad/s"), "double pole")
 
 
 def gains(parameters: FollowingParameters, robot: tc.Robot, viscous: Array) -> Array:

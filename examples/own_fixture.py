@@ -15,8 +15,8 @@ Array = NDArray[np.float64]
 class PillParameters:
     """What ``--set fixture.pill.radius=...`` sets; the distance gets the numbers in this order."""
 
-    radius: float = tc.parameter(0.012, unit="m", lower=1e-4, upper=0.5, doc="of sides and ends")
-    height: float = tc.parameter(0.01, unit="m", lower=0.0, upper=0.5, doc="without its ends")
+    radius: float = tc.parameter(0.012, tc.Within(1e-4, 0.5, "m"), "of sides and ends")
+    height: float = tc.parameter(0.01, tc.Within(0.0, 0.5, "m"), "without its ends")
 
 
 @tc.kernel

@@ -18,7 +18,7 @@ DAMPING_CF = tc.Topic(
 class DampingParameters:
     """What ``--set hand_damping.damping=...`` sets."""
 
-    damping: float = tc.parameter(10.0, unit="N·s/m", lower=0.0, upper=50.0, doc="of the hand")
+    damping: float = tc.parameter(10.0, tc.Within(0.0, 50.0, "N·s/m"), "of the hand")
 
 
 @tc.kernel

@@ -15,8 +15,8 @@ Array = NDArray[np.float64]
 class FadingParameters:
     """What ``--set network.there.fading.period=...`` sets; the draw gets these in their order."""
 
-    period: float = tc.parameter(2.0, unit="s", lower=0.01, upper=60.0, doc="from fade to fade")
-    worst: float = tc.parameter(0.9, lower=0.0, upper=1.0, doc="share of packets lost in a fade")
+    period: float = tc.parameter(2.0, tc.Within(0.01, 60.0, "s"), "from fade to fade")
+    worst: float = tc.parameter(0.9, tc.Within(0.0, 1.0), "share of packets lost in a fade")
 
 
 @tc.kernel

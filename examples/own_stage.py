@@ -21,7 +21,7 @@ LIMITED = tc.Topic("slave/limited_cp", tc.Kind.POSE, passed_on("slave/servo_cp")
 class LimitParameters:
     """What ``--set velocity_limit.speed=...`` sets."""
 
-    speed: float = tc.parameter(0.02, unit="m/s", lower=1e-4, upper=10.0, doc="largest speed")
+    speed: float = tc.parameter(0.02, tc.Within(1e-4, 10.0, "m/s"), "largest speed")
 
 
 class LimitState(tc.Fields):

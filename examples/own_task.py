@@ -6,19 +6,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 import teleop_core as tc
-from teleop_core.chain.tasks import Act, Miss, attempts
+from teleop_core.hand.tasks import attempts
 
 Array = NDArray[np.float64]
-PASS, LATE = int(Act.PASS), int(Miss.LATE)
 
 
 @dataclass(frozen=True, kw_only=True)
 class CornersParameters:
     """What ``--set task.corners.side=...`` sets; the kernel gets them as numbers."""
 
-    side: float = tc.parameter(0.02, unit="m", lower=1e-3, upper=0.2, doc="of the square")
-    width: float = tc.parameter(0.003, unit="m", lower=1e-4, upper=0.1, doc="of a corner")
-    longest: float = tc.parameter(10.0, unit="s", lower=0.1, upper=60.0, doc="after which an attempt is an error")
+    side: float = tc.parameter(0.02, tc.Within(1e-3, 0.2, "m"), "of the square")
+    width: float = tc.parameter(0.003, tc.Within(1e-4, 0.1, "m"), "of a corner")
+    longest: float = tc.parameter(10.0, tc.Within(0.1, 60.0, "s"), "after which an attempt is an error")
 
 
 @tc.kernel
@@ -30,13 +29,13 @@ def corners(numbers: Array, memory: Array, scene: Array, state: Array) -> None:
     elif attempts.is_at_goal(scene, state):
         attempts.tell_attempt(memory, scene, state)
     elif attempts.waited(memory, scene) > numbers[2]:
-        attempts.end_attempt(memory, scene, state, LATE)
+        attempts.end_attempt(memory, scene, state, attempts.LATE)
     else:
         return
     corner = int(state[0]) % 4
     y = memory[1] + numbers[0] * (corner in (0, 1))
     z = memory[2] + numbers[0] * (corner in (1, 2))
-    attempts.begin_goal(memory, scene, state, PASS, memory[0], y, z, numbers[1])
+    attempts.begin_goal(memory, scene, state, attempts.PASS, memory[0], y, z, numbers[1])
 
 
 tc.register_task(tc.Task("corners", CornersParameters, corners))

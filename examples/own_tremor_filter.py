@@ -15,7 +15,7 @@ Array = NDArray[np.float64]
 class LowPassParameters:
     """What ``--set tremor_filter.low_pass.corner=...`` sets; the filter gets it as a number."""
 
-    corner: float = tc.parameter(3.0, unit="Hz", lower=0.1, upper=25.0, doc="what is faster goes")
+    corner: float = tc.parameter(3.0, tc.Within(0.1, 25.0, "Hz"), "what is faster goes")
 
 
 @tc.kernel

@@ -15,8 +15,8 @@ Array = NDArray[np.float64]
 class RingParameters:
     """What ``--set world.ring.radius=...`` sets; the distance gets the numbers in this order."""
 
-    radius: float = tc.parameter(0.02, unit="m", lower=1e-3, upper=1.0, doc="of its middle line")
-    thickness: float = tc.parameter(0.02, unit="m", lower=1e-3, upper=1.0, doc="of its wire")
+    radius: float = tc.parameter(0.02, tc.Within(1e-3, 1.0, "m"), "of its middle line")
+    thickness: float = tc.parameter(0.02, tc.Within(1e-3, 1.0, "m"), "of its wire")
 
 
 @tc.kernel

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from hypothesis.strategies import SearchStrategy
 
 from teleop_core.base import ParameterError
-from teleop_core.chain.fixtures import Fixture, Held, fixture_depth
+from teleop_core.coupling.fixtures import Fixture, Held, fixture_depth
 from teleop_core.kernels import Array, kernel
 from teleop_core.shapes import SHAPES, box, capsule, cone, cylinder, half_space, hole, line, path, plane, sphere
 

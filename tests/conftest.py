@@ -64,7 +64,7 @@ def teleop() -> Run:
     """Run the ``teleop`` command as a user would, in a process of its own."""
 
     def run(*arguments: object, code: int = 0) -> "subprocess.CompletedProcess[str]":
-        command = [sys.executable, "-m", "teleop_core.cli", *map(str, arguments)]
+        command = [sys.executable, "-m", "teleop_core.commands.cli", *map(str, arguments)]
         done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
         assert done.returncode == code, done.stdout + done.stderr
         return done
@@ -92,7 +92,7 @@ def teleop_again(_starter: Starter) -> Run:
         command = ["teleop", *map(str, arguments)]
         with TemporaryFile("w+") as out, TemporaryFile("w+") as err:
             files = {"out": out.fileno(), "err": err.fileno()}
-            process = _starter.start(command, os.environ, files, main="teleop_core.cli:main")
+            process = _starter.start(command, os.environ, files, main="teleop_core.commands.cli:main")
             try:
                 returned = process.wait(300)
             finally:

@@ -21,7 +21,7 @@ class ConsoleProcess:
 
     def __init__(self, folder: Path, *arguments: object) -> None:
         self.folder, self._log = folder, folder / "console.log"
-        command = [sys.executable, "-m", "teleop_core.cli", "console", *map(str, arguments)]
+        command = [sys.executable, "-m", "teleop_core.commands.cli", "console", *map(str, arguments)]
         with self._log.open("wb") as log:
             self.process = subprocess.Popen(
                 [*command, "--port", "0", "--no-browser"], stdout=log, stderr=log, cwd=folder

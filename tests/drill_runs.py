@@ -10,7 +10,7 @@ from typing import Any
 def run_drill(tmp_path: Path, *arguments: Any) -> Any:
     """Exit code, output and outcomes by name of ``teleop drill``."""
     file = tmp_path / "drill.json"
-    command = [sys.executable, "-m", "teleop_core.cli", "drill", *arguments, "--json", str(file)]
+    command = [sys.executable, "-m", "teleop_core.commands.cli", "drill", *arguments, "--json", str(file)]
     done = subprocess.run(command, check=False, capture_output=True, text=True, timeout=400)
     text = done.stdout + done.stderr
     assert file.exists(), text

@@ -2,10 +2,10 @@
 
 from collections.abc import Callable
 
-from teleop_core.chain.master.haptic_master import HapticMaster, HapticMasterParameters
-from teleop_core.chain.master.operator import RunningOperator
-from teleop_core.chain.operators.parameters import OperatorParameters
 from teleop_core.graph.topics import HAND_BUTTONS, HAND_SERVO_CP, HAND_TREMOR
+from teleop_core.hand.master.haptic_master import HapticMaster, HapticMasterParameters
+from teleop_core.hand.master.operator import RunningOperator
+from teleop_core.hand.operators.behaviour import OperatorParameters
 
 _HAND = [topic.field for topic in (HAND_SERVO_CP, HAND_BUTTONS, HAND_TREMOR)]
 

@@ -40,7 +40,7 @@ SLOW = (
 )  # fmt: skip
 
 # What moves hand and arm; the kernels of recording and scoring have no part in that.
-PARTS = ("geometry.py", "signals.py", "fixtures", "controllers", "mapping", "master", "robots", "slave")
+PARTS = ("geometry.py", "signals.py", "fixtures", "controllers", "mapping", "master", "kinematics", "robots", "slave")
 
 SETTINGS = f"""
 [run]

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from teleop_core.kernels import Array, fields_of, kernel, pointer, record, record_array
-from teleop_core.robots.kinematics import FK
+from teleop_core.kinematics import FK
 from teleop_core.slave.simulation import SimulationNumbers
 from teleop_core.slave.world import WORLD_OBJECTS, contact
 from teleop_core.slave.world.button import ButtonNumbers

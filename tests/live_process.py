@@ -40,7 +40,7 @@ class LiveProcess:
         self.bag, self.temporary, self._log = folder / "bag", folder / "tmp", folder / "live.log"
         self._duration = duration
         self.temporary.mkdir()
-        command = [sys.executable, "-m", "teleop_core.cli", "live", "--out", str(self.bag)]
+        command = [sys.executable, "-m", "teleop_core.commands.cli", "live", "--out", str(self.bag)]
         command += ["--duration", f"{duration}", "--scenario", "coarse_box", *arguments]
         command += [word for setting in settings for word in ("--set", setting)]
         with self._log.open("wb") as log:

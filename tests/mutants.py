@@ -186,11 +186,11 @@ MUTANTS = (
     _mutant("old_messages", "messages older than the last one are taken (axol #187)",
             "nodes/streams.py", "check(self.topic.kind, stamp_ns, values, last_ns)",
             "check(self.topic.kind, stamp_ns, values, None)", "replayed", "stamps_frozen"),
-    _mutant("plausibility_off", "a hand may be anywhere at once", "chain/mapping/plausibility.py",
+    _mutant("plausibility_off", "a hand may be anywhere at once", "coupling/mapping/plausibility.py",
             "    if not is_sound:\n", "    is_sound = True\n    if not is_sound:\n",
             "teleport", "infinite"),
     _mutant("buttons_forgotten", "silent buttons are released ones",
-            "chain/mapping/plausibility.py",
+            "coupling/mapping/plausibility.py",
             "return bool(s.is_lost)", "return False", "buttons_silent"),
     _mutant("measured_lies", "the arm measures what it was told", "slave/simulation.py",
             "row.slave_measured_js[i] = s.measured[i]",
@@ -211,7 +211,7 @@ MUTANTS = (
             ("nodes/streams.py", "(has_buttons and self._target.tobytes() != before)", "True")),
            (), schedule=Schedule("queues", ((2.0, "standstill", "slave_side", 4.5, 0.5),))),
     _mutant("engage_jumps", "who engages leads on from where the hand was (as in moveit2 #3378 and "
-            "IsaacTeleop #730)", "chain/mapping/motion_scaling.py",
+            "IsaacTeleop #730)", "coupling/mapping/motion_scaling.py",
             "        s.must_latch = 1\n        if not is_doubtful:\n"
             "            copy(row.slave_setpoint_cp, s.command)\n",
             "        s.must_latch = 1 - s.is_engaged\n",
@@ -244,7 +244,8 @@ MUTANTS = (
             schedule=Schedule("motion", (
                 (1.0, "command", "", 0.1, 0.28), (1.15, "press", "", 0.5, 0.5)))),
     _mutant("garbage_ends", "bytes that are no message end the node that reads them",
-            "nodes/streams.py", "            if not isinstance(found, Refusal):\n                "
+            "nodes/streams.py", "            if not isinstance(found, messages.Refusal):\n"
+            "                "
             "return found\n", "            return found\n",
             schedule=Schedule("ends", (
                 (1.0, "kill", "hand_side", 1.5, 0.5), (2.0, "garbage", "", 0.5, 0.5)))),
@@ -313,7 +314,7 @@ def drilled(mutant: Mutant, rows: Sequence[str], *, is_composed: bool, is_live: 
     """What the drill finds wrong with a mutant, by row."""
     with tempfile.TemporaryDirectory(prefix="mutant_") as folder:
         file = Path(folder) / "drill.json"
-        command = [sys.executable, "-m", "teleop_core.cli", "drill", *rows, "--json", str(file)]
+        command = [sys.executable, "-m", "teleop_core.commands.cli", "drill", *rows, "--json", str(file)]
         command += ["--set", PRIORITY] if is_live else ["--simulated"]
         command += ["--composed"] if is_composed else []
         env = os.environ | {"PYTHONPATH": str(tree(mutant))}

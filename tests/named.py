@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 import teleop_core as tc
-from teleop_core.cli import _parser, main
+from teleop_core.commands.cli import _parser, main
 
 ROOT = Path(__file__).resolve().parents[1]
 HELP = "--help"

@@ -4,11 +4,11 @@ from typing import Any
 
 import numpy as np
 
-from teleop_core.chain.mapping.motion_scaling import MotionScaling
-from teleop_core.chain.mapping.parameters import MotionScalingParameters
-from teleop_core.chain.mapping.plausibility import PlausibilityParameters
-from teleop_core.chain.operators.rest import REST_POSITION
+from teleop_core.coupling.mapping.gains import MotionScalingParameters
+from teleop_core.coupling.mapping.motion_scaling import MotionScaling
+from teleop_core.coupling.mapping.plausibility import PlausibilityParameters
 from teleop_core.graph.signals import STATE, TICK_NS
+from teleop_core.hand.operators.rest import REST_POSITION
 from teleop_core.kernels import geometry
 from teleop_core.robots import load_robot
 

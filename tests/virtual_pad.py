@@ -3,7 +3,7 @@
 import ctypes
 from pathlib import Path
 
-from teleop_core.chain.devices.gamepad import Sdl
+from teleop_core.hand.devices.gamepad import Sdl
 
 AXES = {"left x": 0, "left y": 1, "right x": 2, "right y": 3, "left trigger": 4, "right trigger": 5}
 BUTTONS = {"a": 0, "b": 1, "left shoulder": 9, "right shoulder": 10, "up": 11, "down": 12}

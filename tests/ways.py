@@ -6,7 +6,7 @@ import numpy as np
 
 from present import present
 from teleop_core.kernels.geometry import Array
-from teleop_core.robots.kinematics import IkResult
+from teleop_core.kinematics import IkResult
 from teleop_core.robots.robot import Robot
 
 

@@ -97,7 +97,7 @@ setup(
     ],
     entry_points={
         "console_scripts": [
-            "teleop = teleop_core.cli:main",
+            "teleop = teleop_core.commands.cli:main",
             *(f"{node} = teleop_core.nodes.start:main" for node in NODES),
         ]
     },

@@ -26,8 +26,8 @@ from rosbags.typesys.store import Typestore
 import teleop_core as tc
 from fuzzing import NASTY, assert_one_line, damaged, fuzz
 from teleop_console.recorded import RecordedLink
-from teleop_core import cli
 from teleop_core.bags.reader import Bag
+from teleop_core.commands import cli
 from teleop_core.graph.layers import config_folder
 from teleop_core.robots import load_robot
 from teleop_lab.fitting.rest_table import read_rests

@@ -11,15 +11,15 @@ import pytest
 
 from held_master import HeldMaster
 from teleop_core.base.parameters import build
-from teleop_core.chain.mapping.motion_scaling import MotionScaling
-from teleop_core.chain.mapping.parameters import FixtureParameters, MotionScalingParameters
-from teleop_core.chain.mapping.walls import passive_stiffness
-from teleop_core.chain.master import hand_mechanics, haptic_master
-from teleop_core.chain.master.device import DeviceParameters
-from teleop_core.chain.operators import register_operator, rest
-from teleop_core.chain.operators.parameters import ButtonParameters, OperatorParameters
+from teleop_core.coupling.mapping.gains import FixtureParameters, MotionScalingParameters
+from teleop_core.coupling.mapping.motion_scaling import MotionScaling
+from teleop_core.coupling.mapping.walls import passive_stiffness
 from teleop_core.evaluation.metrics.contact import TOUCH_J
 from teleop_core.graph.signals import TICK_NS
+from teleop_core.hand.master import hand_mechanics, haptic_master
+from teleop_core.hand.master.device import DeviceParameters
+from teleop_core.hand.operators import register_operator, rest
+from teleop_core.hand.operators.behaviour import ButtonParameters, OperatorParameters
 from teleop_core.kernels.geometry import Array
 
 HALF = 2e-3  # from the middle of the box to its walls [m]

@@ -10,12 +10,12 @@ from scipy.spatial.transform import Rotation
 
 from teleop_core.bags.memory import MemoryBag
 from teleop_core.bags.series import Series
-from teleop_core.chain.mapping.inverse_kinematics import InverseKinematics, InverseKinematicsParameters
-from teleop_core.chain.mapping.motion_scaling import MotionScaling
-from teleop_core.chain.mapping.parameters import MotionScalingParameters
-from teleop_core.chain.mapping.plausibility import PlausibilityParameters
-from teleop_core.chain.operators.shapes import minimum_jerk
+from teleop_core.coupling.mapping.gains import MotionScalingParameters
+from teleop_core.coupling.mapping.inverse_kinematics import InverseKinematics, InverseKinematicsParameters
+from teleop_core.coupling.mapping.motion_scaling import MotionScaling
+from teleop_core.coupling.mapping.plausibility import PlausibilityParameters
 from teleop_core.graph import STATE, TICK_NS, topics
+from teleop_core.hand.operators.shapes import minimum_jerk
 from teleop_core.kernels.geometry import Array, pose_from_transform
 from teleop_core.robots import load_robot
 from teleop_core.session import api, runner, virtual

@@ -12,10 +12,11 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from present import present
-from teleop_core.chain.mapping.motion_scaling import MotionScaling
-from teleop_core.chain.mapping.parameters import MotionScalingParameters, axis_map
-from teleop_core.chain.mapping.plausibility import PlausibilityParameters
+from teleop_core.coupling.mapping.gains import MotionScalingParameters
+from teleop_core.coupling.mapping.motion_scaling import MotionScaling
+from teleop_core.coupling.mapping.plausibility import PlausibilityParameters
 from teleop_core.graph.signals import STATE, TICK_NS
+from teleop_core.kernels.axes import axis_map
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots import load_robot
 from teleop_core.session import configuration, virtual

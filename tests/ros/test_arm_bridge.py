@@ -40,7 +40,7 @@ def test_conformance_passes_unchanged_through_the_bridge(peer: "Peer") -> None:
             return bool(np.abs(q - robot.home).max() < 1e-3)
 
         peer.wait(is_home, "an arm at home")
-        command = [sys.executable, "-m", "teleop_core.cli", "conformance", "slave", "--yes"]
+        command = [sys.executable, "-m", "teleop_core.commands.cli", "conformance", "slave", "--yes"]
         done = subprocess.run(
             [*command, "--domain", peer.domain, "--wait", "30"],
             check=False,

@@ -62,7 +62,7 @@ def test_types_and_qualities_of_a_foreign_arm_are_those_that_discovery_tells() -
 
 def test_a_test_that_is_interrupted_claims_no_recording() -> None:
     domain = free_domain()
-    command = [sys.executable, "-m", "teleop_core.cli", "conformance", "slave", "--read-only",
+    command = [sys.executable, "-m", "teleop_core.commands.cli", "conformance", "slave", "--read-only",
                "--wait", "60", "--domain", domain]  # fmt: skip
     with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:
         wait_until(lambda: process.poll() is not None or takes_part(int(domain)), "a participant")

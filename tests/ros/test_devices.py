@@ -12,9 +12,9 @@ from rclpy.logging import get_logger
 
 from teleop_console.status import RESTS
 from teleop_core.base.errors import SessionError
-from teleop_core.chain.operators import OPERATORS
-from teleop_core.chain.operators.remote import AHEAD, RemoteHand
 from teleop_core.graph.topics import HAND_BUTTONS
+from teleop_core.hand.operators import OPERATORS
+from teleop_core.hand.operators.remote import AHEAD, RemoteHand
 from teleop_core.middleware.ros import ROS
 from teleop_core.nodes.device_hand import DeviceHand
 from virtual_pad import VirtualPad

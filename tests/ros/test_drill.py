@@ -43,7 +43,7 @@ def test_a_composed_session_survives_a_hand_that_lies_and_is_stopped(tmp_path: P
 
 def test_drives_that_end_are_named_with_what_they_wrote_last() -> None:
     drives = shlex.join([sys.executable, "-c", "import sys; sys.exit('no arm on this cable')"])
-    command = [sys.executable, "-m", "teleop_core.cli", "drill", "--drives", drives, "stop_topic"]
+    command = [sys.executable, "-m", "teleop_core.commands.cli", "drill", "--drives", drives, "stop_topic"]
     done = subprocess.run(command, check=False, capture_output=True, text=True, timeout=200)
     assert done.returncode == 2, done.stdout + done.stderr
     assert "slave_sim ended with exit code 1" in done.stderr

@@ -30,7 +30,7 @@ def test_a_full_disk_ends_the_recorder_with_one_line_and_a_readable_bag(peer: "P
     assert "recover" in line or "are safe" in line
     bag = tmp_path / "bag"
     if "recover" in line:  # not even the end of the file found room
-        subprocess.run([sys.executable, "-m", "teleop_core.cli", "recover", str(bag)], check=True)
+        subprocess.run([sys.executable, "-m", "teleop_core.commands.cli", "recover", str(bag)], check=True)
         bag = tmp_path / "bag_recovered"
     assert sum(topic.count for topic in Bag(bag).topics.values()) > 0
 

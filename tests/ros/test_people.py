@@ -51,7 +51,7 @@ SIZE = (1000, 640)  # px; software draws the page with the processors that the s
 def conducted(folder: Path, operator: str = "observer") -> Iterator[tuple[subprocess.Popen[bytes], str]]:
     """The command at work, and the address of the participant's page; ended with Ctrl-C."""
     (folder / "s.yaml").write_text(STUDY.replace("OPERATOR", operator))
-    command = [sys.executable, "-m", "teleop_core.cli", "people", "s.yaml", "--store", "store"]
+    command = [sys.executable, "-m", "teleop_core.commands.cli", "people", "s.yaml", "--store", "store"]
     log = folder / "people.log"
     with log.open("wb") as file:
         process = subprocess.Popen([*command, "--port", "0", "--no-browser"], stdout=file, stderr=file, cwd=folder)

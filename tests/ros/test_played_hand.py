@@ -33,7 +33,7 @@ def test_a_recorded_hand_that_is_played_is_the_operator(
     peer.wait(lambda: peer.status("haptic_master").message.endswith(RESTS), "a free stylus")
     peer.wait(at_rest(tips), "rest")
     tips.forget()
-    command = [sys.executable, "-m", "teleop_core.cli", "play", str(bag), "--topics",
+    command = [sys.executable, "-m", "teleop_core.commands.cli", "play", str(bag), "--topics",
                HAND_SERVO_CP.name, HAND_BUTTONS.name]  # fmt: skip
     player = subprocess.Popen(command, stdout=subprocess.DEVNULL, env=environment() | {"ROS_DOMAIN_ID": peer.domain})
 

@@ -98,7 +98,7 @@ def led(tmp_path: Path, bridge: Any, seed: int, *settings: Any, operator: Any = 
     """A recorded session that leads the arm, and what the controller witnessed."""
     out = tmp_path / f"bag_{seed}"
     live = [
-        sys.executable, "-m", "teleop_core.cli", "live", "--without", "slave_sim",
+        sys.executable, "-m", "teleop_core.commands.cli", "live", "--without", "slave_sim",
         *(["--without", "operator"] if operator else []),
         "--out", str(out), "--duration", "8", "--set", *ARM, *settings,
     ]  # fmt: skip

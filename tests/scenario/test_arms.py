@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 import teleop_core as tc
 from teleop_core.bags.reader import Bag
 from teleop_core.base.errors import TeleopError
-from teleop_core.chain.operators import register_operator
 from teleop_core.graph.layers import parse_layer
 from teleop_core.graph.topics import STREAMS
+from teleop_core.hand.operators import register_operator
 from teleop_core.kernels.geometry import Array
 from teleop_core.session import runner, virtual
 from teleop_core.session.configuration import Configuration, configure

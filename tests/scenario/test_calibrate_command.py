@@ -11,8 +11,8 @@ import pytest
 import yaml
 
 from present import present
-from teleop_core import cli
 from teleop_core.bags.reader import Bag
+from teleop_core.commands import cli
 from teleop_core.graph.topics import SLAVE_MEASURED_CP
 from teleop_core.robots import load_robot
 

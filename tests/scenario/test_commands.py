@@ -212,7 +212,7 @@ def test_progress_shows_on_a_terminal_and_not_in_a_pipe(teleop: "Run", tmp_path:
     assert "simulating" not in piped.stderr
     reader, terminal = pty.openpty()
     process = subprocess.Popen(
-        [sys.executable, "-m", "teleop_core.cli", "sim", "--duration", "1", "--out", str(tmp_path / "seen")],
+        [sys.executable, "-m", "teleop_core.commands.cli", "sim", "--duration", "1", "--out", str(tmp_path / "seen")],
         stderr=terminal,
         stdout=subprocess.DEVNULL,
     )
@@ -252,7 +252,7 @@ def test_the_shell_completes_commands_and_options(tmp_path: Path) -> None:
             "_ARGCOMPLETE_STDOUT_FILENAME": str(answer),
             "_ARGCOMPLETE_SUPPRESS_SPACE": "1",
         }
-        subprocess.run([sys.executable, "-m", "teleop_core.cli"], env=environment, check=False, timeout=60)
+        subprocess.run([sys.executable, "-m", "teleop_core.commands.cli"], env=environment, check=False, timeout=60)
         assert answer.read_text() == expected
 
 

@@ -25,7 +25,7 @@ print(compiled_count())
 @pytest.mark.slow
 @pytest.mark.skipif(not IS_COMPILED, reason="nothing is compiled in pure Python")
 def test_what_was_compiled_ahead_no_scenario_compiles_again() -> None:
-    compile_ahead = [sys.executable, "-m", "teleop_core.cli", "compile"]
+    compile_ahead = [sys.executable, "-m", "teleop_core.commands.cli", "compile"]
     for command, told in (
         (compile_ahead, ""),
         (compile_ahead, "all kernels are there\n"),

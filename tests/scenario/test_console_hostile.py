@@ -1,5 +1,6 @@
 """Hostile pages: nothing that they send moves an arm that they do not drive, or stops the stop."""
 
+import gc
 import logging
 import socket
 import subprocess
@@ -225,3 +226,13 @@ print(found.pop("console front") == before, set(found.values()))
 def test_thread_that_answers_the_stop_keeps_its_priority_where_the_page_gives_way_to_the_session() -> None:
     done = subprocess.run([sys.executable, "-c", PRIORITIES], capture_output=True, text=True, check=False)
     assert done.stdout == "True {19}\n", done.stderr
+
+
+def test_no_search_for_garbage_through_all_of_a_page_keeps_its_stop_waiting() -> None:
+    before = gc.get_freeze_count()
+    with shown(Desk()) as (_, desk):
+        until(lambda: desk.looks > 1, "the page's first drawing")
+        kept = gc.get_freeze_count() - before
+        left = len(gc.get_objects())
+    assert kept > 50_000 > left
+    assert gc.get_freeze_count() == 0

@@ -71,6 +71,21 @@ def test_stop_is_in_view_at_any_scroll_and_the_page_looks_stopped_when_it_was_pr
         assert not tab.faults()
 
 
+def test_press_that_takes_a_while_is_one_press(tab: Any) -> None:
+    with shown(Desk(is_stoppable=True)) as (server, desk):
+        tab.visit(server.url)
+        tab.shows("ENABLED")
+        place = tab.place("EMERGENCY STOP")
+        tab.mouse("mousePressed", *place)
+        tab.shows("press Initialize")
+        tab.until(DEAD)  # it is confirmed: the next press would be another one
+        tab.mouse("mouseReleased", *place)
+        tab.value("fetch('alive').then((answer) => answer.status)")  # behind all that was asked before
+        assert desk.stops == 1
+        tab.value("document.querySelector('#t-stop').click()")  # as a screen reader does it
+        until(lambda: desk.stops == 2, "the second press")
+
+
 def gizmos(server: ConsoleServer) -> list[Any]:
     """All styli's handles that the server shows."""
     return list(server.viser.scene._handle_from_transform_controls_name.values())

@@ -8,8 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from teleop_core import cli
-from teleop_core.commands import installed
+from teleop_core.commands import cli, installed
 from teleop_core.robots import ROBOTS
 
 ALONE = """
@@ -20,7 +19,7 @@ for name in ("teleop_machines", "teleop_console", "teleop_exchange", "teleop_lab
 entries = (entry for found in importlib.metadata.distributions() for entry in found.entry_points)
 others = [entry for entry in entries if not entry.group.startswith("teleop_")]
 importlib.metadata.entry_points = importlib.metadata.EntryPoints(others).select
-from teleop_core import cli
+from teleop_core.commands import cli
 
 sys.exit(cli.main(sys.argv[1:]))
 """

@@ -16,7 +16,7 @@ import teleop_core
 import teleop_drill
 import teleop_lab
 import teleop_machines
-from teleop_core.cli import _parser
+from teleop_core.commands.cli import _parser
 from teleop_core.evaluation.score import keys
 from teleop_core.graph.layers import parse_setting
 from teleop_core.session import api, virtual
@@ -184,7 +184,7 @@ def test_parts_of_the_package_in_the_documents_are_there_once_it_is_installed(tm
     run(["-c", "import setuptools; setuptools.setup()", "-q", "egg_info"], tmp_path)
     sim = ["sim", "--duration", "1", "--out", "bag", "--set", "fixture=fence",
            "fixture.fence.room=0.02", "operator=still"]  # fmt: skip
-    run(["-m", "teleop_core.cli", *sim], tmp_path, PYTHONPATH=str(tmp_path))
+    run(["-m", "teleop_core.commands.cli", *sim], tmp_path, PYTHONPATH=str(tmp_path))
 
 
 def test_every_key_of_a_score_that_a_page_names_is_one() -> None:

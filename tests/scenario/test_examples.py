@@ -307,7 +307,7 @@ def test_arms_are_led_closer_once_they_are_calibrated(tmp_path: Path) -> None:
 def test_commands_take_the_parts_of_the_examples(tmp_path: Path) -> None:
     files = [text for name in PARTS for text in ("--parts", str(EXAMPLES / f"{name}.py"))]
     settings = ["fixture=pill", "controller=following", "robot=gantry", "stages=[velocity_limit, hand_damping]"]
-    teleop = [sys.executable, "-m", "teleop_core.cli", *files]
+    teleop = [sys.executable, "-m", "teleop_core.commands.cli", *files]
     out = str(tmp_path / "bag")
     sim = ["sim", "--scenario", "coarse_box", "--duration", "5", "--out", out, "--set", *settings]
     scores = str(tmp_path / "scores.json")

@@ -14,8 +14,8 @@ from scipy.spatial.transform import Rotation
 
 from present import present
 from teleop_core.bags.reader import Bag
-from teleop_core.chain.operators.rest import REST_POSITION
 from teleop_core.graph.topics import MASTER_MEASURED_CP, SLAVE_MEASURED_CP
+from teleop_core.hand.operators.rest import REST_POSITION
 
 if TYPE_CHECKING:
     from conftest import Run
@@ -99,7 +99,7 @@ def test_import_is_repeated_by_what_its_metadata_say(
     assert about["imported_from"] == "hand.csv"
     words = about["imported_by"].split()
     done = subprocess.run(
-        [sys.executable, "-m", "teleop_core.cli", *words[1:-1], str(tmp_path / "again")],
+        [sys.executable, "-m", "teleop_core.commands.cli", *words[1:-1], str(tmp_path / "again")],
         cwd=hand.parent,
         capture_output=True,
         text=True,

@@ -94,7 +94,7 @@ def test_file_that_exists_is_kept_until_the_new_one_is_whole(teleop_again: "Run"
 
 def test_files_are_written_although_nobody_reads_the_tables_to_their_end(tmp_path: Path) -> None:
     file = tmp_path / "found.json"
-    command = [sys.executable, "-m", "teleop_core.cli", "experiment", "poses", "--json", str(file)]
+    command = [sys.executable, "-m", "teleop_core.commands.cli", "experiment", "poses", "--json", str(file)]
     reader = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
     assert reader.stdout is not None
     reader.stdout.close()

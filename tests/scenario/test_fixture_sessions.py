@@ -8,7 +8,7 @@ import pytest
 import teleop_core as tc
 from any_shape import depth_of
 from present import present
-from teleop_core.chain.fixtures import Fixture
+from teleop_core.coupling.fixtures import Fixture
 from teleop_core.shapes import SHAPES
 
 SECONDS = 10.0

@@ -16,7 +16,7 @@ import teleop_core as tc
 from example_runs import NAMES
 from named import ROOT, Named, commands, places, provide
 from present import present
-from teleop_core.cli import main
+from teleop_core.commands.cli import main
 from teleop_core.graph.layers import list_scenarios
 from teleop_core.session import configuration, runner, virtual
 from teleop_lab import experiments
@@ -85,7 +85,7 @@ def run(named: Named, form: str) -> int:
     words = [*named.words, *(BRIEF if form == "brief" and named.words[0] == "sim" else ())]
     if "--parts" not in words:
         return main(words)
-    return subprocess.run([sys.executable, "-m", "teleop_core.cli", *words], check=False).returncode
+    return subprocess.run([sys.executable, "-m", "teleop_core.commands.cli", *words], check=False).returncode
 
 
 def test_every_example_is_run_by_a_test() -> None:

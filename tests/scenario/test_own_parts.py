@@ -10,9 +10,8 @@ import pytest
 from numpy.typing import NDArray
 
 from teleop_core.bags.reader import Bag
-from teleop_core.base import NoParameters, PartError, build, parameter
-from teleop_core.chain.mapping.parameters import MotionScalingParameters
-from teleop_core.chain.operators import register_operator
+from teleop_core.base import NoParameters, PartError, Within, build, parameter
+from teleop_core.coupling.mapping.gains import MotionScalingParameters
 from teleop_core.graph import STATE, TICK_NS, Stage, register_stage
 from teleop_core.graph.topics import (
     MASTER_MEASURED_CP,
@@ -23,6 +22,7 @@ from teleop_core.graph.topics import (
     Topic,
     passed_on,
 )
+from teleop_core.hand.operators import register_operator
 from teleop_core.kernels import Array, kernel
 from teleop_core.robots import load_robot
 from teleop_core.session import configuration, runner
@@ -139,7 +139,7 @@ LIMITED = Topic("slave/limited_cp", Kind.POSE, passed_on("slave/servo_cp"), "sla
 class LimitParameters:
     """How fast the tool may go."""
 
-    speed: float = parameter(0.02, unit="m/s", lower=1e-3, upper=1.0, doc="along each axis")
+    speed: float = parameter(0.02, Within(1e-3, 1.0, "m/s"), "along each axis")
 
 
 def limit_step(p: Any, s: Any, row: Any, dt: float) -> None:
@@ -223,7 +223,7 @@ def push_step(p: Any, s: Any, row: Any, dt: float) -> None:
 class PushParameters:
     """A steady push."""
 
-    newton: float = parameter(1.0, unit="N", doc="along the master's x")
+    newton: float = parameter(1.0, Within(unit="N"), "along the master's x")
 
 
 def test_second_source_of_force_is_added_and_pushes_the_hand(own_parts: None, plain: NDArray[np.void]) -> None:

@@ -7,10 +7,10 @@ import pytest
 
 import teleop_core as tc
 from teleop_core.base.errors import ParameterError
-from teleop_core.chain.tasks import MEMORY, SCENE, Act, Miss
-from teleop_core.chain.tasks.peg_transfer import PEG_TRANSFER, PegTransferParameters
-from teleop_core.chain.tasks.transfer import STEPS
 from teleop_core.graph.topics import TASK_STATE
+from teleop_core.hand.tasks import MEMORY, SCENE, Act, Miss
+from teleop_core.hand.tasks.peg_transfer import PEG_TRANSFER, PegTransferParameters
+from teleop_core.hand.tasks.transfer import STEPS
 from teleop_core.kernels.geometry import Array
 
 COLUMN = {name: i for i, name in enumerate(TASK_STATE.columns)}

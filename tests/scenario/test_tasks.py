@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 import teleop_core as tc
-from teleop_core.chain.master.display import DisplayParameters
-from teleop_core.chain.tasks import MEMORY, SCENE
-from teleop_core.chain.tasks.follow import FOLLOW, FollowParameters
 from teleop_core.graph import STAGES, topics
+from teleop_core.hand.master.display import DisplayParameters
+from teleop_core.hand.tasks import MEMORY, SCENE
+from teleop_core.hand.tasks.follow import FOLLOW, FollowParameters
 from teleop_core.kernels.parts import numbers_of
 
 COLUMN = {name: i for i, name in enumerate(topics.TASK_STATE.columns)}

@@ -169,7 +169,7 @@ def test_the_drill_gives_the_same_bits_in_processes_that_hash_otherwise(tmp_path
         place, file = tmp_path / "bags", tmp_path / "drill.json"
         words = ["drill", "--simulated", "--seed", "5", "stop_service"]
         done = subprocess.run(
-            [sys.executable, "-m", "teleop_core.cli", *words, "--out", place, "--json", file],
+            [sys.executable, "-m", "teleop_core.commands.cli", *words, "--out", place, "--json", file],
             env=os.environ | {"PYTHONHASHSEED": hashed},
             capture_output=True,
             check=False,

@@ -9,7 +9,6 @@ from numpy.typing import ArrayLike
 
 from peers import at_rest
 from teleop_console.status import RESTS
-from teleop_core.chain.operators.rest import rest_pose
 from teleop_core.graph.topics import (
     MASTER_BUTTONS,
     MASTER_MEASURED_CP,
@@ -17,6 +16,7 @@ from teleop_core.graph.topics import (
     OPERATOR_SERVO_CP,
     SLAVE_MEASURED_CP,
 )
+from teleop_core.hand.operators.rest import rest_pose
 from teleop_core.kernels.geometry import Array
 
 if TYPE_CHECKING:

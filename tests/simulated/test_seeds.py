@@ -63,7 +63,7 @@ def test_one_schedule_is_run_again_by_its_seed_and_faults_on_processors_that_rou
         (folder := tmp_path / str(k)).mkdir()
         words = ["drill", "--seeds", "1", "--seed", "3", "--faults", "0", "--out", "bags"]  # which is recorded
         done = subprocess.run(
-            [sys.executable, "-m", "teleop_core.cli", *words],
+            [sys.executable, "-m", "teleop_core.commands.cli", *words],
             check=False, capture_output=True, text=True, env=os.environ | processor, cwd=folder,
         )  # fmt: skip
         assert done.returncode == 0, done.stdout + done.stderr
@@ -77,7 +77,7 @@ def test_many_schedules_are_told_as_a_table_of_faults_and_states(tmp_path: Path)
     file = tmp_path / "seeds.json"
     words = ["drill", "--seeds", "2", "--seed", "10", "--json", str(file)]
     done = subprocess.run(
-        [sys.executable, "-m", "teleop_core.cli", *words], check=False, capture_output=True, text=True
+        [sys.executable, "-m", "teleop_core.commands.cli", *words], check=False, capture_output=True, text=True
     )
     assert done.returncode == 0, done.stdout + done.stderr
     found = json.loads(file.read_text(encoding="utf-8"))
@@ -111,7 +111,7 @@ def test_of_three_seeds_the_one_is_run_whose_faults_have_met_least(monkeypatch: 
 )
 def test_arguments_that_do_not_go_together_are_refused_in_one_line(words: Any, needed: Any) -> None:
     done = subprocess.run(
-        [sys.executable, "-m", "teleop_core.cli", "drill", *words], check=False, capture_output=True, text=True
+        [sys.executable, "-m", "teleop_core.commands.cli", "drill", *words], check=False, capture_output=True, text=True
     )
     assert done.returncode == 2
     assert needed in done.stderr

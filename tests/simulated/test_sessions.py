@@ -11,7 +11,7 @@ from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 
 from teleop_core.bags.messages import write_values
-from teleop_core.chain.mapping.inverse_kinematics import InverseKinematics, InverseKinematicsParameters
+from teleop_core.coupling.mapping.inverse_kinematics import InverseKinematics, InverseKinematicsParameters
 from teleop_core.graph import topics
 from teleop_core.graph.topics import Topic
 from teleop_core.kernels.geometry import Array

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 import teleop_core as tc
 from teleop_core.base import PartError, UnknownNameError, build
-from teleop_core.chain.mapping.parameters import MotionScalingParameters
+from teleop_core.coupling.mapping.gains import MotionScalingParameters
 from teleop_core.graph import STATE
 from teleop_core.kernels import Array, kernel
 from teleop_core.session import configuration, virtual

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from present import present
-from teleop_core.bags import messages, ros_types
+from teleop_core.bags import messages, ros_types, walk
 from teleop_core.bags.layouts import Layout, discover, layout, layout_of
 from teleop_core.base import ShapeError
 from teleop_core.graph import topics
@@ -119,12 +119,17 @@ def test_any_other_constant_byte_is_noticed_one_by_one_and_in_batches(
     other = layout_of(form.kind, tuple(n + "x" for n in form.joint_names), form.frame_id + "x")
     same_size = np.resize(rows, (len(rows), other.size))
     assert not other.matches(same_size)
+    begins = np.arange(len(rows)) * form.size
+    found = walk.gather(rows.ravel(), begins, form.template, form.mask)
+    np.testing.assert_array_equal(present(found), rows)
+    begins = np.arange(len(rows)) * other.size
+    assert walk.gather(same_size.ravel(), begins, other.template, other.mask) is None
     assert other.decode_one(same_size[0].tobytes()) is None
 
 
 def padding_of(form: Layout) -> list[int]:
     """Bytes that hold neither constants nor numbers."""
-    used = form._mask.astype(bool)
+    used = form.mask.astype(bool)
     for name in form._dtype.names or ():
         field, at = present(form._dtype.fields)[name][:2]
         used[at : at + field.itemsize] = True

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from present import present
 from teleop_core.bags.cdr import template
 from teleop_core.base import ParameterError, build
-from teleop_core.chain.network.network import NETWORK, NetworkLink
-from teleop_core.chain.network.packet_size import HEADER, message_size
-from teleop_core.chain.network.parameters import NetworkParameters
+from teleop_core.coupling.network.network import NETWORK, NetworkLink
+from teleop_core.coupling.network.packet_size import HEADER, message_size
+from teleop_core.coupling.network.presets import NetworkParameters
 from teleop_core.graph import topics
 from teleop_core.kernels.geometry import Array
 from teleop_core.session import configuration, virtual

@@ -8,11 +8,11 @@ import pytest
 import teleop_core as tc
 from teleop_core.base.errors import ParameterError, ShapeError
 from teleop_core.kernels.geometry import rotations_from_quaternions
+from teleop_core.kinematics import FkStatus
 from teleop_core.robots import Robot
 from teleop_core.robots.bodies import Bodies, Joint, Solid, bodies_of
 from teleop_core.robots.bodies.describe import serial_bodies, unknown_bodies
 from teleop_core.robots.bodies.solids import along, capsule
-from teleop_core.robots.kinematics import FkStatus
 from teleop_machines.mma_models import frames, joints_of_model, loop_closure, model_table
 
 TABLE = {

@@ -13,9 +13,9 @@ from scipy.spatial.transform import Rotation
 from present import present
 from teleop_core.base.errors import ParameterError, RecordingError, ShapeError, UnknownNameError
 from teleop_core.kernels.geometry import Array
+from teleop_core.kinematics import dh_kernels
 from teleop_core.robots import load_robot, robot_from_table
 from teleop_core.robots.arms.as_chain import true_chain
-from teleop_core.robots.chains import dh_kernels
 from teleop_core.robots.robot import Robot
 from teleop_lab.calibration import (
     CalibrationError,

@@ -25,11 +25,11 @@ from random_arms import (
 )
 from real_arms import urdf_of
 from teleop_core.kernels import Array, kernel
+from teleop_core.kinematics import IkResult
+from teleop_core.kinematics.branches import turn
+from teleop_core.kinematics.closed_form import candidates, swivel, swivel_arcs
 from teleop_core.robots import IkStatus, dexterity, load_robot
 from teleop_core.robots.arms.as_chain import chain_of
-from teleop_core.robots.branches import turn
-from teleop_core.robots.closed_form import candidates, swivel, swivel_arcs
-from teleop_core.robots.kinematics import IkResult
 from teleop_core.robots.robot import Robot
 
 Case = tuple[str, Callable[[np.random.Generator, str], list[tuple[Array, Array]]], str, int]

@@ -5,7 +5,7 @@ import sys
 import numpy as np
 import pytest
 
-from teleop_core.cli import main
+from teleop_core.commands.cli import main
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots import load_robot
 from teleop_drill.conformance.agreement import LATEST, Trail, adds_up, follows, obeys

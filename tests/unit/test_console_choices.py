@@ -10,7 +10,7 @@ import pytest
 from teleop_console import choices
 from teleop_console.choices import FIELDS, OWN, START, Chosen
 from teleop_core.base.errors import ParameterError
-from teleop_core.cli import _parsed
+from teleop_core.commands.cli import _parsed
 from teleop_core.session.api import configuration
 from teleop_core.session.configuration import Configuration
 

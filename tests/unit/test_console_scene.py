@@ -27,7 +27,7 @@ from teleop_console.scene import Scene, targets_of
 from teleop_console.server import ConsoleServer
 from teleop_console.view_tab import Visitors
 from teleop_console.world_nodes import object_outline
-from teleop_core.chain.fixtures import Fixture
+from teleop_core.coupling.fixtures import Fixture
 from teleop_core.graph.topics import Limit
 from teleop_core.kernels.geometry import Array, rotations_from_quaternions
 from teleop_core.robots.bodies import Solid

@@ -7,9 +7,9 @@ import pytest
 
 from teleop_console.link import ArmView, View
 from teleop_console.status import closes, facts, leader, next_step, status_html, task_text
-from teleop_core.chain.operators import OPERATORS
-from teleop_core.chain.tasks import Act, Miss
 from teleop_core.graph.topics import TASK_STATE
+from teleop_core.hand.operators import OPERATORS
+from teleop_core.hand.tasks import Act, Miss
 from teleop_core.slave.operation import State
 
 

@@ -11,13 +11,13 @@ import pytest
 from held_master import HeldMaster
 from recipes import Recipe
 from teleop_core.base.parameters import build
-from teleop_core.chain.mapping import parameters, walls
-from teleop_core.chain.master import hand_mechanics, haptic_master
-from teleop_core.chain.master.device import DeviceParameters
-from teleop_core.chain.operators.parameters import OperatorParameters
-from teleop_core.chain.operators.rest import REST_POSITION
+from teleop_core.coupling.mapping import gains, walls
 from teleop_core.evaluation import Score, evaluate
 from teleop_core.graph.topics import MASTER_CONTACT
+from teleop_core.hand.master import hand_mechanics, haptic_master
+from teleop_core.hand.master.device import DeviceParameters
+from teleop_core.hand.operators.behaviour import OperatorParameters
+from teleop_core.hand.operators.rest import REST_POSITION
 from teleop_core.kernels.geometry import Array
 from teleop_core.session import api, notes
 
@@ -199,7 +199,7 @@ def test_recording_that_does_not_tell_of_contacts_says_so(tmp_path: Path) -> Non
 def test_a_wall_stiffer_than_the_device_is_told_with_what_the_hand_feels(
     settings: Mapping[str, Any], told: str
 ) -> None:
-    note = notes.rendered_note(DeviceParameters(), parameters.FixtureParameters(**settings))
+    note = notes.rendered_note(DeviceParameters(), gains.FixtureParameters(**settings))
     assert told in note
     assert bool(note) is bool(told)
 
@@ -213,21 +213,21 @@ HELD = ((1000.0, 0.0), (333.0, 1e-3), (140.0, 3e-3))
 
 @pytest.mark.parametrize(("stiffness", "delay"), BROKEN)
 def test_walls_that_were_seen_to_feed_a_hand_are_told(stiffness: float, delay: float) -> None:
-    fixture = parameters.FixtureParameters(stiffness=stiffness)
+    fixture = gains.FixtureParameters(stiffness=stiffness)
     assert "may give back more energy than it took" in notes.passive_note(DEVICE, fixture, delay)
 
 
 @pytest.mark.parametrize(("stiffness", "delay"), HELD)
 def test_walls_within_what_is_passive_are_not_told(stiffness: float, delay: float) -> None:
-    assert not notes.passive_note(DEVICE, parameters.FixtureParameters(stiffness=stiffness), delay)
+    assert not notes.passive_note(DEVICE, gains.FixtureParameters(stiffness=stiffness), delay)
 
 
 @pytest.mark.parametrize("wall", ["source", "soft", "step"])
 def test_a_wall_without_damping_is_told_whatever_its_stiffness(wall: str) -> None:
-    assert "it is not damped" in notes.passive_note(DEVICE, parameters.FixtureParameters(wall=wall), 0.0)
+    assert "it is not damped" in notes.passive_note(DEVICE, gains.FixtureParameters(wall=wall), 0.0)
     for silent in ({"max_force": 0.0}, {"side": "slave"}):  # the hand feels nothing
-        assert not notes.passive_note(DEVICE, parameters.FixtureParameters(wall=wall, **silent), 0.0)
-        assert not notes.rendered_note(DEVICE, parameters.FixtureParameters(wall=wall, **silent))
+        assert not notes.passive_note(DEVICE, gains.FixtureParameters(wall=wall, **silent), 0.0)
+        assert not notes.rendered_note(DEVICE, gains.FixtureParameters(wall=wall, **silent))
 
 
 def test_passive_stiffness_falls_with_delay_and_coarse_readings_and_gains_nothing_by_damping() -> None:

@@ -12,12 +12,12 @@ from scipy.spatial.transform import Rotation
 
 from present import present
 from teleop_core.base.errors import ParameterError, SessionError
-from teleop_core.chain.devices import NOTHING, Reading, pilot, spacemouse
-from teleop_core.chain.devices.gamepad import Gamepad
-from teleop_core.chain.operators import OPERATORS
-from teleop_core.chain.operators.remote import AHEAD, RemoteHand
-from teleop_core.chain.operators.rest import rest_pose
-from teleop_core.cli import main
+from teleop_core.commands.cli import main
+from teleop_core.hand.devices import NOTHING, Reading, pilot, spacemouse
+from teleop_core.hand.devices.gamepad import Gamepad
+from teleop_core.hand.operators import OPERATORS
+from teleop_core.hand.operators.remote import AHEAD, RemoteHand
+from teleop_core.hand.operators.rest import rest_pose
 from teleop_core.kernels.geometry import Array
 from teleop_core.session import configuration, virtual
 from virtual_pad import VirtualPad
@@ -243,7 +243,7 @@ def pad() -> Iterator[VirtualPad]:
 
 @pytest.fixture
 def gamepad(pad: VirtualPad) -> Iterator[Gamepad]:
-    from teleop_core.chain.devices.gamepad import Gamepad
+    from teleop_core.hand.devices.gamepad import Gamepad
 
     made = Gamepad("virtual")
     yield made
@@ -286,7 +286,7 @@ def test_buttons_of_a_gamepad(pad: VirtualPad, gamepad: Gamepad) -> None:
 
 
 def test_the_right_trigger_closes_the_jaw_where_that_is_wanted_and_rolls_no_more(pad: VirtualPad) -> None:
-    from teleop_core.chain.devices.gamepad import GamepadParameters, open_gamepad
+    from teleop_core.hand.devices.gamepad import GamepadParameters, open_gamepad
 
     made = open_gamepad(GamepadParameters(device="virtual", triggers="jaw"))
     try:

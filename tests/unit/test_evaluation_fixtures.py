@@ -14,14 +14,15 @@ from rich.console import Console
 from present import present
 from recipes import START_NS, Recipe, state
 from teleop_core.bags.reader import Bag
-from teleop_core.base import EvaluationError, parameter
-from teleop_core.chain.fixtures.reported_fixture import ReportedFixture
-from teleop_core.chain.mapping.parameters import MotionScalingParameters, axis_map
-from teleop_core.evaluation import Figure, Row, evaluate, study
+from teleop_core.base import EvaluationError, Within, parameter
+from teleop_core.coupling.fixtures.reported_fixture import ReportedFixture
+from teleop_core.coupling.mapping.gains import MotionScalingParameters
+from teleop_core.evaluation import Figure, TableRow, evaluate, study
 from teleop_core.evaluation.command import evaluate_bags
 from teleop_core.evaluation.origin import read_origin
 from teleop_core.evaluation.rows import summary
 from teleop_core.graph import TICK_NS, topics
+from teleop_core.kernels.axes import axis_map
 from teleop_core.kernels.geometry import Array
 from teleop_core.shapes import Shape, register_shape
 
@@ -181,7 +182,7 @@ def test_kind_and_size_may_change_while_the_fixture_is_on(recipe: Recipe, path: 
 class WallParameters:
     """A wall above the hand."""
 
-    height: float = parameter(0.01, unit="m", lower=0.0, upper=1.0, doc="above the middle")
+    height: float = parameter(0.01, Within(0.0, 1.0, "m"), "above the middle")
 
 
 def wall_distance(offset: Array, numbers: Array, out: Array) -> float:
@@ -261,7 +262,7 @@ def test_known_shapes_are_scored_beside_unknown_ones(recipe: Recipe, path: Path)
 # -- tables and pictures ---------------------------------------------------------------------------
 
 
-def rows_of(bag: Bag) -> dict[str, Row]:
+def rows_of(bag: Bag) -> dict[str, TableRow]:
     return {row.label: row for row in summary(evaluate(bag))}
 
 

@@ -17,7 +17,7 @@ from teleop_core import evaluation
 from teleop_core.bags.reader import Bag, Series
 from teleop_core.bags.writer import BagWriter
 from teleop_core.base.errors import EvaluationError, PartError, UnknownNameError
-from teleop_core.evaluation import METRICS, Context, Key, Metric, Moments, Row, Spread, Window, evaluate
+from teleop_core.evaluation import METRICS, Context, Key, Metric, Moments, Spread, TableRow, Window, evaluate
 from teleop_core.evaluation.command import evaluate_bags
 from teleop_core.evaluation.figure import Figure, line, time_axis
 from teleop_core.evaluation.metrics.clutches import ClutchesMetric
@@ -307,8 +307,8 @@ def test_metric_that_cannot_draw_is_named(added: Callable[[str, object], None], 
     [
         ({"values": lambda self: {"rms": 1.0, "max": 2.0}}, "lacks jerk.samples"),
         ({"values": lambda self: {"rms": 1.0, "mean": 2.0}}, "gives jerk.mean"),
-        ({"rows": lambda self: ["rms"]}, r"rows\(\) is a list of Row"),
-        ({"rows": lambda self: Row("a", "b", "c", "d")}, r"rows\(\) is a list of Row"),
+        ({"rows": lambda self: ["rms"]}, r"rows\(\) is a list of TableRow"),
+        ({"rows": lambda self: TableRow("a", "b", "c", "d")}, r"rows\(\) is a list of TableRow"),
     ],
 )
 def test_metric_that_does_not_keep_its_word_is_refused(

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from teleop_core.base.errors import ParameterError, UnknownNameError
 from teleop_core.evaluation.figure import Figure
 from teleop_lab import experiments
-from teleop_lab.experiments import EXACT, Experiment, Outcome, Row, Tolerance, absolute, factor, percent
+from teleop_lab.experiments import EXACT, Comparison, Experiment, Outcome, Tolerance, absolute, factor, percent
 from teleop_lab.experiments.experiment_table import numbers, summary, text
 from teleop_lab.experiments.page import experiments_page
 
@@ -23,7 +23,7 @@ positive = st.floats(1e-6, 1e6)
 finite = st.floats(-1e9, 1e9)
 
 
-def outcome(*rows: Row, notes: tuple[str, ...] = (), figures: tuple[Figure, ...] = ()) -> Outcome:
+def outcome(*rows: Comparison, notes: tuple[str, ...] = (), figures: tuple[Figure, ...] = ()) -> Outcome:
     return Outcome("trial", "a trial", "nobody 1900", 3, rows, figures, notes)
 
 
@@ -56,7 +56,7 @@ def test_factor_bounds_the_ratio_from_above_and_below(published: float, times: f
 
 def test_a_small_error_does_not_agree_with_a_large_one() -> None:
     # What the machine did is to be predicted, not beaten.
-    assert Row(quantity="e", published=0.338, predicted=0.037, within=percent(15)).agrees is False
+    assert Comparison(quantity="e", published=0.338, predicted=0.037, within=percent(15)).agrees is False
 
 
 def test_exact_forgives_rounding_of_the_computer_alone() -> None:
@@ -73,8 +73,8 @@ def test_difference_that_is_just_the_tolerance_agrees() -> None:
 @pytest.mark.parametrize("missing", ["published", "predicted", "within"])
 def test_row_without_one_of_its_parts_is_not_judged(missing: str) -> None:
     whole: dict[str, Any] = {"published": 1.0, "predicted": 1.0, "within": EXACT}
-    assert Row(quantity="q", **whole).agrees is True
-    assert Row(quantity="q", **{**whole, missing: None}).agrees is None
+    assert Comparison(quantity="q", **whole).agrees is True
+    assert Comparison(quantity="q", **{**whole, missing: None}).agrees is None
 
 
 @pytest.mark.parametrize(
@@ -85,7 +85,7 @@ def test_row_without_one_of_its_parts_is_not_judged(missing: str) -> None:
         (lambda: absolute(math.nan), "amount"),
         (lambda: factor(1.0), "amount"),
         (lambda: Tolerance("exact", 0.1), "amount"),
-        (lambda: Row(quantity="q", predicted=math.inf), "predicted of q"),
+        (lambda: Comparison(quantity="q", predicted=math.inf), "predicted of q"),
     ],
 )
 def test_nonsense_is_refused_by_name(call: Callable[..., object], name: str) -> None:
@@ -96,7 +96,7 @@ def test_nonsense_is_refused_by_name(call: Callable[..., object], name: str) -> 
 
 @given(finite, finite)
 def test_json_brings_back_the_same_bits(published: float, predicted: float) -> None:
-    row = Row(quantity="q", unit="mm", published=published, predicted=predicted, within=EXACT)
+    row = Comparison(quantity="q", unit="mm", published=published, predicted=predicted, within=EXACT)
     back = json.loads(json.dumps(outcome(row).to_json(), allow_nan=False))["rows"][0]
     assert back["published"] == published
     assert back["predicted"] == predicted
@@ -106,13 +106,13 @@ def test_json_brings_back_the_same_bits(published: float, predicted: float) -> N
 
 def test_only_what_was_printed_counts_as_a_published_figure() -> None:
     whole: dict[str, Any] = {"published": 1.0, "predicted": 1.0, "within": EXACT}
-    rows = [Row(quantity="q", basis=basis, **whole) for basis in ("printed", "law", "law", "goal")]
-    found = outcome(*rows, Row(quantity="q", basis="goal", **whole | {"predicted": 2.0}))
+    rows = [Comparison(quantity="q", basis=basis, **whole) for basis in ("printed", "law", "law", "goal")]
+    found = outcome(*rows, Comparison(quantity="q", basis="goal", **whole | {"predicted": 2.0}))
     assert (found.agreeing, found.judged, found.count("goal")) == (1, 1, (1, 2))
     told = "1 of 1 published figures agree; 2 of 2 laws hold; 1 of 2 goals are kept"
     assert summary([found]) == f"{told}; 0 rows are not judged"
     with pytest.raises(ParameterError, match="basis"):
-        Row(quantity="q", basis="guess", **whole)
+        Comparison(quantity="q", basis="guess", **whole)
 
 
 class Typed(ast.NodeVisitor):
@@ -133,16 +133,16 @@ class Typed(ast.NodeVisitor):
 
 def test_no_experiment_compares_two_typed_numbers() -> None:
     for typed in ("36.0 - 6.0", "1e3 * MASSES['L2']", "float(_TIME_S)"):
-        assert Typed(f"Row(published=30.0, predicted={typed})").lines == [1]
+        assert Typed(f"Comparison(published=30.0, predicted={typed})").lines == [1]
     for file in Path(inspect.getfile(experiments)).parent.glob("*.py"):
         assert not Typed(file.read_text()).lines, file
 
 
 def test_outcome_counts_what_is_judged_and_what_agrees() -> None:
     rows = (
-        Row(quantity="a", published=1.0, predicted=1.0, within=EXACT),
-        Row(quantity="b", published=1.0, predicted=2.0, within=EXACT),
-        Row(quantity="c", predicted=2.0),
+        Comparison(quantity="a", published=1.0, predicted=1.0, within=EXACT),
+        Comparison(quantity="b", published=1.0, predicted=2.0, within=EXACT),
+        Comparison(quantity="c", predicted=2.0),
     )
     found = outcome(*rows)
     assert (found.agreeing, found.judged) == (1, 2)
@@ -150,7 +150,7 @@ def test_outcome_counts_what_is_judged_and_what_agrees() -> None:
 
 
 def test_row_is_found_by_quantity_and_group_and_a_wrong_name_lists_those_there_are() -> None:
-    first, second = (Row(quantity="rms", group=group, predicted=1.0) for group in ("x", "y"))
+    first, second = (Comparison(quantity="rms", group=group, predicted=1.0) for group in ("x", "y"))
     found = outcome(first, second)
     assert found.row("rms") is first
     assert found.row("rms", "y") is second
@@ -160,26 +160,26 @@ def test_row_is_found_by_quantity_and_group_and_a_wrong_name_lists_those_there_a
 
 
 def test_prediction_is_shown_with_a_decimal_more_than_the_publication() -> None:
-    row = Row(quantity="q", published=22.3607, predicted=22.360680)
+    row = Comparison(quantity="q", published=22.3607, predicted=22.360680)
     assert numbers(row) == ("22.3607", "22.36068", "", "-2e-05")
-    assert numbers(Row(quantity="q", published=1.0, predicted=1.0 + 1e-15))[3] == "0"
+    assert numbers(Comparison(quantity="q", published=1.0, predicted=1.0 + 1e-15))[3] == "0"
 
 
 def test_table_shows_marks_notes_and_ours_where_there_is_one() -> None:
-    row = Row(
+    row = Comparison(
         quantity="error", unit="mm", published=0.5, predicted=0.51, ours=0.04, within=percent(15),
         lowest=0.4, highest=0.6, group="coarse", note="by hand",
     )  # fmt: skip
     shown = text(outcome(row, notes=("mind this",)))
     for part in ("coarse", "error (by hand)", "0.4 … 0.6", "ours", "15 %", "✓", "mind this"):
         assert part in shown
-    assert "ours" not in text(outcome(Row(quantity="error", published=0.5, predicted=0.9)))
+    assert "ours" not in text(outcome(Comparison(quantity="error", published=0.5, predicted=0.9)))
 
 
 def test_page_escapes_what_others_wrote_and_asks_nobody() -> None:
     evil = "<script>alert(1)</script>"
     figure = Figure(evil, evil, [{"type": "scatter", "x": [0.0], "y": [1.0], "name": evil}])
-    page = experiments_page([outcome(Row(quantity=evil, note=evil), figures=(figure,))])
+    page = experiments_page([outcome(Comparison(quantity=evil, note=evil), figures=(figure,))])
     assert evil not in page
     assert "src=" not in page.split("<body", 1)[0]
     assert "default-src 'none'" in page

@@ -8,12 +8,12 @@ from scipy.signal import dlti, dstep
 
 from present import present
 from teleop_core.base.errors import ParameterError, PartError, TeleopError, UnknownNameError
-from teleop_core.chain.operators.tour import tour
+from teleop_core.hand.operators.tour import tour
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots import load_robot
 from teleop_core.session import configuration, recording
 from teleop_lab import experiments
-from teleop_lab.experiments import Bench, Experiment, Findings, Row, accuracy, points24, reference_filter
+from teleop_lab.experiments import Bench, Comparison, Experiment, Findings, accuracy, points24, reference_filter
 from teleop_lab.experiments.responses import response
 
 # Experiments of formulas alone, each with what its source is known to have misprinted.
@@ -84,7 +84,7 @@ def test_several_experiments_run_in_the_order_given_each_once() -> None:
 
 def test_own_experiment_is_run_by_its_name() -> None:
     def measure(bench: Bench) -> Findings:
-        return Findings((Row(quantity="seed", predicted=float(bench.seed)),))
+        return Findings((Comparison(quantity="seed", predicted=float(bench.seed)),))
 
     experiments.register_experiment("seeds", Experiment("seeds", "its seed", "me", measure))
     try:

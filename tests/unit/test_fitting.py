@@ -11,7 +11,7 @@ import yaml
 
 from present import present
 from teleop_core.base import ParameterError, TeleopError, UnknownNameError, build
-from teleop_core.cli import main
+from teleop_core.commands.cli import main
 from teleop_core.robots import load_robot
 from teleop_core.session.configuration import configure
 from teleop_core.slave.pair import ArmParameters

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from any_shape import KINDS, depth_of, found
 from scaling_desk import MM, Desk
 from teleop_core.base import ParameterError, build, parameter
-from teleop_core.chain.mapping.motion_scaling import to_slave_axes
-from teleop_core.chain.mapping.parameters import FixtureParameters
+from teleop_core.coupling.mapping.gains import FixtureParameters
+from teleop_core.coupling.mapping.motion_scaling import to_slave_axes
 from teleop_core.graph import TICK_NS
 from teleop_core.kernels import Array, kernel
 from teleop_core.shapes import Shape, register_shape

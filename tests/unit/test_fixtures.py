@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from numpy.typing import ArrayLike
 
 from any_shape import depth_of
-from teleop_core.chain.fixtures import Fixture
-from teleop_core.chain.mapping.walls import wall_force
+from teleop_core.coupling.fixtures import Fixture
+from teleop_core.coupling.mapping.walls import wall_force
 from teleop_core.kernels.geometry import Array
 from teleop_core.shapes.box import BOX, BoxParameters
 

@@ -13,10 +13,10 @@ import teleop_core as tc
 from present import present
 from random_arms import random_urdf
 from teleop_core.base.errors import ParameterError, UnknownNameError
+from teleop_core.kinematics import IkStatus
 from teleop_core.robots.arms.as_chain import chain_of
 from teleop_core.robots.bodies import bodies_of, urdf_of
-from teleop_core.robots.chains.followers import follower_inertia
-from teleop_core.robots.kinematics import IkStatus
+from teleop_core.robots.dynamics.followers import follower_inertia
 
 pytestmark = pytest.mark.filterwarnings("ignore::teleop_core.TeleopWarning")
 REACHED = (IkStatus.FOLLOWED, IkStatus.NEAR_SINGULAR)

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from teleop_core.chain.master.haptic_master import HapticMaster, HapticMasterParameters
+from teleop_core.hand.master.haptic_master import HapticMaster, HapticMasterParameters
 from teleop_core.kernels.geometry import Array
 
 MS = 1_000_000

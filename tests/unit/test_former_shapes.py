@@ -7,8 +7,8 @@ import pytest
 
 from any_shape import depth_of
 from teleop_core.base import UnknownNameError, build
-from teleop_core.chain.fixtures.reported_fixture import reported_fixture
-from teleop_core.chain.mapping.parameters import FixtureParameters
+from teleop_core.coupling.fixtures.reported_fixture import reported_fixture
+from teleop_core.coupling.mapping.gains import FixtureParameters
 from teleop_core.graph.former_shapes import present_layer
 from teleop_core.graph.layers import parse_text
 from teleop_core.session.configuration import configure

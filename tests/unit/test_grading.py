@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 import teleop_core as tc
-from teleop_core.cli import main
+from teleop_core.commands.cli import main
 from teleop_lab.grading import FIGURES, ODD, REASON, WORST, grade, usual
 
 RATE, ODD_ONE = 50.0, 4

@@ -14,12 +14,12 @@ from scipy.spatial.transform import Rotation
 
 from held_master import HeldMaster
 from teleop_core.base import ParameterError, build
-from teleop_core.chain.master import hand_mechanics, haptic_master
-from teleop_core.chain.master.device import DeviceParameters
-from teleop_core.chain.operators import OPERATORS, Setting, register_operator
-from teleop_core.chain.operators.parameters import ButtonParameters, OperatorParameters
-from teleop_core.chain.operators.rest import REST_POSITION, REST_TILT
-from teleop_core.chain.operators.shapes import PHASES
+from teleop_core.hand.master import hand_mechanics, haptic_master
+from teleop_core.hand.master.device import DeviceParameters
+from teleop_core.hand.operators import OPERATORS, Setting, register_operator
+from teleop_core.hand.operators.behaviour import ButtonParameters, OperatorParameters
+from teleop_core.hand.operators.rest import REST_POSITION, REST_TILT
+from teleop_core.hand.operators.shapes import PHASES
 from teleop_core.kernels import Array, records
 
 RESOLUTION, NOISE, PEAK = 0.055e-3, 2e-3, 3.3

@@ -15,12 +15,12 @@ from mcap.opcode import Opcode
 from mcap.records import DataEnd, Footer, Header
 from rich.console import Console
 
-from teleop_core import cli
 from teleop_core.bags import compression, mcap_file, reader, rosbag2
 from teleop_core.bags.reports import report
 from teleop_core.bags.writer import BagWriter
 from teleop_core.base.errors import RecordingError, TeleopError, UnknownNameError
 from teleop_core.base.texts import LONGEST_LINE, one_line, printable, shown
+from teleop_core.commands import cli
 from teleop_core.evaluation.command import evaluate_bags
 from teleop_core.graph import topics
 from teleop_core.graph.layers import load_file

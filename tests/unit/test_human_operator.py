@@ -10,10 +10,10 @@ import pytest
 
 from held_master import HeldMaster
 from teleop_core.base import ParameterError, build
-from teleop_core.chain.master.haptic_master import HapticMasterParameters
-from teleop_core.chain.operators import OPERATORS, Setting
-from teleop_core.chain.operators.human import HumanParameters, Submovement, submovements, tremor
-from teleop_core.chain.operators.parameters import OperatorParameters
+from teleop_core.hand.master.haptic_master import HapticMasterParameters
+from teleop_core.hand.operators import OPERATORS, Setting
+from teleop_core.hand.operators.behaviour import OperatorParameters
+from teleop_core.hand.operators.human import HumanParameters, Submovement, submovements, tremor
 from teleop_core.kernels.geometry import Array
 
 SIZE, ROTATION, APPROACH = (0.06, 0.05, 0.04), 0.2, 2.0

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.signal import lsim
 
 from teleop_core.base import ParameterError, PartError, build
-from teleop_core.chain.architectures.impedance import IMPEDANCE, ImpedanceParameters
+from teleop_core.coupling.architectures.impedance import IMPEDANCE, ImpedanceParameters
 from teleop_core.graph import TICK_NS, Graph, build_graph, topics
 from teleop_core.kernels.geometry import Array
 from teleop_core.session import configuration, virtual

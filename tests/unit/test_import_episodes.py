@@ -9,7 +9,7 @@ import pytest
 
 import teleop_core as tc
 import teleop_exchange
-from teleop_core.cli import main
+from teleop_core.commands.cli import main
 
 NUMBERS, ROWS = (0, 1, 5), (120, 200, 80)
 

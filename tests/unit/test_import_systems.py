@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 import teleop_core as tc
 import teleop_exchange
-from teleop_core import cli
+from teleop_core.commands import cli
 from teleop_core.kernels.geometry import Array, rotation_from_quaternion
 from teleop_exchange import ImportOptions
 

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from present import present
-from teleop_core.chain.mapping.inverse_kinematics import InverseKinematics, InverseKinematicsParameters
+from teleop_core.coupling.mapping.inverse_kinematics import InverseKinematics, InverseKinematicsParameters
 from teleop_core.graph import TICK_NS, topics
 from teleop_core.kernels.geometry import Array, pose_from_transform, rotation, transform
 from teleop_core.robots import IkStatus, load_robot

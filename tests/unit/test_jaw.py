@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 import teleop_core as tc
 from present import present
 from teleop_core.base import ParameterError
-from teleop_core.chain.mapping.jaw_command import JAW_COMMAND, JawCommandParameters
+from teleop_core.coupling.mapping.jaw_command import JAW_COMMAND, JawCommandParameters
 from teleop_core.graph import TICK_NS, topics
 from teleop_core.kernels.geometry import Array
 from teleop_core.slave.jaw.grip import WEIGHT

@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from teleop_core.base import build
-from teleop_core.chain.mapping import limits, motion_scaling, parameters
+from teleop_core.coupling.mapping import gains, limits, motion_scaling
 from teleop_core.graph import STATE, TICK_NS, topics
 from teleop_core.kernels.geometry import Array
 
@@ -26,7 +26,7 @@ class Arm:
     """
 
     def __init__(self, delay: int = 1, **values: Any) -> None:
-        self.scaling = motion_scaling.MotionScaling(parameters.MotionScalingParameters(**PLAIN, **values))
+        self.scaling = motion_scaling.MotionScaling(gains.MotionScalingParameters(**PLAIN, **values))
         self.told: list[Any]
         self.row, self.delay, self.told = self.scaling.signals, delay, []
         self.hand, self.turn, self.stamp_ns = np.zeros(3), 0.0, TICK_NS
@@ -109,7 +109,7 @@ def test_an_answer_to_a_command_that_is_forgotten_draws_nothing_back() -> None:
 
 @pytest.mark.parametrize("gain", [1.0, 0.25])
 def test_the_push_grows_with_the_hand_beyond_the_wall_up_to_its_bound(gain: float) -> None:
-    force = parameters.ReachForceParameters(stiffness=1000.0, max_force=1.2)
+    force = gains.ReachForceParameters(stiffness=1000.0, max_force=1.2)
     arm = Arm(coarse_gain=gain, fine_gain=0.1, reach_force=force)
     for _ in range(round(WALL / gain / STEP)):
         arm.step(1)
@@ -132,7 +132,7 @@ def test_where_a_fixture_holds_the_slave_too_the_nearer_of_wall_and_limit_stops_
     half: float, side: str, delay: int
 ) -> None:
     box = {"side": side, "box.size": (2.0 * half,) * 3}
-    arm = Arm(delay, fixture=build(parameters.FixtureParameters, box))
+    arm = Arm(delay, fixture=build(gains.FixtureParameters, box))
     for pressed in (1.0, 0.0):
         arm.row["master_buttons"][1] = pressed
         arm.step(0)

@@ -8,9 +8,9 @@ import pytest
 from present import present
 from teleop_core.base.errors import ParameterError, ShapeError, UnknownNameError
 from teleop_core.kernels.geometry import Array
+from teleop_core.kinematics import dh_kernels
 from teleop_core.robots import link_errors, load_robot, robot_from_table
 from teleop_core.robots.arms.as_chain import chain_of, true_chain
-from teleop_core.robots.chains import dh_kernels
 from teleop_core.robots.robot import Robot
 
 CHAINS = ("rcrt1", "puma560", "scara", "planar_3r", "five_axis")

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from present import present
-from teleop_core.chain.mapping.inverse_kinematics import InverseKinematics, InverseKinematicsParameters
+from teleop_core.coupling.mapping.inverse_kinematics import InverseKinematics, InverseKinematicsParameters
 from teleop_core.graph.signals import DT, TICK_NS
 from teleop_core.kernels.geometry import Array, pose_from_transform
 from teleop_core.robots import load_robot

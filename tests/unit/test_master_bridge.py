@@ -13,8 +13,8 @@ from scipy.spatial.transform import Rotation
 
 from present import present
 from teleop_core.base import ParameterError, build
-from teleop_core.chain.mapping.parameters import AXES
-from teleop_core.chain.master import master_bridge
+from teleop_core.hand.master import master_bridge
+from teleop_core.kernels.axes import AXES
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots import load_robot
 

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from teleop_core.kernels.geometry import Array, rotation, transform
+from teleop_core.kinematics import REACHED
+from teleop_core.kinematics.damped import is_near_singular, pose_error
 from teleop_core.robots import IkStatus, load_robot
-from teleop_core.robots.chains.damped import is_near_singular, pose_error
-from teleop_core.robots.kinematics import REACHED
 from teleop_core.robots.robot import Robot
 from teleop_machines.mma_branches import branch, unwrapped
 from ways import followed

@@ -8,9 +8,9 @@ import pytest
 
 from scaling_desk import ANY_HAND, HOME, MM, Desk
 from teleop_core.base import build
-from teleop_core.chain.mapping import motion_scaling, parameters
-from teleop_core.chain.operators.rest import REST_POSITION, REST_TILT
+from teleop_core.coupling.mapping import gains, motion_scaling
 from teleop_core.graph import TICK_NS, topics
+from teleop_core.hand.operators.rest import REST_POSITION, REST_TILT
 from teleop_core.kernels.geometry import Array, quaternion_from_rotation, rotation, rotation_from_quaternion
 
 DEGREE = math.pi / 180.0
@@ -21,7 +21,7 @@ NANOMETRE = 1e-9
 
 
 def test_the_wall_stands_around_the_stylus_and_the_slave_goes_by_what_is_left_of_it() -> None:
-    desk = Desk(fixture=parameters.FixtureParameters(wall="soft"))
+    desk = Desk(fixture=gains.FixtureParameters(wall="soft"))
     desk.step()
     out, force = desk.row["master_filtered_out"], desk.row["master_servo_cf"]
     size = desk.scaling.parameters["size"][0]
@@ -45,7 +45,7 @@ def test_the_wall_stands_around_the_stylus_and_the_slave_goes_by_what_is_left_of
 
 
 def mapped(stylus: Array, tool_roll: float) -> Array:
-    scaling = motion_scaling.MotionScaling(parameters.MotionScalingParameters(tool_roll=tool_roll))
+    scaling = motion_scaling.MotionScaling(gains.MotionScalingParameters(tool_roll=tool_roll))
     quaternion, tool, out = np.empty(4), np.empty(4), np.empty((3, 3))
     quaternion_from_rotation(np.ascontiguousarray(stylus), quaternion)
     motion_scaling.mapped_orientation(scaling.parameters, quaternion, tool)
@@ -54,7 +54,7 @@ def mapped(stylus: Array, tool_roll: float) -> Array:
 
 
 def slave_axes(master: tuple[float, float, float], **values: Any) -> Array:
-    scaling, out = motion_scaling.MotionScaling(parameters.MotionScalingParameters(**values)), np.empty(3)
+    scaling, out = motion_scaling.MotionScaling(gains.MotionScalingParameters(**values)), np.empty(3)
     motion_scaling.to_slave_axes(scaling.parameters, np.array(master), out)
     return out
 
@@ -114,11 +114,11 @@ def test_mode_parameter_switches_the_mode_at_run_time_and_others_leave_that_of_t
     desk = Desk()
     desk.step()
     desk.press("mode")
-    desk.scaling.retune(parameters.MotionScalingParameters(plausible=ANY_HAND, coarse_gain=2.0))
+    desk.scaling.retune(gains.MotionScalingParameters(plausible=ANY_HAND, coarse_gain=2.0))
     desk.step()
     assert desk.state("is_fine") == 1.0
     desk.press("mode")
-    desk.scaling.retune(parameters.MotionScalingParameters(plausible=ANY_HAND, mode="fine"))
+    desk.scaling.retune(gains.MotionScalingParameters(plausible=ANY_HAND, mode="fine"))
     desk.step()
     assert (desk.state("is_fine"), desk.state("gain")) == (1.0, 0.1)
 
@@ -223,7 +223,7 @@ def test_button_that_stays_pressed_toggles_once(button: str) -> None:
 
 
 def test_box_is_put_around_the_slave_where_the_button_was_pressed() -> None:
-    desk = Desk(fixture=build(parameters.FixtureParameters, {"box.size": (0.01, 0.02, 0.03)}))
+    desk = Desk(fixture=build(gains.FixtureParameters, {"box.size": (0.01, 0.02, 0.03)}))
     desk.step()
     desk.step((2 * MM, 0, 0))
     desk.hold("fixture")
@@ -237,7 +237,7 @@ def test_box_is_put_around_the_slave_where_the_button_was_pressed() -> None:
 
 
 def test_box_switched_on_while_clutched_stands_around_the_slave() -> None:
-    desk = Desk(fixture=parameters.FixtureParameters(wall="soft"))
+    desk = Desk(fixture=gains.FixtureParameters(wall="soft"))
     held = desk.step()
     desk.hold("clutch")
     desk.step((1 * MM, 0, 0))
@@ -296,7 +296,7 @@ def test_size_of_the_box_follows_the_gain_and_a_second_press_takes_it_and_its_fo
     ],
 )
 def test_wall_pushes_the_hand_back(wall: str, mm: float, newton: float) -> None:
-    desk = Desk(fixture=parameters.FixtureParameters(wall=wall))
+    desk = Desk(fixture=gains.FixtureParameters(wall=wall))
     desk.step()
     desk.press("fixture")
     desk.step((mm * MM, 0, 0))

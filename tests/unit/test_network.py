@@ -15,10 +15,10 @@ import teleop_core as tc
 from present import present
 from teleop_core.bags.reader import Bag
 from teleop_core.base import NoParameters, ParameterError, PartError, TeleopError, build
-from teleop_core.chain.network import LOST, NETWORKS, Network, register_network
-from teleop_core.chain.network.network import NETWORK, NetworkLink
-from teleop_core.chain.network.parameters import PRESETS, NetworkParameters
-from teleop_core.chain.network.trace import read_trace
+from teleop_core.coupling.network import LOST, NETWORKS, Network, register_network
+from teleop_core.coupling.network.network import NETWORK, NetworkLink
+from teleop_core.coupling.network.presets import PRESETS, NetworkParameters
+from teleop_core.coupling.network.trace import read_trace
 from teleop_core.evaluation.metrics.network import _Ages
 from teleop_core.kernels import Array, kernel
 from teleop_core.session import configuration, virtual

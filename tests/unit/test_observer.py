@@ -10,12 +10,12 @@ import pytest
 from numpy.typing import NDArray
 
 import teleop_core as tc
-from teleop_core.chain.operators.observer import AHEAD, Observer
-from teleop_core.chain.operators.observer_parameters import ObserverParameters
-from teleop_core.chain.operators.parameters import OperatorParameters, RoomParameters
-from teleop_core.chain.tasks import Act
 from teleop_core.graph import STATE, topics
 from teleop_core.graph.topics import Limit
+from teleop_core.hand.operators.behaviour import OperatorParameters, RoomParameters
+from teleop_core.hand.operators.observer import AHEAD, Observer
+from teleop_core.hand.operators.observer_parameters import ObserverParameters
+from teleop_core.hand.tasks import Act
 from teleop_core.kernels.geometry import invert_quaternion, multiply_quaternions, rotate_by_vector
 
 Array = NDArray[np.float64]

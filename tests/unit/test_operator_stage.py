@@ -9,8 +9,8 @@ import pytest
 import teleop_core as tc
 from present import present
 from teleop_core.base.errors import ParameterError, RecordingError
-from teleop_core.chain.master.haptic_master import HapticMaster, HapticMasterParameters
-from teleop_core.chain.operators.rest import rest_pose
+from teleop_core.hand.master.haptic_master import HapticMaster, HapticMasterParameters
+from teleop_core.hand.operators.rest import rest_pose
 from teleop_core.kernels.geometry import Array
 from teleop_core.session import configuration, virtual
 

@@ -11,10 +11,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from held_master import HeldMaster
-from teleop_core.base import NoParameters, ParameterError, PartError, build, parameter
-from teleop_core.chain.operators import OPERATORS, Operator, Setting, following, register_operator
-from teleop_core.chain.operators.parameters import OperatorParameters
-from teleop_core.chain.operators.shapes import PHASES, minimum_jerk
+from teleop_core.base import NoParameters, ParameterError, PartError, Within, build, parameter
+from teleop_core.hand.operators import OPERATORS, Operator, Setting, following, register_operator
+from teleop_core.hand.operators.behaviour import OperatorParameters
+from teleop_core.hand.operators.shapes import PHASES, minimum_jerk
 from teleop_core.kernels.geometry import Array
 
 # Products of numbers below one.
@@ -258,7 +258,7 @@ def test_own_operator_presses_buttons_beside_those_of_the_parameters(own_parts: 
 def test_own_operator_is_made_with_its_parameters_the_seed_and_its_phases(own_parts: None) -> None:
     @dataclass(frozen=True, kw_only=True)
     class Wanted:
-        height: float = parameter(0.01, unit="m", doc="how high")
+        height: float = parameter(0.01, Within(unit="m"), "how high")
 
     made = []
 

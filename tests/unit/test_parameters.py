@@ -8,21 +8,21 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from teleop_core.base import ParameterError, UnknownNameError, build, parameter, specs, values_of
+from teleop_core.base import ParameterError, UnknownNameError, Within, build, parameter, specs, values_of
 
 
 @dataclass(frozen=True, kw_only=True)
 class Spring:
-    stiffness: float = parameter(300.0, unit="N/m", lower=1.0, upper=5000.0, doc="spring")
-    rest: tuple[float, ...] = parameter((0.0, 0.0), unit="m", lower=-1.0, length=2, doc="place")
+    stiffness: float = parameter(300.0, Within(1.0, 5000.0, "N/m"), "spring")
+    rest: tuple[float, ...] = parameter((0.0, 0.0), Within(-1.0, None, "m"), "place", length=2)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Arm:
     name: str = parameter("left", choices=("left", "right"), doc="side")
-    count: int = parameter(3, lower=1, fixed=True, doc="joints")
+    count: int = parameter(3, Within(1), "joints", fixed=True)
     is_on: bool = parameter(False, doc="switch")
-    slow: float = parameter(0.1, upper=1.0, doc="slow gain")
+    slow: float = parameter(0.1, Within(None, 1.0), "slow gain")
     fast: float = parameter(0.5, doc="fast gain")
     tags: tuple[str, ...] = parameter((), choices=("a", "b"), doc="marks")
     spring: Spring = field(default_factory=Spring)
@@ -128,9 +128,9 @@ def test_unknown_name_is_refused_with_all_names(name: str) -> None:
 
 @dataclass(frozen=True)
 class Loose:
-    length: float = parameter(0.0, unit="m", doc="")
-    angle: float = parameter(0.0, unit="rad or m", lower=0.0, doc="")
-    silence: float = parameter(0.0, unit="s", lower=0.01, upper=9.0, off=0.0, doc="")
+    length: float = parameter(0.0, Within(unit="m"), "")
+    angle: float = parameter(0.0, Within(0.0, None, "rad or m"), "")
+    silence: float = parameter(0.0, Within(0.01, 9.0, "s"), "", off=0.0)
 
 
 @pytest.mark.parametrize(

@@ -12,12 +12,12 @@ from typing import Any, cast
 import pytest
 
 from teleop_core import evaluation
-from teleop_core.base import NoParameters, ParameterError, PartError, build, parameter, specs
-from teleop_core.chain.operators import Operator, register_operator
-from teleop_core.chain.tasks import Task, register_task
+from teleop_core.base import NoParameters, ParameterError, PartError, Within, build, parameter, specs
 from teleop_core.evaluation import Metric
 from teleop_core.graph import Stage, register_stage
 from teleop_core.graph.topics import SLAVE_MEASURED_CP, SLAVE_SERVO_CP, TASK_STATE, Kind, Topic, passed_on
+from teleop_core.hand.operators import Operator, register_operator
+from teleop_core.hand.tasks import Task, register_task
 from teleop_core.kernels import IS_COMPILED, kernel, records
 from teleop_core.session.configuration import configure
 from teleop_core.shapes import register_shape, sphere
@@ -46,12 +46,12 @@ def stage(
 
 @dataclass(frozen=True, kw_only=True)
 class TooFast:
-    speed: float = parameter(2.0, unit="m/s", lower=0.0, upper=1.0, doc="of the tool")
+    speed: float = parameter(2.0, Within(0.0, 1.0, "m/s"), "of the tool")
 
 
 @dataclass(frozen=True, kw_only=True)
 class Whole:
-    speed: float = parameter(1, unit="m/s", doc="of the tool")
+    speed: float = parameter(1, Within(unit="m/s"), "of the tool")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -222,7 +222,7 @@ def test_index_that_goes_wrong_later_is_found_with_checks_compiled_in(tmp_path: 
 def test_parameter_of_a_stage_that_the_session_has_not_is_refused_with_the_way_out(own_parts: None) -> None:
     @dataclass(frozen=True, kw_only=True)
     class Limit:
-        speed: float = parameter(0.1, unit="m/s", doc="of the tool")
+        speed: float = parameter(0.1, Within(unit="m/s"), "of the tool")
 
     register_stage(stage("limit", Limit))
     told = r"limit\.speed is .*0\.5.*, must be left out: this session has no stage limit; add stag"
@@ -254,3 +254,15 @@ def test_a_task_that_counts_no_attempt_at_its_goals_is_refused() -> None:
 
     with pytest.raises(PartError, match="counts none in ten minutes at its goals"):
         register_task(Task("endless", NoParameters, endless))
+
+
+def test_a_compiled_task_that_reads_beyond_its_parameters_is_refused() -> None:
+    at = {name: i for i, name in enumerate(TASK_STATE.columns)}
+    attempts, width, time = at["attempts"], at["width"], at["time"]
+
+    @kernel
+    def beyond(numbers, memory, scene, state):  # type: ignore[no-untyped-def]
+        state[0], state[attempts], state[width], state[time] = 1.0, 1.0, 0.01, numbers[7]
+
+    with pytest.raises(PartError, match="one that writes 22 finite numbers"):
+        register_task(Task("beyond", NoParameters, beyond))

@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from teleop_core.base.parameters import NoParameters, build
-from teleop_core.chain.mapping.parameters import MotionScalingParameters
-from teleop_core.chain.passivity import PASSIVITIES, Passivity, register_passivity, slave_side
-from teleop_core.chain.passivity.port import (
+from teleop_core.coupling.mapping.gains import MotionScalingParameters
+from teleop_core.coupling.passivity import PASSIVITIES, Passivity, register_passivity, slave_side
+from teleop_core.coupling.passivity.port import (
     DRIFT,
     HEARD,
     IN,
@@ -25,14 +25,14 @@ from teleop_core.chain.passivity.port import (
     begin_round,
     hear_energy,
 )
-from teleop_core.chain.passivity.tank import tank_slave
-from teleop_core.chain.passivity.tdpa import tdpa_hand, tdpa_slave
+from teleop_core.coupling.passivity.tank import tank_slave
+from teleop_core.coupling.passivity.tdpa import tdpa_hand, tdpa_slave
 from teleop_core.evaluation.metrics.contact import TOUCH_J
 from teleop_core.graph.topics import ENERGY, MASTER_CONTACT, OPERATION
 from teleop_core.kernels.geometry import Array
 from teleop_core.session import configuration, virtual
 from teleop_core.slave.operation import Fault
-from teleop_core.slave.world.parameters import MATERIALS
+from teleop_core.slave.world.contents import MATERIALS
 
 pytestmark = pytest.mark.usefixtures("own_parts")
 BOTH = ("teleop.stages=[network,passivity]", "feedback_timeout=1.0", "reach_force.is_on=false", "gimbal_noise=0.0")

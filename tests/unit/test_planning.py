@@ -11,10 +11,10 @@ from scipy.spatial.transform import Rotation
 import teleop_core as tc
 import teleop_lab as lab
 from people import PEOPLE, moves, recorded
-from teleop_core.chain.mapping import inverse_kinematics, parameters
+from teleop_core.coupling.mapping import gains, inverse_kinematics
 from teleop_core.kernels import IS_COMPILED
 from teleop_core.robots.freedom import free_postures, freedom
-from teleop_core.robots.parameters import RobotParameters
+from teleop_core.robots.selection import RobotParameters
 from teleop_lab.planning import turns, walk
 from teleop_lab.planning.aim import Aim
 from teleop_lab.planning.asked import STRETCHES, AskedPath, asked_path
@@ -22,7 +22,7 @@ from teleop_lab.planning.placement import Placement
 
 START = tuple(tc.load_robot("puma560").start.tolist())
 PUMA = RobotParameters(robot="puma560")
-GIVEN = Placement.of(parameters.MotionScalingParameters(), PUMA, START)
+GIVEN = Placement.of(gains.MotionScalingParameters(), PUMA, START)
 
 
 def path_of(name: str, seconds: float, seed: int = 1) -> AskedPath:
@@ -31,7 +31,7 @@ def path_of(name: str, seconds: float, seed: int = 1) -> AskedPath:
 
 def walker(path: AskedPath, robot: str = "puma560") -> walk.Walker:
     solving = inverse_kinematics.InverseKinematicsParameters(robot=robot)
-    return walk.Walker(path, parameters.MotionScalingParameters(), solving)
+    return walk.Walker(path, gains.MotionScalingParameters(), solving)
 
 
 def test_an_excerpt_has_no_more_samples_a_second_than_asked_and_keeps_the_buttons() -> None:
@@ -78,7 +78,7 @@ def test_a_single_pose_is_no_motion() -> None:
 def test_there_are_24_turns_and_all_are_maps_that_parameters_take() -> None:
     assert len(set(turns.turns())) == 24
     for axes in turns.turns():
-        parameters.MotionScalingParameters(axes=axes)
+        gains.MotionScalingParameters(axes=axes)
 
 
 def test_a_placement_is_the_same_as_file_as_texts_and_as_settings(tmp_path: Path) -> None:
@@ -147,7 +147,7 @@ def test_no_tool_is_aimed_worse_than_a_cube_allows() -> None:
 def test_a_walk_tells_the_same_of_a_path_that_was_walked_before() -> None:
     walks = walker(path_of("da_vinci_36", 10.0))
     first = walks.walk(GIVEN)
-    other = parameters.MotionScalingParameters(coarse_gain=3.0, rotation_gain=0.5)
+    other = gains.MotionScalingParameters(coarse_gain=3.0, rotation_gain=0.5)
     walks.walk(Placement.of(other, PUMA, START))
     again = walks.walk(GIVEN)
     np.testing.assert_array_equal(first.q, again.q)
@@ -158,7 +158,7 @@ def test_a_walk_tells_the_same_of_a_path_that_was_walked_before() -> None:
 def test_shares_and_causes_add_up_to_one() -> None:
     walked = walker(path_of("da_vinci_36", 20.0), "rcrt1")
     start = tuple(tc.load_robot("rcrt1").start.tolist())
-    found = walked.walk(Placement.of(parameters.MotionScalingParameters(), PUMA, start))
+    found = walked.walk(Placement.of(gains.MotionScalingParameters(), PUMA, start))
     assert found.share < 0.9
     assert abs(found.share + sum(found.causes.values()) - 1.0) < 1e-12
 

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from teleop_core.chain.mapping import motion_scaling, parameters
+from teleop_core.coupling.mapping import gains, motion_scaling
 from teleop_core.graph.signals import TICK_NS
 from teleop_core.kernels.geometry import Array
 
@@ -16,7 +16,7 @@ class Hand:
     """Motion scaling under a hand, with a slave that has every command in force at once."""
 
     def __init__(self, period_ns: int = TICK_NS) -> None:
-        self.stage = motion_scaling.MOTION_SCALING.run(parameters.MotionScalingParameters())
+        self.stage = motion_scaling.MOTION_SCALING.run(gains.MotionScalingParameters())
         self.row, self.now_ns, self.period_ns = self.stage.signals, 10**9, period_ns
         self.row["slave_setpoint_cp"] = [0.3, 0.0, 0.2, 1.0, 0.0, 0.0, 0.0]
         self.has_buttons = True

@@ -15,7 +15,7 @@ from teleop_core.kernels import portable
 
 PACKAGE = Path(teleop_core.__file__).parent
 MACHINES = Path(teleop_machines.__file__).parent
-ROOMS = ("chain", "kernels", "robots", "session", "slave", "graph/signals.py")
+ROOMS = ("hand", "coupling", "kernels", "kinematics", "robots", "session", "slave", "graph/signals.py")
 """What computes the values of a session's streams, or of its drawings; all machines do too."""
 ELSEWHERE = {
     "robots/dexterity.py": "measures of dexterity, printed and plotted",

@@ -15,8 +15,8 @@ from present import present
 from recipes import JOINTS, START_NS, Recipe, state
 from teleop_core.bags import reader, reports
 from teleop_core.bags.writer import BagWriter
-from teleop_core.chain.mapping.motion_scaling import MotionScaling
-from teleop_core.chain.mapping.parameters import MotionScalingParameters
+from teleop_core.coupling.mapping.gains import MotionScalingParameters
+from teleop_core.coupling.mapping.motion_scaling import MotionScaling
 from teleop_core.evaluation import Score, evaluate
 from teleop_core.evaluation.score_table import MET, NOT_MET, score_tables
 from teleop_core.evaluation.windows import windows

@@ -16,8 +16,8 @@ import teleop_core as tc
 from teleop_core.bags.markers import Marker, Shape, marker_message
 from teleop_core.bags.transforms import TransformMessages
 from teleop_core.base import ShapeError, UnknownNameError, values_of
-from teleop_core.chain.mapping.parameters import axis_map
 from teleop_core.graph import TICK_NS
+from teleop_core.kernels.axes import axis_map
 from teleop_core.session.markers import FORCE_SCALE, TAIL, ArmMarkers
 from teleop_core.shapes import SHAPES
 

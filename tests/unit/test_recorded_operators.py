@@ -13,10 +13,10 @@ import teleop_core as tc
 from present import present
 from teleop_core.bags.writer import BagWriter
 from teleop_core.base.parameters import build
-from teleop_core.chain.operators import OPERATORS, Setting, rest
-from teleop_core.chain.operators.parameters import OperatorParameters
-from teleop_core.chain.operators.shapes import PHASES
 from teleop_core.graph.topics import HAND_JAW, MASTER_BUTTONS, MASTER_MEASURED_CP, Topic
+from teleop_core.hand.operators import OPERATORS, Setting, rest
+from teleop_core.hand.operators.behaviour import OperatorParameters
+from teleop_core.hand.operators.shapes import PHASES
 from teleop_core.kernels.geometry import Array
 
 START_NS = 1_700_000_000_000_000_000

@@ -8,8 +8,8 @@ from typing import Any
 import pytest
 
 from teleop_core.base import PartError, Registry, UnknownNameError
-from teleop_core.chain.operators import OPERATORS
 from teleop_core.graph import STAGES
+from teleop_core.hand.operators import OPERATORS
 from teleop_core.shapes import SHAPES
 from teleop_core.slave.controllers import CONTROLLERS
 

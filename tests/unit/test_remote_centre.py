@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 import teleop_core as tc
 from present import present
 from teleop_core.base.errors import ParameterError
-from teleop_core.chain.fixtures.remote_centre import RemoteCentreParameters, RunningRemoteCentre
+from teleop_core.coupling.fixtures.remote_centre import RemoteCentreParameters, RunningRemoteCentre
 from teleop_core.graph.signals import TICK_NS
 from teleop_core.kernels.geometry import Array
 

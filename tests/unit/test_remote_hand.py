@@ -12,10 +12,10 @@ from scipy.spatial.transform import Rotation
 
 from present import present
 from teleop_core.base import ShapeError, UnknownNameError, specs
-from teleop_core.chain.mapping.plausibility import PlausibilityParameters
-from teleop_core.chain.master.operator import RunningOperator
-from teleop_core.chain.operators.remote import AHEAD, RemoteHand, RemoteParameters
-from teleop_core.chain.operators.rest import rest_pose
+from teleop_core.coupling.mapping.plausibility import PlausibilityParameters
+from teleop_core.hand.master.operator import RunningOperator
+from teleop_core.hand.operators.remote import AHEAD, RemoteHand, RemoteParameters
+from teleop_core.hand.operators.rest import rest_pose
 from teleop_core.kernels.geometry import Array
 from teleop_core.session.configuration import configure
 

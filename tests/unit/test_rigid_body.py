@@ -9,7 +9,7 @@ from present import present
 from teleop_core.kernels import Array, pointer
 from teleop_core.robots import drives, load_robot
 from teleop_core.robots.arms import rcrt1_dynamics
-from teleop_core.robots.chains.rigid_body import invert_positive, write_model
+from teleop_core.robots.dynamics.rigid_body import invert_positive, write_model
 
 ROW = rcrt1_dynamics.link_row()
 FORWARD = pointer(rcrt1_dynamics.DYNAMICS.acceleration, drives.ACCELERATION)

@@ -15,9 +15,9 @@ from present import present
 from random_arms import random_urdf
 from teleop_core.base.errors import ParameterError, RecordingError, ShapeError, TeleopWarning, UnknownNameError
 from teleop_core.kernels.geometry import Array
+from teleop_core.kinematics import DIRECTIONS, IkStatus
 from teleop_core.robots import freedom, load_robot, load_robot_set
-from teleop_core.robots.chains.chain_dynamics import inertia_matrix, inverse_dynamics, tip_efforts
-from teleop_core.robots.kinematics import DIRECTIONS, IkStatus
+from teleop_core.robots.dynamics.chain_dynamics import inertia_matrix, inverse_dynamics, tip_efforts
 from teleop_core.robots.rank import directions_of
 from teleop_core.robots.robot import Robot
 from teleop_core.session.api import configuration, run

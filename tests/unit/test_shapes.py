@@ -19,7 +19,7 @@ from hypothesis import strategies as st
 
 from any_shape import BALL, BEYOND, KINDS, THIN, depth_of, found, pieces, places
 from teleop_core.base.errors import ParameterError, PartError
-from teleop_core.chain.fixtures import Fixture
+from teleop_core.coupling.fixtures import Fixture
 from teleop_core.kernels import kernel
 from teleop_core.shapes import SHAPES, Shape, register_shape
 from teleop_core.shapes.basis.directions import ON_AXIS

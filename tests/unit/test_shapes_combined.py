@@ -16,8 +16,8 @@ from any_shape import BALL, BEYOND, KINDS, found, places
 from present import present
 from teleop_core.bags.reader import Bag
 from teleop_core.base import ParameterError, TeleopError, UnknownNameError, build, values_of
-from teleop_core.chain.fixtures.reported_fixture import reported_fixture
-from teleop_core.chain.mapping.parameters import FixtureParameters
+from teleop_core.coupling.fixtures.reported_fixture import reported_fixture
+from teleop_core.coupling.mapping.gains import FixtureParameters
 from teleop_core.evaluation.scoring import evaluate
 from teleop_core.kernels.geometry import Array
 from teleop_core.shapes import SHAPES

@@ -5,6 +5,8 @@ import os
 import signal
 import subprocess
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,6 +15,7 @@ import numpy as np
 import pytest
 
 import teleop_core as tc
+from patience import wait_until
 from teleop_core.graph.layers import config_folder
 from teleop_lab import Study, read_study, sweep
 from teleop_lab.studies import point, summary
@@ -181,11 +184,89 @@ def test_differences_are_by_pairs_and_intervals_hold_their_mean(found: Found) ->
     assert METRICS[0] in summary.study_table(whole, data)
 
 
+HALVES = """
+import teleop_core as tc
+from teleop_core.evaluation.metric import figure
+from teleop_core.graph.topics import SLAVE_SETPOINT_CP
+
+class Halves(tc.Metric):
+    "{words}"
+
+    name, topics = "halves", (SLAVE_SETPOINT_CP,)
+    share = figure("1", "of a whole")
+
+    def add(self, window):
+        self.share = {share}  # {words}
+
+tc.register_metric(Halves)
+"""
+
+
+@pytest.fixture
+def halves(own_parts: None, tmp_path: Path) -> Any:
+    """Study of a measure of one's own, and what writes its file anew."""
+    file = tmp_path / "halves.py"
+
+    def write(share: float, words: str = "Halves.") -> None:
+        file.write_text(HALVES.format(share=share, words=words))
+
+    write(0.5)
+    return (lambda **more: study(metrics=["halves.share"], parts=(file,), **more)), write
+
+
+def test_a_measure_of_ones_own_that_was_changed_is_measured_again(halves: Any, tmp_path: Path) -> None:
+    made, write = halves
+    store = tmp_path / "store"
+    first = made().run(store, jobs=1)
+    assert set(first["error"].values.ravel()) == {""}
+    assert set(first["halves.share"].values.ravel()) == {0.5}
+    write(0.5, "Other words for the same.")
+    assert made().explain(store).to_run == 0
+    write(0.25)
+    assert made().explain(store).why == {"changed code": 4}
+    assert set(made().run(store, jobs=1)["halves.share"].values.ravel()) == {0.25}
+    write(0.125)
+    assert set(made().run(store, jobs=2)["halves.share"].values.ravel()) == {0.125}
+
+
+@pytest.mark.slow
+def test_processes_of_a_study_end_when_it_is_killed(tmp_path: Path) -> None:
+    script = tmp_path / "long.py"
+    script.write_text(_KILLED.format(folder=str(Path(__file__).parent)).replace("study()", "study(seeds=range(99))"))
+    whole = subprocess.Popen([sys.executable, script, tmp_path / "store"])
+    wait_until(lambda: len(list(tmp_path.glob("store/*/*.json"))) > 1, "its first results", 120)
+    processes = [int(pid) for pid in Path(f"/proc/{whole.pid}/task/{whole.pid}/children").read_text().split()]
+    assert len(processes) >= 2
+    whole.kill()
+    whole.wait()
+    wait_until(lambda: not any(map(is_alive, processes)), "their end", 60)
+
+
+def is_alive(pid: int) -> bool:
+    """Whether a process is there, and not only its exit code."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except FileNotFoundError:
+        return False
+
+
+@pytest.mark.slow
+def test_a_program_that_each_process_would_run_again_is_told_so_in_a_line(tmp_path: Path) -> None:
+    script = tmp_path / "plain.py"
+    script.write_text(
+        _KILLED.format(folder=str(Path(__file__).parent)).replace('if __name__ == "__main__":', "if True:")
+    )
+    done = subprocess.run([sys.executable, script, tmp_path / "store"], capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    assert done.stderr.count("Traceback") == 1
+    assert done.stderr.splitlines()[-1].endswith("call the study below `if __name__ == '__main__':`, in a file")
+
+
 _KILLED = """
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
-sys.path.insert(0, {folder!r})
+sys.path[:0] = [{folder!r}, {folder!r} + "/.."]
 from test_studies import study
 if __name__ == "__main__":
     study().run(Path(sys.argv[1]), jobs=2)
@@ -215,19 +296,48 @@ def test_a_study_that_is_killed_goes_on_to_the_same_bits(found: Found, tmp_path:
         assert np.array_equal(again[metric].values, data[metric].values, equal_nan=True)
 
 
-@pytest.mark.slow
-def test_dask_workers_give_the_same_bits(found: Found, tmp_path: Path) -> None:
+@contextmanager
+def dask(folder: Path) -> Iterator[Any]:
+    """Client of a cluster of two workers."""
     distributed = pytest.importorskip("distributed", reason="Dask is not installed")
-    _, data = found
     with (
         distributed.LocalCluster(
-            n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None, local_directory=str(tmp_path)
+            n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None, local_directory=str(folder)
         ) as cluster,
         distributed.Client(cluster, set_as_default=False) as client,
     ):
+        yield client
+
+
+@pytest.mark.slow
+def test_dask_workers_give_the_same_bits_with_parts_of_ones_own_and_whoever_comes_later(
+    found: Found, halves: Any, tmp_path: Path
+) -> None:
+    _, data = found
+    made, write = halves
+    with dask(tmp_path / "dask") as client:
         again = study().run(client=client)
+        for share in (0.5, 0.25):
+            write(share)
+            assert set(made().run(client=client)["halves.share"].values.ravel()) == {share}
+        late = next(iter(client.run(os.getpid)))
+
+        def have_other_code() -> None:  # in here it travels as a value
+            from teleop_lab.studies import point, workers
+
+            workers.code_digest = point.code_digest = lambda: "other"  # type: ignore[assignment]
+
+        def progress(done: int, _: int) -> None:
+            if done == 1:  # a worker with other code, that nobody asked
+                client.run(have_other_code, workers=[late])
+
+        mixed = study(seeds=tuple(range(1, 9))).run(client=client, progress=progress)
+        assert set(mixed["error"].values.ravel()) == {""}
+        with pytest.raises(tc.TeleopError, match="has code other, must be ours"):
+            study().run(client=client)
     for metric in METRICS:
         assert np.array_equal(again[metric].values, data[metric].values, equal_nan=True)
+        assert np.array_equal(mixed[metric].values[:, :2], data[metric].values, equal_nan=True)
 
 
 @pytest.mark.parametrize(("name", "sessions"), [("uva", 1080 // 6), ("ten_thousand", 10_000)])

@@ -13,9 +13,9 @@ from scipy.spatial.transform import Rotation
 from random_arms import table
 from teleop_core.base.errors import ParameterError
 from teleop_core.kernels.geometry import Array, rotation, transform
+from teleop_core.kinematics.closed_form.decomposition import SEARCH
 from teleop_core.robots import IkStatus, load_robot
 from teleop_core.robots.arms.dh import load_table
-from teleop_core.robots.closed_form.decomposition import SEARCH
 from ways import followed
 
 NAMES = ("puma560", "scara", "planar_3r", "five_axis")

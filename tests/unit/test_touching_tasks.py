@@ -8,10 +8,10 @@ import pytest
 
 import teleop_core as tc
 from teleop_core.base.errors import ParameterError
-from teleop_core.chain.tasks import MEMORY, SCENE, Miss, Task
-from teleop_core.chain.tasks.insert import INSERT, InsertParameters
-from teleop_core.chain.tasks.palpate import PALPATE, PalpateParameters
 from teleop_core.graph.topics import TASK_STATE
+from teleop_core.hand.tasks import MEMORY, SCENE, Miss, Task
+from teleop_core.hand.tasks.insert import INSERT, InsertParameters
+from teleop_core.hand.tasks.palpate import PALPATE, PalpateParameters
 
 COLUMN = {name: i for i, name in enumerate(TASK_STATE.columns)}
 DT = 0.01

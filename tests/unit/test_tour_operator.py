@@ -12,10 +12,10 @@ from scipy.interpolate import CubicHermiteSpline
 import teleop_core as tc
 from present import present
 from teleop_core.base import ParameterError, build
-from teleop_core.chain.operators import OPERATORS, Setting
-from teleop_core.chain.operators.parameters import OperatorParameters
-from teleop_core.chain.operators.shapes import PHASES
-from teleop_core.chain.operators.tour import TourParameters, through, tour
+from teleop_core.hand.operators import OPERATORS, Setting
+from teleop_core.hand.operators.behaviour import OperatorParameters
+from teleop_core.hand.operators.shapes import PHASES
+from teleop_core.hand.operators.tour import TourParameters, through, tour
 from teleop_core.session.configuration import configure
 
 ROUNDING = 1e-15

@@ -17,9 +17,9 @@ import teleop_core as tc
 from forgotten_parts import own_parts  # noqa: F401
 from present import present
 from teleop_core.base import NoParameters, ParameterError, PartError, build
-from teleop_core.chain.filters import LONGEST_NS, MEMORY, TREMOR_FILTERS, tremor_filter
-from teleop_core.chain.filters.wflc import RATE
-from teleop_core.chain.mapping import motion_scaling, parameters
+from teleop_core.coupling.filters import LONGEST_NS, MEMORY, TREMOR_FILTERS, tremor_filter
+from teleop_core.coupling.filters.wflc import RATE
+from teleop_core.coupling.mapping import gains, motion_scaling
 from teleop_core.evaluation.metrics.tremor_filter import passage
 from teleop_core.evaluation.motion_measures import RATE as SAMPLED
 from teleop_core.evaluation.motion_measures import tremor_power, velocities
@@ -347,7 +347,7 @@ def test_a_hand_that_is_thrown_elsewhere_is_followed_from_there_as_from_the_firs
 
 def commands(runner: tremor_filter.RunningTremorFilter, places: Array) -> Array:
     """What the mapping commands (N, 3) behind a filter, with a slave that is where it is led."""
-    scaling = motion_scaling.MOTION_SCALING.run(parameters.MotionScalingParameters())
+    scaling = motion_scaling.MOTION_SCALING.run(gains.MotionScalingParameters())
     row, found = scaling.signals, []
     row["slave_setpoint_cp"] = [0.3, 0.0, 0.2, 1.0, 0.0, 0.0, 0.0]
     for i, place in enumerate(places):

@@ -112,7 +112,7 @@ def test_a_wrong_file_is_refused_with_what_must_be_there(text: str, words: str, 
 def test_the_command_prints_the_best_values_and_writes_page_and_numbers(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    from teleop_core.cli import main
+    from teleop_core.commands.cli import main
 
     text = (
         "scenario: coarse_box\nduration: 0.3\n"

@@ -10,11 +10,11 @@ import pytest
 
 import teleop_core as tc
 from present import present
-from teleop_core.cli import main
+from teleop_core.commands.cli import main
 from teleop_core.kernels.geometry import rotations_from_quaternions
 from teleop_core.robots.arms import rcrt1_dynamics
 from teleop_core.robots.bodies import Solid, bodies_of, urdf_of
-from teleop_core.robots.chains.chain_dynamics import inertia_matrix
+from teleop_core.robots.dynamics.chain_dynamics import inertia_matrix
 
 pytestmark = pytest.mark.filterwarnings("ignore::teleop_core.TeleopWarning")
 ROUNDING = 1e-9

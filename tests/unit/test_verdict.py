@@ -58,6 +58,8 @@ def test_a_drift_is_named_before_the_share_that_was_followed() -> None:
             "delay p99 130 ms, hand to setpoint, 100 ms of it asked for",
         ),
         ({"topics.network/servo_cp.gaps": 1000}, None, "nothing"),  # losses that were asked for
+        ({"task.attempts": 5, "task.successes": 0}, "task.successes", "no success in 5 attempts at the task"),
+        ({"task.attempts": 5, "task.successes": 1}, None, "nothing"),
         ({"ticks.made_up": 300}, "ticks.made_up", "300 control ticks made up late"),
         ({"ticks.dropped": 300}, "ticks.dropped", "300 control ticks never executed (3 %)"),
         (
@@ -95,6 +97,7 @@ def test_every_concern_says_what_it_means_and_what_to_do() -> None:
         "topics.slave/servo_cp.gaps": 900,
         "fixture.penetration_max_mm": 9.0,
         "contact.feeding": 3,
+        "task.attempts": 3,
     }
     alone = [verdict_of(FINE | {key: value}) for key, value in wrong.items()]
     found = [*alone, verdict_of(FINE | ports(1.0, 1.0, 9.0, 9.0))]

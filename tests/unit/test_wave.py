@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 
 from teleop_core.base import ParameterError
-from teleop_core.chain.passivity.port import (
+from teleop_core.coupling.passivity.port import (
     DRIFT,
     IMPEDANCE,
     IN,
@@ -21,7 +21,7 @@ from teleop_core.chain.passivity.port import (
     count,
     hear_energy,
 )
-from teleop_core.chain.passivity.wave import draw, wave_hand, wave_slave
+from teleop_core.coupling.passivity.wave import draw, wave_hand, wave_slave
 from teleop_core.graph import topics
 from teleop_core.kernels import Array, kernel
 from teleop_core.session import configuration, virtual

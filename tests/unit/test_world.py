@@ -16,7 +16,7 @@ from teleop_core.kernels.geometry import Array
 from teleop_core.robots import load_robot
 from teleop_core.session import configuration, virtual
 from teleop_core.slave.slave_sim import SlaveSim
-from teleop_core.slave.world.parameters import MATERIALS
+from teleop_core.slave.world.contents import MATERIALS
 
 BLOCK = [0.241, -0.236, -0.087]
 """Middle of the block that the scenario ``palpation`` presses, whose top is at -0.072."""

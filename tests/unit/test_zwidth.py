@@ -8,8 +8,15 @@ from present import present
 from teleop_lab import experiments
 from teleop_lab.experiments import zwidth
 from teleop_lab.experiments.one_axis import Grip, exact_boundary, sampled_boundary
-from teleop_lab.experiments.outcome import Outcome, Row
-from teleop_lab.experiments.sampled_wall import Loop, Wall, is_restless, passive_boundary, press_energy, wall_growth
+from teleop_lab.experiments.outcome import Comparison, Outcome
+from teleop_lab.experiments.sampled_wall import (
+    SampledDevice,
+    Wall,
+    is_restless,
+    passive_boundary,
+    press_energy,
+    wall_growth,
+)
 from teleop_lab.experiments.stability import GRIPS
 
 PUSHES = [1.0 + share / 8.0 for share in range(1, 8)]
@@ -20,7 +27,7 @@ def outcome() -> Outcome:
     return experiments.run("zwidth")
 
 
-def rows(outcome: Outcome, *parts: str) -> list[Row]:
+def rows(outcome: Outcome, *parts: str) -> list[Comparison]:
     return [row for row in outcome.rows if all(part in row.group for part in parts)]
 
 
@@ -112,7 +119,7 @@ def test_friction_holds_a_device_between_steps_up_to_its_law(friction: float, re
 def test_a_restless_wall_pushes_by_one_step_of_its_force() -> None:
     friction, resolution = zwidth.DEVICES[0]
     wall = Wall(1.1 * zwidth.quiet_law(friction, resolution))
-    loop = Loop(Grip(0.045, 1.0, 0.1), wall, friction=friction, position_resolution=resolution)
+    loop = SampledDevice(Grip(0.045, 1.0, 0.1), wall, friction=friction, position_resolution=resolution)
     loop.aim(loop.origin + 1.5 * wall.stiffness * resolution)
     forces = [loop.step() for _ in range(600)][-100:]
     assert max(forces) - min(forces) == pytest.approx(wall.stiffness * resolution, rel=1e-9)

@@ -1,5 +1,6 @@
 """Console: the page of one session, from its opening to its end."""
 
+import gc
 import logging
 import os
 import threading
@@ -11,7 +12,7 @@ from pathlib import Path
 
 from teleop_console.answers import Situation
 from teleop_console.front import STOPPER
-from teleop_console.link import Link, Parameters
+from teleop_console.link import Parameters, SessionLink
 from teleop_console.panel import Panel
 from teleop_console.recorded import RecordedLink
 from teleop_console.scene import Scene
@@ -46,7 +47,7 @@ class Console:
     def __init__(
         self,
         server: ConsoleServer,
-        link: Link,
+        link: SessionLink,
         renew: Renew | None = None,
         of_session: Parameters | None = None,
         *,
@@ -127,11 +128,15 @@ class Console:
         if self._link.is_live:
             give_way()
         threading.Thread(target=self._ask, args=(is_over,), daemon=True).start()
-        due = time.monotonic()
-        while not is_over():
-            self.try_to_draw()
-            due = max(due + 1.0 / RATE, time.monotonic())
-            time.sleep(max(0.0, due - time.monotonic()))
+        gc.freeze()  # a stop waits 0.2 s while garbage is looked for among all that the page is made of
+        try:
+            due = time.monotonic()
+            while not is_over():
+                self.try_to_draw()
+                due = max(due + 1.0 / RATE, time.monotonic())
+                time.sleep(max(0.0, due - time.monotonic()))
+        finally:
+            gc.unfreeze()
         self.close()
 
     def close(self) -> None:

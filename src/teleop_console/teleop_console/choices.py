@@ -16,8 +16,6 @@ from pathlib import Path
 
 from teleop_core.base.errors import ParameterError, TeleopError
 from teleop_core.base.parameters import specs
-from teleop_core.chain.operators import OPERATORS
-from teleop_core.chain.tasks import TASKS
 from teleop_core.graph.layers import (
     SESSION,
     Layer,
@@ -27,6 +25,8 @@ from teleop_core.graph.layers import (
     load_file,
     parse_setting,
 )
+from teleop_core.hand.operators import OPERATORS
+from teleop_core.hand.tasks import TASKS
 from teleop_core.robots import ROBOTS, load_robot_set
 from teleop_core.robots.files.urdf_tree import elements_of, root_of
 from teleop_core.session.configuration import Configuration

@@ -42,7 +42,7 @@ _HEARTBEAT = "operation.heartbeat"
 
 
 class LiveLink(Observer):
-    """A :class:`~teleop_console.link.Link` to a running session.
+    """A :class:`~teleop_console.link.SessionLink` to a running session.
 
     Args:
         domain: ROS domain of the session.

@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 
-from teleop_console.link import ArmView, Link, View
+from teleop_console.link import ArmView, SessionLink, View
 from teleop_console.status import alive, fixture_text, mode_text
 from teleop_core.base.errors import PartError
 from teleop_core.base.registry import Registry
@@ -38,20 +38,20 @@ class Control:
 
     name: str
     hint: str
-    act: Callable[[Link, str], Answers]
+    act: Callable[[SessionLink, str], Answers]
     folder: str = ""
     text: Callable[[ArmView], str] | None = None
     is_alive: Callable[[View], bool] | None = None
 
 
-def commands(*words: str) -> Callable[[Link, str], Answers]:
+def commands(*words: str) -> Callable[[SessionLink, str], Answers]:
     """Action of a control that sends the arm commands, one after the other.
 
     Args:
         words: Of :data:`~teleop_core.graph.topics.STATE_COMMANDS`; a reset lets the stop go first.
     """
 
-    def act(link: Link, arm: str) -> Answers:
+    def act(link: SessionLink, arm: str) -> Answers:
         if "reset" in words:
             link.press(is_pressed=False)
         return [_insist(link, word, arm) for word in words]
@@ -59,7 +59,7 @@ def commands(*words: str) -> Callable[[Link, str], Answers]:
     return act
 
 
-def _insist(link: Link, word: str, arm: str) -> tuple[bool, str]:
+def _insist(link: SessionLink, word: str, arm: str) -> tuple[bool, str]:
     """Send a command; an arm that is coming to rest is asked again for a while."""
     until = time.monotonic() + _PATIENCE
     while True:
@@ -70,13 +70,13 @@ def _insist(link: Link, word: str, arm: str) -> tuple[bool, str]:
         time.sleep(_PAUSE)
 
 
-def _release(link: Link, arm: str) -> Answers:
+def _release(link: SessionLink, arm: str) -> Answers:
     link.press(is_pressed=False)
     return ()
 
 
-def _pressed(name: str) -> Callable[[Link, str], Answers]:
-    def act(link: Link, arm: str) -> Answers:
+def _pressed(name: str) -> Callable[[SessionLink, str], Answers]:
+    def act(link: SessionLink, arm: str) -> Answers:
         link.press_button(arm, name)
         return ()
 
@@ -88,7 +88,7 @@ def _is_alive(name: str, view: View) -> bool:
 
 
 def _built_in(
-    name: str, hint: str, act: Callable[[Link, str], Answers], text: Callable[[ArmView], str] | None = None
+    name: str, hint: str, act: Callable[[SessionLink, str], Answers], text: Callable[[ArmView], str] | None = None
 ) -> Control:
     known = None if name == "Initialize" else partial(_is_alive, name)
     return Control(name, hint, act, "stylus" if text else "", text, known)

@@ -11,7 +11,7 @@ import viser
 from teleop_console.link import Setting
 from teleop_console.look import GOOD, WRONG
 from teleop_core.base.parameters import build
-from teleop_core.chain.fixtures import Fixture
+from teleop_core.coupling.fixtures import Fixture
 from teleop_core.kernels.geometry import Array
 from teleop_core.shapes import SHAPES
 from teleop_core.shapes.basis.drawing import segments_of

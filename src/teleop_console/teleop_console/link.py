@@ -1,4 +1,4 @@
-"""Link: what the page sees of a session, and what it asks of it; live or recorded alike."""
+"""SessionLink: what the page sees of a session, and what it asks of it; live or recorded alike."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -113,7 +113,7 @@ Parameters = Mapping[tuple[str, str], ParameterInfo]
 """Parameters by node and name."""
 
 
-class Link(Protocol):
+class SessionLink(Protocol):
     """A session as the page sees it. All methods may be called from any thread.
 
     A class below it that has only ``view`` and ``parameters`` of its own refuses all commands.

@@ -129,8 +129,9 @@
     'input:not([type=checkbox]):not([type=radio]):not([type=range]), textarea, [contenteditable=true]');
   document.documentElement.append(banner, safety, starting, spoken); // before the page has a body
   show();
-  stop.addEventListener('pointerdown', press);
-  stop.addEventListener('click', press);
+  let isDown = false; // the click that ends a press with mouse or finger is not another one
+  stop.addEventListener('pointerdown', () => { isDown = true; press(); });
+  stop.addEventListener('click', (event) => { if (!isDown || !event.detail) press(); isDown = false; });
   hand.addEventListener('pointerdown', (event) => { hand.setPointerCapture(event.pointerId); close(true); });
   for (const kind of ['pointerup', 'pointercancel']) hand.addEventListener(kind, () => close(false));
   addEventListener('blur', () => close(false));

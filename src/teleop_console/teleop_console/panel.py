@@ -15,7 +15,7 @@ from teleop_console.controls import CONTROLS, Control
 from teleop_console.drivers import Drivers
 from teleop_console.history import LiveScores
 from teleop_console.hooks import Server
-from teleop_console.link import Link, Parameters, View
+from teleop_console.link import Parameters, SessionLink, View
 from teleop_console.settings import Renew, SettingsPanel
 from teleop_console.status import alive, leader, next_button, next_step, status_html
 from teleop_core.base.errors import TeleopError
@@ -40,7 +40,7 @@ class Panel:
     def __init__(
         self,
         server: Server,
-        link: Link,
+        link: SessionLink,
         drivers: Drivers,
         renew: Renew | None = None,
         of_session: Parameters | None = None,
@@ -157,7 +157,7 @@ class Panel:
     def _evaluate(self, client: int) -> None:
         """Score in a process of its own, with what the session leaves of the processors."""
         self._scored.content = "scoring …"
-        command = ["nice", "-n", "15", sys.executable, "-m", "teleop_core.cli", "evaluate"]
+        command = ["nice", "-n", "15", sys.executable, "-m", "teleop_core.commands.cli", "evaluate"]
         done = subprocess.run([*command, str(self._last)], capture_output=True, text=True, check=False)
         self._scored.content = f"```\n{done.stdout or done.stderr}\n```"
 

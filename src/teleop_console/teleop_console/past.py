@@ -10,15 +10,7 @@ import numpy as np
 
 from teleop_console.link import Arm, ArmView, View
 from teleop_console.recorded_arms import in_words
-from teleop_core.graph.topics import (
-    BY_NAME,
-    OPERATION,
-    SLAVE_MEASURED_CP,
-    SLAVE_OPERATION,
-    SLAVE_SERVO_CP,
-    TELEOP_STATE,
-    Kind,
-)
+from teleop_core.graph import topics
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots.robot import Robot
 
@@ -29,10 +21,10 @@ DELAY = "session command_delay"
 ROWS = 4000
 """Times that are kept of a live session: two minutes at 30 Hz."""
 _UNITS = {
-    Kind.POSE: ("m",) * 3 + ("",) * 4,
-    Kind.TWIST: ("m/s",) * 3 + ("rad/s",) * 3,
-    Kind.WRENCH: ("N",) * 3 + ("N·m",) * 3,
-    Kind.JAW: ("rad", "rad/s", "N·m"),
+    topics.Kind.POSE: ("m",) * 3 + ("",) * 4,
+    topics.Kind.TWIST: ("m/s",) * 3 + ("rad/s",) * 3,
+    topics.Kind.WRENCH: ("N",) * 3 + ("N·m",) * 3,
+    topics.Kind.JAW: ("rad", "rad/s", "N·m"),
 }
 _UNIT_OF = {
     name: unit
@@ -108,7 +100,7 @@ class Past(ABC):
                 return None if found is None else _NO_SAMPLES
             return found[0], found[1][:, column.index]
         arm = name.removesuffix(ERROR)
-        wanted, found = self.rows(arm + SLAVE_SERVO_CP.name), self.rows(arm + SLAVE_MEASURED_CP.name)
+        wanted, found = self.rows(arm + topics.SLAVE_SERVO_CP.name), self.rows(arm + topics.SLAVE_MEASURED_CP.name)
         if wanted is None or found is None:
             return None
         known = self._errors.get(arm)
@@ -126,17 +118,17 @@ class Past(ABC):
         """Take note of a topic's columns."""
         for index, (name, unit) in enumerate(zip(names, units, strict=True)):
             self.columns[f"{below(arm, topic)} {name}"] = Column(below(arm, topic), index, unit, is_held)
-        if topic == SLAVE_MEASURED_CP.name:
+        if topic == topics.SLAVE_MEASURED_CP.name:
             self.columns[below(arm, ERROR)] = Column(below(arm, topic), 0, "m")
 
-    def _add_known(self, arm: str, topic: str, kind: Kind, joints: tuple[str, ...], robot: Robot | None) -> None:
+    def _add_known(self, arm: str, topic: str, kind: topics.Kind, joints: tuple[str, ...], robot: Robot | None) -> None:
         """Take note of the columns of a topic whose kind is known."""
-        known = BY_NAME.get(topic)
+        known = topics.BY_NAME.get(topic)
         names = known.columns if known is not None and known.columns else kind.columns(joints)
         units = _UNITS.get(kind) or [_UNIT_OF.get(name, "") for name in names]
         if kind.has_joints:
             units = _of_joints(kind, len(names), robot)
-        self._add(arm, topic, names, units, is_held=kind is Kind.REPORT)
+        self._add(arm, topic, names, units, is_held=kind is topics.Kind.REPORT)
 
 
 class Seen(Past):
@@ -182,9 +174,9 @@ class Seen(Past):
         found = self._rings.get((arm, topic))
         if found is None:
             found = self._rings[arm, topic] = np.full((ROWS, width), np.nan)
-            if topic in BY_NAME:
+            if topic in topics.BY_NAME:
                 robot = self._arms[arm].robot
-                self._add_known(arm, topic, BY_NAME[topic].kind, robot.joint_names, robot)
+                self._add_known(arm, topic, topics.BY_NAME[topic].kind, robot.joint_names, robot)
         return found
 
     def _order(self) -> Any:
@@ -214,10 +206,10 @@ class Seen(Past):
                 if topic == DELAY or np.isnan(row).all():
                     continue
                 one = view.arms[arm]
-                if topic == TELEOP_STATE.name:
-                    one.state = dict(zip(TELEOP_STATE.columns, row.tolist(), strict=True))
-                elif topic == SLAVE_OPERATION.name:
-                    one.operation = dict(zip(OPERATION, row.tolist(), strict=True))
+                if topic == topics.TELEOP_STATE.name:
+                    one.state = dict(zip(topics.TELEOP_STATE.columns, row.tolist(), strict=True))
+                elif topic == topics.SLAVE_OPERATION.name:
+                    one.operation = dict(zip(topics.OPERATION, row.tolist(), strict=True))
                     one.operation_text = in_words(one.operation, self.joints[arm])
                 else:
                     one.streams[topic] = row.copy()
@@ -233,16 +225,16 @@ def _values(view: ArmView) -> Iterator[tuple[str, Array]]:
     """What is known of an arm, by topics."""
     yield from view.streams.items()
     if view.state:
-        yield TELEOP_STATE.name, np.array([view.state[name] for name in TELEOP_STATE.columns])
+        yield topics.TELEOP_STATE.name, np.array([view.state[name] for name in topics.TELEOP_STATE.columns])
     if view.operation:
-        yield SLAVE_OPERATION.name, np.array([view.operation[name] for name in OPERATION])
+        yield topics.SLAVE_OPERATION.name, np.array([view.operation[name] for name in topics.OPERATION])
 
 
-def _of_joints(kind: Kind, count: int, robot: Robot | None) -> list[str]:
+def _of_joints(kind: topics.Kind, count: int, robot: Robot | None) -> list[str]:
     """Units of joints: of position, and where there are, of velocity and effort."""
-    joints = count // 3 if kind is Kind.STATE else count
+    joints = count // 3 if kind is topics.Kind.STATE else count
     slides = np.zeros(joints, bool)
     if robot is not None:
         slides = np.linalg.norm(robot.jacobian(robot.home)[3:], axis=0) < 1e-9
-    parts = (("m", "rad"), ("m/s", "rad/s"), ("N", "N·m")) if kind is Kind.STATE else (("m", "rad"),)
+    parts = (("m", "rad"), ("m/s", "rad/s"), ("N", "N·m")) if kind is topics.Kind.STATE else (("m", "rad"),)
     return [straight if is_so else turning for straight, turning in parts for is_so in slides.tolist()]

@@ -7,7 +7,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from teleop_console.link import ArmView, Link, Parameters, View
+from teleop_console.link import ArmView, Parameters, SessionLink, View
 from teleop_console.recorded_arms import configuration_of, parameters_of, recorded_arms
 from teleop_console.recorded_past import Recorded
 from teleop_core.bags.reader import Bag
@@ -18,7 +18,7 @@ from teleop_core.kernels.geometry import Array
 _PATH = 200  # points of a path
 
 
-class RecordedLink(Link):
+class RecordedLink(SessionLink):
     """A link to a recording, which refuses what a session takes.
 
     A view is what was known at the present time of the replay: of each stream the last sample that

@@ -14,21 +14,7 @@ from teleop_core.bags.reports import read_reports
 from teleop_core.bags.series import Series, in_order
 from teleop_core.base.errors import RecordingError, TeleopError
 from teleop_core.base.parameters import specs, values_of
-from teleop_core.graph.topics import (
-    MASTER_ENERGY,
-    OPERATION,
-    SLAVE_ENERGY,
-    SLAVE_JAW_BOARD,
-    SLAVE_JAW_MEASURED_JS,
-    SLAVE_JAW_OBJECT_CP,
-    SLAVE_MEASURED_CF,
-    SLAVE_MEASURED_JS,
-    SLAVE_OPERATION,
-    STREAMS,
-    TASK_STATE,
-    TELEOP_STATE,
-    Topic,
-)
+from teleop_core.graph import topics
 from teleop_core.robots import load_robot_set
 from teleop_core.robots.robot import Robot
 from teleop_core.session.configuration import Configuration
@@ -39,14 +25,14 @@ MOST = 200 << 20
 """Bytes of samples that are kept; of longer recordings every second, third ... sample is."""
 _STAMP_BYTES = 16
 _KEPT = (
-    *STREAMS,
-    SLAVE_MEASURED_CF,
-    SLAVE_JAW_MEASURED_JS,
-    SLAVE_JAW_OBJECT_CP,
-    SLAVE_JAW_BOARD,
-    MASTER_ENERGY,
-    SLAVE_ENERGY,
-    TASK_STATE,
+    *topics.STREAMS,
+    topics.SLAVE_MEASURED_CF,
+    topics.SLAVE_JAW_MEASURED_JS,
+    topics.SLAVE_JAW_OBJECT_CP,
+    topics.SLAVE_JAW_BOARD,
+    topics.MASTER_ENERGY,
+    topics.SLAVE_ENERGY,
+    topics.TASK_STATE,
 )
 
 
@@ -68,10 +54,10 @@ class RecordedArm:
             if (i := track.at(time_ns)) < 0:
                 continue
             row = track.values[i]
-            if name == TELEOP_STATE.name:
-                view.state = dict(zip(TELEOP_STATE.columns, row.tolist(), strict=True))
-            elif name == SLAVE_OPERATION.name:
-                view.operation = dict(zip(OPERATION, row.tolist(), strict=True))
+            if name == topics.TELEOP_STATE.name:
+                view.state = dict(zip(topics.TELEOP_STATE.columns, row.tolist(), strict=True))
+            elif name == topics.SLAVE_OPERATION.name:
+                view.operation = dict(zip(topics.OPERATION, row.tolist(), strict=True))
                 view.operation_text = in_words(view.operation, self.arm.robot.joint_names)
             else:
                 view.streams[name], view.stamp_ns[name] = row, int(track.stamp_ns[i])
@@ -129,7 +115,7 @@ def _robot(bag: Bag, configuration: Configuration | None, arm: str) -> Robot:
         robot = load_robot_set(name, geometry)
     except (TeleopError, OSError) as error:
         raise RecordingError(bag.path, f"its robot cannot be made: {error}") from error
-    bag.require([SLAVE_MEASURED_JS])
+    bag.require([topics.SLAVE_MEASURED_JS])
     return robot
 
 
@@ -161,7 +147,7 @@ def _tracks(bag: Bag, arm: Arm, thinning: int) -> dict[str, Series]:
                 rows = rows[:, _order(bag, series.names, rows.shape[1], arm.robot)]
             parts[name].append(Series(stamps, logs, rows))
     tracks = {name: in_order(found) for name, found in parts.items() if found}
-    for topic in (TELEOP_STATE, SLAVE_OPERATION):
+    for topic in (topics.TELEOP_STATE, topics.SLAVE_OPERATION):
         if (found := reports_of(bag, topic)) is not None:
             tracks[topic.name] = found
     return tracks
@@ -182,7 +168,7 @@ def _order(bag: Bag, names: tuple[str, ...], width: int, robot: Robot) -> list[i
     return [part * len(names) + joint for part in range(width // len(names)) for joint in chosen]
 
 
-def reports_of(bag: Bag, topic: Topic) -> Series | None:
+def reports_of(bag: Bag, topic: topics.Topic) -> Series | None:
     """Numbers of a report, whose own are those of its columns that it has; None without any."""
     info = bag.topics.get(topic.name)
     if info is None or not info.count or info.type != topic.kind.ros_type:

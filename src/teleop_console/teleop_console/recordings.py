@@ -125,7 +125,7 @@ class Recordings:
 
 
 def _program() -> list[str]:
-    return ["nice", "-n", "15", sys.executable, "-m", "teleop_core.cli"]
+    return ["nice", "-n", "15", sys.executable, "-m", "teleop_core.commands.cli"]
 
 
 def _operator(path: Path) -> list[str]:

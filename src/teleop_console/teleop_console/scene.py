@@ -12,8 +12,8 @@ from teleop_console.link import Arm, Parameters, Setting, View
 from teleop_console.look import DARK, GRID, GRID_DARK, LIGHT, TARGET
 from teleop_console.stand import PUBLISHED_AXES
 from teleop_core.base.errors import TeleopError
-from teleop_core.chain.mapping.parameters import axis_map
-from teleop_core.chain.operators.rest import REST_POSITION
+from teleop_core.hand.operators.rest import REST_POSITION
+from teleop_core.kernels.axes import axis_map
 from teleop_core.kernels.geometry import Array
 
 _POINTS = {"tour": "tour.points", "points": "points"}
@@ -25,7 +25,7 @@ def targets_of(parameters: Parameters, arm: str) -> Array:
     """Points (N, 3) [m] in master_base to which the operator of an arm goes; none for others.
 
     Args:
-        parameters: As :meth:`~teleop_console.link.Link.parameters` gives them.
+        parameters: As :meth:`~teleop_console.link.SessionLink.parameters` gives them.
         arm: Namespace of the arm.
     """
     node = f"{arm}/operator" if arm else "operator"
@@ -104,7 +104,7 @@ class Scene:
         """Take what parameters of the session say of the picture: axes, fixture, targets, object.
 
         Args:
-            parameters: As :meth:`~teleop_console.link.Link.parameters` gives them; what they
+            parameters: As :meth:`~teleop_console.link.SessionLink.parameters` gives them; what they
                 lack stays as it is.
         """
         with self._server.atomic():

@@ -7,7 +7,7 @@ from dataclasses import replace
 import viser
 
 from teleop_console.inputs import LATER, Input, default_of, form, text
-from teleop_console.link import Link, ParameterInfo, Parameters, Setting
+from teleop_console.link import ParameterInfo, Parameters, SessionLink, Setting
 from teleop_core.base.errors import TeleopError
 
 QUICK = (
@@ -46,7 +46,7 @@ class SettingsPanel:
     def __init__(
         self,
         server: viser.ViserServer,
-        link: Link,
+        link: SessionLink,
         may_drive: Guard,
         renew: Renew | None = None,
         of_session: Parameters | None = None,

@@ -4,7 +4,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from teleop_core.chain.mapping.parameters import MotionScalingParameters, axis_map
+from teleop_core.coupling.mapping.gains import MotionScalingParameters
+from teleop_core.kernels.axes import axis_map
 from teleop_core.kernels.geometry import Array, quaternion_from_rotation
 from teleop_core.robots.bodies.meshes import mesh_of
 from teleop_core.robots.bodies.solids import Solid

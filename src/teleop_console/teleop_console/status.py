@@ -5,8 +5,8 @@ import math
 
 from teleop_console.answers import Situation
 from teleop_console.link import ArmView, View
-from teleop_core.chain.tasks import Act, Miss
 from teleop_core.graph.topics import SLAVE_JAW_MEASURED_JS, TASK_STATE
+from teleop_core.hand.tasks import Act, Miss
 from teleop_core.slave.operation import Fault, State
 
 _SIGNALS = {State.ENABLED: "good", State.PAUSED: "held", State.DISABLED: "idle", State.FAULT: "wrong"}

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from teleop_console.curves import bands, thinned
 from teleop_console.drivers import Drivers
-from teleop_console.link import Link, View
+from teleop_console.link import SessionLink, View
 from teleop_console.past import ERROR, Past, Seen
 from teleop_console.recorded import RecordedLink
 from teleop_console.recorded_past import Recorded
@@ -43,7 +43,7 @@ class Timeline:
         clock: Monotonic time [s].
     """
 
-    def __init__(self, link: Link, clock: Callable[[], float] = time.monotonic) -> None:
+    def __init__(self, link: SessionLink, clock: Callable[[], float] = time.monotonic) -> None:
         self._link, self._clock = link, clock
         self._past: Past
         self._replay, self._seen = None, None

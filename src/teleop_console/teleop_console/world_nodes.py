@@ -14,7 +14,7 @@ from teleop_core.kernels.geometry import Array
 from teleop_core.robots.robot import Robot
 from teleop_core.shapes.basis.drawing import segments_of
 from teleop_core.slave.world import WORLD_OBJECTS
-from teleop_core.slave.world.parameters import WorldParameters
+from teleop_core.slave.world.contents import WorldParameters
 
 
 def object_outline(values: Mapping[str, Setting], robot: Robot) -> Array:

@@ -1,10 +1,10 @@
 """Master-slave teleoperation: haptic master, motion scaling, inverse kinematics, 1 kHz slave.
 
-Folders follow the data: ``chain`` is the way from the operator's hand to the command of the slave, ``slave`` the arm's
-server with its control laws and plants, ``bags`` what is recorded, ``evaluation`` what it is worth. ``graph`` says
-which stages there are and how they are linked, ``session`` runs them in virtual time, ``nodes`` puts them on ROS 2
-topics, ``commands`` is the ``teleop`` of a terminal. All stand on ``robots``, ``shapes``,
-``kernels`` and ``base``.
+Folders follow the data: ``hand`` is the operator and the master, ``coupling`` what lies between master and slave,
+``slave`` the arm's server with its control laws and plants, ``bags`` what is recorded, ``evaluation`` what it is
+worth. ``graph`` says which stages there are and how they are linked, ``session`` runs them in virtual time, ``nodes``
+puts them on ROS 2 topics, ``commands`` is the ``teleop`` of a terminal. All stand on ``robots``, ``kinematics``,
+``shapes``, ``kernels`` and ``base``.
 
 Everything a user needs is here:
 

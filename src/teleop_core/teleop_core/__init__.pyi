@@ -21,23 +21,23 @@ from .evaluation import (
     frame_of as frame_of,
     register_metric as register_metric,
 )
-from .chain.passivity import Passivity as Passivity, register_passivity as register_passivity
-from .chain.architectures import Architecture as Architecture, register_architecture as register_architecture
-from .chain.filters import TremorFilter as TremorFilter, register_tremor_filter as register_tremor_filter
+from .coupling.passivity import Passivity as Passivity, register_passivity as register_passivity
+from .coupling.architectures import Architecture as Architecture, register_architecture as register_architecture
+from .coupling.filters import TremorFilter as TremorFilter, register_tremor_filter as register_tremor_filter
 from .graph.graph import Graph as Graph, build_graph as build_graph
 from .kernels import kernel as kernel
 from .kernels.fields import Fields as Fields, Vector3 as Vector3
-from .chain.network import Network as Network, register_network as register_network
-from .chain.operators import (
+from .coupling.network import Network as Network, register_network as register_network
+from .hand.operators import (
     Operator as Operator,
     Seen as Seen,
     Setting as Setting,
     following as following,
     register_operator as register_operator,
 )
-from .chain.operators.remote import RemoteHand as RemoteHand, remote_operator as remote_operator
-from .chain.tasks import Task as Task, register_task as register_task
-from .base.parameters import NoParameters as NoParameters, parameter as parameter
+from .hand.operators.remote import RemoteHand as RemoteHand, remote_operator as remote_operator
+from .hand.tasks import Task as Task, register_task as register_task
+from .base.parameters import NoParameters as NoParameters, Within as Within, parameter as parameter
 from .slave.bridges import Bridge as Bridge, Command as Command, register_bridge as register_bridge
 from .shapes import Shape as Shape, register_shape as register_shape
 from .slave.plants import Physics as Physics, Plant as Plant, register_plant as register_plant
@@ -49,7 +49,7 @@ from .robots import (
     register_robot as register_robot,
     robot_from_table as robot_from_table,
 )
-from .robots.parameters import RobotParameters as RobotParameters
+from .robots.selection import RobotParameters as RobotParameters
 from .session.configuration import Configuration as Configuration
 from .session.stepped import Observation as Observation, Session as Session, Space as Space
 from .session.virtual import VirtualTime as VirtualTime

@@ -151,7 +151,7 @@ class ImportOptions:
         """
         import numpy as np  # and what is compiled: not for `--help`
 
-        from teleop_core.chain.mapping.parameters import axis_map
+        from teleop_core.kernels.axes import axis_map
 
         x, *others = self.signed_axes
         if self.handedness == "right":

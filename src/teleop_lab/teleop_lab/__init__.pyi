@@ -4,7 +4,7 @@ from .experiments import (
     Experiment as Experiment,
     Findings as Findings,
     Outcome as Outcome,
-    Row as Row,
+    Comparison as Comparison,
     register_experiment as register_experiment,
 )
 from .fitting import FitError as FitError, FitResult as FitResult, fit_plant as fit_plant

@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 
 import teleop_core as tc
 from teleop_core.base.parameters import build, values_of
-from teleop_core.chain.mapping.parameters import axis_map
-from teleop_core.chain.tasks import Act
-from teleop_core.chain.tasks.task import TaskParameters
 from teleop_core.graph.topics import TASK_STATE
+from teleop_core.hand.tasks import Act
+from teleop_core.hand.tasks.task import TaskParameters
+from teleop_core.kernels.axes import axis_map
 from teleop_core.session.api import Setting
 
 Observed = NDArray[np.float32]

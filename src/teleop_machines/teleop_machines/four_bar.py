@@ -15,9 +15,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from teleop_core import kinematics
 from teleop_core.base import ParameterError
 from teleop_core.kernels import Array, inner, kernel
-from teleop_core.robots import branches, kinematics
+from teleop_core.kinematics import branches
 from teleop_core.robots.robot import Robot, geometry_of
 from teleop_machines.bodies.planar import four_bar_bodies
 from teleop_machines.drives import geared_motors

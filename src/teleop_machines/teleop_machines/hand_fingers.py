@@ -12,7 +12,7 @@ import math
 from typing import NamedTuple
 
 from teleop_core.kernels import Array, inner, kernel
-from teleop_core.robots.branches import bounded, turned, wrapped
+from teleop_core.kinematics.branches import bounded, turned, wrapped
 
 # Sine of phi of a straight finger: shortens it by less than rounding, and has a sign, so that a
 # path through it remembers its side.

@@ -18,7 +18,7 @@ import numpy as np
 
 from teleop_core.base import ParameterError, ShapeError
 from teleop_core.kernels import Array, checked_array, inner, is_rigid, kernel
-from teleop_core.robots.kinematics import REACHED
+from teleop_core.kinematics import REACHED
 from teleop_core.robots.robot import geometry_of
 from teleop_machines.hand_fingers import Triple, finger_branch, finger_jacobian, finger_point
 from teleop_machines.rps3_loop import COSINES, SINES, frame

@@ -21,8 +21,8 @@ import numpy as np
 
 from teleop_core.base import ParameterError, UnknownNameError
 from teleop_core.kernels import Array, product
+from teleop_core.kinematics import Kernels
 from teleop_core.robots.drives import ENTRIES, Drives
-from teleop_core.robots.kinematics import Kernels
 from teleop_core.robots.robot import Robot, geometry_of
 from teleop_machines import mma_balance, mma_forward, mma_ik, mma_models
 from teleop_machines.bodies.mma_bodies import mma_bodies

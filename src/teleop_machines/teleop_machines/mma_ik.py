@@ -14,9 +14,8 @@ import math
 import numpy as np
 
 from teleop_core.kernels import Array, inner, kernel
-from teleop_core.robots.branches import bounded
-from teleop_core.robots.chains import damped
-from teleop_core.robots.kinematics import IkStatus, is_askable, pose_residual
+from teleop_core.kinematics import IkStatus, damped, is_askable, pose_residual
+from teleop_core.kinematics.branches import bounded
 from teleop_machines import mma_branches, mma_forward
 
 LENGTH = 0.1  # distance [m] that weighs as much as one radian

@@ -14,8 +14,8 @@ import numpy as np
 
 from teleop_core.base import ParameterError
 from teleop_core.kernels import Array, kernel
-from teleop_core.robots.branches import bounded, turned
-from teleop_core.robots.kinematics import REACHED, IkStatus, Kernels, is_askable, pose_residual
+from teleop_core.kinematics import REACHED, IkStatus, Kernels, is_askable, pose_residual
+from teleop_core.kinematics.branches import bounded, turned
 from teleop_core.robots.robot import Robot, geometry_of
 from teleop_machines.bodies.planar import parallelogram_bodies
 from teleop_machines.drives import geared_motors

@@ -13,7 +13,7 @@ import numpy as np
 
 from teleop_core.kernels import inner, kernel
 from teleop_core.kernels.geometry import Array, rotation_angle_between
-from teleop_core.robots.kinematics import MAX_ASSEMBLIES, REACHED, SEARCH_ALL, FkStatus
+from teleop_core.kinematics import MAX_ASSEMBLIES, REACHED, SEARCH_ALL, FkStatus
 from teleop_machines.rps3_loop import COSINES, SINES, frame, loop, points, settle
 
 # Volume of the three unit rows of the loop equations under which the legs hardly fix the platform.

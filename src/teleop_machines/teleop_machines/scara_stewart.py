@@ -19,9 +19,10 @@ import math
 
 import numpy as np
 
+from teleop_core import kinematics
 from teleop_core.base import ParameterError, UnknownNameError
 from teleop_core.kernels import Array, inner, kernel
-from teleop_core.robots import branches, kinematics
+from teleop_core.kinematics import branches
 from teleop_core.robots.robot import Robot, geometry_of
 from teleop_machines import scara_stewart_drives, scara_stewart_legs, stewart_legs, stewart_search
 from teleop_machines.bodies.hybrid_bodies import scara_stewart_bodies

@@ -17,7 +17,7 @@ import math
 import numpy as np
 
 from teleop_core.kernels import Array, inner, kernel
-from teleop_core.robots.kinematics import AGREED, FkStatus
+from teleop_core.kinematics import AGREED, FkStatus
 from teleop_machines import stewart_legs, stewart_search
 
 # Sine of sigma_b + sigma_m under which the layout counts as similar hexagons.

@@ -22,10 +22,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from teleop_core import kinematics
 from teleop_core.base import ParameterError, ShapeError
 from teleop_core.kernels import Array, checked_array, inner, is_rigid, kernel, length
-from teleop_core.robots import branches, kinematics
-from teleop_core.robots.chains.damped import is_near_singular
+from teleop_core.kinematics import branches
+from teleop_core.kinematics.damped import is_near_singular
 from teleop_core.robots.robot import Robot, geometry_of
 from teleop_machines.bodies.parallel import stewart_bodies
 from teleop_machines.drives import electric_cylinders

@@ -12,7 +12,7 @@ import math
 import numpy as np
 
 from teleop_core.kernels import Array, inner, kernel
-from teleop_core.robots.chains.damped import eliminate
+from teleop_core.kinematics.damped import eliminate
 
 # Legs count as closed within this error of length [m].
 CLOSED = 1e-11

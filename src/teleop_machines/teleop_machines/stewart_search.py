@@ -14,8 +14,8 @@ import numpy as np
 
 from teleop_core.kernels import inner, kernel
 from teleop_core.kernels.geometry import Array, rotation_angle_between
-from teleop_core.robots.chains.damped import is_near_singular
-from teleop_core.robots.kinematics import MAX_ASSEMBLIES, REACHED, FkStatus
+from teleop_core.kinematics import MAX_ASSEMBLIES, REACHED, FkStatus
+from teleop_core.kinematics.damped import is_near_singular
 from teleop_machines.stewart_legs import direct, leg_system
 
 # Smallest over largest singular value of the leg Jacobian under which a pose is close to singular.

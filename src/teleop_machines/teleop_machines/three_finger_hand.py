@@ -14,9 +14,9 @@ import math
 
 import numpy as np
 
+from teleop_core import kinematics
 from teleop_core.base import ParameterError
 from teleop_core.kernels import Array, inner, kernel
-from teleop_core.robots import kinematics
 from teleop_core.robots.robot import Robot
 from teleop_machines import hand_fingers, rps3_loop
 from teleop_machines.bodies.hand_bodies import hand_bodies

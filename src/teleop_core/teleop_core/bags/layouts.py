@@ -34,6 +34,8 @@ class Layout:
         frame_id: Frame in the header.
         size: Bytes of one message.
         width: Numbers in one message, the columns of its values.
+        template: One message whose numbers are zero, shape (size,).
+        mask: Its bits that all messages share, shape (size,).
     """
 
     def __init__(self, kind: Kind, joint_names: tuple[str, ...], frame_id: str) -> None:
@@ -41,9 +43,12 @@ class Layout:
         self.kind, self.joint_names, self.frame_id = kind, joint_names, frame_id
         self.size, self.width = len(cdr.template), kind.width(len(joint_names))
         self.template: Bytes = np.frombuffer(bytes(cdr.template), np.uint8)
-        self._mask: Bytes = np.frombuffer(bytes(cdr.mask), np.uint8)
+        mask = np.zeros(self.size, np.uint8)
+        for begin, end in cdr.constants():
+            mask[begin:end] = np.frombuffer(bytes(cdr.mask[begin:end]), np.uint8)
+        mask.flags.writeable = False
+        self.mask: Bytes = mask
         self._columns = [columns for *_, columns in cdr.gaps[2:]]
-        self._runs = [slice(a, b) for a, b in cdr.constants() if b > a]
         self._dtype = np.dtype(
             {
                 "names": ["sec", "nanosec", *(f"part{i}" for i in range(len(self._columns)))],
@@ -122,11 +127,7 @@ class Layout:
         """Whether messages, shape (N, size or more), differ from the template in numbers only."""
         if rows.shape[1] < self.size:
             return False
-        for run in self._runs:
-            difference = rows[:, run] ^ self.template[run]
-            if difference.any() and (difference & self._mask[run]).any():
-                return False
-        return True
+        return not ((rows[:, : self.size] ^ self.template) & self.mask).any()
 
     # -- single messages -------------------------------------------------------------------------
 

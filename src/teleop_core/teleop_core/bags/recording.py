@@ -4,7 +4,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from teleop_core.bags import compression
-from teleop_core.base import ParameterError, UnknownNameError, parameter
+from teleop_core.base import ParameterError, UnknownNameError, Within, parameter
 from teleop_core.graph import Stage
 from teleop_core.graph.topics import BY_NAME, Kind, Quality, Stamp, Topic
 
@@ -14,21 +14,17 @@ class RecordingParameters:
     """Parameters of :class:`~teleop_core.bags.writer.BagWriter`."""
 
     compression: str = parameter("zstd", doc="compression of the bag", choices=compression.NAMES, fixed=True)
-    compression_level: int = parameter(
-        1, doc="effort of the compression: more is slower", lower=1, upper=16, fixed=True
-    )
+    compression_level: int = parameter(1, Within(1, 16), "effort of the compression: more is slower", fixed=True)
     topics: tuple[str, ...] = parameter((), doc="topics to record; empty for all", fixed=True)
-    every: int = parameter(1, doc="record every n-th sample of the streams", lower=1, upper=1_000_000, fixed=True)
+    every: int = parameter(1, Within(1, 1_000_000), "record every n-th sample of the streams", fixed=True)
     every_of: tuple[str, ...] = parameter(
         (), doc="exceptions from every, as topic=n, e.g. slave/measured_js=10", fixed=True
     )
     tf_rate: float = parameter(
         50.0,
-        unit="1/s",
-        lower=0.0,
-        upper=1000.0,
+        Within(0.0, 1000.0, "1/s"),
+        "messages of /tf a second, with the robot's model beside them; 0: neither",
         fixed=True,
-        doc="messages of /tf a second, with the robot's model beside them; 0: neither",
     )
 
     def __post_init__(self) -> None:

@@ -140,8 +140,8 @@ class Column:
         form = self._layout
         if form is None or not len(sizes) or sizes.min() != sizes.max() or sizes[0] < form.size:
             return None
-        rows = walk.gather(data, begins, form.size)
-        if not form.matches(rows):
+        rows = walk.gather(data, begins, form.template, form.mask)
+        if rows is None:
             return None
         stamps, values = form.decode(rows)
         if self.names != form.joint_names:

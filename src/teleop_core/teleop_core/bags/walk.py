@@ -48,12 +48,16 @@ def _walk(data, at, end, rows):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _gather(data, begins, out):  # type: ignore[no-untyped-def]
-    """Copy pieces of equal size from anywhere into rows."""
+def _gather(data, begins, template, mask, out):  # type: ignore[no-untyped-def]
+    """Copy pieces of equal size from anywhere into rows; whether all are the template where the mask is not zero."""
+    wrong, size = np.uint8(0), out.shape[1]
     for i in range(len(begins)):
-        begin = begins[i]
-        for j in range(out.shape[1]):
-            out[i, j] = data[begin + j]
+        piece = data[begins[i] : begins[i] + size]  # indices into a slice need no test of their sign
+        row = out[i]
+        for j in range(size):
+            row[j] = piece[j]
+            wrong |= (piece[j] ^ template[j]) & mask[j]
+    return wrong == 0
 
 
 def walk(data: Bytes, begin: int, end: int) -> tuple[Rows, int]:
@@ -78,8 +82,14 @@ def walk(data: Bytes, begin: int, end: int) -> tuple[Rows, int]:
         begin = at
 
 
-def gather(data: Bytes, begins: Stamps, size: int) -> Bytes:
-    """Pieces of one size that begin at these places, shape (n, size)."""
-    out = np.empty((len(begins), size), np.uint8)
-    _gather(data, np.ascontiguousarray(begins), out)
-    return out
+def gather(data: Bytes, begins: Stamps, template: Bytes, mask: Bytes) -> Bytes | None:
+    """Pieces that begin at these places, shape (n, size); None where one differs from a template.
+
+    Args:
+        data: Read-only bytes.
+        begins: Where the pieces begin, shape (n,); each ends inside of the data.
+        template: What pieces are, shape (size,).
+        mask: Bits that count, shape (size,).
+    """
+    out = np.empty((len(begins), len(template)), np.uint8)
+    return out if _gather(data, np.ascontiguousarray(begins), template, mask, out) else None

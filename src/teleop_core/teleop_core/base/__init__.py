@@ -15,8 +15,8 @@ else:  # loaded with their first use
         "errors": ("ClosureError", "EvaluationError", "KernelError", "ParameterError", "PartError", "RecordingError",
             "SessionError", "ShapeError", "TeleopError", "TeleopWarning", "UnknownNameError"),
         "damage": ("damage_told",),
-        "parameters": ("Choice", "NoParameters", "Spec", "Value", "build", "choice", "parameter", "specs",
-            "values_of"),
+        "parameters": ("Choice", "NoParameters", "Spec", "Value", "Within", "build", "choice", "parameter",
+            "specs", "values_of"),
         "registry": ("Registry", "part_check"),
         "texts": ("one_line", "printable", "shown"),
     }  # fmt: skip

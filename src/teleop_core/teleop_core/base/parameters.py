@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cache
 from types import UnionType
-from typing import TYPE_CHECKING, Any, TypeVar, get_args, get_origin, get_type_hints
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar, get_args, get_origin, get_type_hints
 
 from teleop_core.base.errors import ParameterError, PartError, UnknownNameError
 from teleop_core.base.ranges import check
@@ -24,34 +24,45 @@ MARKS = ("published", "derived", "fitted", "assumed")
 """How a number is known: a source prints it, follows from one, is fitted to data, is plausible."""
 
 
+class Within(NamedTuple):
+    """Bounds of a number, each itself allowed, and its SI unit, empty for pure numbers.
+
+    They hold for each element of a tuple. None is the bound of the unit (:mod:`~teleop_core.base.ranges`).
+    """
+
+    lower: float | None = None
+    upper: float | None = None
+    unit: str = ""
+
+
+_ANY = Within()
+
+
 def parameter(
     default: Any,
+    within: Within = _ANY,
+    doc: str = "",
     *,
-    unit: str = "",
-    doc: str,
-    lower: float | None = None,
-    upper: float | None = None,
     choices: tuple[str, ...] = (),
     length: int | None = None,
     off: float | None = None,
     fixed: bool = False,
     source: str = "",
+    **former: Any,
 ) -> Any:
     """Dataclass field that describes one parameter.
 
     Args:
         default: Value when nothing else is said; its type is the parameter's type.
-        unit: SI unit, empty for pure numbers and names.
+        within: Bounds and unit of numbers.
         doc: One line for the README's table and the ROS descriptor.
-        lower: Smallest allowed number, itself allowed; each element of a tuple. None, as of
-            ``upper``: that of its unit (:mod:`~teleop_core.base.ranges`).
-        upper: Largest allowed number, itself allowed; each element of a tuple.
         choices: Allowed names; empty for any.
         length: Number of elements of a tuple; None for any.
         off: Number that is allowed whatever the bounds, and turns off what it sets; None for none.
         fixed: Whether it can only be set before the stage is built.
         source: Where the default comes from: a mark of :data:`MARKS`, a colon, and by whom, from
             what, to what or why; empty for a matter of taste.
+        **former: ``lower``, ``upper`` and ``unit``, as 0.6.0 has them in place of ``within``.
 
     Returns:
         The dataclass field.
@@ -61,9 +72,8 @@ def parameter(
     """
     if source and source.partition(":")[0] not in MARKS:
         raise ParameterError("source", source, f"one of {', '.join(MARKS)}, a colon and a text")
-    meta = {
-        "unit": unit, "doc": doc, "lower": lower, "upper": upper,
-        "choices": choices, "length": length, "off": off, "fixed": fixed, "source": source,
+    meta = within._replace(**former)._asdict() | {
+        "doc": doc, "choices": choices, "length": length, "off": off, "fixed": fixed, "source": source,
     }  # fmt: skip
     return field(default=default, metadata=meta)
 
@@ -169,7 +179,7 @@ class Spec:
 
     def _check_element(self, value: object) -> None:
         if type(value) is not self.element:
-            hint = " (write 1.0, not 1)" if self.element is float else ""
+            hint = " (write 1.0, not 1)" if self.element is float and isinstance(value, int) else ""
             raise ParameterError(self.name, value, f"of type {self.element.__name__}{hint}")
         if self.choices and value not in self.choices:
             raise UnknownNameError(self.name, value, self.choices)

@@ -18,12 +18,14 @@ from functools import cache
 from importlib import import_module
 from importlib.metadata import EntryPoint, EntryPoints, entry_points
 from types import MappingProxyType
-from typing import Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
 from teleop_core.base.errors import PartError, UnknownNameError
 
 Part = TypeVar("Part")
 _NAME = re.compile(r"\w[\w-]*")
+ADDED: list[tuple["Registry[Any]", str]] = []
+"""What this program has added so far, in its order."""
 
 
 class Registry(Generic[Part]):
@@ -119,6 +121,7 @@ class Registry(Generic[Part]):
             self._trial(checked)
         self._own.add(name)
         self._parts[name] = checked
+        ADDED.append((self, name))
         return checked
 
     def remove(self, name: str) -> None:

@@ -31,14 +31,14 @@ def _run(_: argparse.Namespace) -> int:
 
 
 def _gamepads() -> Iterator[str]:
-    from teleop_core.chain.devices.gamepad import Sdl
+    from teleop_core.hand.devices.gamepad import Sdl
 
     for _, name, is_known in Sdl().names():
         yield (name if is_known else f"{name}: of unknown layout, SDL_GAMECONTROLLERCONFIG may say it")
 
 
 def _space_mice() -> Iterator[str]:
-    from teleop_core.chain.devices.spacemouse import space_mice
+    from teleop_core.hand.devices.spacemouse import space_mice
 
     for name, _ in space_mice():
         yield name

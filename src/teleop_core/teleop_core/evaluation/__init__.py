@@ -34,7 +34,7 @@ else:  # loaded with their first use
         "metric": ("Key", "Metric", "SPREAD_MEANING", "keys_of"),
         "pairing": ("latest", "same_stamp"),
         "registry": ("METRICS", "register_metric"),
-        "rows": ("MISSING", "Row", "error_rows", "fixed", "number", "row", "spread_rows"),
+        "rows": ("MISSING", "TableRow", "error_rows", "fixed", "number", "row", "spread_rows"),
         "score": ("Score", "Session", "frame_of", "key_table", "keys"),
         "scoring": ("evaluate", "measure", "scores", "study"),
         "traces": ("Envelope", "spacing_s"),

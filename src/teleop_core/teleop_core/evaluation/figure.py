@@ -56,6 +56,17 @@ def time_axis() -> dict[str, Any]:
     return {"title": {"text": "time [s]"}, "uirevision": _TIME}
 
 
+def force_figure(title: str, sentence: str, times: Numbers, values: Numbers, of: str) -> Figure:
+    """Force against time: x, y, z and magnitude [N], the columns of ``values`` (N, 4), in the axes of ``of``."""
+    traces = [
+        line(times, values[:, i], f"{axis} ({of})", color, 1.2, "N")
+        for i, (axis, color) in enumerate(zip("xyz", (FIRST, SECOND, THIRD), strict=True))
+    ]
+    traces.append(line(times, values[:, 3], "magnitude", DARK, 1.4, "N"))
+    layout = {"xaxis": time_axis(), "yaxis": {"title": {"text": "force [N]"}}, "hovermode": "x unified"}
+    return Figure(title, sentence, traces, layout, 340)
+
+
 def is_against_time(figure: Figure) -> bool:
     """Whether a plot has an axis of :func:`time_axis`."""
     axes = (axis for name, axis in figure.layout.items() if name.startswith("xaxis"))

@@ -6,7 +6,7 @@ from itertools import groupby
 from typing import TYPE_CHECKING
 
 from teleop_core.evaluation.published import published_for
-from teleop_core.evaluation.rows import Line, Row, side_by_side
+from teleop_core.evaluation.rows import Line, TableRow, side_by_side
 
 if TYPE_CHECKING:
     from teleop_core.evaluation.score import Score
@@ -54,6 +54,6 @@ def compact_table(score: "Score") -> str:
     return "<table>" + "\n".join(lines) + "</table>"
 
 
-def _compact_line(row: Row) -> str:
+def _compact_line(row: TableRow) -> str:
     cells = (row.label, row.value + _MARKS[row.is_met], row.unit, row.published)
     return "<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in cells) + "</tr>"

@@ -10,7 +10,7 @@ from teleop_core.evaluation.accumulators import Moments, Spread
 from teleop_core.evaluation.context import Context
 from teleop_core.evaluation.figure import Figure
 from teleop_core.evaluation.plain import Leaf, Values, leaves, plain
-from teleop_core.evaluation.rows import Row, error_rows, row
+from teleop_core.evaluation.rows import TableRow, error_rows, row
 from teleop_core.evaluation.windows import Window
 from teleop_core.graph.topics import Topic
 from teleop_core.kernels.geometry import Array
@@ -145,7 +145,7 @@ class Metric(ABC):
         names = [key.path.removeprefix(f"{self.place()}.") for key in self.keys]
         return {name: getattr(self, name, None) for name in names}
 
-    def rows(self) -> list[Row]:
+    def rows(self) -> list[TableRow]:
         """What tables show.
 
         Unless a metric says otherwise, this is one row per :func:`figure` with a label that has a value, and none where
@@ -175,19 +175,19 @@ class Metric(ABC):
         return []
 
 
-def _figure_row(group: str, one: Field[Any], value: float) -> Row:
+def _figure_row(group: str, one: Field[Any], value: float) -> TableRow:
     label, unit = one.metadata["label"], one.metadata["unit"]
     if isinstance(value, int):
-        return Row(group, label, "", str(value))
+        return TableRow(group, label, "", str(value))
     return row(group, label, "%", 100.0 * value) if unit == "1" else row(group, label, unit, value)
 
 
-def _row(name: str, label: str, unit: str, value: Leaf) -> Row:
+def _row(name: str, label: str, unit: str, value: Leaf) -> TableRow:
     group, text = name.replace("_", " "), label.replace("_", " ").replace(".", " ")
-    unit = "" if unit == "1" else unit
+    text, unit = text.removesuffix(f" {unit.replace('/', ' ')}"), "" if unit == "1" else unit
     if isinstance(value, float) or value is None:
         return row(group, text, unit, value)
-    return Row(group, text, unit, str(value))
+    return TableRow(group, text, unit, str(value))
 
 
 class SpreadMetric(Metric):
@@ -225,6 +225,6 @@ class SpreadMetric(Metric):
         """Spread so far, in the metric's unit."""
         return self._error.spread()
 
-    def rows(self) -> list[Row]:
+    def rows(self) -> list[TableRow]:
         """Root mean square and maximum."""
         return error_rows(self.group, self.label, self.unit, self.values())

@@ -7,22 +7,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from teleop_core.evaluation import motion_measures
 from teleop_core.evaluation.metric import figure
-from teleop_core.evaluation.motion_measures import (
-    IDLE_SPEED,
-    RATE,
-    cut,
-    frequency_holding,
-    log_dimensionless_jerk,
-    median,
-    reversals,
-    share_between,
-    sparc,
-    submovements,
-    turn_rates,
-    velocities,
-    velocity_spectrum,
-)
 from teleop_core.evaluation.motion_samples import MotionSamples, TremorWindows
 from teleop_core.kernels.geometry import Array
 
@@ -87,12 +73,12 @@ class Kinematics:
         count = len(rows)
         self._velocity, self._acceleration = np.zeros((count, 3)), np.zeros((count, 3))
         self._turning = np.zeros(count)
-        self._ends = np.flatnonzero(np.diff(self.times) > 1.5 / RATE) + 1
+        self._ends = np.flatnonzero(np.diff(self.times) > 1.5 / motion_measures.RATE) + 1
         for part in self._parts(self.everything):
-            self._velocity[part] = velocities(self.position[part])
-            self._acceleration[part] = velocities(self._velocity[part])
+            self._velocity[part] = motion_measures.velocities(self.position[part])
+            self._acceleration[part] = motion_measures.velocities(self._velocity[part])
             if part.stop - part.start > 1:
-                self._turning[part.start + 1 : part.stop] = turn_rates(rows[part, 3:7])
+                self._turning[part.start + 1 : part.stop] = motion_measures.turn_rates(rows[part, 3:7])
         self.speed = np.linalg.norm(self._velocity, axis=1)
 
     @property
@@ -107,39 +93,43 @@ class Kinematics:
 
     def spectrum(self, mask: Mask) -> tuple[Array, Array]:
         """Frequencies [Hz] and power density of the velocity [m²/s] of a part of the motion."""
-        return velocity_spectrum(self._velocity[part] for part in self._parts(mask))
+        return motion_measures.velocity_spectrum(self._velocity[part] for part in self._parts(mask))
 
     def figures(self, mask: Mask) -> MotionFigures:
         """Figures of the samples of a mask (N,)."""
         parts, speed = self._parts(mask), self.speed[mask]
-        time = len(speed) / RATE
+        time = len(speed) / motion_measures.RATE
         if not len(speed):
             return MotionFigures(0.0, 0.0)
         windows = [
             slice(part.start + one.start, part.start + one.stop)
             for part in parts
-            for one in cut(part.stop - part.start)
+            for one in motion_measures.cut(part.stop - part.start)
         ]
-        peaks = sum(len(submovements(self.speed[part])) for part in parts)
+        peaks = sum(len(motion_measures.submovements(self.speed[part])) for part in parts)
         frequency, density = self.spectrum(mask)
         acceleration = np.linalg.norm(self._acceleration[mask], axis=1)
         turning = np.degrees(self._turning[mask])
         tremor, at_rest = self._tremor.between(self._times_of(parts))
         return MotionFigures(
             time_s=time,
-            path_mm=float(speed.sum() / RATE * 1e3),
+            path_mm=float(speed.sum() / motion_measures.RATE * 1e3),
             speed_median_mm_s=float(np.median(speed) * 1e3),
             speed_p95_mm_s=float(np.quantile(speed, 0.95) * 1e3),
             acceleration_p95_m_s2=float(np.quantile(acceleration, 0.95)),
-            idle_share=float(np.mean(speed < IDLE_SPEED)),
+            idle_share=float(np.mean(speed < motion_measures.IDLE_SPEED)),
             submovements=peaks,
             peaks_per_s=peaks / time,
-            reversals=sum(reversals(self.position[part]) for part in parts),
-            frequency_50_hz=frequency_holding(0.5, frequency, density),
-            frequency_95_hz=frequency_holding(0.95, frequency, density),
-            power_1_3=share_between(1.0, 3.0, frequency, density),
-            sparc=median([sparc(self.speed[one], RATE) for one in windows]),
-            ldlj=median([log_dimensionless_jerk(self._velocity[one], RATE) for one in windows]),
+            reversals=sum(motion_measures.reversals(self.position[part]) for part in parts),
+            frequency_50_hz=motion_measures.frequency_holding(0.5, frequency, density),
+            frequency_95_hz=motion_measures.frequency_holding(0.95, frequency, density),
+            power_1_3=motion_measures.share_between(1.0, 3.0, frequency, density),
+            sparc=motion_measures.median(
+                [motion_measures.sparc(self.speed[one], motion_measures.RATE) for one in windows]
+            ),
+            ldlj=motion_measures.median(
+                [motion_measures.log_dimensionless_jerk(self._velocity[one], motion_measures.RATE) for one in windows]
+            ),
             tremor_um=_micrometres(tremor),
             tremor_at_rest_um=_micrometres(at_rest),
             turn_median_deg_s=float(np.median(turning)),

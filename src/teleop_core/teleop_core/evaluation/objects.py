@@ -10,7 +10,7 @@ from teleop_core.evaluation.metric import Metric
 from teleop_core.evaluation.windows import Window
 from teleop_core.graph.topics import SLAVE_TRUE_CF, SLAVE_TRUE_CP
 from teleop_core.kernels.geometry import Array
-from teleop_core.slave.world.parameters import WorldParameters
+from teleop_core.slave.world.contents import WorldParameters
 
 
 def object_of(context: Context, kind: type) -> tuple[WorldParameters, Array] | None:

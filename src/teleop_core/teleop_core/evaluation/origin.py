@@ -8,13 +8,14 @@ from typing import Any
 
 from teleop_core.bags import arms, reader
 from teleop_core.base import TeleopError, build, plain_yaml, shown, specs
-from teleop_core.chain.mapping.motion_scaling import MOTION_SCALING
-from teleop_core.chain.mapping.parameters import MotionScalingParameters, axis_map, tool_maps
-from teleop_core.chain.master.operator import OPERATOR
+from teleop_core.coupling.mapping.gains import MotionScalingParameters, tool_maps
+from teleop_core.coupling.mapping.motion_scaling import MOTION_SCALING
 from teleop_core.graph import HAND, SESSION, STAGES, Graph, Layer, SessionParameters, build_graph, topics
 from teleop_core.graph.former_shapes import present_layer
 from teleop_core.graph.graph import DEVICE
 from teleop_core.graph.layers import parse_layer
+from teleop_core.hand.master.operator import OPERATOR
+from teleop_core.kernels.axes import axis_map
 from teleop_core.kernels.geometry import Array
 from teleop_core.slave import slave, slave_sim
 

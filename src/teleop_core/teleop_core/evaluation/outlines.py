@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from teleop_core.chain.fixtures.reported_fixture import ReportedFixture
+from teleop_core.coupling.fixtures.reported_fixture import ReportedFixture
 from teleop_core.evaluation.context import Context
 from teleop_core.evaluation.figure import DRAWN_FIXTURES, FIXTURE
 from teleop_core.evaluation.state_history import States

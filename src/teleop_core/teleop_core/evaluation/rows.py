@@ -14,7 +14,7 @@ _LEAST = 1e-9  # a number below it is rounding
 
 
 @dataclass(frozen=True)
-class Row:
+class TableRow:
     """One row: what it is, its unit, the value, the published value, and whether both agree.
 
     Rows of one group stand together under its name. ``is_met`` says whether the value agrees with
@@ -31,9 +31,9 @@ class Row:
 
 def row(
     group: str, label: str, unit: str, value: float | None, published: float | None = None, agrees: bool | None = None
-) -> Row:
+) -> TableRow:
     """Row of a number, beside what was published, and whether both agree if that is asked."""
-    return Row(group, label, unit, number(value), number(published, ""), agrees)
+    return TableRow(group, label, unit, number(value), number(published, ""), agrees)
 
 
 def spread_rows(
@@ -43,7 +43,7 @@ def spread_rows(
     spread: Spread,
     figures: tuple[float, float] | None = None,
     agrees: bool | None = None,
-) -> list[Row]:
+) -> list[TableRow]:
     """Three rows of a spread; ``figures`` are the published root mean square and maximum.
 
     Agreement is judged of the root mean square alone: a maximum is one moment of one session.
@@ -56,7 +56,7 @@ def spread_rows(
     ]
 
 
-def error_rows(group: str, label: str, unit: str, spread: Spread) -> list[Row]:
+def error_rows(group: str, label: str, unit: str, spread: Spread) -> list[TableRow]:
     """Root mean square and maximum of a spread of which nothing was published."""
     return [row(group, f"{label}, RMS", unit, spread.rms), row(group, f"{label}, max", unit, spread.max)]
 
@@ -89,12 +89,12 @@ class Line(NamedTuple):
     group: str
     label: str
     unit: str
-    rows: tuple[Row, ...]
+    rows: tuple[TableRow, ...]
 
 
-def summary(score: "Score") -> list[Row]:
+def summary(score: "Score") -> list[TableRow]:
     """Rows of a score; those of one group stand together, where its first row stands."""
-    groups: dict[str, list[Row]] = {}
+    groups: dict[str, list[TableRow]] = {}
     for result in score.results:
         for row in result.rows:
             groups.setdefault(row.group, []).append(row)
@@ -108,7 +108,7 @@ def side_by_side(scores: "Sequence[Score]") -> list[Line]:
     """
     found = [{_place(row): row for row in summary(score)} for score in scores]
     places = dict.fromkeys(place for rows in found for place in rows)
-    lines = [Line(*place, tuple(rows.get(place) or Row(*place, MISSING) for rows in found)) for place in places]
+    lines = [Line(*place, tuple(rows.get(place) or TableRow(*place, MISSING) for rows in found)) for place in places]
     return [line for line in lines if any(row.value not in _NOTHING for row in line.rows)]
 
 
@@ -117,5 +117,5 @@ def is_compared(lines: Sequence[Line]) -> bool:
     return any(row.published for line in lines for row in line.rows)
 
 
-def _place(row: Row) -> tuple[str, str, str]:
+def _place(row: TableRow) -> tuple[str, str, str]:
     return row.group, row.label, row.unit

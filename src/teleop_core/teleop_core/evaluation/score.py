@@ -13,7 +13,7 @@ from teleop_core.evaluation.metrics.orientation_error import OrientationError
 from teleop_core.evaluation.metrics.reach import ReachScore
 from teleop_core.evaluation.plain import Leaf, Plain, Values, leaves, plain
 from teleop_core.evaluation.registry import METRICS, SESSION
-from teleop_core.evaluation.rows import Row, number
+from teleop_core.evaluation.rows import TableRow, number
 from teleop_core.evaluation.verdict import Verdict, verdict_of
 
 if TYPE_CHECKING:
@@ -127,7 +127,7 @@ class Result:
     place: str
     values: Values
     json: dict[str, Plain] | None
-    rows: tuple[Row, ...]
+    rows: tuple[TableRow, ...]
 
 
 class _Found(Generic[Record]):

@@ -9,7 +9,7 @@ from rich.table import Table
 
 from teleop_core.base.texts import printable
 from teleop_core.evaluation.published import ANGLE_FACTOR, POSITION_SHARE, SOURCE, published_for
-from teleop_core.evaluation.rows import MISSING, Row, is_compared, side_by_side
+from teleop_core.evaluation.rows import MISSING, TableRow, is_compared, side_by_side
 from teleop_core.evaluation.score import Score, Session
 
 MET, NOT_MET = "✓", "✗"
@@ -67,7 +67,7 @@ def heading(session: Session) -> str:
     return "\n".join(line for line in lines if line)
 
 
-def _cell(row: Row) -> str:
+def _cell(row: TableRow) -> str:
     if row.is_met is None and (not row.published or row.value == MISSING):
         return escape(row.value)
     if row.is_met is None:

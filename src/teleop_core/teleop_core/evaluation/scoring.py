@@ -21,7 +21,7 @@ from teleop_core.evaluation.origin import read_origin
 from teleop_core.evaluation.plain import Plain, leaves, plain
 from teleop_core.evaluation.published import Gains
 from teleop_core.evaluation.registry import METRICS, all_metrics
-from teleop_core.evaluation.rows import Row
+from teleop_core.evaluation.rows import TableRow
 from teleop_core.evaluation.score import Result, Score, Session
 from teleop_core.evaluation.state_history import StateHistory, read_history
 from teleop_core.evaluation.windows import DisorderError, Seconds, Span, Window, span_of, whole, windows
@@ -48,7 +48,7 @@ class Study(NamedTuple):
         for metric in self.metrics:
             with _named(place, metric):
                 figures = metric.figures()
-                _insist(metric, figures, Figure)
+                _insist(metric, "figures", figures, Figure)
                 found += figures
         return found
 
@@ -193,7 +193,7 @@ def _named(place: str, part: Accumulator | type[Metric]) -> Iterator[None]:
 def _result(context: Context, metric: Metric) -> Result:
     with _named(str(context.bag.path), metric):
         values, rows = metric.values(), metric.rows()
-        _insist(metric, rows, Row)
+        _insist(metric, "rows", rows, TableRow)
         tree = _checked(metric, plain(values))
         return Result(metric.name, metric.place(), values, tree if metric.keys else None, tuple(rows))
 
@@ -207,7 +207,7 @@ def _compared(results: tuple[Result, ...]) -> tuple[Result, ...]:
     share = reach.followed_share if reach is not None else None
     if share is not None and share >= COMPARABLE:
         return results
-    note = Row(REACH_GROUP, "too little to compare", "", _too_little(share))
+    note = TableRow(REACH_GROUP, "too little to compare", "", _too_little(share))
     found = []
     for result in results:
         rows = tuple(replace(entry, is_met=None) for entry in result.rows)
@@ -228,9 +228,9 @@ def _too_little(share: float | None) -> str:
     return f"{math.floor(1000.0 * share) / 10.0:.1f} % < {100.0 * COMPARABLE:.0f} %"
 
 
-def _insist(metric: Metric, found: object, kind: type[object]) -> None:
+def _insist(metric: Metric, method: str, found: object, kind: type[object]) -> None:
     if not isinstance(found, list) or not all(isinstance(entry, kind) for entry in found):
-        expected = f"a metric whose {kind.__name__.lower()}s() is a list of {kind.__name__}"
+        expected = f"a metric whose {method}() is a list of {kind.__name__}"
         raise PartError("metric", metric.name, f"{expected}, not {found!r}")
 
 

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from teleop_core.bags import kept_files, messages, reader
 from teleop_core.base import EvaluationError, TeleopWarning
-from teleop_core.chain.fixtures.reported_fixture import ReportedFixture, reported_fixture
+from teleop_core.coupling.fixtures.reported_fixture import ReportedFixture, reported_fixture
 from teleop_core.evaluation.accumulators import Integers
 from teleop_core.evaluation.pairing import NONE, latest
 from teleop_core.graph import STATE, STATE_FIELDS, topics

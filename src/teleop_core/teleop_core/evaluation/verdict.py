@@ -26,6 +26,7 @@ _CAUSES = {
 _BUSY = "the machine was busy: close other programs, or give the session real-time priority"
 _ADVICE = {
     SHARE: "the slave could not go where the hand led: keep to its reach, or lead it more slowly",
+    "task.successes": "its goals are out of reach, too small or too hasty for who works at it: look at `task.errors`",
     "asked_error_mm.max": "the tip fell behind the hand: lead it more slowly, or lower the gain",
     "position_error_mm.rms": "the drives do not hold the setpoint: lead it more slowly, or give "
     "the controller other gains",
@@ -139,6 +140,12 @@ def _beyond(key: str, fine: float, text: str) -> Callable[[Values], Iterator[Con
     return concern
 
 
+def _in_vain(values: Values) -> Iterator[Concern]:
+    """A task none of whose attempts succeeded."""
+    if (tried := _number(values, "task.attempts")) and not _number(values, "task.successes"):
+        yield Concern(1.0 + tried, "task.successes", f"no success in {tried:.0f} attempts at the task")
+
+
 def _messages(values: Values) -> Iterator[Concern]:
     """Messages that are missing, of all topics: lost, or never sent by a stage that was late."""
     missing, count, lost = (_of_topics(values, name) for name in ("gaps", "count", "lost"))
@@ -197,6 +204,7 @@ _CONCERNS: tuple[Callable[[Values], Iterator[Concern]], ...] = (
     _missing,
     _drift,
     _following,
+    _in_vain,
     _messages,
     _ticks,
     _created,

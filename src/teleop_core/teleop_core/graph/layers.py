@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from teleop_core.base import Spec, TeleopError, UnknownNameError, parameter, plain_yaml, shown, specs
+from teleop_core.base import Spec, TeleopError, UnknownNameError, Within, parameter, plain_yaml, shown, specs
 from teleop_core.base.texts import LONGEST_VALUE
 from teleop_core.graph.stage import STAGES
 
@@ -18,23 +18,20 @@ class RealTimeParameters:
 
     priority: int = parameter(
         -1,
-        lower=-1,
-        upper=98,
-        fixed=True,
-        doc="SCHED_FIFO priority of the loop, and 1 for the threads beside it; 0: fair shares; -1: "
+        Within(-1, 98),
+        "SCHED_FIFO priority of the loop, and 1 for the threads beside it; 0: fair shares; -1: "
         "20 in sessions by side or in one process where the system grants it, else fair shares",
+        fixed=True,
     )
-    cpus: tuple[int, ...] = parameter((), lower=0, fixed=True, doc="processors that the loop may use; empty: all")
+    cpus: tuple[int, ...] = parameter((), Within(0), "processors that the loop may use; empty: all", fixed=True)
     patience: float = parameter(
         0.8,
-        unit="s",
-        lower=0.01,
-        upper=60.0,
+        Within(0.01, 60.0, "s"),
+        "a loop of which nothing came for longer hangs, and ends its process; time for which "
+        "it waited for a processor does not count; 0: never",
         off=0.0,
         fixed=True,
         source="assumed",
-        doc="a loop of which nothing came for longer hangs, and ends its process; time for which "
-        "it waited for a processor does not count; 0: never",
     )
     lock_memory: bool = parameter(False, fixed=True, doc="keep all memory out of swap")
     freeze_gc: bool = parameter(True, fixed=True, doc="keep what exists at the start out of garbage collections")
@@ -45,7 +42,7 @@ class SessionParameters:
     """Parameters of a session as a whole."""
 
     description: str = parameter("", doc="what happens in it, in one sentence")
-    duration: float = parameter(10.0, unit="s", lower=0.001, upper=86400.0, doc="simulated or live time")
+    duration: float = parameter(10.0, Within(0.001, 86400.0, "s"), "simulated or live time")
     ends_with_task: bool = parameter(
         False, fixed=True, doc="end it within a second after no arm's task has a goal left"
     )

@@ -269,7 +269,7 @@ SLAVE_REACH = Topic(
     ),
 )  # fmt: skip
 """How far inverse kinematics can follow: status as of
-:class:`~teleop_core.robots.kinematics.IkStatus`, :class:`Limit`, the joint at its limit (-1: none),
+:class:`~teleop_core.kinematics.IkStatus`, :class:`Limit`, the joint at its limit (-1: none),
 what the answer leaves [m, rad], and by what the command would have to be moved, in slave_base
 [m, rad], to be one that the arm can reach given time."""
 SLAVE_SETPOINT_JS = Topic("slave/setpoint_js", Kind.JOINTS, in_force("slave/servo_jp"), "slave_base")
@@ -411,9 +411,9 @@ TASK_STATE = Topic(
     ),
 )  # fmt: skip
 """What a task asks for now, and what came of it: how many goals there were, what to do at this one
-(:class:`~teleop_core.chain.tasks.Act`), where it is and how wide [m]; attempts, successes and errors so far; of the
+(:class:`~teleop_core.hand.tasks.Act`), where it is and how wide [m]; attempts, successes and errors so far; of the
 last attempt: the way to its goal [m], how far the tip was beyond the goal along it [m], the time it took [s], and what
-was wrong with it (:class:`~teleop_core.chain.tasks.Miss`); the step of the present one, where a task has several. Then
+was wrong with it (:class:`~teleop_core.hand.tasks.Miss`); the step of the present one, where a task has several. Then
 how the tool shall be turned there, and how wide that is [rad]; with how much force to press [N]; and how far beside its
 way the tip would meet something [m]. Zero stands for what a task does not ask for. Last, whether no goal is left."""
 OPERATOR_SERVO_CP = Topic("operator/servo_cp", Kind.POSE, SAMPLED, "master_base")

@@ -5,9 +5,9 @@ from concurrent.futures import Future
 from typing import Any
 
 from teleop_core.base.errors import SessionError, TeleopError
-from teleop_core.chain.devices import Device
-from teleop_core.chain.devices.pilot import Pilot, PilotParameters
-from teleop_core.chain.operators.remote import RemoteHand
+from teleop_core.hand.devices import Device
+from teleop_core.hand.devices.pilot import Pilot, PilotParameters
+from teleop_core.hand.operators.remote import RemoteHand
 from teleop_core.nodes.loop import Loop
 
 PERIOD = 0.01

@@ -140,7 +140,7 @@ class FeedReader:
 
     def __init__(self, channels: Mapping[str, Fed], world: World) -> None:
         self._channels, self._world, self.cut = channels, world, 0
-        self._loops: list[_Loop] = []
+        self._loops: list[_Source] = []
         self._opened: Listener | None = None
         with suppress(OSError):
             self._opened = world.listen(world.feed_place())
@@ -148,7 +148,7 @@ class FeedReader:
     def drain(self) -> None:
         """Hand on all that has come."""
         while self._opened is not None and (line := self._opened.accept()) is not None:
-            self._loops.append(_Loop(line, self._channels, self._world))
+            self._loops.append(_Source(line, self._channels, self._world))
         for one in self._loops:
             one.drain()
         self.cut += sum(not (one.is_open or one.has_ended) for one in self._loops)
@@ -163,7 +163,7 @@ class FeedReader:
         self._loops, self._opened = [], None
 
 
-class _Loop:
+class _Source:
     """What one loop feeds; where it ends, its topics are left to others."""
 
     def __init__(self, line: Line, channels: Mapping[str, Fed], world: World) -> None:

@@ -2,8 +2,8 @@
 
 from typing import Any
 
-from teleop_core.chain.master.haptic_master import HapticMasterParameters
 from teleop_core.graph.topics import HAND_SERVO_CP, MASTER_CONTACT, MASTER_SERVO_CF, OPERATION, SLAVE_OPERATION, Topic
+from teleop_core.hand.master.haptic_master import HapticMasterParameters
 from teleop_core.nodes.crtk import Condition, OperatingState, is_installed
 from teleop_core.nodes.operation import StopInput
 from teleop_core.nodes.ticking import TickingNode

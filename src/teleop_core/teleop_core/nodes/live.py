@@ -20,7 +20,6 @@ from teleop_core.nodes.children import Child, end_all, environment
 from teleop_core.nodes.crews import Crew, Processes, crews
 from teleop_core.nodes.interrupt import Interrupt
 from teleop_core.nodes.keys import Keys
-from teleop_core.nodes.leftovers import remove_leftovers
 from teleop_core.nodes.observer import WARNING, Observer, Status
 from teleop_core.nodes.remote_control import RemoteControl
 from teleop_core.nodes.sessions import announced
@@ -85,7 +84,6 @@ def live(
         raise RecordingError(out, "exists already; choose another --out")
     shared = crews(configuration.graph, processes, without)
     env = environment(domain)
-    remove_leftovers()
     interrupt = interrupt or Interrupt()
     # A file without a name: there is nothing to remove, however this ends.
     with (

@@ -6,14 +6,7 @@ import numpy as np
 
 from teleop_core.bags.markers import MARKERS, Marker, marker_message
 from teleop_core.bags.messages import read_reports
-from teleop_core.graph.topics import (
-    MASTER_MEASURED_CF,
-    MASTER_MEASURED_CP,
-    SLAVE_MEASURED_CP,
-    SLAVE_SERVO_CP,
-    TELEOP_STATE,
-    Topic,
-)
+from teleop_core.graph import topics
 from teleop_core.kernels.geometry import Array
 from teleop_core.nodes.base import CoreNode
 from teleop_core.nodes.model import absolute
@@ -22,7 +15,13 @@ from teleop_core.session.markers import ArmMarkers
 
 PERIOD_NS = 50_000_000
 """Time from one message to the next [ns]."""
-_READ = (MASTER_MEASURED_CF, MASTER_MEASURED_CP, SLAVE_MEASURED_CP, SLAVE_SERVO_CP, TELEOP_STATE)
+_READ = (
+    topics.MASTER_MEASURED_CF,
+    topics.MASTER_MEASURED_CP,
+    topics.SLAVE_MEASURED_CP,
+    topics.SLAVE_SERVO_CP,
+    topics.TELEOP_STATE,
+)
 
 
 class LiveMarkers:
@@ -50,21 +49,21 @@ class LiveMarkers:
         self._publisher.publish(marker_message(self._time_ns(), self._markers(newest)))
 
     def _markers(self, newest: Newest) -> list[Marker]:
-        wrench = self._values(newest, MASTER_MEASURED_CF)
-        stylus = self._values(newest, MASTER_MEASURED_CP)
+        wrench = self._values(newest, topics.MASTER_MEASURED_CF)
+        stylus = self._values(newest, topics.MASTER_MEASURED_CP)
         force = np.zeros(3) if wrench is None else wrench[:3]
-        data = newest.data(self._topics[TELEOP_STATE])
+        data = newest.data(self._topics[topics.TELEOP_STATE])
         texts = read_reports(data)[0].values if data else {}
-        state = {name: float(texts[name]) for name in TELEOP_STATE.columns if name in texts}
+        state = {name: float(texts[name]) for name in topics.TELEOP_STATE.columns if name in texts}
         markers = [self._drawn.fixture(state, texts, float(np.linalg.norm(force)))]
         if stylus is not None:
             markers.append(self._drawn.force(stylus, force))
-        for name, topic in (("measured", SLAVE_MEASURED_CP), ("commanded", SLAVE_SERVO_CP)):
+        for name, topic in (("measured", topics.SLAVE_MEASURED_CP), ("commanded", topics.SLAVE_SERVO_CP)):
             pose = self._values(newest, topic)
             if pose is not None:
                 markers.append(self._drawn.path(name, pose[:3]))
         return markers
 
-    def _values(self, newest: Newest, topic: Topic) -> Any:
+    def _values(self, newest: Newest, topic: topics.Topic) -> Any:
         found = newest.values(self._topics[topic])
         return None if found is None else found[1]

@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from teleop_core.chain.master.master_bridge import RATE_MESSAGE, MasterBridgeParameters
 from teleop_core.graph.topics import MASTER_BUTTONS, MASTER_MEASURED_CP, MASTER_SERVO_CF, Kind, Quality, Topic
+from teleop_core.hand.master.master_bridge import RATE_MESSAGE, MasterBridgeParameters
 from teleop_core.middleware.ros_messages import read_message
 from teleop_core.nodes.news import Trouble
 from teleop_core.nodes.streams import Subscription, message_type

@@ -2,20 +2,13 @@
 
 from typing import Any
 
-from teleop_core.chain.network.network import BACK, THERE
-from teleop_core.chain.network.parameters import NetworkParameters
+from teleop_core.coupling.network.network import BACK, THERE
+from teleop_core.coupling.network.presets import NetworkParameters
+from teleop_core.graph import topics
 from teleop_core.graph.signals import TICK_NS
-from teleop_core.graph.topics import (
-    NETWORK_JAW_SERVO_JP,
-    NETWORK_MASTER_ENERGY,
-    NETWORK_SERVO_CP,
-    NETWORK_SETPOINT_CP,
-    NETWORK_STATE,
-    Topic,
-)
 from teleop_core.nodes.ticking import TickingNode
 
-_THERE = (NETWORK_SERVO_CP, NETWORK_MASTER_ENERGY, NETWORK_JAW_SERVO_JP)
+_THERE = (topics.NETWORK_SERVO_CP, topics.NETWORK_MASTER_ENERGY, topics.NETWORK_JAW_SERVO_JP)
 
 
 class NetworkNode(TickingNode):
@@ -27,7 +20,7 @@ class NetworkNode(TickingNode):
     def setup(self, parameters: NetworkParameters) -> None:
         """Make the network, and open its topics."""
         super().setup(parameters)
-        self._passed = {topic: 0 for topic in self.description.writes if topic is not NETWORK_STATE}
+        self._passed = {topic: 0 for topic in self.description.writes if topic is not topics.NETWORK_STATE}
 
     def turn(self) -> None:
         """Make all steps that are due; a packet is sent when it is read, however late that is."""
@@ -44,10 +37,10 @@ class NetworkNode(TickingNode):
         silent = {topic.name for topic in self._passed if not self._is_due(topic, has_come)}
         self.ports.send(now_ns, silent)
 
-    def _is_due(self, topic: Topic, has_come: Any) -> bool:
+    def _is_due(self, topic: topics.Topic, has_come: Any) -> bool:
         """Whether a topic arrived, and anew."""
         if not has_come[THERE if topic in _THERE else BACK]:
             return False
         before_ns, stamp_ns = self._passed[topic], self.row[f"{topic.field}_ns"]
         self._passed[topic] = stamp_ns
-        return stamp_ns != before_ns or topic is NETWORK_SETPOINT_CP
+        return stamp_ns != before_ns or topic is topics.NETWORK_SETPOINT_CP

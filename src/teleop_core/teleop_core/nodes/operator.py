@@ -6,19 +6,11 @@ from typing import Any
 import numpy as np
 
 from teleop_core.base.errors import PartError
-from teleop_core.chain.operators import OPERATORS
-from teleop_core.chain.operators.follower import MOST
-from teleop_core.chain.operators.parameters import OperatorParameters
-from teleop_core.chain.operators.remote import BUTTONS, RemoteHand
-from teleop_core.graph.topics import (
-    MASTER_MEASURED_CF,
-    MASTER_MEASURED_CP,
-    OPERATOR_BUTTONS,
-    OPERATOR_JAW,
-    OPERATOR_SERVO_CP,
-    SLAVE_MEASURED_CP,
-    Topic,
-)
+from teleop_core.graph import topics
+from teleop_core.hand.operators import OPERATORS
+from teleop_core.hand.operators.behaviour import OperatorParameters
+from teleop_core.hand.operators.follower import MOST
+from teleop_core.hand.operators.remote import BUTTONS, RemoteHand
 from teleop_core.nodes.device_hand import DeviceHand
 from teleop_core.nodes.streams import Input
 from teleop_core.nodes.ticking import TickingNode
@@ -41,11 +33,11 @@ class HandInput:
     def __init__(self, node: Any, hand: RemoteHand, *, has_poses: bool) -> None:
         self._node, self._hand, self._ticks = node, hand, 0
         self._pose, self._pressed, self._closing = np.zeros(7), np.zeros(len(BUTTONS)), np.zeros(1)
-        self._poses = self._open(OPERATOR_SERVO_CP, self._pose) if has_poses else None
-        self._buttons = self._open(OPERATOR_BUTTONS, self._pressed)
-        self._jaw = self._open(OPERATOR_JAW, self._closing)
+        self._poses = self._open(topics.OPERATOR_SERVO_CP, self._pose) if has_poses else None
+        self._buttons = self._open(topics.OPERATOR_BUTTONS, self._pressed)
+        self._jaw = self._open(topics.OPERATOR_JAW, self._closing)
 
-    def _open(self, topic: Topic, target: Any) -> Input:
+    def _open(self, topic: topics.Topic, target: Any) -> Input:
         name, delay = self._node.options.feeds(topic.name)[0]
         of_arm = replace(topic, name=name).of_arm(self._node.arm)
         entry = Input(self._node, of_arm, name, (), target, delay, self._node.options.joy_buttons)
@@ -69,7 +61,7 @@ class HandInput:
         """A stylus that nobody holds."""
         if self._poses is None or self._hand.is_held:
             return []
-        return [f"waits for {OPERATOR_SERVO_CP.name}: nobody holds the stylus"]
+        return [f"waits for {topics.OPERATOR_SERVO_CP.name}: nobody holds the stylus"]
 
     def values(self) -> dict[str, str]:
         """Whether somebody holds the stylus, and who sends the poses."""
@@ -96,11 +88,11 @@ class OperatorNode(TickingNode):
     def setup(self, parameters: OperatorParameters) -> None:
         """Make the operator and open its topics, and its device."""
         super().setup(parameters)
-        self._force = self.stage.signals[MASTER_MEASURED_CF.field]
+        self._force = self.stage.signals[topics.MASTER_MEASURED_CF.field]
         self._hand, self._device = None, None
         self._sees = self.stage.ahead <= MOST
         if not self._sees:  # whoever plans so far ahead answers to nothing
-            for port in (SLAVE_MEASURED_CP, MASTER_MEASURED_CP, MASTER_MEASURED_CF):
+            for port in (topics.SLAVE_MEASURED_CP, topics.MASTER_MEASURED_CP, topics.MASTER_MEASURED_CF):
                 self.input(port).close()
         kind, hand = parameters.kind, self.stage.hand
         operator = OPERATORS.find(kind.kind)
@@ -130,7 +122,7 @@ class OperatorNode(TickingNode):
             self._device.close()
         super().teardown()
 
-    def read_ports(self, trigger: Topic | None = None) -> None:
+    def read_ports(self, trigger: topics.Topic | None = None) -> None:
         """Bring the signals up to date, and read the pose that a person or program commands."""
         self._ticks += 1
         if self._sees or not self.has_own_loop or self._ticks % _LOOK == 0:

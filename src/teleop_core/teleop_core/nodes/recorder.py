@@ -14,11 +14,11 @@ from teleop_core.bags.reports import report
 from teleop_core.bags.writer import BagWriter
 from teleop_core.base.errors import RecordingError, SessionError, TeleopError
 from teleop_core.base.parameters import build, parameter, specs, values_of
-from teleop_core.chain.mapping.parameters import axis_map
 from teleop_core.graph.graph import RECORDER_NAME, Graph
 from teleop_core.graph.layers import SESSION, parse_text
 from teleop_core.graph.stage import Stage
 from teleop_core.graph.topics import DIAGNOSTICS, Quality, Topic
+from teleop_core.kernels.axes import axis_map
 from teleop_core.middleware.world import Outcome
 from teleop_core.nodes.base import CoreNode
 from teleop_core.nodes.display import LiveDisplay

@@ -12,18 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from teleop_core.bags.messages import (
-    BUTTONS,
-    Layout,
-    Refusal,
-    Values,
-    check,
-    layout,
-    read_any,
-    read_numbers,
-    read_reports,
-    report,
-)
+from teleop_core.bags import messages
 from teleop_core.base.errors import MessageTypeError
 from teleop_core.graph.topics import NO_COMMAND_NS, Kind, Topic
 from teleop_core.kernels.geometry import Array
@@ -113,7 +102,7 @@ class Input:
         joint_names: tuple[str, ...],
         target: Array,
         delay: float = 0.0,
-        buttons: tuple[int, ...] = BUTTONS,
+        buttons: tuple[int, ...] = messages.BUTTONS,
     ) -> None:
         self.topic, self._owner, self._name = topic, owner, name
         self._world, options = owner.world, getattr(owner, "options", None)
@@ -123,13 +112,13 @@ class Input:
         self._is_new = False
         self._joint_names, self._target = topic.names(joint_names), target
         is_report = topic.kind is Kind.REPORT
-        self._layout = None if is_report else layout(topic, joint_names)
+        self._layout = None if is_report else messages.layout(topic, joint_names)
         self._buttons = buttons
-        self._has_own_order = topic.kind is not Kind.BUTTONS or buttons == BUTTONS
-        read_reports(report(0, "", 0, "", {}))  # loads the message types, 60 ms
+        self._has_own_order = topic.kind is not Kind.BUTTONS or buttons == messages.BUTTONS
+        messages.read_reports(messages.report(0, "", 0, "", {}))  # loads the message types, 60 ms
         self._delay_ns = round(delay * 1e9)
-        self._held: deque[tuple[int, int, Values]] = deque()
-        self.received, self.refused = 0, Counter[Refusal]()
+        self._held: deque[tuple[int, int, messages.Values]] = deque()
+        self.received, self.refused = 0, Counter[messages.Refusal]()
         self.sender = options.sender() if options is not None else Sender()
         self._is_fault = options is not None and options.second_publisher == "fault"
         self.stamp_ns: int | None = None
@@ -170,7 +159,7 @@ class Input:
                 pass
         return is_new
 
-    def _next(self) -> tuple[int, Values] | None:
+    def _next(self) -> tuple[int, messages.Values] | None:
         """Next message of the subscription that can be read."""
         while self.subscription is not None and (taken := self.subscription.take()) is not None:
             self.received += 1
@@ -181,7 +170,7 @@ class Input:
             if self._layout is not None and self._has_own_order:
                 known = self._layout.decode_one(taken.data)
             found = known or self._read(taken.data)
-            if not isinstance(found, Refusal):
+            if not isinstance(found, messages.Refusal):
                 return found
             self.refused[found] += 1
         return None
@@ -197,17 +186,17 @@ class Input:
                 return True
         return False
 
-    def _accept(self, stamp_ns: int, values: Values) -> bool:
+    def _accept(self, stamp_ns: int, values: messages.Values) -> bool:
         now_ns, last_ns = self._world.monotonic_ns(), self.stamp_ns
         may_repeat = self.topic.stamp.is_in_force or self._layout is None
         if now_ns - self.arrival_ns > SILENCE_NS or (may_repeat and stamp_ns <= NO_COMMAND_NS):
             last_ns = None
         elif may_repeat and last_ns is not None:
             last_ns -= 1
-        reason = check(self.topic.kind, stamp_ns, values, last_ns)
+        reason = messages.check(self.topic.kind, stamp_ns, values, last_ns)
         if reason is not None:
             self.refused[reason] += 1
-            if reason is Refusal.NOT_NEWER and last_ns is not None:
+            if reason is messages.Refusal.NOT_NEWER and last_ns is not None:
                 self.sender.note_old(stamp_ns, last_ns)
             return False
         if may_repeat:
@@ -218,11 +207,11 @@ class Input:
         self.stamp_ns, self.arrival_ns = stamp_ns, now_ns
         return True
 
-    def _read(self, data: bytes) -> tuple[int, Values] | Refusal:
+    def _read(self, data: bytes) -> tuple[int, messages.Values] | messages.Refusal:
         """Stamp and values of a message with other bytes than ours, or of a report."""
         if self._layout is None:
-            return read_numbers(data, self.topic.columns)
-        return read_any(self.topic.kind, data, self._joint_names, self._buttons)
+            return messages.read_numbers(data, self.topic.columns)
+        return messages.read_any(self.topic.kind, data, self._joint_names, self._buttons)
 
     def age(self) -> float:
         """Time since the last sound message was taken [s]; infinite before the first."""
@@ -257,7 +246,7 @@ class Input:
         elif not is_inside and self.subscription is None:
             self.subscription = Subscription(self._owner, self.topic, self._name, self._waiting)
 
-    def give(self, stamp_ns: int, values: Values) -> None:
+    def give(self, stamp_ns: int, values: messages.Values) -> None:
         """Take a sound sample from a sender in this process."""
         self.received += 1
         if self._delay_ns:
@@ -292,7 +281,9 @@ class Output:
         pending: Where messages wait for :meth:`publish` of their session; None to publish at once.
     """
 
-    def __init__(self, owner: Owner, publisher: Publisher, form: Layout, source: Array, name: str = "") -> None:
+    def __init__(
+        self, owner: Owner, publisher: Publisher, form: messages.Layout, source: Array, name: str = ""
+    ) -> None:
         self.name, self._time_ns, self._send = name, owner.world.time_ns, publisher.send
         self._encode, self._source = form.encode_one, source
         self.sent = 0

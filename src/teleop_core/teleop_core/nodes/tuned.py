@@ -6,7 +6,7 @@ from typing import Any
 
 from teleop_core.bags.messages import BUTTONS
 from teleop_core.base.errors import ParameterError, SessionError, TeleopError
-from teleop_core.base.parameters import Value, build, parameter, specs, values_of
+from teleop_core.base.parameters import Value, Within, build, parameter, specs, values_of
 from teleop_core.graph.layers import RealTimeParameters
 from teleop_core.graph.stage import Runner, Stage
 from teleop_core.middleware.ros import ROS
@@ -26,11 +26,9 @@ class NodeParameters:
     autostart: bool = parameter(True, fixed=True, doc="node configures and activates itself; false: a supervisor does")
     max_catch_up: int = parameter(
         1000,
-        unit="ticks",
-        lower=0,
-        upper=10_000,
+        Within(0, 10_000, "ticks"),
+        "missed ticks that one late wake-up makes up for; beyond them time is dropped",
         fixed=True,
-        doc="missed ticks that one late wake-up makes up for; beyond them time is dropped",
     )
     links: tuple[str, ...] = parameter(
         (),
@@ -40,11 +38,10 @@ class NodeParameters:
     )
     joy_buttons: tuple[int, ...] = parameter(
         BUTTONS,
-        lower=-1,
-        upper=255,
+        Within(-1, 255),
+        "which buttons of an incoming Joy are clutch, fixture and mode, counted from 0; -1: it has none",
         length=3,
         fixed=True,
-        doc="which buttons of an incoming Joy are clutch, fixture and mode, counted from 0; -1: it has none",
     )
     second_publisher: str = parameter(
         "refuse",
@@ -55,21 +52,17 @@ class NodeParameters:
     )
     owner_silence: float = parameter(
         0.5,
-        unit="s",
-        lower=0.0,
-        upper=60.0,
+        Within(0.0, 60.0, "s"),
+        "who owns a topic must be silent for longer before another publisher may take it",
         fixed=True,
         source="assumed",
-        doc="who owns a topic must be silent for longer before another publisher may take it",
     )
     flood_rate: int = parameter(
         5000,
-        unit="1/s",
-        lower=1,
-        upper=1_000_000,
+        Within(1, 1_000_000, "1/s"),
+        "messages of one topic beyond so many a second are refused",
         fixed=True,
         source="assumed",
-        doc="messages of one topic beyond so many a second are refused",
     )
     real_time: RealTimeParameters = field(default_factory=RealTimeParameters)
 

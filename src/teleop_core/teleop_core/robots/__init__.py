@@ -24,17 +24,7 @@ from contextlib import suppress
 from typing import TYPE_CHECKING
 
 from teleop_core.base.errors import ParameterError, TeleopWarning
-from teleop_core.robots.kinematics import (
-    FkBatch,
-    FkOne,
-    FkResult,
-    FkStatus,
-    IkBatch,
-    IkOne,
-    IkResult,
-    IkStatus,
-    Kernels,
-)
+from teleop_core.kinematics import FkBatch, FkOne, FkResult, FkStatus, IkBatch, IkOne, IkResult, IkStatus, Kernels
 from teleop_core.robots.parts import ARGUMENT, ROBOTS, Part, RobotPart, built, from_file, is_urdf, part_name
 from teleop_core.robots.robot import Robot
 

@@ -5,8 +5,8 @@ from collections.abc import Mapping
 from typing import Protocol
 
 from teleop_core.kernels.geometry import Array
+from teleop_core.kinematics import AssembleKernel, FkBatch, FkOne, IkBatch, IkKernel, Kernels, WriteKernel
 from teleop_core.robots.drives import Drives
-from teleop_core.robots.kinematics import AssembleKernel, FkBatch, FkOne, IkBatch, IkKernel, Kernels, WriteKernel
 
 
 class Arm(Protocol):

@@ -7,9 +7,9 @@ from html import escape
 import numpy as np
 
 from teleop_core.kernels.geometry import Array
+from teleop_core.kinematics import DIRECTIONS
 from teleop_core.robots.arm import Arm
 from teleop_core.robots.freedom import freedom, lever
-from teleop_core.robots.kinematics import DIRECTIONS
 from teleop_core.robots.rank import directions_of
 
 _OF_CHAINS = "fixed0_00"  # a symbol of chains from tables, whose geometry is a row of matrices

@@ -7,7 +7,7 @@ import numpy as np
 
 from teleop_core.base.errors import ParameterError
 from teleop_core.kernels.geometry import Array
-from teleop_core.robots.kinematics import FkStatus
+from teleop_core.kinematics import FkStatus
 from teleop_core.robots.robot import Robot
 
 COLUMNS = ("x_m", "y_m", "z_m", "manipulability")

@@ -2,10 +2,11 @@
 
 import numpy as np
 
+from teleop_core import kinematics
 from teleop_core.base import ClosureError, ParameterError, ShapeError
 from teleop_core.kernels import Array, checked_array, is_rigid, raise_pending
-from teleop_core.robots import arm, kinematics
-from teleop_core.robots.kinematics import MAX_ASSEMBLIES, SEARCH, FkBatch, FkOne, FkResult, FkStatus
+from teleop_core.kinematics import MAX_ASSEMBLIES, SEARCH, FkBatch, FkOne, FkResult, FkStatus
+from teleop_core.robots import arm
 
 _NOT_CLOSED = int(FkStatus.NOT_CLOSED)
 _STATUS = tuple(FkStatus)

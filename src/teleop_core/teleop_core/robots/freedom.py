@@ -12,9 +12,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from teleop_core import kinematics
 from teleop_core.kernels import Array, length, product, raise_pending, rotations_from_quaternions
-from teleop_core.robots import arm, kinematics
-from teleop_core.robots.kinematics import IkStatus
+from teleop_core.kinematics import IkStatus
+from teleop_core.robots import arm
 
 # One step of the walk turns the tool so far [rad], or takes it as far as a lever of reach/pi would.
 STEP = math.radians(2.0)

@@ -3,7 +3,7 @@
 Link i of a chain is T_i = Rz(theta) Tz(d) Tx(a) Rx(alpha), the standard convention. A built arm has theta + its error
 of theta and so on; joint offsets are errors of theta on turning and of d on sliding joints.
 :func:`~teleop_core.robots.arms.as_chain.true_chain` gives the geometry row of the arm as built, on which
-:func:`teleop_core.robots.chains.dh_kernels.fk` says where its tip really is::
+:func:`teleop_core.kinematics.dh_kernels.fk` says where its tip really is::
 
     errors = LinkErrors.of(robot, {"d3": 5.5e-3})
     dh_kernels.fk(q, true_chain(robot, errors), T_base_tip)
@@ -110,7 +110,7 @@ class Chain:
     """A serial arm T_base_tip = F0 J1 F1 J2 ... Jn Fn, Ji about or along the local z axis.
 
     Args:
-        kinds: Of each joint as in :mod:`~teleop_core.robots.chains.dh_kernels`, (n,).
+        kinds: Of each joint as in :mod:`~teleop_core.kinematics.dh_kernels`, (n,).
         fixed: Transforms F0 ... Fn, (n + 1, 4, 4).
         row: Geometry row of the kernels.
     """

@@ -11,8 +11,8 @@ from typing import NamedTuple
 import numpy as np
 
 from teleop_core.kernels.geometry import Array
+from teleop_core.kinematics import DIRECTIONS
 from teleop_core.robots import arm, freedom
-from teleop_core.robots.kinematics import DIRECTIONS
 
 _POSTURES, _FEW = 128, 4
 _NONE = 1e-6  # singular value, over the lever, of a direction in which the tip cannot move

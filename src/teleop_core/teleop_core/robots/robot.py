@@ -9,12 +9,10 @@ from typing import TYPE_CHECKING, cast, overload
 
 import numpy as np
 
+from teleop_core import kinematics
 from teleop_core.base import ParameterError, ShapeError, UnknownNameError
 from teleop_core.kernels import Array, checked_array, direct, is_rigid, pointer, product, raise_pending
-from teleop_core.robots import description, forward_kinematics, freedom, kinematics
-from teleop_core.robots.drives import Drives, Dynamics, independent_axes, read_only
-from teleop_core.robots.hardware import Hardware
-from teleop_core.robots.kinematics import (
+from teleop_core.kinematics import (
     ASSEMBLE,
     FK,
     IK,
@@ -31,6 +29,9 @@ from teleop_core.robots.kinematics import (
     WriteKernel,
     is_ready,
 )
+from teleop_core.robots import description, forward_kinematics, freedom
+from teleop_core.robots.drives import Drives, Dynamics, independent_axes, read_only
+from teleop_core.robots.hardware import Hardware
 
 if TYPE_CHECKING:
     from teleop_core.robots.bodies.body import Bodies

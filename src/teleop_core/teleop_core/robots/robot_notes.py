@@ -1,7 +1,7 @@
 """Notes on a robot of a URDF: what of it may not be meant, each in a line."""
 
+from teleop_core.kinematics import DIRECTIONS
 from teleop_core.robots.freedom import lever
-from teleop_core.robots.kinematics import DIRECTIONS
 from teleop_core.robots.rank import directions_of
 from teleop_core.robots.robot import Robot
 

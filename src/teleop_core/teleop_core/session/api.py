@@ -19,10 +19,10 @@ from numpy.typing import NDArray
 from teleop_core.bags.memory import MemoryBag, Message
 from teleop_core.bags.series import Series
 from teleop_core.base import ParameterError, TeleopError, TeleopWarning
-from teleop_core.chain.operators import OPERATORS, Motion, Operator, following
 from teleop_core.graph import HAND, SESSION, STAGES, Layer, Stage, config_folder, topics
 from teleop_core.graph.graph import DEVICE
 from teleop_core.graph.layers import load_file, parse_setting, scenario_file, setting
+from teleop_core.hand.operators import OPERATORS, Motion, Operator, following
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots import ROBOTS, Robot
 from teleop_core.robots.arms.dh import DhTable
@@ -44,7 +44,7 @@ OperatorLike: TypeAlias = Union[
     str, Path, Operator, Motion, NDArray[np.float64], tuple[Array, Array], "pandas.DataFrame"
 ]
 """An operator: its name; a CSV table or recording; a part; ``motion(times)``; an array whose
-columns are time [s] and what :data:`~teleop_core.chain.operators.Motion` says; times and rows; or a
+columns are time [s] and what :data:`~teleop_core.hand.operators.Motion` says; times and rows; or a
 data frame with columns called as those of such a table."""
 Setting = float | str | bool | Sequence[float] | Sequence[str]
 """Value of a parameter."""

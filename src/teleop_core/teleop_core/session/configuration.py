@@ -7,10 +7,9 @@ from typing import Any
 
 from teleop_core.base import ParameterError, PartError, UnknownNameError, build, specs, values_of
 from teleop_core.base.plain_yaml import written
-from teleop_core.chain.architectures import ARCHITECTURES, impedance
-from teleop_core.chain.operators import OPERATORS
-from teleop_core.chain.passivity import PASSIVITIES
-from teleop_core.chain.passivity.slave_side import PASSIVITY
+from teleop_core.coupling.architectures import ARCHITECTURES, impedance
+from teleop_core.coupling.passivity import PASSIVITIES
+from teleop_core.coupling.passivity.slave_side import PASSIVITY
 from teleop_core.graph import HAND, RECORDER_NAME, STAGES, Graph, Member, build_graph
 from teleop_core.graph.graph import DEVICE
 from teleop_core.graph.layers import (
@@ -23,6 +22,7 @@ from teleop_core.graph.layers import (
     parse_setting,
     scenario_file,
 )
+from teleop_core.hand.operators import OPERATORS
 
 
 @dataclass(frozen=True)

@@ -5,11 +5,11 @@ from dataclasses import fields, replace
 
 import numpy as np
 
-from teleop_core.chain.master.operator import OPERATOR
-from teleop_core.chain.operators import OPERATORS, Setting
-from teleop_core.chain.operators.parameters import OperatorParameters
-from teleop_core.chain.operators.shapes import PHASES
 from teleop_core.graph.layers import SESSION, Layer, SessionParameters
+from teleop_core.hand.master.operator import OPERATOR
+from teleop_core.hand.operators import OPERATORS, Setting
+from teleop_core.hand.operators.behaviour import OperatorParameters
+from teleop_core.hand.operators.shapes import PHASES
 from teleop_core.session.configuration import Configuration
 
 

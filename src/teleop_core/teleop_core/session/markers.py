@@ -6,9 +6,10 @@ from collections.abc import Mapping
 import numpy as np
 
 from teleop_core.bags.markers import Color, Marker, Shape
-from teleop_core.chain.fixtures.reported_fixture import ReportedFixture, reported_fixture
-from teleop_core.chain.mapping.parameters import MotionScalingParameters, axis_map
+from teleop_core.coupling.fixtures.reported_fixture import ReportedFixture, reported_fixture
+from teleop_core.coupling.mapping.gains import MotionScalingParameters
 from teleop_core.kernels import Array, length
+from teleop_core.kernels.axes import axis_map
 from teleop_core.session.model import MASTER, SLAVE
 from teleop_core.shapes import box, sphere
 from teleop_core.shapes.basis.drawing import segments_of

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from teleop_core.bags.reader import Bag
 from teleop_core.bags.transforms import ROBOT_DESCRIPTION, TF, WORLD, TransformMessages, text_message
 from teleop_core.bags.writer import BagWriter
-from teleop_core.chain.mapping.parameters import axis_map
 from teleop_core.graph.graph import RECORDER_NAME
 from teleop_core.graph.topics import MASTER_MEASURED_CP, SLAVE_MEASURED_JS, Topic
+from teleop_core.kernels.axes import axis_map
 from teleop_core.kernels.geometry import Array, quaternion_from_rotation
 from teleop_core.robots import load_robot_set
 from teleop_core.robots.bodies import bodies_of, urdf_of

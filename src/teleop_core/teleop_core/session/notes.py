@@ -1,9 +1,9 @@
 """Notes: what runs but may not be meant, of a configuration before its session begins."""
 
-from teleop_core.chain.mapping import parameters, walls
-from teleop_core.chain.master.device import DeviceParameters
-from teleop_core.chain.master.haptic_master import HapticMasterParameters
+from teleop_core.coupling.mapping import gains, walls
 from teleop_core.graph import BUILT_IN, DT, topics
+from teleop_core.hand.master.device import DeviceParameters
+from teleop_core.hand.master.haptic_master import HapticMasterParameters
 from teleop_core.robots import load_robot_set
 from teleop_core.robots.parts import is_urdf
 from teleop_core.robots.robot_notes import assumed_note, notes_on_robot
@@ -23,7 +23,7 @@ def notes_of(configuration: Configuration, transport: float = 0.0) -> list[str]:
     found = list(configuration.graph.notes)
     for arm in configuration.graph.namespaces:
         master, mapping = (configuration.group(name, arm) for name in BUILT_IN[1:3])
-        if isinstance(master, HapticMasterParameters) and isinstance(mapping, parameters.MotionScalingParameters):
+        if isinstance(master, HapticMasterParameters) and isinstance(mapping, gains.MotionScalingParameters):
             delay = transport + _delay(configuration, arm)
             told = (rendered_note(master.device, mapping.fixture), passive_note(master.device, mapping.fixture, delay))
             found += [f"arm {arm!r}: {note}" if arm else note for note in told if note]
@@ -48,7 +48,7 @@ def _delay(configuration: Configuration, arm: str) -> float:
     )
 
 
-def passive_note(device: DeviceParameters, fixture: parameters.FixtureParameters, delay: float) -> str:
+def passive_note(device: DeviceParameters, fixture: gains.FixtureParameters, delay: float) -> str:
     """What a wall gives back that is stiffer than passive; empty where it is not.
 
     Args:
@@ -68,7 +68,7 @@ def passive_note(device: DeviceParameters, fixture: parameters.FixtureParameters
     return f"the {fixture.wall} wall of {stiffness:.0f} N/m may give back more energy than it took: {until}"
 
 
-def rendered_note(device: DeviceParameters, fixture: parameters.FixtureParameters) -> str:
+def rendered_note(device: DeviceParameters, fixture: gains.FixtureParameters) -> str:
     """What becomes of a wall that is stiffer than the device; empty where none is.
 
     The device bends by force over its stiffness, so wall and device are two springs in series.

@@ -15,10 +15,10 @@ import numpy as np
 
 from teleop_core.bags.reader import Bag
 from teleop_core.base import ParameterError, RecordingError, TeleopWarning, parameter
-from teleop_core.chain.operators import Motion, Operator, Setting
-from teleop_core.chain.operators.rest import REST_TILT
-from teleop_core.chain.operators.shapes import minimum_jerk
 from teleop_core.graph import topics
+from teleop_core.hand.operators import Motion, Operator, Setting
+from teleop_core.hand.operators.rest import REST_TILT
+from teleop_core.hand.operators.shapes import minimum_jerk
 from teleop_core.kernels.geometry import Array, continuous, quaternion_products
 from teleop_core.kernels.portable import arctangent, length
 from teleop_core.session.master_bag import as_master_bag

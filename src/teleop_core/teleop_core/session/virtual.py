@@ -7,9 +7,9 @@ from numpy.typing import NDArray
 
 from teleop_core.bags.arms import PLAYED_KEY
 from teleop_core.base import PartError, ShapeError, TeleopError
-from teleop_core.chain.operators.parameters import insist_on_virtual
 from teleop_core.graph import BUILT_IN, TICK_NS, Runner, assign, topics
 from teleop_core.graph.stage import joints_of
+from teleop_core.hand.operators.behaviour import insist_on_virtual
 from teleop_core.kernels import records
 from teleop_core.session.compose import Rings, Tick, block_dtype, compose
 from teleop_core.session.configuration import Configuration

@@ -1,7 +1,7 @@
 """Shapes: how far a point is from a body, whether it is inside, and how the body is drawn.
 
 One file per shape, in this folder. A virtual fixture holds the hand inside or outside of a shape
-(:mod:`teleop_core.chain.fixtures`); the slave's tool touches one (:mod:`teleop_core.slave.world`).
+(:mod:`teleop_core.coupling.fixtures`); the slave's tool touches one (:mod:`teleop_core.slave.world`).
 """
 
 import re

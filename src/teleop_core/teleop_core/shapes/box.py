@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass
 
-from teleop_core.base import parameter
+from teleop_core.base import Within, parameter
 from teleop_core.kernels import Array, kernel
 from teleop_core.shapes import Shape
 from teleop_core.shapes.basis.drawing import edges_of
@@ -15,11 +15,9 @@ class BoxParameters:
 
     size: tuple[float, ...] = parameter(
         (0.03, 0.03, 0.03),
-        unit="m",
-        lower=1e-4,
-        upper=2.0,
+        Within(1e-4, 2.0, "m"),
+        "wall to wall along x, y, z",
         length=3,
-        doc="wall to wall along x, y, z",
         source="published: Vongbunyong 2008, section 6.3: 30 mm on the slave at gain 1",
     )
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from teleop_core.base.parameters import parameter
+from teleop_core.base.parameters import Within, parameter
 from teleop_core.kernels.geometry import Array
 from teleop_core.shapes import Shape, line
 from teleop_core.shapes.basis import directions, drawing
@@ -15,11 +15,9 @@ from teleop_core.shapes.basis import directions, drawing
 class CapsuleParameters:
     """A rod with round ends."""
 
-    radius: float = parameter(0.01, unit="m", lower=5e-5, upper=1.0, doc="of rod and ends")
-    length: float = parameter(0.06, unit="m", lower=0.0, upper=2.0, doc="between the ends' middles")
-    direction: tuple[float, ...] = parameter(
-        (0.0, 1.0, 0.0), lower=-1.0, upper=1.0, length=3, doc="of the rod, of any length"
-    )
+    radius: float = parameter(0.01, Within(5e-5, 1.0, "m"), "of rod and ends")
+    length: float = parameter(0.06, Within(0.0, 2.0, "m"), "between the ends' middles")
+    direction: tuple[float, ...] = parameter((0.0, 1.0, 0.0), Within(-1.0, 1.0), "of the rod, of any length", length=3)
 
     def __post_init__(self) -> None:
         directions.require_direction("capsule.direction", self.direction)

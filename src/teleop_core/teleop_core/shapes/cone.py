@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from teleop_core.base import parameter
+from teleop_core.base import Within, parameter
 from teleop_core.kernels import Array, dot, kernel
 from teleop_core.shapes import Shape
 from teleop_core.shapes.basis import directions, drawing
@@ -19,22 +19,18 @@ class ConeParameters:
 
     apex: tuple[float, ...] = parameter(
         (0.0, -0.03, 0.0),
-        unit="m",
-        lower=-0.5,
-        upper=0.5,
+        Within(-0.5, 0.5, "m"),
+        "from the middle to the tip",
         length=3,
-        doc="from the middle to the tip",
         source="assumed: as far as the published box is wide",
     )
     axis: tuple[float, ...] = parameter(
-        (0.0, 1.0, 0.0), lower=-1.0, upper=1.0, length=3, doc="from the tip into the cone, of any length"
+        (0.0, 1.0, 0.0), Within(-1.0, 1.0), "from the tip into the cone, of any length", length=3
     )
     half_angle: float = parameter(
         0.4,
-        unit="rad",
-        lower=0.01,
-        upper=1.5,
-        doc="from the axis to the wall",
+        Within(0.01, 1.5, "rad"),
+        "from the axis to the wall",
         source="assumed: so that the funnel is nearly as wide as the published box at the middle",
     )
 

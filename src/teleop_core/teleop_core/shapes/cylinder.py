@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from teleop_core.base import parameter
+from teleop_core.base import Within, parameter
 from teleop_core.kernels import Array, kernel
 from teleop_core.shapes import Shape, line
 from teleop_core.shapes.basis import directions, drawing
@@ -16,24 +16,12 @@ class CylinderParameters:
     """A tube or a post."""
 
     radius: float = parameter(
-        0.015,
-        unit="m",
-        lower=5e-5,
-        upper=1.0,
-        doc="from the axis to the wall",
-        source="assumed: as wide as the published box",
+        0.015, Within(5e-5, 1.0, "m"), "from the axis to the wall", source="assumed: as wide as the published box"
     )
     length: float = parameter(
-        0.03,
-        unit="m",
-        lower=0.0,
-        upper=2.0,
-        doc="from end to end; 0: without ends",
-        source="assumed: as long as the published box",
+        0.03, Within(0.0, 2.0, "m"), "from end to end; 0: without ends", source="assumed: as long as the published box"
     )
-    direction: tuple[float, ...] = parameter(
-        (0.0, 1.0, 0.0), lower=-1.0, upper=1.0, length=3, doc="of its axis, of any length"
-    )
+    direction: tuple[float, ...] = parameter((0.0, 1.0, 0.0), Within(-1.0, 1.0), "of its axis, of any length", length=3)
 
     def __post_init__(self) -> None:
         directions.require_direction("cylinder.direction", self.direction)

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from teleop_core.base.parameters import parameter
+from teleop_core.base.parameters import Within, parameter
 from teleop_core.kernels.geometry import Array
 from teleop_core.shapes import Shape, plane
 from teleop_core.shapes.basis import directions, drawing
@@ -15,14 +15,12 @@ class HalfSpaceParameters:
     """What is in front of a plane."""
 
     normal: tuple[float, ...] = parameter(
-        (0.0, 1.0, 0.0), lower=-1.0, upper=1.0, length=3, doc="from the plane into the half-space, of any length"
+        (0.0, 1.0, 0.0), Within(-1.0, 1.0), "from the plane into the half-space, of any length", length=3
     )
     room: float = parameter(
         0.01,
-        unit="m",
-        lower=0.0,
-        upper=0.5,
-        doc="from the middle down to the plane",
+        Within(0.0, 0.5, "m"),
+        "from the middle down to the plane",
         source="assumed: less than half of the published box",
     )
 

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from teleop_core.base.parameters import parameter
+from teleop_core.base.parameters import Within, parameter
 from teleop_core.kernels.geometry import Array
 from teleop_core.shapes import Shape
 from teleop_core.shapes.basis.distance_grid import DistanceGrid, GridRequest, distance_grid
@@ -14,14 +14,12 @@ class HeightFieldParameters:
     """A table of heights above the middle."""
 
     file: str = parameter("", fixed=True, doc="CSV or .npy: heights [m], a row for each x, a column for each y")
-    spacing: float = parameter(2e-3, unit="m", lower=1e-5, upper=0.1, fixed=True, doc="between heights")
+    spacing: float = parameter(2e-3, Within(1e-5, 0.1, "m"), "between heights", fixed=True)
     step: float = parameter(
         1e-3,
-        unit="m",
-        lower=5e-5,
-        upper=5e-3,
+        Within(5e-5, 5e-3, "m"),
+        "between nodes of the grid of distances: what is smaller than that is rounded off",
         fixed=True,
-        doc="between nodes of the grid of distances: what is smaller than that is rounded off",
     )
 
 

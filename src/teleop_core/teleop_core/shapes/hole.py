@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from teleop_core.base import ParameterError, parameter
+from teleop_core.base import ParameterError, Within, parameter
 from teleop_core.kernels import Array, inner, kernel, length
 from teleop_core.shapes import Shape
 from teleop_core.shapes.basis import directions, drawing
@@ -15,14 +15,12 @@ from teleop_core.shapes.basis import directions, drawing
 class HoleParameters:
     """A round plate and a hole through it; its middle is that of the hole's mouth."""
 
-    radius: float = parameter(0.0055, unit="m", lower=1e-4, upper=1.0, doc="of the hole")
-    thickness: float = parameter(0.03, unit="m", lower=1e-3, upper=1.0, doc="of the plate")
-    plate_radius: float = parameter(0.025, unit="m", lower=1e-3, upper=2.0, doc="of the plate")
-    chamfer: float = parameter(
-        0.002, unit="m", lower=0.0, upper=0.5, doc="width and depth of the chamfer of 45° around the mouth"
-    )
+    radius: float = parameter(0.0055, Within(1e-4, 1.0, "m"), "of the hole")
+    thickness: float = parameter(0.03, Within(1e-3, 1.0, "m"), "of the plate")
+    plate_radius: float = parameter(0.025, Within(1e-3, 2.0, "m"), "of the plate")
+    chamfer: float = parameter(0.002, Within(0.0, 0.5, "m"), "width and depth of the chamfer of 45° around the mouth")
     axis: tuple[float, ...] = parameter(
-        (0.0, 0.0, 1.0), lower=-1.0, upper=1.0, length=3, doc="of the hole, out of its mouth, of any length"
+        (0.0, 0.0, 1.0), Within(-1.0, 1.0), "of the hole, out of its mouth, of any length", length=3
     )
 
     def __post_init__(self) -> None:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from teleop_core.base import parameter
+from teleop_core.base import Within, parameter
 from teleop_core.kernels import Array, kernel, numbers_of
 from teleop_core.shapes import Shape
 from teleop_core.shapes.basis import directions, drawing
@@ -17,18 +17,12 @@ class LineParameters:
 
     radius: float = parameter(
         0.001,
-        unit="m",
-        lower=0.0,
-        upper=0.1,
-        doc="distance from the line that is inside",
+        Within(0.0, 0.1, "m"),
+        "distance from the line that is inside",
         source="assumed: what a hand at ease strays without a push",
     )
-    length: float = parameter(
-        0.0, unit="m", lower=0.0, upper=2.0, doc="from end to end, the middle halfway; 0: without ends"
-    )
-    direction: tuple[float, ...] = parameter(
-        (1.0, 0.0, 0.0), lower=-1.0, upper=1.0, length=3, doc="of the line, of any length"
-    )
+    length: float = parameter(0.0, Within(0.0, 2.0, "m"), "from end to end, the middle halfway; 0: without ends")
+    direction: tuple[float, ...] = parameter((1.0, 0.0, 0.0), Within(-1.0, 1.0), "of the line, of any length", length=3)
 
     def __post_init__(self) -> None:
         directions.require_direction("line.direction", self.direction)

@@ -7,7 +7,7 @@ they are a cubic spline, so that the normal, which is its gradient, turns withou
 import math
 from dataclasses import dataclass
 
-from teleop_core.base import parameter
+from teleop_core.base import Within, parameter
 from teleop_core.kernels import Array, inner, kernel
 from teleop_core.shapes import Shape
 from teleop_core.shapes.basis import directions, distance_grid, spline
@@ -18,23 +18,19 @@ class MeshParameters:
     """A mesh from a file."""
 
     file: str = parameter("", fixed=True, doc="STL, OBJ, PLY, OFF, or what else trimesh reads")
-    scale: float = parameter(1e-3, unit="m", lower=1e-6, upper=1e3, fixed=True, doc="length of the file's unit")
+    scale: float = parameter(1e-3, Within(1e-6, 1e3, "m"), "length of the file's unit", fixed=True)
     angles: tuple[float, ...] = parameter(
         (0.0, 0.0, 0.0),
-        unit="rad",
-        lower=-2.0 * math.pi,
-        upper=2.0 * math.pi,
+        Within(-2.0 * math.pi, 2.0 * math.pi, "rad"),
+        "turns of the mesh about its middle: about x, then y, then z of the base",
         length=3,
         fixed=True,
-        doc="turns of the mesh about its middle: about x, then y, then z of the base",
     )
     step: float = parameter(
         1e-3,
-        unit="m",
-        lower=5e-5,
-        upper=0.05,
+        Within(5e-5, 0.05, "m"),
+        "between nodes of the grid of distances: what is smaller than that is rounded off",
         fixed=True,
-        doc="between nodes of the grid of distances: what is smaller than that is rounded off",
     )
 
 

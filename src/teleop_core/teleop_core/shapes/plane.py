@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from teleop_core.base import parameter
+from teleop_core.base import Within, parameter
 from teleop_core.kernels import Array, kernel
 from teleop_core.shapes import Shape
 from teleop_core.shapes.basis import directions, drawing
@@ -15,7 +15,7 @@ class PlaneParameters:
     """A flat surface."""
 
     normal: tuple[float, ...] = parameter(
-        (0.0, 0.0, 1.0), lower=-1.0, upper=1.0, length=3, doc="out of the shape, of any length"
+        (0.0, 0.0, 1.0), Within(-1.0, 1.0), "out of the shape, of any length", length=3
     )
 
     def __post_init__(self) -> None:

@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass
 
-from teleop_core.base import parameter
+from teleop_core.base import Within, parameter
 from teleop_core.kernels import Array, kernel
 from teleop_core.shapes import Shape
 from teleop_core.shapes.basis import directions, drawing
@@ -14,12 +14,7 @@ class SphereParameters:
     """A ball."""
 
     radius: float = parameter(
-        0.015,
-        unit="m",
-        lower=5e-5,
-        upper=1.0,
-        doc="from the middle to the surface",
-        source="assumed: as wide as the published box",
+        0.015, Within(5e-5, 1.0, "m"), "from the middle to the surface", source="assumed: as wide as the published box"
     )
 
 

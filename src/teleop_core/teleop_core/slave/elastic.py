@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from teleop_core.kernels import Array, PerJoint, inner, kernel
-from teleop_core.robots.chains.rigid_body import invert_positive, write_model
+from teleop_core.robots.dynamics.rigid_body import invert_positive, write_model
 from teleop_core.slave.friction import FrictionState, bend, friction
 from teleop_core.slave.joints import JointNumbers
 from teleop_core.slave.world.contact import add_push

@@ -12,7 +12,7 @@ import numpy as np
 from teleop_core.graph import copy
 from teleop_core.kernels import Array, Fields, PerJoint, inner, kernel
 from teleop_core.kernels.room import room
-from teleop_core.robots.chains.rigid_body import invert_positive, write_model
+from teleop_core.robots.dynamics.rigid_body import invert_positive, write_model
 from teleop_core.slave.arm import Arm
 from teleop_core.slave.friction import FrictionNumbers
 

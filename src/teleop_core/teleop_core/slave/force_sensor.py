@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from teleop_core.base import parameter
+from teleop_core.base import Within, parameter
 from teleop_core.graph import Noise, Row
 from teleop_core.kernels import Fields, Wrench, inner
 from teleop_core.slave.arm import Arm
@@ -43,52 +43,40 @@ class ForceSensorParameters:
 
     force_noise: float = parameter(
         0.0,
-        unit="N",
-        lower=0.0,
-        upper=100.0,
-        doc="standard deviation of each sample, of every axis",
+        Within(0.0, 100.0, "N"),
+        "standard deviation of each sample, of every axis",
         source="assumed: none, an ideal sensor",
     )
     torque_noise: float = parameter(
         0.0,
-        unit="N·m",
-        lower=0.0,
-        upper=10.0,
-        doc="standard deviation of each sample, of every axis",
+        Within(0.0, 10.0, "N·m"),
+        "standard deviation of each sample, of every axis",
         source="assumed: none, an ideal sensor",
     )
     force_bias: tuple[float, ...] = parameter(
         (0.0, 0.0, 0.0),
-        unit="N",
-        lower=-100.0,
-        upper=100.0,
+        Within(-100.0, 100.0, "N"),
+        "what it tells of no force, along the slave's base",
         length=3,
-        doc="what it tells of no force, along the slave's base",
         source="assumed: none, an ideal sensor",
     )
     torque_bias: tuple[float, ...] = parameter(
         (0.0, 0.0, 0.0),
-        unit="N·m",
-        lower=-10.0,
-        upper=10.0,
+        Within(-10.0, 10.0, "N·m"),
+        "what it tells of no torque, along the slave's base",
         length=3,
-        doc="what it tells of no torque, along the slave's base",
         source="assumed: none, an ideal sensor",
     )
     force_bandwidth: float = parameter(
         0.0,
-        unit="Hz",
-        lower=0.0,
-        upper=500.0,
-        doc="of its low-pass of first order, before the noise; 0: it passes everything at once",
+        Within(0.0, 500.0, "Hz"),
+        "of its low-pass of first order, before the noise; 0: it passes everything at once",
         source="assumed: none, an ideal sensor",
     )
     tool_mass: float = parameter(
         0.0,
-        unit="kg",
-        lower=0.0,
-        upper=10.0,
-        doc="of what hangs behind the sensor, at the tip: its weight is measured, its inertia not",
+        Within(0.0, 10.0, "kg"),
+        "of what hangs behind the sensor, at the tip: its weight is measured, its inertia not",
         source="assumed: none, an ideal sensor",
     )
     estimate: bool = parameter(
@@ -96,10 +84,8 @@ class ForceSensorParameters:
     )
     estimate_bandwidth: float = parameter(
         10.0,
-        unit="Hz",
-        lower=0.1,
-        upper=200.0,
-        doc="of the estimate",
+        Within(0.1, 200.0, "Hz"),
+        "of the estimate",
         source="assumed: faster than a hand moves, slower than what steps of encoders blur",
     )
 

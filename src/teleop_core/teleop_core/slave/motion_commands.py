@@ -16,7 +16,7 @@ import numpy as np
 from teleop_core.base.errors import ShapeError
 from teleop_core.graph.topics import NO_COMMAND_NS
 from teleop_core.kernels.geometry import Array
-from teleop_core.robots.kinematics import IkStatus
+from teleop_core.kinematics import IkStatus
 from teleop_core.robots.robot import Robot
 from teleop_core.slave.operation.states import Answer, Event, State
 from teleop_core.slave.velocity import Motion

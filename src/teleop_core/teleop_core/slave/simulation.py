@@ -4,7 +4,7 @@ import math
 
 from teleop_core.graph import Row, copy, topics
 from teleop_core.kernels import Array, PerJoint, inner, kernel, pose_from_transform
-from teleop_core.robots.chains.rigid_body import write_model
+from teleop_core.robots.dynamics.rigid_body import write_model
 from teleop_core.slave.arm import Arm
 from teleop_core.slave.elastic import ElasticNumbers, ElasticState, integrate_elastic
 from teleop_core.slave.force_observer import ObserverNumbers, ObserverState, estimate, forget

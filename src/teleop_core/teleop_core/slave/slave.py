@@ -9,13 +9,13 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from teleop_core.base import ParameterError, parameter
+from teleop_core.base import ParameterError, Within, parameter
 from teleop_core.graph import DT, RunningStage, Stage, assign, topics
 from teleop_core.kernels import Array, kernel, length, pointer, pose_from_transform, record, records
+from teleop_core.kinematics import FK
 from teleop_core.robots import load_robot_set
-from teleop_core.robots.kinematics import FK
-from teleop_core.robots.parameters import RobotParameters
 from teleop_core.robots.robot import Robot
+from teleop_core.robots.selection import RobotParameters
 from teleop_core.slave import arm, commands, motion_commands, simulation, step, trajectory
 from teleop_core.slave.operation import Answer, Event, Fault, OperationParameters, State, command_event
 from teleop_core.slave.operation.states import answer_text, change
@@ -39,9 +39,9 @@ class ReferenceFilterParameters:
     """First-order lag on every joint reference; at rest its output is its input."""
 
     is_on: bool = parameter(True, doc="whether references pass the filter")
-    gain: float = parameter(0.1, lower=0.0, upper=1.0, doc="gain for fast motion", source=_FILTER_SOURCE)
-    zero: float = parameter(100.0, unit="rad/s", lower=0.0, upper=1000.0, doc="zero", source=_FILTER_SOURCE)
-    pole: float = parameter(10.0, unit="rad/s", lower=0.01, upper=1000.0, doc="pole", source=_FILTER_SOURCE)
+    gain: float = parameter(0.1, Within(0.0, 1.0), "gain for fast motion", source=_FILTER_SOURCE)
+    zero: float = parameter(100.0, Within(0.0, 1000.0, "rad/s"), "zero", source=_FILTER_SOURCE)
+    pole: float = parameter(10.0, Within(0.01, 1000.0, "rad/s"), "pole", source=_FILTER_SOURCE)
 
     def __post_init__(self) -> None:
         if not math.isclose(self.gain * self.zero, self.pole, rel_tol=1e-9):
@@ -54,24 +54,18 @@ class SlaveParameters(RobotParameters):
     """Parameters of :class:`Slave`."""
 
     command_timeout: float = parameter(
-        0.1,
-        unit="s",
-        lower=0.002,
-        upper=5.0,
-        doc="the last reference is held when no command came for longer than this",
+        0.1, Within(0.002, 5.0, "s"), "the last reference is held when no command came for longer than this"
     )
     start: tuple[float, ...] = parameter(
         (),
-        unit="rad or m",
+        Within(unit="rad or m"),
+        "joints to which the slave moves from home before it follows; empty: the robot's start",
         fixed=True,
-        doc="joints to which the slave moves from home before it follows; empty: the robot's start",
     )
     starts_at_home: bool = parameter(
         False, fixed=True, doc="whether it starts where it is, at home, if no start is given; a URDF states no home"
     )
-    start_speed: float = parameter(
-        0.5, lower=0.01, upper=1.0, fixed=True, doc="share of the speed limits used on that move"
-    )
+    start_speed: float = parameter(0.5, Within(0.01, 1.0), "share of the speed limits used on that move", fixed=True)
     interpolation: str = parameter(
         "linear",
         choices=INTERPOLATIONS,

@@ -4,14 +4,13 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from teleop_core.base import Choice, ClosureError, ParameterError, choice, parameter
+from teleop_core.base import Choice, ClosureError, ParameterError, Within, choice, parameter
 from teleop_core.graph import DT, RunningStage, Stage, assign, topics
 from teleop_core.kernels import Array, fields_of, pointer, record, record_array
+from teleop_core.kinematics import FK, dh_kernels
 from teleop_core.robots import load_robot_set
-from teleop_core.robots.chains import dh_kernels
 from teleop_core.robots.drives import ACCELERATION, GRAVITY
-from teleop_core.robots.kinematics import FK
-from teleop_core.robots.parameters import RobotParameters
+from teleop_core.robots.selection import RobotParameters
 from teleop_core.slave import handover, simulation, stability, transmission
 from teleop_core.slave.arm import Arm
 from teleop_core.slave.controllers import CONTROLLERS, per_joint
@@ -21,7 +20,7 @@ from teleop_core.slave.friction import bristle_damping
 from teleop_core.slave.plants import PER_JOINT, PLANTS, Physics
 from teleop_core.slave.world import WORLD_OBJECTS, contact, puncture
 from teleop_core.slave.world.button import ButtonNumbers
-from teleop_core.slave.world.parameters import WorldParameters
+from teleop_core.slave.world.contents import WorldParameters
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,19 +41,19 @@ class PlantParameters:
 class SlaveSimParameters(RobotParameters):
     """Parameters of :class:`SlaveSim`."""
 
-    seed: int = parameter(1, lower=0, fixed=True, doc="seed of everything random in the session")
+    seed: int = parameter(1, Within(0), "seed of everything random in the session", fixed=True)
 
     gravity_compensation: str = parameter(
         "published",
         choices=("published", "all", "none"),
         doc="axes whose gravity is fed forward: those of the source (axis 2), all, none",
     )
-    integration_steps: int = parameter(2, lower=1, upper=50, doc="Runge-Kutta steps in each control tick")
+    integration_steps: int = parameter(2, Within(1, 50), "Runge-Kutta steps in each control tick")
     viscous: tuple[float, ...] = parameter(
-        (), unit="N·m·s/rad or N·s/m", lower=0.0, doc="friction of each joint; empty: the plant's"
+        (), Within(0.0, None, "N·m·s/rad or N·s/m"), "friction of each joint; empty: the plant's"
     )
     coulomb: tuple[float, ...] = parameter(
-        (), unit="N·m or N", lower=0.0, doc="dry friction of each joint; empty: the plant's"
+        (), Within(0.0, None, "N·m or N"), "dry friction of each joint; empty: the plant's"
     )
     plant: PlantParameters = field(default_factory=PlantParameters)
     world: WorldParameters = field(default_factory=WorldParameters)

@@ -5,7 +5,7 @@ from enum import IntEnum
 from teleop_core.graph import copy
 from teleop_core.kernels import Array, inner
 from teleop_core.kernels.room import room
-from teleop_core.robots.chains.damped import eliminate, gram, weigh
+from teleop_core.kinematics.damped import eliminate, gram, weigh
 from teleop_core.slave import commands
 from teleop_core.slave.arm import ArmModel
 from teleop_core.slave.commands import SlaveNumbers, SlaveState

@@ -7,7 +7,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from teleop_core.base.texts import one_line
-from teleop_drill.conformance.rows import Finding, Verdict
+from teleop_drill.conformance.crtk_topics import Finding, Verdict
 
 _STYLES = {
     Verdict.OK: "green",

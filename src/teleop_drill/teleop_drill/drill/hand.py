@@ -11,7 +11,7 @@ from typing import Protocol
 
 import numpy as np
 
-from teleop_core.chain.operators.rest import rest_pose
+from teleop_core.hand.operators.rest import rest_pose
 from teleop_core.kernels.geometry import Array
 
 PERIOD = 2e-3

@@ -7,7 +7,7 @@ project.
 from collections.abc import Callable, Iterable
 
 from teleop_core.robots.robot import Robot
-from teleop_drill.conformance.rows import ROWS, Finding, Group, Row, Verdict
+from teleop_drill.conformance.crtk_topics import CRTK_TOPICS, CrtkTopic, Finding, Group, Verdict
 from teleop_drill.nodes.conformance_arm import Arm
 from teleop_drill.nodes.conformance_queries import look
 from teleop_drill.nodes.conformance_trials import TRIALS, TURN, Outcome, Trials
@@ -34,7 +34,7 @@ def examine(arm: Arm, *, may_move: bool, report: Report = lambda _: None, robot:
         robot: What it should be; its forward kinematics are held against the measured tip.
     """
     findings: dict[str, Finding] = {}
-    for row in ROWS:
+    for row in CRTK_TOPICS:
         report(f"looking at {row.name}")
         findings[row.name] = look(arm, row)
     _insist_on_one(findings)
@@ -42,7 +42,7 @@ def examine(arm: Arm, *, may_move: bool, report: Report = lambda _: None, robot:
         _try(arm, findings, report, robot)
     else:
         _skip(findings, "read only")
-    return [findings[row.name] for row in ROWS]
+    return [findings[row.name] for row in CRTK_TOPICS]
 
 
 def left_behind(arm: Arm, *, may_move: bool) -> str:
@@ -65,7 +65,7 @@ def _insist_on_one(findings: dict[str, Finding]) -> None:
         )
 
 
-def _commands(findings: dict[str, Finding]) -> Iterable[tuple[str, Row]]:
+def _commands(findings: dict[str, Finding]) -> Iterable[tuple[str, CrtkTopic]]:
     """Commands whose topics passed."""
     for name, found in list(findings.items()):
         if found.row.group is not Group.QUERY and found.verdict is Verdict.OK:

@@ -12,9 +12,9 @@ from teleop_core.middleware.world import Endpoint, Node, Publisher, Qos, World
 from teleop_core.nodes.guest import Guest
 from teleop_core.nodes.interrupt import Interrupt
 from teleop_core.nodes.streams import message_type
-from teleop_drill.conformance.rows import ROWS
+from teleop_drill.conformance.crtk_topics import CRTK_TOPICS
 
-_ROWS = {row.name: row for row in ROWS}
+_BY_NAME = {row.name: row for row in CRTK_TOPICS}
 _TURN = 0.005
 _SETTLED = 15  # tenths of a second without new ends after which all are known
 
@@ -81,7 +81,7 @@ class Arm(Guest):
     """
 
     def __init__(self, namespace: str, domain: int | None = None, world: World = ROS) -> None:
-        for row in ROWS:  # before anything moves
+        for row in CRTK_TOPICS:  # before anything moves
             message_type(row.ros_type)
         super().__init__("teleop_conformance", domain, world)
         self._own = f"/{self.ros.get_name()}"
@@ -109,7 +109,7 @@ class Arm(Guest):
 
     def _ends(self) -> int:
         """How many publishers and readers its topics have, beside us."""
-        return sum(len(self.publishers(r.name)) + len(self.readers(r.name)) for r in ROWS)
+        return sum(len(self.publishers(r.name)) + len(self.readers(r.name)) for r in CRTK_TOPICS)
 
     def publishers(self, name: str) -> list[Endpoint]:
         """Who sends a topic, beside us."""
@@ -130,7 +130,7 @@ class Arm(Guest):
     def tap(self, name: str) -> Tap:
         """What comes on one of its topics, from the first call on."""
         if name not in self._taps:
-            self._taps[name] = Tap(self.ros, self.path(name), _ROWS[name].ros_type)
+            self._taps[name] = Tap(self.ros, self.path(name), _BY_NAME[name].ros_type)
         return self._taps[name]
 
     def untap(self, name: str) -> None:
@@ -144,7 +144,7 @@ class Arm(Guest):
         Returns once there is one of each, or after a time [s]: until a publisher has found a new
         reader, nothing that it sends is kept, and a motion that begins earlier is not seen whole.
         """
-        made = [Tap(self.ros, self.path(name), _ROWS[name].ros_type) for name in names]
+        made = [Tap(self.ros, self.path(name), _BY_NAME[name].ros_type) for name in names]
         self._keeping.update(zip(names, made, strict=True))
         self.wait(lambda: all(tap.drain() for tap in made), timeout)
 
@@ -173,7 +173,7 @@ class Arm(Guest):
 
     def publisher_of(self, name: str) -> Publisher:
         """Publisher of a command, once the arm reads it."""
-        row = _ROWS[name]
+        row = _BY_NAME[name]
         if row.name not in self._publishers:
             quality = Qos(is_latched=row.name == "state_command")  # as the stock client has it
             own = self.ros.create_publisher(message_type(row.ros_type), self.path(row.name), quality)
@@ -183,7 +183,7 @@ class Arm(Guest):
 
     def message(self, name: str, **values: Any) -> Any:
         """Empty message of a topic, with some fields filled."""
-        return message_type(_ROWS[name].ros_type)(**values)
+        return message_type(_BY_NAME[name].ros_type)(**values)
 
     def wait(self, condition: Callable[[], bool], timeout: float) -> bool:
         """Whether something becomes true within a time [s]."""

@@ -7,7 +7,7 @@ import numpy as np
 
 from teleop_core.bags.messages import SECOND_NS
 from teleop_core.middleware.world import Endpoint
-from teleop_drill.conformance.rows import STATES, Finding, Group, Row, Verdict
+from teleop_drill.conformance.crtk_topics import STATES, CrtkTopic, Finding, Group, Verdict
 from teleop_drill.nodes.conformance_arm import Arm, numbers_of, stamp_of
 
 _LOOK = 0.5  # time in which messages are counted [s]
@@ -16,7 +16,7 @@ _OLD = 1.0  # a measurement may lie back by this [s]
 _UNIT = 1e-3
 
 
-def look(arm: Arm, row: Row) -> Finding:
+def look(arm: Arm, row: CrtkTopic) -> Finding:
     """Finding of one row, without touching the arm."""
     is_command = row.group is Group.COMMAND or row.name == "state_command"
     ends = arm.readers(row.name) if is_command else arm.publishers(row.name)
@@ -32,7 +32,7 @@ def look(arm: Arm, row: Row) -> Finding:
     return _listen(arm, row, ends)
 
 
-def _listen(arm: Arm, row: Row, ends: list[Endpoint]) -> Finding:
+def _listen(arm: Arm, row: CrtkTopic, ends: list[Endpoint]) -> Finding:
     """What comes on a topic with publishers of the right type."""
     messages: list[Any] = []
     tap = arm.tap(row.name)
@@ -57,7 +57,7 @@ def _listen(arm: Arm, row: Row, ends: list[Endpoint]) -> Finding:
     return Finding(row, Verdict.OK, found)
 
 
-def _stamps(row: Row, messages: list[Any], now_ns: int) -> list[str]:
+def _stamps(row: CrtkTopic, messages: list[Any], now_ns: int) -> list[str]:
     """What is wrong with the stamps."""
     if not hasattr(messages[0], "header"):
         return []
@@ -74,7 +74,7 @@ def _stamps(row: Row, messages: list[Any], now_ns: int) -> list[str]:
     return []
 
 
-def _content(row: Row, messages: list[Any]) -> list[str]:
+def _content(row: CrtkTopic, messages: list[Any]) -> list[str]:
     """What is wrong with the numbers, names and words."""
     newest = messages[-1]
     if row.name == "operating_state":
@@ -97,7 +97,7 @@ def _content(row: Row, messages: list[Any]) -> list[str]:
     return []
 
 
-def _joints(row: Row, message: Any, vectors: dict[str, np.ndarray]) -> list[str]:
+def _joints(row: CrtkTopic, message: Any, vectors: dict[str, np.ndarray]) -> list[str]:
     names = list(message.name)
     sizes = {len(values) for values in vectors.values() if len(values)}
     if not sizes:

@@ -10,7 +10,7 @@ import numpy as np
 
 from teleop_core.base.errors import SessionError
 from teleop_core.kernels.geometry import Array
-from teleop_drill.conformance.rows import Verdict
+from teleop_drill.conformance.crtk_topics import Verdict
 from teleop_drill.nodes.conformance_arm import Arm, numbers_of
 
 TURN = 0.01

@@ -1,13 +1,6 @@
 """Evidence of a drill: what a session says of a fault, what the tap hears, what recovery takes."""
 
-from teleop_core.graph.topics import (
-    SLAVE_MEASURED_CP,
-    SLAVE_MEASURED_JS,
-    SLAVE_OPERATION,
-    SLAVE_SETPOINT_JS,
-    SLAVE_TRUE_CP,
-    TELEOP_STATE,
-)
+from teleop_core.graph import topics
 from teleop_core.slave.operation import Fault, State
 from teleop_drill.drill.exercise import Cure, Exercise
 from teleop_drill.drill.judging import Seen
@@ -24,7 +17,7 @@ def note_state(outcome: Outcome, rig: LiveRig, before: dict[str, float]) -> None
     """State that followed, and who told first."""
     begin_ns = rig.begin_ns
     told: list[tuple[int, str]] = []
-    for sent_ns, report in rig.tap.reports(SLAVE_OPERATION):
+    for sent_ns, report in rig.tap.reports(topics.SLAVE_OPERATION):
         if sent_ns >= begin_ns and _differs(report, before):
             told.append((sent_ns, "slave/operation"))
             if outcome.told is None and _is_expected(report, outcome.exercise):
@@ -32,7 +25,7 @@ def note_state(outcome: Outcome, rig: LiveRig, before: dict[str, float]) -> None
                 outcome.fault = Fault(int(report["fault"]))
             if report["fault"] and outcome.fault is Fault.NONE:
                 outcome.fault = Fault(int(report["fault"]))
-    for sent_ns, report in rig.tap.reports(TELEOP_STATE):
+    for sent_ns, report in rig.tap.reports(topics.TELEOP_STATE):
         if sent_ns >= begin_ns and not report["is_following"]:
             told.append((sent_ns, "teleop/state"))
     told += [(ns, f"diagnostics of {n}") for n, ns in rig.warned.items() if ns >= begin_ns]
@@ -54,7 +47,7 @@ def seen_of(outcome: Outcome, rig: LiveRig, time_ns: tuple[int, int], scheduling
     """
     begin_ns, end_ns = time_ns
     true_cp, measured_cp, setpoints, joints = rig.tap.traces(
-        SLAVE_TRUE_CP, SLAVE_MEASURED_CP, SLAVE_SETPOINT_JS, SLAVE_MEASURED_JS
+        topics.SLAVE_TRUE_CP, topics.SLAVE_MEASURED_CP, topics.SLAVE_SETPOINT_JS, topics.SLAVE_MEASURED_JS
     )
     tip = true_cp if len(true_cp) else measured_cp  # the true one only a simulator tells
     told_ns = None if outcome.told is None else begin_ns + round(1e9 * outcome.told)

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from random import Random
 
 from teleop_core.middleware.world import Endpoint, Taken
-from teleop_drill.simulation.ends import Link, Reader, Service, Writer
+from teleop_drill.simulation.ends import Match, Reader, Service, Writer
 from teleop_drill.simulation.machine import Process
 from teleop_drill.simulation.scheduler import Scheduler
 
@@ -169,7 +169,7 @@ class Bus:
             return
         if wanted.is_latched and not offered.is_latched:
             return
-        link = Link(
+        link = Match(
             reader,
             self.found_ns(writer.process, reader),
             self.found_ns(reader.process, writer),
@@ -180,7 +180,7 @@ class Bus:
             link.awaits_last = True
             self.scheduler.at(link.writer_knows_ns, lambda: self._send_last(writer, link))
 
-    def _send_last(self, writer: Writer, link: Link) -> None:
+    def _send_last(self, writer: Writer, link: Match) -> None:
         """Send a late reader what a latched topic has."""
         link.awaits_last = False
         if writer.is_open and not writer.process.is_dead:
@@ -198,7 +198,7 @@ class Bus:
                 return self.lines[key]
         return self._plain
 
-    def carry(self, writer: Writer, link: Link, taken: Taken) -> None:
+    def carry(self, writer: Writer, link: Match, taken: Taken) -> None:
         """Bring a message to a reader."""
         reader, draw = link.reader, self._random.random
         line = self.line(writer.process, reader.process)

@@ -24,7 +24,7 @@ def _name_of(kind: Any) -> str:
 
 
 @dataclass
-class Link:
+class Match:
     """A writer and a reader that have found each other, or will have."""
 
     reader: "Reader"
@@ -53,7 +53,7 @@ class Writer:
         self.ros_type = _name_of(kind)
         self.sender, self.born_ns, self._clock = bus.next_gid(), bus.scheduler.now_ns, process.machine.clock
         self.number, self.is_open, self.is_active = 0, True, True
-        self.links: list[Link] = []
+        self.links: list[Match] = []
         self.history: deque[Taken] = deque(maxlen=None if qos.keeps_all else qos.depth)
 
     def publish(self, message: Any) -> None:

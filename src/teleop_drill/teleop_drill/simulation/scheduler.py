@@ -181,10 +181,6 @@ class Scheduler:
 
     # -- for strands -----------------------------------------------------------------------------
 
-    def charge(self, nanoseconds: int) -> None:
-        """Let what runs take so long [ns]."""
-        self.now_ns += nanoseconds
-
     def look_ns(self) -> int:
         """Time [ns], for whoever reads a clock."""
         self.now_ns += _LOOK_NS

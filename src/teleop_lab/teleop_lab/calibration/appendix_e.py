@@ -11,7 +11,7 @@ Source:
 import numpy as np
 
 from teleop_core.kernels.geometry import Array
-from teleop_core.robots.kinematics import IkStatus
+from teleop_core.kinematics import IkStatus
 from teleop_core.robots.robot import Robot
 from teleop_lab.calibration.measured import CalibrationError, Measured
 

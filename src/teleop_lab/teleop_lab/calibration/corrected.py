@@ -7,12 +7,12 @@ from typing import TypeAlias
 import numpy as np
 
 from teleop_core.kernels.geometry import Array
-from teleop_core.robots.kinematics import DIRECTIONS
+from teleop_core.kinematics import DIRECTIONS
 from teleop_core.robots.link_errors import Chain, LinkErrors, next_axis_motion
 from teleop_core.robots.robot import Robot
 
-Row: TypeAlias = dict[str, float | str]
-Table: TypeAlias = dict[str, str | list[str] | list[Row] | dict[str, dict[str, float]]]
+Comparison: TypeAlias = dict[str, float | str]
+Table: TypeAlias = dict[str, str | list[str] | list[Comparison] | dict[str, dict[str, float]]]
 _STATED = ("inertia", "viscous", "coulomb", "friction_speed", "effort_limit", "speed_limit",
            "encoder_step", "bandwidth")  # fmt: skip
 
@@ -41,14 +41,14 @@ def corrected_table(robot: Robot, errors: LinkErrors) -> Table:
     return table
 
 
-def _rows(robot: Robot, chain: Chain, errors: LinkErrors) -> Iterator[Row]:
+def _rows(robot: Robot, chain: Chain, errors: LinkErrors) -> Iterator[Comparison]:
     """A row for each link, with one before them and one after where the chain has more."""
     first, S = _links(chain.fixed[0])
     if any(abs(value) > 0.0 for value in first.values()):
         yield dict(first)
     for i in range(chain.n):
         drawn, after = _links(chain.fixed[i + 1])
-        row: Row = {
+        row: Comparison = {
             "theta": S[0] + drawn["theta"] + float(errors.theta[i]),
             "d": S[1] + drawn["d"] + float(errors.d[i]),
             "a": drawn["a"] + float(errors.a[i]),
@@ -80,7 +80,7 @@ def _with_joint(constant: float, is_against: bool) -> str:
     return f"{text} {'-' if constant < 0.0 else '+'} {np.format_float_positional(abs(constant))}"
 
 
-def _joint(robot: Robot, i: int) -> Row:
+def _joint(robot: Robot, i: int) -> Comparison:
     return {
         "name": robot.joint_names[i],
         "lower": float(robot.lower[i]),

@@ -20,6 +20,8 @@ a study is a YAML file:
     display.latency: [0.033, 0.133, 0.333]
     coarse_gain: [0.5, 1.0]
   metrics: [task.time_s, task.error_share]        keys of scores, as `teleop evaluate --json`
+  duration: 20.0                                  of each session [s]
+  parts: [mine.py]                                files of your own parts, beside this one
 then:
   teleop study delay.yaml --explain               how many sessions, how long, how many bytes
   teleop study delay.yaml --store delay           killed and called again, it goes on

@@ -10,17 +10,17 @@ from collections.abc import Callable, Iterable
 
 from teleop_lab.experiments.bench import SEEDS, Bench, Session, mean, pooled
 from teleop_lab.experiments.experiment import EXPERIMENTS, Experiment, register_experiment
-from teleop_lab.experiments.outcome import EXACT, Findings, Outcome, Row, Tolerance, absolute, factor, percent
+from teleop_lab.experiments.outcome import EXACT, Comparison, Findings, Outcome, Tolerance, absolute, factor, percent
 
 __all__ = [
     "EXACT",
     "EXPERIMENTS",
     "SEEDS",
     "Bench",
+    "Comparison",
     "Experiment",
     "Findings",
     "Outcome",
-    "Row",
     "Session",
     "Tolerance",
     "absolute",

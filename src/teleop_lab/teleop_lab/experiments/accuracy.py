@@ -15,7 +15,7 @@ from teleop_lab.calibration.appendix_e import ESCAPE, OFFSET_OF_D3, READ, STEP
 from teleop_lab.drawing import axis, joined, published_points
 from teleop_lab.experiments import conditions, experiment
 from teleop_lab.experiments.bench import Bench
-from teleop_lab.experiments.outcome import Findings, Row, absolute
+from teleop_lab.experiments.outcome import Comparison, Findings, absolute
 from teleop_lab.fitting.rests import Mover
 
 DESIRED_MM = np.arange(10.0, 101.0, 10.0)
@@ -145,7 +145,7 @@ def _measure(bench: Bench) -> Findings:
     for name, which in AXES.items():
         error = _errors(which, as_read(exact[name], which.step_mm))
         rows += [
-            Row(
+            Comparison(
                 quantity=quantity,
                 unit="mm",
                 published=printed,
@@ -164,7 +164,7 @@ def _measure(bench: Bench) -> Findings:
     for number, (name, which) in enumerate(AXES.items(), start=1):
         error = _errors(which, as_read(exact[name], which.step_mm))
         rows += [
-            Row(
+            Comparison(
                 quantity=f"error at {way:g} mm",
                 unit="mm",
                 published=was,
@@ -195,13 +195,13 @@ def _rms(values: Array) -> float:
     return float(np.sqrt(np.mean(np.square(values))))
 
 
-def _total_rows(robot: Robot, longer: dict[str, Array], exact: dict[str, Array]) -> list[Row]:
+def _total_rows(robot: Robot, longer: dict[str, Array], exact: dict[str, Array]) -> list[Comparison]:
     """All readings as the ruler gives them, of y from home, less what models expect."""
     read = np.concatenate([which.read_mm for which in AXES.values()])
     drawn = {name: readings(robot, which, longer_d3(robot, 0.0)) for name, which in AXES.items()}
     group = "all readings of the ruler, less what is expected of it"
     return [
-        Row(
+        Comparison(
             quantity=f"RMS, {text}",
             unit="mm",
             group=group,

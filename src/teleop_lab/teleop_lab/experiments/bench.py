@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from teleop_core.base.errors import ParameterError, UnknownNameError
-from teleop_core.chain.operators import Motion
 from teleop_core.evaluation import Score
 from teleop_core.graph.topics import NO_COMMAND_NS
+from teleop_core.hand.operators import Motion
 from teleop_core.kernels.geometry import Array
 from teleop_core.session.recording import Recording, Stream
 from teleop_core.session.runner import silent

@@ -12,7 +12,7 @@ from teleop_core.robots import load_robot
 from teleop_lab.drawing import DARK, Trace, axis, level, line, points
 from teleop_lab.experiments import experiment, joint_steps
 from teleop_lab.experiments.bench import Bench, Session, Settings, mean, pooled
-from teleop_lab.experiments.outcome import Findings, Row, percent
+from teleop_lab.experiments.outcome import Comparison, Findings, percent
 
 _PLANT: Settings = {"plant": "hardware"}
 LAWS: Mapping[str, Settings] = {
@@ -109,7 +109,7 @@ _TRACKED: tuple[tuple[str, str, str, Callable[..., float]], ...] = (
 )
 
 
-def _tracking_rows(scenario: str, found: Mapping[str, list[Tracking]]) -> list[Row]:
+def _tracking_rows(scenario: str, found: Mapping[str, list[Tracking]]) -> list[Comparison]:
     printed = MODES[scenario]
     rows = []
     for field, text, unit, together in _TRACKED:
@@ -118,7 +118,7 @@ def _tracking_rows(scenario: str, found: Mapping[str, list[Tracking]]) -> list[R
             value, is_judged = together(values), field == "rms" and law == "source_pid"
             is_reached = field == "rms" and value <= GOAL_UM
             rows.append(
-                Row(
+                Comparison(
                     quantity=law,
                     unit=unit,
                     predicted=value,
@@ -133,14 +133,16 @@ def _tracking_rows(scenario: str, found: Mapping[str, list[Tracking]]) -> list[R
     return rows
 
 
-def _step_rows(answers: Mapping[str, joint_steps.StepAnswer]) -> list[Row]:
+def _step_rows(answers: Mapping[str, joint_steps.StepAnswer]) -> list[Comparison]:
     rows = []
     for text, unit, value in (
         ("step of a joint, no filter: overshoot, largest of the joints", "%", lambda one: 100.0 * one.overshoot.max()),
         ("rest after it: error of the tip at the encoders, RMS", "µm", lambda one: 1e6 * one.rest_error),
         ("rest after it: largest travel of an encoder in 2 s", "counts", lambda one: one.rest_travel.max()),
     ):
-        rows += [Row(quantity=law, unit=unit, predicted=value(answer), group=text) for law, answer in answers.items()]
+        rows += [
+            Comparison(quantity=law, unit=unit, predicted=value(answer), group=text) for law, answer in answers.items()
+        ]
     return rows
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from teleop_core.evaluation.figure import Figure
 from teleop_lab.experiments.bench import Bench, Settings
 from teleop_lab.experiments.experiment import Experiment
-from teleop_lab.experiments.outcome import EXACT, Findings, Row, percent
+from teleop_lab.experiments.outcome import EXACT, Comparison, Findings, percent
 
 if TYPE_CHECKING:
     from xarray import DataArray
@@ -39,11 +39,11 @@ def _study(bench: Bench, kind: str, delays: tuple[float, ...], gains: tuple[floa
     return lambda key: found[key].mean("seed")
 
 
-def _rises(quantity: str, low: float, high: float, group: str) -> Row:
+def _rises(quantity: str, low: float, high: float, group: str) -> Comparison:
     """Whether a figure is larger in the second case, as the source says; 1 for yes."""
     is_so = float(high > low)
     note = f"{low:.3g} and {high:.3g}"
-    return Row(quantity=quantity, published=1.0, predicted=is_so, within=EXACT, group=group, note=note)
+    return Comparison(quantity=quantity, published=1.0, predicted=is_so, within=EXACT, group=group, note=note)
 
 
 def _delays(bench: Bench) -> Findings:
@@ -53,12 +53,12 @@ def _delays(bench: Bench) -> Findings:
     looks = (some - none) / DELAYS[1]
     pressing, group = "press in targets on a ring", "follow a point that wanders: order"
     rows = [
-        Row(quantity="looks in an attempt: its lengthening per delay", predicted=looks, group=pressing),
-        Row(quantity="time of an attempt, not late", unit="s", predicted=none, group=pressing),
+        Comparison(quantity="looks in an attempt: its lengthening per delay", predicted=looks, group=pressing),
+        Comparison(quantity="time of an attempt, not late", unit="s", predicted=none, group=pressing),
     ]
     for delay, time in zip(DELAYS[2:], pressed[2:], strict=True):
         rows.append(
-            Row(
+            Comparison(
                 quantity=f"time of an attempt, {1e3 * delay:g} ms late",
                 unit="s",
                 published=none + looks * delay,
@@ -101,9 +101,9 @@ def _scaling(bench: Bench) -> Findings:
             at = {LATE: delay, GAIN: gain}
             group = f"{1e3 * delay:g} ms late"
             rows += [
-                Row(quantity=f"time of an attempt, scale {gain:g}", unit="s", group=group,
+                Comparison(quantity=f"time of an attempt, scale {gain:g}", unit="s", group=group,
                     predicted=float(score("task.time_s").sel(at))),
-                Row(quantity=f"throughput, scale {gain:g}", unit="bit/s", group=group,
+                Comparison(quantity=f"throughput, scale {gain:g}", unit="bit/s", group=group,
                     predicted=float(score("task.throughput").sel(at))),
             ]  # fmt: skip
     return Findings(tuple(rows), (_figure(score),), _SCALING_NOTES)

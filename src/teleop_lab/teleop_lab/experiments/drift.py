@@ -5,14 +5,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from teleop_core.chain.operators.shapes import minimum_jerk
-from teleop_core.chain.passivity.port import IN, OUT
+from teleop_core.coupling.passivity.port import IN, OUT
 from teleop_core.evaluation.figure import FIRST, FIXTURE, SECOND, THIRD, Figure
+from teleop_core.hand.operators.shapes import minimum_jerk
 from teleop_core.kernels.geometry import Array
 from teleop_lab.drawing import axis, joined, level
 from teleop_lab.experiments import experiment, transmission
 from teleop_lab.experiments.bench import Bench
-from teleop_lab.experiments.outcome import Findings, Row, absolute
+from teleop_lab.experiments.outcome import Comparison, Findings, absolute
 
 MATERIALS = ("tissue", "silicone", "steel")
 PASSIVITIES = ("none", "tank", "tdpa", "wave")
@@ -100,13 +100,13 @@ def measure_drift(bench: Bench, job: Job) -> Drift:
     )
 
 
-def _rows(found: Mapping[Job, Drift]) -> tuple[Row, ...]:
+def _rows(found: Mapping[Job, Drift]) -> tuple[Comparison, ...]:
     rows = []
     for (material, passivity, round_trip), drift in found.items():
         group = f"{material}, passivity {passivity}, round trip {1e3 * round_trip:.0f} ms"
         ended = len(drift.left)
         rows.append(
-            Row(
+            Comparison(
                 quantity=f"contacts that ended, of {CONTACTS}",
                 predicted=float(ended),
                 note="" if ended == CONTACTS else "the arm was stopped",
@@ -115,21 +115,21 @@ def _rows(found: Mapping[Job, Drift]) -> tuple[Row, ...]:
         )
         if ended == CONTACTS:
             rows += [
-                Row(quantity="drift as the tip leaves", unit="mm", group=group,
+                Comparison(quantity="drift as the tip leaves", unit="mm", group=group,
                     predicted=1e3 * float(drift.leaving.mean()),
                     lowest=1e3 * float(drift.leaving.min()),
                     highest=1e3 * float(drift.leaving.max())),
-                Row(quantity="drift before the next contact, worst", unit="mm", published=0.0,
+                Comparison(quantity="drift before the next contact, worst", unit="mm", published=0.0,
                     basis="goal", predicted=1e3 * float(drift.left.max()),
                     within=absolute(GOAL_MM), group=group),
-                Row(quantity="tip from the hand's command, at rest", unit="mm", published=0.0,
+                Comparison(quantity="tip from the hand's command, at rest", unit="mm", published=0.0,
                     basis="goal", predicted=1e3 * drift.rest, within=absolute(GOAL_MM),
                     group=group),
             ]  # fmt: skip
         rows += [
-            Row(quantity="drift, peak", unit="mm", predicted=1e3 * drift.peak, group=group),
-            Row(quantity="energy out less in, both ports", unit="mJ", predicted=1e3 * drift.given, group=group),
-            Row(quantity="force on the tip, peak", unit="N", predicted=drift.force, group=group),
+            Comparison(quantity="drift, peak", unit="mm", predicted=1e3 * drift.peak, group=group),
+            Comparison(quantity="energy out less in, both ports", unit="mJ", predicted=1e3 * drift.given, group=group),
+            Comparison(quantity="force on the tip, peak", unit="N", predicted=drift.force, group=group),
         ]
     return tuple(rows)
 

@@ -15,7 +15,7 @@ from rich.table import Table
 from teleop_core.evaluation.rows import MISSING
 
 if TYPE_CHECKING:
-    from teleop_lab.experiments.outcome import Outcome, Row
+    from teleop_lab.experiments.outcome import Comparison, Outcome
 
 MARKS = {True: "✓", False: "✗", None: ""}
 _COLORS = {True: "green", False: "red", None: "default"}
@@ -24,7 +24,7 @@ _WIDTH = 110
 _DIGITS = 6  # after the point, the most that any source prints
 
 
-def numbers(row: "Row") -> tuple[str, str, str, str]:
+def numbers(row: "Comparison") -> tuple[str, str, str, str]:
     """Texts of published, predicted, ours and difference.
 
     What is predicted has a decimal more than what was printed, so that rounding shows.
@@ -65,14 +65,14 @@ def _signed(difference: float, published: float) -> str:
     return f"{difference:+.{digits}g}"
 
 
-def spread(row: "Row") -> str:
+def spread(row: "Comparison") -> str:
     """From the smallest to the largest of several seeds."""
     if row.lowest is None or row.highest is None:
         return ""
     return f"{row.lowest:.3g} … {row.highest:.3g}"
 
 
-def within(row: "Row") -> str:
+def within(row: "Comparison") -> str:
     """What counts as agreement."""
     if row.within is None:
         return ""

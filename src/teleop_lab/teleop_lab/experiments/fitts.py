@@ -4,7 +4,7 @@ import math
 
 from teleop_lab.experiments import experiment, look_and_move
 from teleop_lab.experiments.bench import Bench
-from teleop_lab.experiments.outcome import Findings, Row, percent
+from teleop_lab.experiments.outcome import Comparison, Findings, percent
 
 LAGS = (0.0083, 0.025, 0.075, 0.225)
 """By which the screen was late [s]."""
@@ -16,12 +16,12 @@ LATENCIES = (0.033, 0.133, 0.333)
 """Of the display in sessions of the scenario ``point`` [s]."""
 
 
-def _laws() -> list[Row]:
+def _laws() -> list[Comparison]:
     rows = []
     for lag, time in zip(LAGS, TIMES, strict=True):
         found = [look_and_move.movement_time(way, width, lag)[0] for way in WAYS for width in WIDTHS]
         rows.append(
-            Row(
+            Comparison(
                 quantity=f"time of movement, {1e3 * lag:g} ms late",
                 unit="s",
                 published=time,
@@ -32,7 +32,7 @@ def _laws() -> list[Row]:
     return rows
 
 
-def _sessions(bench: Bench) -> list[Row]:
+def _sessions(bench: Bench) -> list[Comparison]:
     """Times of whole sessions, beside the slowing that the look-move cycle predicts."""
     times = []
     for latency in LATENCIES:
@@ -42,7 +42,7 @@ def _sessions(bench: Bench) -> list[Row]:
     for latency, time in zip(LATENCIES[1:], times[1:], strict=True):
         law = times[0] * (look_and_move.CYCLE + latency) / (look_and_move.CYCLE + LATENCIES[0])
         rows.append(
-            Row(
+            Comparison(
                 quantity=f"time of an attempt, display {1e3 * latency:g} ms late",
                 unit="s",
                 published=law,

@@ -7,7 +7,7 @@ from teleop_core.robots import load_robot
 from teleop_lab.drawing import axis, line
 from teleop_lab.experiments import conditions, experiment, master_slave
 from teleop_lab.experiments.bench import Bench, Session, pooled
-from teleop_lab.experiments.outcome import Findings, Row, percent
+from teleop_lab.experiments.outcome import Comparison, Findings, percent
 
 _OFF = {"gravity_compensation": "none"}
 _CURVE = 2
@@ -26,7 +26,7 @@ def _measure(bench: Bench) -> Findings:
         ours = _rms(bench.sessions(name, conditions.OURS))
         ours_off = _rms(bench.sessions(name, {**conditions.OURS, **_OFF}))
         rows += [
-            Row(
+            Comparison(
                 quantity="with compensation",
                 unit="mm",
                 published=printed.position_mm[0],
@@ -35,8 +35,8 @@ def _measure(bench: Bench) -> Findings:
                 within=percent(15.0),
                 group=group,
             ),
-            Row(quantity="without", unit="mm", predicted=without, ours=ours_off, group=group),
-            Row(quantity="without over with", predicted=without / with_it, ours=ours_off / ours, group=group),
+            Comparison(quantity="without", unit="mm", predicted=without, ours=ours_off, group=group),
+            Comparison(quantity="without over with", predicted=without / with_it, ours=ours_off / ours, group=group),
         ]
         figures.append(_figure(printed.mode, on[0], off[0]))
     return Findings((*rows, *_effort_rows()), tuple(figures), _NOTES)
@@ -48,7 +48,7 @@ _NOTES = (
 )
 
 
-def _effort_rows() -> list[Row]:
+def _effort_rows() -> list[Comparison]:
     """Efforts that hold the arm, beside the closed form for the same parameters."""
     robot = load_robot("rcrt1")
     assert robot.dynamics is not None
@@ -61,7 +61,7 @@ def _effort_rows() -> list[Row]:
         robot.dynamics.gravity(q, robot.dynamics.parameters, held)
         for k, value, name, unit in ((1, values[0], "C2", "N·m"), (2, values[1], "C3", "N")):
             rows.append(
-                Row(
+                Comparison(
                     quantity=f"{name} {where}",
                     unit=unit,
                     published=value,

@@ -10,7 +10,7 @@ from teleop_core.robots import load_robot
 from teleop_lab.drawing import in_space, scene
 from teleop_lab.experiments.bench import Bench
 from teleop_lab.experiments.experiment import Experiment
-from teleop_lab.experiments.outcome import Findings, Row, absolute
+from teleop_lab.experiments.outcome import Comparison, Findings, absolute
 
 _PLACE_CM, _TILT = (93.3013, 20.0, 43.6603), math.radians(30.0)
 _LEGS_CM = (22.3607, 26.7095, 26.7095, 22.3607, 19.1569, 19.1569)
@@ -28,7 +28,7 @@ def _measure(_: Bench) -> Findings:
     offset = np.array([0.0, 0.0, _HEIGHT_CM]) + _TOOL_CM * turned[:, 2]
     back = 1e2 * robot.fk(q)[:3, 3]
     rows = [
-        Row(
+        Comparison(
             quantity=f"leg {k}",
             unit="cm",
             published=printed,
@@ -39,7 +39,9 @@ def _measure(_: Bench) -> Findings:
         for k, (printed, found) in enumerate(zip(_LEGS_CM, q[3:], strict=True), start=1)
     ]
     rows += [
-        Row(quantity=name, unit=unit, published=printed, predicted=found, within=within, group="inverse kinematics")
+        Comparison(
+            quantity=name, unit=unit, published=printed, predicted=found, within=within, group="inverse kinematics"
+        )
         for name, unit, printed, found, within in (
             ("theta1", "°", 0.0, math.degrees(q[0]), _ANGLE),
             ("theta2", "°", 30.0, math.degrees(q[1]), _ANGLE),
@@ -52,7 +54,7 @@ def _measure(_: Bench) -> Findings:
         ("tool, forward again", _PLACE_CM, back),
     ):
         rows += [
-            Row(
+            Comparison(
                 quantity=f"{name}, {letter}",
                 unit="cm",
                 published=printed[k],

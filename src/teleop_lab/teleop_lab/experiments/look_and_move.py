@@ -6,7 +6,7 @@ guides.
 
 import numpy as np
 
-from teleop_core.chain.operators.observer_parameters import ObserverParameters
+from teleop_core.hand.operators.observer_parameters import ObserverParameters
 from teleop_core.kernels.geometry import Array
 
 _PEOPLE = 20_000

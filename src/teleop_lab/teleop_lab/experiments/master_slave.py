@@ -12,7 +12,7 @@ from teleop_core.shapes.basis.drawing import edges_of
 from teleop_lab.drawing import FIXTURE, axis, in_planes, in_space, level, line, scene
 from teleop_lab.experiments import conditions, experiment
 from teleop_lab.experiments.bench import Bench, Session, mean, pooled
-from teleop_lab.experiments.outcome import Findings, Row, Tolerance, absolute, factor, percent
+from teleop_lab.experiments.outcome import Comparison, Findings, Tolerance, absolute, factor, percent
 
 MODES = {"coarse_box": COARSE, "fine_box": FINE}
 BOX_MM = {"coarse_box": 30.0, "fine_box": 3.0}
@@ -68,16 +68,16 @@ def figures_of(session: Session) -> Figures:
 def _row(
     quantity: str, unit: str, published: float | None, found: list[float], ours: list[float],
     within: Tolerance | None, group: str, *, is_rms: bool = False, note: str = "",
-) -> Row:  # fmt: skip
+) -> Comparison:  # fmt: skip
     together = pooled if is_rms else mean
-    return Row(
+    return Comparison(
         quantity=quantity, unit=unit, published=published, predicted=together(found),
         ours=together(ours), within=within, lowest=min(found),
         highest=max(found), group=group, note=note,
     )  # fmt: skip
 
 
-def _mode_rows(name: str, found: list[Figures], ours: list[Figures]) -> list[Row]:
+def _mode_rows(name: str, found: list[Figures], ours: list[Figures]) -> list[Comparison]:
     printed: Published = MODES[name]
     group = f"{printed.mode}, gain {printed.gain:g}"
     rows = []

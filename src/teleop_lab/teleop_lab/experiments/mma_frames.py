@@ -7,7 +7,7 @@ from teleop_core.robots import load_robot
 from teleop_lab.drawing import PUBLISHED, in_space, scene
 from teleop_lab.experiments.bench import Bench
 from teleop_lab.experiments.experiment import Experiment
-from teleop_lab.experiments.outcome import EXACT, Findings, Row, absolute
+from teleop_lab.experiments.outcome import EXACT, Comparison, Findings, absolute
 from teleop_machines import mma_models, mobility
 
 # Frame: printed model, measured prototype [mm].
@@ -29,7 +29,7 @@ def _measure(_: Bench) -> Findings:
     found = mma_models.frames(mma_models.model_table("B", mma.geometry), _SERIAL_HOME)
     places = {name: 1e3 * found[name][:3, 3] for name in TABLE_4_7}
     rows = [
-        Row(quantity=f"frame {name}, {letter}", unit="mm", published=column[k],
+        Comparison(quantity=f"frame {name}, {letter}", unit="mm", published=column[k],
             predicted=places[name][k], within=tolerance, group=group)
         for which, group, tolerance in (
             (0, "model, home, as printed", _PRINTED), (1, "prototype, measured by hand", _BY_HAND)
@@ -40,14 +40,14 @@ def _measure(_: Bench) -> Findings:
     ]  # fmt: skip
     gaps = [float(np.linalg.norm(places[n] - np.array(c[1]))) for n, c in TABLE_4_7.items()]
     rows += [
-        Row(quantity="prototype off the model, largest", unit="mm", predicted=max(gaps),
+        Comparison(quantity="prototype off the model, largest", unit="mm", predicted=max(gaps),
             group="prototype, measured by hand"),
-        Row(quantity="freedoms", published=7.0, predicted=float(mma.n), within=EXACT,
+        Comparison(quantity="freedoms", published=7.0, predicted=float(mma.n), within=EXACT,
             group="mobility, section 3.5"),
-        Row(quantity="independent loops", published=1.0,
+        Comparison(quantity="independent loops", published=1.0,
             predicted=float(mobility.independent_loops(mma_models.LINKS, mma_models.JOINTS)), within=EXACT,
             group="mobility, section 3.5"),
-        Row(quantity="freedoms of the parallelogram", published=2.0,
+        Comparison(quantity="freedoms of the parallelogram", published=2.0,
             predicted=float(mobility.degrees_of_freedom(5, 5, 5, space=mobility.PLANAR)), within=EXACT,
             group="mobility, section 3.5"),
     ]  # fmt: skip

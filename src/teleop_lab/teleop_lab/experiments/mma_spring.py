@@ -8,7 +8,7 @@ from teleop_core.evaluation.figure import DARK, SECOND, THIRD, Figure
 from teleop_lab.drawing import axis, line, published_points
 from teleop_lab.experiments.bench import Bench
 from teleop_lab.experiments.experiment import Experiment
-from teleop_lab.experiments.outcome import EXACT, Findings, Row, absolute, percent
+from teleop_lab.experiments.outcome import EXACT, Comparison, Findings, absolute, percent
 from teleop_machines import mma_balance
 
 _OPEN, _SQUARE = math.radians(135.0), math.radians(90.0)
@@ -20,7 +20,7 @@ def _measure(_: Bench) -> Findings:
     total = sum(mma_balance.MASSES.values())
     spring = mma_balance.ShoulderSpring()
     rows = [
-        Row(
+        Comparison(
             quantity="total mass",
             unit="g",
             published=310.36,
@@ -35,7 +35,7 @@ def _measure(_: Bench) -> Findings:
     )
     group = "torque about the shoulder"
     rows += [
-        Row(quantity=name, unit="N·m", published=printed, predicted=value, within=absolute(1e-4), group=group)
+        Comparison(quantity=name, unit="N·m", published=printed, predicted=value, within=absolute(1e-4), group=group)
         for name, printed, value in (
             ("link 2 at 45°", 1.0349, first),
             ("link 2 level", 1.1926, second),
@@ -45,7 +45,7 @@ def _measure(_: Bench) -> Findings:
     rows += [*_spring_rows(spring, second - first), *_coil_rows()]
     load = mma_balance.shoulder_load(np.radians([-45.0, 0.0]), spring)
     rows += [
-        Row(
+        Comparison(
             quantity=f"left for the hand, link 2 {pose}",
             unit="N·m",
             predicted=float(left),
@@ -62,7 +62,7 @@ _NOTES = (
 )
 
 
-def _spring_rows(spring: mma_balance.ShoulderSpring, difference: float) -> list[Row]:
+def _spring_rows(spring: mma_balance.ShoulderSpring, difference: float) -> list[Comparison]:
     deflection = float(spring.length(_OPEN) - spring.length(_SQUARE))
     rate = mma_balance.matching_rate(difference, deflection, float(spring.lever(_SQUARE)))
     found = (
@@ -75,12 +75,14 @@ def _spring_rows(spring: mma_balance.ShoulderSpring, difference: float) -> list[
         ("rate with safety 1.15", "N/m", 754.57, _SAFETY * rate),
     )
     return [
-        Row(quantity=name, unit=unit, published=printed, predicted=value, within=_CLOSE, group="spring, eqs. 5.22-5.33")
+        Comparison(
+            quantity=name, unit=unit, published=printed, predicted=value, within=_CLOSE, group="spring, eqs. 5.22-5.33"
+        )
         for name, unit, printed, value in found
     ]
 
 
-def _coil_rows() -> list[Row]:
+def _coil_rows() -> list[Comparison]:
     wound = mma_balance.coil()
     found = (
         ("turns", "", 13.0, float(wound.turns)),
@@ -90,7 +92,7 @@ def _coil_rows() -> list[Row]:
         ("pitch", "mm", 4.31, 1e3 * wound.pitch),
     )
     return [
-        Row(
+        Comparison(
             quantity=name,
             unit=unit,
             published=printed,

@@ -10,10 +10,10 @@ from scipy.linalg import expm
 from scipy.optimize import brentq
 
 from teleop_core.base.parameters import build
-from teleop_core.chain.mapping.motion_scaling import MotionScaling
-from teleop_core.chain.mapping.parameters import MotionScalingParameters
-from teleop_core.chain.master.haptic_master import HapticMaster, HapticMasterParameters
+from teleop_core.coupling.mapping.gains import MotionScalingParameters
+from teleop_core.coupling.mapping.motion_scaling import MotionScaling
 from teleop_core.graph.signals import DT, TICK_NS
+from teleop_core.hand.master.haptic_master import HapticMaster, HapticMasterParameters
 from teleop_core.kernels.geometry import Array
 
 _AXIS = 1  # of the master's base, along which the hand is pushed

@@ -82,7 +82,7 @@ def factor(amount: float) -> Tolerance:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Row:
+class Comparison:
     """One number of an experiment, each None where there is none.
 
     Attributes:
@@ -163,7 +163,7 @@ class Findings(NamedTuple):
         notes: Sentences without which the numbers mislead.
     """
 
-    rows: tuple[Row, ...]
+    rows: tuple[Comparison, ...]
     figures: tuple[Figure, ...] = ()
     notes: tuple[str, ...] = ()
 
@@ -186,7 +186,7 @@ class Outcome:
     title: str
     source: str
     seed: int
-    rows: tuple[Row, ...]
+    rows: tuple[Comparison, ...]
     figures: tuple[Figure, ...] = ()
     notes: tuple[str, ...] = ()
 
@@ -205,7 +205,7 @@ class Outcome:
         """How many of them agree with what was published."""
         return self.count()[0]
 
-    def row(self, quantity: str, group: str = "") -> Row:
+    def row(self, quantity: str, group: str = "") -> Comparison:
         """The row of a quantity.
 
         Raises:

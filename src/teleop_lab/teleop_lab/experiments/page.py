@@ -11,7 +11,7 @@ from plotly.offline import get_plotlyjs, get_plotlyjs_version
 from teleop_console.report import packing, page_template
 from teleop_core.evaluation.figure import Figure, is_against_time
 from teleop_lab.experiments.experiment_table import MARKS, empty, numbers, spread, summary, within
-from teleop_lab.experiments.outcome import BASES, Outcome, Row
+from teleop_lab.experiments.outcome import BASES, Comparison, Outcome
 
 _CLASSES = {True: "met", False: "missed", None: "plain"}
 _STYLE = """
@@ -139,7 +139,7 @@ def _wide(is_wide: bool) -> str:
     return ' class="wide"' if is_wide else ""
 
 
-def _line(row: Row, has_ours: bool, has_spread: bool) -> str:
+def _line(row: Comparison, has_ours: bool, has_spread: bool) -> str:
     published, predicted, ours, difference = numbers(row)
     note = f"<small>{escape(row.note)}</small>" if row.note else ""
     cells: list[Any] = [

@@ -6,7 +6,7 @@ from teleop_core.evaluation.figure import FIRST, SECOND, Figure
 from teleop_lab.drawing import axis, line
 from teleop_lab.experiments.bench import Bench
 from teleop_lab.experiments.experiment import Experiment
-from teleop_lab.experiments.outcome import EXACT, Findings, Row
+from teleop_lab.experiments.outcome import EXACT, Comparison, Findings
 from teleop_machines import four_bar_loop, mobility
 
 # Mechanism: space, links, joints, freedoms of the joints, and the printed freedom.
@@ -19,10 +19,10 @@ _COUNTS = {
 _LOOP = four_bar_loop.FourBar(4.0, 1.0, 3.5, 2.5)
 
 
-def _count_rows() -> list[Row]:
+def _count_rows() -> list[Comparison]:
     group = "mobility, eq. 1"
     rows = [
-        Row(
+        Comparison(
             quantity=f"freedoms, {name}",
             published=float(printed),
             predicted=float(mobility.degrees_of_freedom(links, joints, freedoms, space=space)),
@@ -33,7 +33,7 @@ def _count_rows() -> list[Row]:
         for name, (space, links, joints, freedoms, printed) in _COUNTS.items()
     ]
     return rows + [
-        Row(
+        Comparison(
             quantity=f"passive joints, {name}",
             published=float(printed),
             predicted=float(mobility.passive_joints(joints, freedoms)),

@@ -6,16 +6,17 @@ from typing import NamedTuple
 import numpy as np
 
 from teleop_core.base.errors import TeleopError
-from teleop_core.chain.mapping.parameters import MotionScalingParameters, axis_map
-from teleop_core.chain.operators.tour import TourParameters
+from teleop_core.coupling.mapping.gains import MotionScalingParameters
 from teleop_core.evaluation.figure import COMMAND, FIRST, MEASURED, Figure
 from teleop_core.graph.signals import DT
+from teleop_core.hand.operators.tour import TourParameters
+from teleop_core.kernels.axes import axis_map
 from teleop_core.kernels.geometry import Array
 from teleop_lab.drawing import axis, line
 from teleop_lab.experiments.bench import Bench, Session, Settings, mean
 from teleop_lab.experiments.conditions import OURS, PREDICTED
 from teleop_lab.experiments.experiment import Experiment
-from teleop_lab.experiments.outcome import EXACT, Findings, Row
+from teleop_lab.experiments.outcome import EXACT, Comparison, Findings
 
 SCENARIO = "points24"
 INNER_MM = 0.5
@@ -121,7 +122,7 @@ def _met(visits: Visits) -> float:
 
 
 def _measure(bench: Bench) -> Findings:
-    rows: list[Row] = []
+    rows: list[Comparison] = []
     blind = _visits(bench, PREDICTED, seeing=False)
     seen = _visits(bench, PREDICTED, seeing=True)
     ours = {"blind": _visits(bench, OURS, seeing=False), "seen": _visits(bench, OURS, seeing=True)}
@@ -130,7 +131,7 @@ def _measure(bench: Bench) -> Findings:
         values = [value(v) for v in (seen if which == "seen" else blind)]
         others = [value(v) for v in ours[which]]
         rows.append(
-            Row(quantity=text, unit=unit, published=published, predicted=mean(values),
+            Comparison(quantity=text, unit=unit, published=published, predicted=mean(values),
                 ours=mean(others), lowest=min(values), highest=max(values),
                 within=EXACT if published is not None else None, group=_GROUPS[which])
         )  # fmt: skip

@@ -11,7 +11,7 @@ from teleop_core.robots import Robot, load_robot
 from teleop_lab.drawing import PUBLISHED, in_space, scene
 from teleop_lab.experiments.bench import Bench
 from teleop_lab.experiments.experiment import Experiment
-from teleop_lab.experiments.outcome import Findings, Row, absolute
+from teleop_lab.experiments.outcome import Comparison, Findings, absolute
 
 _D = math.pi / 180.0
 _WRIST = 80.214 * _D
@@ -53,16 +53,18 @@ TARGETS = {
 _PLACE, _TURN = absolute(1.05e-3), absolute(1.05e-3)
 
 
-def _rows_of(number: int, target: Target, robot: Robot) -> list[Row]:
+def _rows_of(number: int, target: Target, robot: Robot) -> list[Comparison]:
     pose = robot.fk(np.array(target.joints))
     group = f"point {number}, eq. 7.3.{number}"
     rows = [
-        Row(quantity=name, unit="mm", published=printed, predicted=1e3 * found, within=_PLACE,
+        Comparison(quantity=name, unit="mm", published=printed, predicted=1e3 * found, within=_PLACE,
             group=group, note=target.note if name == "z" else "")
         for name, printed, found in zip("xyz", target.place_mm, pose[:3, 3], strict=True)
     ]  # fmt: skip
     rows += [
-        Row(quantity=f"{column}{name}", published=target.turn[i][j], predicted=pose[i, j], within=_TURN, group=group)
+        Comparison(
+            quantity=f"{column}{name}", published=target.turn[i][j], predicted=pose[i, j], within=_TURN, group=group
+        )
         for j, column in enumerate("noa")
         for i, name in enumerate("xyz")
     ]
@@ -75,7 +77,7 @@ def _measure(_: Bench) -> Findings:
     home = 1e3 * robot.fk(robot.home)[:3, 3]
     group = "home, table 6.1 against the joints of table 6.2"
     rows += [
-        Row(quantity=name, unit="mm", published=printed, predicted=found, within=_PLACE, group=group, note=note)
+        Comparison(quantity=name, unit="mm", published=printed, predicted=found, within=_PLACE, group=group, note=note)
         for name, printed, found, note in zip(
             "xyz",
             (416.901, 0.0, -194.414),

@@ -13,7 +13,7 @@ from teleop_core.slave.pair import ArmParameters
 from teleop_lab.drawing import axis, points, published_points
 from teleop_lab.experiments import conditions, experiment
 from teleop_lab.experiments.bench import Bench, Settings
-from teleop_lab.experiments.outcome import Findings, Row, factor, percent
+from teleop_lab.experiments.outcome import Comparison, Findings, factor, percent
 from teleop_lab.experiments.pose_measures import accuracy, repeatability
 from teleop_lab.fitting.rest_table import PUBLISHED, RestTable, read_rests
 from teleop_lab.fitting.rests import rest_positions
@@ -86,17 +86,17 @@ def _rms(values: Array) -> float:
 def _measure_precision(bench: Bench) -> Findings:
     predicted, ours = simulated_rests(bench, conditions.PREDICTED), simulated_rests(bench, conditions.OURS)
     rows = [
-        Row(quantity="precision: largest error", unit="mm", published=_PRECISION_MM,
+        Comparison(quantity="precision: largest error", unit="mm", published=_PRECISION_MM,
             predicted=predicted.errors_mm.max(), ours=ours.errors_mm.max(), within=percent(15.0)),
-        Row(quantity="RMS of all runs", unit="mm", published=_rms(published_rests().errors_mm),
+        Comparison(quantity="RMS of all runs", unit="mm", published=_rms(published_rests().errors_mm),
             predicted=_rms(predicted.errors_mm), ours=_rms(ours.errors_mm), within=percent(15.0)),
     ]  # fmt: skip
     for k, (rms, _, largest, _) in enumerate(_SUMMARY):
         group = f"point {k + 1}"
         rows += [
-            Row(quantity="RMS", unit="mm", published=rms, predicted=_rms(predicted.errors_mm[k]),
+            Comparison(quantity="RMS", unit="mm", published=rms, predicted=_rms(predicted.errors_mm[k]),
                 ours=_rms(ours.errors_mm[k]), within=percent(15.0), group=group),
-            Row(quantity="largest", unit="mm", published=largest,
+            Comparison(quantity="largest", unit="mm", published=largest,
                 predicted=predicted.errors_mm[k].max(), ours=ours.errors_mm[k].max(), group=group),
         ]  # fmt: skip
     return Findings(tuple(rows), (_error_figure(predicted, ours), *_joint_figures(predicted)), _NOTES)
@@ -145,7 +145,7 @@ def _measure_repeatability(bench: Bench) -> Findings:
     predicted, ours = simulated_rests(bench, conditions.PREDICTED), simulated_rests(bench, conditions.OURS)
     spread, spread_ours = (2.0 * r.errors_mm.std(axis=1, ddof=1) for r in (predicted, ours))
     rows = [
-        Row(
+        Comparison(
             quantity="repeatability: 2 S.D. of point 2",
             unit="mm",
             published=_REPEATABILITY_MM,
@@ -155,7 +155,7 @@ def _measure_repeatability(bench: Bench) -> Findings:
         )
     ]
     rows += [
-        Row(quantity=f"2 S.D. of point {k + 1}", unit="mm", published=2.0 * sd,
+        Comparison(quantity=f"2 S.D. of point {k + 1}", unit="mm", published=2.0 * sd,
             predicted=spread[k], ours=spread_ours[k], within=factor(2.0))
         for k, (_, sd, _, _) in enumerate(_SUMMARY) if k != 1
     ]  # fmt: skip
@@ -166,7 +166,7 @@ def _measure_repeatability(bench: Bench) -> Findings:
     ):
         printed, simulated, own = (float(values.max()) for values in found)
         rows.append(
-            Row(
+            Comparison(
                 quantity=f"ISO 9283, {name}: largest of the points",
                 unit="mm",
                 published=printed,

@@ -7,14 +7,14 @@ from functools import partial
 
 import numpy as np
 
-from teleop_core.chain.operators.human import HumanParameters
-from teleop_core.chain.operators.shapes import minimum_jerk
 from teleop_core.evaluation.figure import FIRST, FIXTURE, MEASURED, SECOND, THIRD, Figure
+from teleop_core.hand.operators.human import HumanParameters
+from teleop_core.hand.operators.shapes import minimum_jerk
 from teleop_core.kernels.geometry import Array
 from teleop_lab.drawing import PUBLISHED, axis, joined
 from teleop_lab.experiments.bench import Bench, Settings
 from teleop_lab.experiments.experiment import Experiment
-from teleop_lab.experiments.outcome import Findings, Row, absolute
+from teleop_lab.experiments.outcome import Comparison, Findings, absolute
 from teleop_lab.experiments.transmission import CHANNELS, Way, far_settings
 
 WAYS: tuple[Way, ...] = (
@@ -115,13 +115,13 @@ def measure_puncture(bench: Bench, job: Job) -> Puncture:
     return Puncture(float(falls[begin]), drop, 1e-3 * (noticed - begin), deepest)
 
 
-def _rows(found: Mapping[Job, Puncture]) -> tuple[Row, ...]:
+def _rows(found: Mapping[Job, Puncture]) -> tuple[Comparison, ...]:
     rows = []
     for ((architecture, passivity), late), each in found.items():
         group, told = f"{architecture}, passivity {passivity}", f", {1e3 * late:.0f} ms"
         if math.isnan(each.notice):
             rows.append(
-                Row(
+                Comparison(
                     quantity=f"fall of the force on the tip{told}",
                     unit="N",
                     group=group,
@@ -132,7 +132,7 @@ def _rows(found: Mapping[Job, Puncture]) -> tuple[Row, ...]:
             continue
         is_noticed = math.isfinite(each.notice)
         rows.append(
-            Row(
+            Comparison(
                 quantity=f"fall of the force at the hand{told}",
                 unit="N",
                 group=group,
@@ -144,9 +144,9 @@ def _rows(found: Mapping[Job, Puncture]) -> tuple[Row, ...]:
         if not is_noticed:
             continue
         rows += [
-            Row(quantity=f"noticed after{told}", unit="ms", group=group, published=500.0 * late,
+            Comparison(quantity=f"noticed after{told}", unit="ms", group=group, published=500.0 * late,
                 basis="law", predicted=1e3 * each.notice, within=absolute(_TICKS_MS)),
-            Row(quantity=f"overshoot{told}", unit="mm", group=group,
+            Comparison(quantity=f"overshoot{told}", unit="mm", group=group,
                 published=1e3 * least_overshoot(late), predicted=1e3 * each.overshoot),
         ]  # fmt: skip
     return tuple(rows)

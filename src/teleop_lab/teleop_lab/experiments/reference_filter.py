@@ -12,7 +12,7 @@ from teleop_core.slave.slave import ReferenceFilterParameters
 from teleop_lab.drawing import axis, level, line, points
 from teleop_lab.experiments.bench import Bench, Session, Settings
 from teleop_lab.experiments.experiment import Experiment
-from teleop_lab.experiments.outcome import EXACT, Findings, Row, absolute, factor
+from teleop_lab.experiments.outcome import EXACT, Comparison, Findings, absolute, factor
 
 # Eqs. 6.2.8 and 6.2.9, sign corrected; printed to two digits.
 _COEFFICIENTS = {"of the last output": 0.99, "of the last input": -0.09, "of the input": 0.1}
@@ -56,7 +56,7 @@ def gain_at(frequency: Array) -> Array:
 def _measure(bench: Bench) -> Findings:
     found = (lag(0.0, 0.0, 1.0), lag(0.0, 1.0, 0.0), lag(1.0, 0.0, 0.0))
     rows = [
-        Row(
+        Comparison(
             quantity=f"coefficient {name}",
             published=printed,
             predicted=value,
@@ -66,7 +66,7 @@ def _measure(bench: Bench) -> Findings:
         for (name, printed), value in zip(_COEFFICIENTS.items(), found, strict=True)
     ]
     rows += [
-        Row(
+        Comparison(
             quantity=f"unit step after {k} ticks",
             published=printed,
             predicted=value,
@@ -77,24 +77,24 @@ def _measure(bench: Bench) -> Findings:
         for k, (printed, value) in enumerate(zip(_STEP, step_response(3), strict=True), start=1)
     ]
     rows += [
-        Row(
+        Comparison(
             quantity="gain at rest", published=1.0, predicted=float(gain_at(np.zeros(1))[0]), within=EXACT, group="gain"
         ),
-        Row(
+        Comparison(
             quantity="gain at 50 Hz",
             published=0.1,
             predicted=float(gain_at(np.array([50.0]))[0]),
             within=absolute(0.01),
             group="gain",
         ),
-        Row(quantity="lag behind a ramp", unit="ms", predicted=_ramp_lag_ms(), group="gain"),
+        Comparison(quantity="lag behind a ramp", unit="ms", predicted=_ramp_lag_ms(), group="gain"),
     ]
     session = bench.session("coarse_box", settings=_RESTS)
     jitter = {name: _jitter(session, name) for name in _WRIST}
     group = "jitter of the references with the stylus at rest, half of peak to peak"
     for when, printed, which in (("before", _BEFORE, 0), ("after", _AFTER, 1)):
         rows += [
-            Row(
+            Comparison(
                 quantity=f"{when} the filter, {name}",
                 unit="rad",
                 predicted=pair[which],

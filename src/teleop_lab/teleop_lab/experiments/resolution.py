@@ -10,7 +10,7 @@ from teleop_core.robots import load_robot
 from teleop_lab.drawing import axis, joined, points
 from teleop_lab.experiments.bench import Bench
 from teleop_lab.experiments.experiment import Experiment
-from teleop_lab.experiments.outcome import EXACT, Findings, Row, percent
+from teleop_lab.experiments.outcome import EXACT, Comparison, Findings, percent
 
 _DEGREE, _UM = math.pi / 180.0, 1e-6
 # Printed steps of the joints [°] and of the screw [µm]; the source's own appendix A.4 has the
@@ -33,7 +33,7 @@ def _measure(_: Bench) -> Findings:
     steps = dict(zip(robot.joint_names, robot.drives.encoder_step, strict=True))
     speeds = dict(zip(robot.joint_names, robot.drives.speed_limit, strict=True))
     rows = [
-        Row(
+        Comparison(
             quantity=f"step of {name}",
             unit="°",
             published=printed,
@@ -44,17 +44,23 @@ def _measure(_: Bench) -> Findings:
         for name, printed in _JOINTS.items()
     ]
     rows += [
-        Row(quantity="step of d3", unit="µm", published=_SCREW_UM, predicted=steps["d3"] / _UM,
+        Comparison(quantity="step of d3", unit="µm", published=_SCREW_UM, predicted=steps["d3"] / _UM,
             within=percent(0.1), group=rows[0].group, note="table 3.6 misprints 13.161"),
     ]  # fmt: skip
     turning = [link_step(_REACH, steps[name]) / _UM for name in ("theta1", "theta2")]
     each = np.array([*turning, steps["d3"] / _UM])
     group = "tip at a reach of 460 mm, ΔS = L Δθ"
     rows += [
-        Row(quantity="tip, theta1", unit="µm", published=_TIP_UM, predicted=each[0], within=percent(0.1), group=group),
-        Row(quantity="tip, theta2", unit="µm", published=_TIP_UM, predicted=each[1], within=percent(0.1), group=group),
-        Row(quantity="tip, d3", unit="µm", published=_SCREW_UM, predicted=each[2], within=percent(0.1), group=group),
-        Row(
+        Comparison(
+            quantity="tip, theta1", unit="µm", published=_TIP_UM, predicted=each[0], within=percent(0.1), group=group
+        ),
+        Comparison(
+            quantity="tip, theta2", unit="µm", published=_TIP_UM, predicted=each[1], within=percent(0.1), group=group
+        ),
+        Comparison(
+            quantity="tip, d3", unit="µm", published=_SCREW_UM, predicted=each[2], within=percent(0.1), group=group
+        ),
+        Comparison(
             quantity="tip, all axes",
             unit="µm",
             published=_TIP_ALL_UM,
@@ -66,7 +72,7 @@ def _measure(_: Bench) -> Findings:
     ]
     group = "speeds of the drives, table 3.6"
     rows += [
-        Row(
+        Comparison(
             quantity=f"speed of {name}",
             unit="rpm",
             published=printed,
@@ -77,7 +83,7 @@ def _measure(_: Bench) -> Findings:
         for name, printed in _SPEEDS_RPM.items()
     ]
     rows.append(
-        Row(
+        Comparison(
             quantity="speed of the screw",
             unit="rpm",
             published=_SCREW_RPM,

@@ -15,7 +15,7 @@ from teleop_core.slave import pair, trajectory
 from teleop_lab.drawing import axis, level, line
 from teleop_lab.experiments import conditions, experiment
 from teleop_lab.experiments.bench import Bench, Settings
-from teleop_lab.experiments.outcome import Findings, Row, factor
+from teleop_lab.experiments.outcome import Comparison, Findings, factor
 from teleop_lab.fitting.rest_table import PUBLISHED, read_rests
 
 # What the text reads from its plots once the tip rests [mm].
@@ -98,7 +98,7 @@ def _transient(found: Response) -> tuple[float, float, float]:
 def _measure(bench: Bench) -> Findings:
     predicted, ours = _responses(bench, conditions.PREDICTED), _responses(bench, conditions.OURS)
     rows = [
-        Row(
+        Comparison(
             quantity=f"error at rest, point {k}",
             unit="mm",
             published=printed,
@@ -111,7 +111,7 @@ def _measure(bench: Bench) -> Findings:
         for k, (printed, found, other) in enumerate(zip(_AT_REST_MM, predicted, ours, strict=True), start=1)
     ]
     rows.append(
-        Row(
+        Comparison(
             quantity="error at rest along z, point 3",
             unit="mm",
             published=_POINT_3_Z_MM,
@@ -127,7 +127,7 @@ def _measure(bench: Bench) -> Findings:
         ("settled at", "s", _SETTLED_S, 2),
     ):
         rows += [
-            Row(
+            Comparison(
                 quantity=f"{text}, point {k}",
                 unit=unit,
                 group="on the way, of figures 7.4-7.14",

@@ -12,7 +12,7 @@ from teleop_core.slave.plants.hardware import faults_of
 from teleop_lab.drawing import DARK, axis
 from teleop_lab.experiments import controllers, experiment
 from teleop_lab.experiments.bench import Bench, Settings
-from teleop_lab.experiments.outcome import Findings, Row
+from teleop_lab.experiments.outcome import Comparison, Findings
 
 _PLANT: Settings = {"plant": "hardware", "robot": "rcrt1"}
 _SECONDS = 12.0  # of each session
@@ -106,7 +106,7 @@ def _measure(bench: Bench) -> Findings:
             found[disturbance, law] = error
             note = "refused" if error is None else f"max {error[1]:.0f}"
             rows.append(
-                Row(
+                Comparison(
                     quantity=law,
                     unit="µm",
                     predicted=None if error is None else error[0],
@@ -116,7 +116,7 @@ def _measure(bench: Bench) -> Findings:
             )
     for law in LAWS:
         rows.append(
-            Row(
+            Comparison(
                 quantity=law,
                 unit="ms",
                 predicted=delay_margin(bench, law),
@@ -124,7 +124,7 @@ def _measure(bench: Bench) -> Findings:
             )
         )
     rows += [
-        Row(
+        Comparison(
             quantity=law,
             unit="",
             predicted=gain_margin(bench, law),

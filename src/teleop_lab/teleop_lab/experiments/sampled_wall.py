@@ -5,9 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from teleop_core.chain.mapping.walls import wall_force
-from teleop_core.chain.master.haptic_master import HapticMaster
+from teleop_core.coupling.mapping.walls import wall_force
 from teleop_core.graph import DT, topics
+from teleop_core.hand.master.haptic_master import HapticMaster
 from teleop_core.kernels.geometry import Array
 from teleop_lab.experiments import one_axis
 
@@ -37,7 +37,7 @@ class Wall:
     late: int = 0
 
 
-class Loop:
+class SampledDevice:
     """Our device before a wall; between two samples the force is held.
 
     The spring is the chain's own (``walls.wall_force``, what ``wall=soft`` renders), without the
@@ -108,7 +108,7 @@ class Loop:
 
 def wall_growth(grip: one_axis.Grip, wall: Wall) -> float:
     """Rate [1/s] at which our hand and device swing up before a wall; negative: down."""
-    loop = Loop(grip, wall)
+    loop = SampledDevice(grip, wall)
     loop.move(_KICK)
     place = np.empty(round(_SECONDS / DT) + _DELAYS * wall.late)
     for i in range(len(place)):
@@ -144,7 +144,7 @@ def press_energy(damping: float, wall: Wall, length: int, speed: float) -> float
         length: Periods in, and as many out.
         speed: Of the hand [m/s].
     """
-    loop = Loop(one_axis.Grip(5.0, 1.0, 0.1), wall)
+    loop = SampledDevice(one_axis.Grip(5.0, 1.0, 0.1), wall)
     loop.origin -= 0.25 * speed * DT  # no sample is on the plane: force 0 would end the contact
     before, lost = 0.0, 0.0
     for i in range(4 * length):
@@ -177,7 +177,7 @@ def is_restless(wall: Wall, friction: float, resolution: float, push: float) -> 
         push: Of the hand [steps of the wall's force].
     """
     grip = one_axis.Grip(0.045, 1.0, 0.1)
-    loop = Loop(grip, wall, friction=friction, position_resolution=resolution)
+    loop = SampledDevice(grip, wall, friction=friction, position_resolution=resolution)
     force = push * wall.stiffness * resolution
     loop.aim(loop.origin + force / grip.stiffness)
     forces = [loop.step() for _ in range(600)]

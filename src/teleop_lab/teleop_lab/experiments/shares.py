@@ -7,7 +7,7 @@ from teleop_core.slave.plants.hardware import FAULTS
 from teleop_lab.drawing import axis
 from teleop_lab.experiments import conditions, experiment
 from teleop_lab.experiments.bench import Bench, Session, Settings
-from teleop_lab.experiments.outcome import Findings, Row
+from teleop_lab.experiments.outcome import Comparison, Findings
 
 
 def _without(bench: Bench, *faults: str) -> Session:
@@ -26,11 +26,12 @@ def _measure(bench: Bench) -> Findings:
     none = _errors(_without(bench, *FAULTS))
     rows = []
     for k, group in enumerate(("at the encoders, RMS", "at the true tip, RMS")):
-        rows.append(Row(quantity="all faults", unit="mm", predicted=whole[k], group=group))
+        rows.append(Comparison(quantity="all faults", unit="mm", predicted=whole[k], group=group))
         rows += [
-            Row(quantity=f"without {name}", unit="mm", predicted=found[k], group=group) for name, found in alone.items()
+            Comparison(quantity=f"without {name}", unit="mm", predicted=found[k], group=group)
+            for name, found in alone.items()
         ]
-        rows.append(Row(quantity="without any", unit="mm", predicted=none[k], group=group))
+        rows.append(Comparison(quantity="without any", unit="mm", predicted=none[k], group=group))
     return Findings(tuple(rows), (_figure(whole, alone),), _NOTES)
 
 

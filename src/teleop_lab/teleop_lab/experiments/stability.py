@@ -5,13 +5,13 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from teleop_core.chain.master.device import DeviceParameters
 from teleop_core.evaluation.figure import DARK, FIRST, FIXTURE, SECOND, THIRD, Figure
 from teleop_core.graph.signals import DT
+from teleop_core.hand.master.device import DeviceParameters
 from teleop_lab.drawing import PUBLISHED, axis, joined, line
 from teleop_lab.experiments import experiment, one_axis, transmission
 from teleop_lab.experiments.bench import Bench, Settings
-from teleop_lab.experiments.outcome import Findings, Row, percent
+from teleop_lab.experiments.outcome import Comparison, Findings, percent
 
 GRIPS: Mapping[str, one_axis.Grip] = {
     "loose": one_axis.Grip(0.25, 100.0, 5.0),
@@ -120,7 +120,7 @@ def _measure(bench: Bench) -> Findings:
             told = f"force {1e3 * delay:.0f} ms later"
             exact = one_axis.exact_boundary(grip, delay + DT)
             rows.append(
-                Row(
+                Comparison(
                     quantity=told,
                     unit="N/m",
                     published=exact,
@@ -135,7 +135,7 @@ def _measure(bench: Bench) -> Findings:
             bench.progress(done, total)
     for k, (architecture, passivity) in enumerate(_WAYS):
         rows += [
-            Row(
+            Comparison(
                 quantity=f"force {1e3 * delay:.0f} ms later",
                 unit="N/m",
                 predicted=found[name, delay][k],

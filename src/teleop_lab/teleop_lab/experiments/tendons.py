@@ -10,7 +10,7 @@ from teleop_core.robots.arms.rcrt1_hardware import tendon_joint_angles, tendon_m
 from teleop_lab.drawing import axis, line
 from teleop_lab.experiments.bench import Bench
 from teleop_lab.experiments.experiment import Experiment
-from teleop_lab.experiments.outcome import EXACT, Findings, Row, percent
+from teleop_lab.experiments.outcome import EXACT, Comparison, Findings, percent
 
 # Radii [mm]: 3.5, 2.5, 1.8 and 2.5 are printed, their stars are lost; most likely so.
 _MOTOR5, _JOINT5, _MOTOR6, _JOINT6 = 3.5, 2.5, 1.8, 2.5
@@ -28,18 +28,18 @@ def _measure(_: Bench) -> Findings:
     back = tendon_joint_angles(_motors((0.4, -0.3)), **_RATIOS)
     group = "turns of a motor for one turn of a joint, eqs. 3.5-3.7 and 4.5.7"
     rows = (
-        Row(quantity="motor 5 for joint 5, r5/r5*", published=0.7143, predicted=turn5[0],
+        Comparison(quantity="motor 5 for joint 5, r5/r5*", published=0.7143, predicted=turn5[0],
             within=percent(0.1), basis="law", group=group, note="of the printed radii"),
-        Row(quantity="motor 6 for joint 6, r6/r6*", published=1.3889, predicted=turn6[1],
+        Comparison(quantity="motor 6 for joint 6, r6/r6*", published=1.3889, predicted=turn6[1],
             within=percent(0.1), basis="law", group=group, note="of the printed radii"),
-        Row(quantity="motor 6 for joint 5", published=_JOINT5 / _JOINT6, predicted=turn5[1],
+        Comparison(quantity="motor 6 for joint 5", published=_JOINT5 / _JOINT6, predicted=turn5[1],
             within=percent(0.1), group=group,
             note="eq. 3.7 lacks the ratio r6/r6*, without which joint 6 does not stand still"),
-        Row(quantity="joint 6 for joint 5, if motor 6 rests", predicted=held, group=group),
-        Row(quantity="motor 6 for joint 5 in chapter 7", published=0.0,
+        Comparison(quantity="joint 6 for joint 5, if motor 6 rests", predicted=held, group=group),
+        Comparison(quantity="motor 6 for joint 5 in chapter 7", published=0.0,
             predicted=float(tendon_motor_angles(np.array([1.0, 0.0]))[1]), within=EXACT,
             group=group, note="its results take motor 6 for joint 6, 'for convenience'"),
-        Row(quantity="joints from their motors and back, largest error", unit="rad",
+        Comparison(quantity="joints from their motors and back, largest error", unit="rad",
             predicted=float(np.abs(back - (0.4, -0.3)).max()), group="check"),
     )  # fmt: skip
     return Findings(rows, (_figure(),), _NOTES)

@@ -5,10 +5,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from teleop_core.chain.architectures.four_channel import FourChannelParameters
-from teleop_core.chain.architectures.impedance import ImpedanceParameters
-from teleop_core.chain.architectures.position_position import PositionPositionParameters
-from teleop_core.chain.architectures.three_channel import ThreeChannelParameters
+from teleop_core.coupling.architectures.four_channel import FourChannelParameters
+from teleop_core.coupling.architectures.impedance import ImpedanceParameters
+from teleop_core.coupling.architectures.position_position import PositionPositionParameters
+from teleop_core.coupling.architectures.three_channel import ThreeChannelParameters
 from teleop_core.graph.signals import DT
 from teleop_core.kernels.geometry import Array
 from teleop_lab.experiments.bench import Bench, Settings

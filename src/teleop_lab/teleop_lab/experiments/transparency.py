@@ -11,7 +11,7 @@ from teleop_core.kernels.geometry import Array
 from teleop_lab.drawing import PUBLISHED, Trace, axis, level, line, points
 from teleop_lab.experiments.bench import Bench
 from teleop_lab.experiments.experiment import Experiment
-from teleop_lab.experiments.outcome import Findings, Row, absolute, percent
+from teleop_lab.experiments.outcome import Comparison, Findings, absolute, percent
 from teleop_lab.experiments.transmission import AIR, Cell, Way, measure_cells, predicted_hybrid
 from teleop_lab.experiments.two_port import LINES, Complex, Lag, bandwidth, felt_impedance, llewellyn
 
@@ -89,7 +89,7 @@ def numbers(cell: Cell, hybrid: Complex) -> list[Number]:
     return found
 
 
-def _rows(found: list[Number], group: str, told: str, *, is_judged: bool) -> list[Row]:
+def _rows(found: list[Number], group: str, told: str, *, is_judged: bool) -> list[Comparison]:
     """Rows of numbers that are finite and of a chain that is linear enough."""
     rows = []
     for each in found:
@@ -99,7 +99,7 @@ def _rows(found: list[Number], group: str, told: str, *, is_judged: bool) -> lis
         # Where the law is 0 there is no share of it; Llewellyn's number is one of a few.
         within = _NEAR if not each.law or "Llewellyn" in each.quantity else _WITHIN
         rows.append(
-            Row(
+            Comparison(
                 quantity=each.quantity + told,
                 unit=each.unit,
                 published=law,
@@ -112,7 +112,7 @@ def _rows(found: list[Number], group: str, told: str, *, is_judged: bool) -> lis
     return rows
 
 
-def _cell_rows(way: Way, round_trip: float, cell: Cell, arm: Complex) -> list[Row]:
+def _cell_rows(way: Way, round_trip: float, cell: Cell, arm: Complex) -> list[Comparison]:
     architecture, passivity = way
     is_judged = passivity == "none" and architecture != "unilateral"
     law = predicted_hybrid(arm, architecture, round_trip) if is_judged else cell.hybrid
@@ -121,7 +121,7 @@ def _cell_rows(way: Way, round_trip: float, cell: Cell, arm: Complex) -> list[Ro
     for world, ports in cell.ports.items():
         if ports.stray > STRAY:
             rows.append(
-                Row(
+                Comparison(
                     quantity=f"off the lines, {world}{told}",
                     unit="%",
                     predicted=100.0 * ports.stray,
@@ -137,14 +137,14 @@ def lag_cell() -> Cell:
     return Cell.of({AIR: LAG.ports(0.0), "tissue": LAG.ports(200.0), "silicone": LAG.ports(1000.0)})
 
 
-def _lag_rows(cell: Cell) -> list[Row]:
+def _lag_rows(cell: Cell) -> list[Comparison]:
     exact, group = LAG.hybrid(), "two-port that is known: our hand and mapping, exact lag"
     rows = []
     for i, k in ((0, 1), (1, 0), (1, 1)):
         size = np.abs(exact[:, i, k])
         off = np.abs(cell.hybrid[:, i, k] - exact[:, i, k]) / size
         rows.append(
-            Row(
+            Comparison(
                 quantity=f"h{i + 1}{k + 1}, farthest from the exact one",
                 unit="%",
                 published=0.0,

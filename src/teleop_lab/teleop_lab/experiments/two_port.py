@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from teleop_core.base.errors import ParameterError
-from teleop_core.chain.operators.shapes import minimum_jerk
 from teleop_core.graph.signals import DT
+from teleop_core.hand.operators.shapes import minimum_jerk
 from teleop_core.kernels.geometry import Array
 from teleop_lab.experiments.one_axis import Grip, Mapped
 

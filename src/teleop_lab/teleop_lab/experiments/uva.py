@@ -12,7 +12,7 @@ from typing import NamedTuple
 from teleop_lab.experiments.bench import Bench
 from teleop_lab.experiments.experiment import Experiment
 from teleop_lab.experiments.look_and_move import CYCLE, difficulty, looks
-from teleop_lab.experiments.outcome import Findings, Row, absolute
+from teleop_lab.experiments.outcome import Comparison, Findings, absolute
 
 LATENCY = 0.033 + 0.050
 """Of the station by itself [s]: two frames at 60 Hz, and a video's encoder and decoder, which take
@@ -160,10 +160,10 @@ def inside(table: Table, levels: Iterable[Level] = LEVELS) -> int:
     )
 
 
-def _rows(table: Table, group: str, levels: Iterable[Level]) -> list[Row]:
+def _rows(table: Table, group: str, levels: Iterable[Level]) -> list[Comparison]:
     means, halves = published()
     return [
-        Row(
+        Comparison(
             quantity=p.name,
             unit="s",
             published=means[level.name][p.name],

@@ -8,7 +8,7 @@ from teleop_core.robots import Robot, load_robot
 from teleop_lab.drawing import axis, in_space, line, scene
 from teleop_lab.experiments.bench import Bench
 from teleop_lab.experiments.experiment import Experiment
-from teleop_lab.experiments.outcome import Findings, Row, percent
+from teleop_lab.experiments.outcome import Comparison, Findings, percent
 
 _REACH_MM = 460.0
 _SAMPLES, _SLICE_MM = 40_000, 6.0
@@ -21,13 +21,13 @@ def _measure(bench: Bench) -> Findings:
     reach = float(np.linalg.norm(places, axis=1).max())
     longest = 1e3 * float(robot.upper[2] + robot.geometry["L6"])
     rows = [
-        Row(quantity="reach, d3 and tool in line", unit="mm", published=_REACH_MM,
+        Comparison(quantity="reach, d3 and tool in line", unit="mm", published=_REACH_MM,
             predicted=longest, within=percent(1.0), group="tip", note="rounded in its estimate"),
-        Row(quantity="reach of the samples", unit="mm", predicted=reach, group="tip"),
+        Comparison(quantity="reach of the samples", unit="mm", predicted=reach, group="tip"),
     ]  # fmt: skip
     for name, begin, end in zip("xyz", low, high, strict=True):
-        rows.append(Row(quantity=f"{name}, from", unit="mm", predicted=begin, group="tip"))
-        rows.append(Row(quantity=f"{name}, to", unit="mm", predicted=end, group="tip"))
+        rows.append(Comparison(quantity=f"{name}, from", unit="mm", predicted=begin, group="tip"))
+        rows.append(Comparison(quantity=f"{name}, to", unit="mm", predicted=end, group="tip"))
     return Findings(tuple(rows), (_in_space(places), _sections(places, robot)), _NOTES)
 
 

@@ -6,13 +6,13 @@ from itertools import count
 
 import numpy as np
 
-from teleop_core.chain.master.device import DeviceParameters
 from teleop_core.evaluation.figure import FIRST, FIXTURE, SECOND, Figure
 from teleop_core.graph.signals import DT
+from teleop_core.hand.master.device import DeviceParameters
 from teleop_lab.drawing import Trace, axis, level, line, points
 from teleop_lab.experiments import experiment, one_axis, sampled_wall, stability
 from teleop_lab.experiments.bench import Bench
-from teleop_lab.experiments.outcome import Findings, Row, absolute, percent
+from teleop_lab.experiments.outcome import Comparison, Findings, absolute, percent
 
 BARE = one_axis.Grip(0.045, 1.0, 2.0)
 """Our device's mass in a hand that holds it as loosely as the parameters allow, and its viscous
@@ -91,14 +91,14 @@ def quiet_law(friction: float, resolution: float) -> float:
     return 2.0 * friction / resolution
 
 
-def _stability(found: Boundaries) -> list[Row]:
+def _stability(found: Boundaries) -> list[Comparison]:
     """Rows of the linear law for every damping, then of the exact axis."""
     laws, exact = [], []
     for (wall_damping, late), predicted in found.items():
         axis_ = one_axis.sampled_boundary(BARE, late, wall_damping)
         law = linear_law(BARE.damping, wall_damping, 1e-3 * late)
         where = f"B = {wall_damping:g} N·s/m"
-        row = Row(
+        row = Comparison(
             quantity=f"force {late} ms later",
             unit="N/m",
             published=round(law, 1),
@@ -114,26 +114,26 @@ def _stability(found: Boundaries) -> list[Row]:
     return [*laws, *exact]
 
 
-def _energy(found: Bounds) -> list[Row]:
+def _energy(found: Bounds) -> list[Comparison]:
     rows = []
     for damping, wall_damping in DAMPINGS:
         bounds = {n: found[damping, wall_damping, n] for n in PRESSES}
         worst, longest = min(bounds.values()), max(PRESSES)
         law, text = passive_law(damping, wall_damping), f"b = {damping:g}, B = {wall_damping:g}"
         rows += [
-            Row(quantity=f"{text} N·s/m, worst press", unit="N/m", published=law, predicted=worst,
+            Comparison(quantity=f"{text} N·s/m, worst press", unit="N/m", published=law, predicted=worst,
                 basis="law", within=_WITHIN if law else _NONE,
                 group="passive, Colgate and Schenkel 1997"),
-            Row(quantity=f"{text} N·s/m, press of {longest} ms", unit="N/m",
+            Comparison(quantity=f"{text} N·s/m, press of {longest} ms", unit="N/m",
                 published=press_law(damping, wall_damping, longest), predicted=bounds[longest],
                 basis="law", within=_WITHIN, group="gives no energy in a long press"),
         ]  # fmt: skip
     return sorted(rows, key=lambda row: row.group, reverse=True)
 
 
-def _divergence() -> Row:
+def _divergence() -> Comparison:
     grip = stability.GRIPS["loose"]  # b of 5 N·s/m and 0.25 kg
-    return Row(
+    return Comparison(
         quantity="b = B = 5 N·s/m, 0.25 kg",
         unit="N/m",
         published=round(one_axis.sampled_boundary(grip, 0, grip.damping), 1),
@@ -145,8 +145,8 @@ def _divergence() -> Row:
     )
 
 
-def _quiet(friction: float, resolution: float) -> Row:
-    return Row(
+def _quiet(friction: float, resolution: float) -> Comparison:
+    return Comparison(
         quantity=f"friction {friction:g} N, steps of {1e3 * resolution:g} mm",
         unit="N/m",
         published=round(quiet_law(friction, resolution), 1),
@@ -220,7 +220,7 @@ def _delay_figure(found: Boundaries) -> Figure:
     return Figure("How stiff a sampled wall may be", sentence, traces, layout, 460)
 
 
-def _press_figure(found: Bounds, diverging: Row) -> Figure:
+def _press_figure(found: Bounds, diverging: Comparison) -> Figure:
     damping, wall_damping = DAMPINGS[-1]
     lengths = range(1, max(PRESSES) + 1)
     law = np.array([press_law(damping, wall_damping, n) for n in lengths])

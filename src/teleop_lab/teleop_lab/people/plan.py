@@ -7,7 +7,7 @@ from itertools import product
 from pathlib import Path
 
 from teleop_core.base.errors import ParameterError
-from teleop_core.base.parameters import build, parameter, specs
+from teleop_core.base.parameters import Within, build, parameter, specs
 from teleop_core.base.texts import LONGEST_LINE
 from teleop_core.evaluation.score import keys
 from teleop_core.graph.layers import SESSION
@@ -91,14 +91,14 @@ class PeopleParameters:
     title: str = parameter("", doc="heading of the participants' page")
     consent: str = parameter("", doc="what a participant agrees to, before anything else")
     instructions: str = parameter("", doc="what is to be done, before each trial")
-    participants: int = parameter(12, lower=1, upper=MOST, doc="how many there are, at most")
-    practice: int = parameter(1, lower=0, upper=MOST, doc="trials of each condition before those that count")
-    repetitions: int = parameter(3, lower=1, upper=MOST, doc="trials of each condition that count")
-    attempts: int = parameter(0, lower=0, upper=MOST, doc="after so many a trial ends; 0: after its time")
+    participants: int = parameter(12, Within(1, MOST), "how many there are, at most")
+    practice: int = parameter(1, Within(0, MOST), "trials of each condition before those that count")
+    repetitions: int = parameter(3, Within(1, MOST), "trials of each condition that count")
+    attempts: int = parameter(0, Within(0, MOST), "after so many a trial ends; 0: after its time")
     order: str = parameter("latin", choices=("fixed", "shuffled", "latin"), doc="of the conditions")
     operator: str = parameter("remote", doc="kind of the operator that a person is")
     duration: float = parameter(
-        0.0, unit="s", lower=0.1, upper=3600.0, off=0.0, doc="longest time of a trial; 0: as the study's sessions"
+        0.0, Within(0.1, 3600.0, "s"), "longest time of a trial; 0: as the study's sessions", off=0.0
     )
     ask: str = parameter("condition", choices=("trial", "condition", "end"), doc="after what the questions come")
 

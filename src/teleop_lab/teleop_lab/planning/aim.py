@@ -11,7 +11,7 @@ from functools import cache
 
 import numpy as np
 
-from teleop_core.chain.mapping.parameters import axis_map
+from teleop_core.kernels.axes import axis_map
 from teleop_core.kernels.geometry import Array, rotation, rotations_from_quaternions
 from teleop_core.robots.robot import Robot
 from teleop_lab.planning.placement import Placement

@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 
 from teleop_core.base.plain_yaml import written
-from teleop_core.chain.mapping.parameters import MotionScalingParameters
-from teleop_core.robots.parameters import RobotParameters
+from teleop_core.coupling.mapping.gains import MotionScalingParameters
+from teleop_core.robots.selection import RobotParameters
 
 Setting = float | str | list[float] | list[str]
 

@@ -11,8 +11,8 @@ from dataclasses import replace
 import numpy as np
 
 from teleop_core.kernels.geometry import Array, multiply_quaternions, transform_from_pose
+from teleop_core.kinematics import IkStatus
 from teleop_core.robots.freedom import free_postures
-from teleop_core.robots.kinematics import IkStatus
 from teleop_lab.planning import turns, walk
 from teleop_lab.planning.aim import Aim
 from teleop_lab.planning.placement import Placement

@@ -6,7 +6,7 @@ from functools import cache
 
 import numpy as np
 
-from teleop_core.chain.mapping.parameters import AXES
+from teleop_core.kernels.axes import AXES
 
 
 @cache

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from teleop_core.chain.mapping.inverse_kinematics import InverseKinematics, InverseKinematicsParameters
-from teleop_core.chain.mapping.motion_scaling import MotionScaling
-from teleop_core.chain.mapping.parameters import MotionScalingParameters
+from teleop_core.coupling.mapping.gains import MotionScalingParameters
+from teleop_core.coupling.mapping.inverse_kinematics import InverseKinematics, InverseKinematicsParameters
+from teleop_core.coupling.mapping.motion_scaling import MotionScaling
 from teleop_core.graph import DT, assign, copy, topics
 from teleop_core.kernels import Array, apart, bound, kernel_from_source, pose_from_transform, raise_pending, records
 from teleop_lab.planning.asked import AskedPath

@@ -9,7 +9,7 @@ from teleop_core.evaluation.objects import ObjectMetric
 from teleop_core.evaluation.registry import METRICS
 from teleop_core.robots import load_robot_set
 from teleop_core.session.configuration import Configuration
-from teleop_core.slave.world.parameters import WorldParameters
+from teleop_core.slave.world.contents import WorldParameters
 
 _NEAR = 0.02
 """An object that the tip comes so near to is within reach: other turns of the tool reach farther [m]."""

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from teleop_core.evaluation.score import keys
-from teleop_lab.studies.point import Point, code_digest
+from teleop_lab.studies.point import Point, code_digest, own_digest
 from teleop_lab.studies.store import Store
 
 if TYPE_CHECKING:
@@ -54,7 +54,7 @@ def dataset_of(study: "Study", points: Sequence[Point], store: Store) -> "xarray
     variables["seconds"] = (study.names, took, {"units": "s"})
     about = {
         "scenario": study.scenario or "",
-        "code": code_digest(),
+        "code": code_digest() + own_digest(),
         "settings": str(dict(study.settings)),
         "sessions": len(points),
     }

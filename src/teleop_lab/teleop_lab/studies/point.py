@@ -3,15 +3,18 @@
 import hashlib
 import json
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import cache, partial
-from importlib.resources import files
+from importlib.metadata import entry_points
+from importlib.util import find_spec
 from pathlib import Path
+from types import CodeType
 
 import teleop_core
 from teleop_core.bags.memory import LeftOutError
 from teleop_core.base.errors import TeleopError
+from teleop_core.base.own_parts import own_files
 from teleop_core.evaluation.scoring import measure, streams_of
 from teleop_core.session import api, configuration
 
@@ -102,14 +105,51 @@ def point_key(recipe: str, seed: int, metrics: Sequence[str], code: str) -> Key:
 
 @cache
 def code_digest() -> str:
-    """Digest of the sources of ``teleop_core``: other code may give other numbers."""
+    """Digest of what ``teleop_core`` and installed packages with parts do: other code may give other numbers."""
+    groups = entry_points()
+    names = {"teleop_core"}
+    for group in groups.groups - _NO_PARTS:
+        if group.startswith("teleop_core."):
+            names.update(entry.module.partition(".")[0] for entry in groups.select(group=group))
+    files = [file for name in sorted(names) for file in _sources(name)]
+    return f"{teleop_core.__version__}-{files_digest(files)}"
+
+
+def own_digest() -> str:
+    """Digest of what the files of own parts, and those beside them, do; empty where there are none."""
+    found = [(path.name, path) for path in own_files()]
+    return f"+{files_digest(found)}" if found else ""
+
+
+def _sources(package: str) -> list[tuple[str, Path]]:
+    spec = find_spec(package)
+    if spec is None or not spec.submodule_search_locations:
+        return [(package, Path(spec.origin))] if spec is not None and spec.origin else []
+    root = Path(spec.submodule_search_locations[0])
+    return [(f"{package}/{path.relative_to(root).as_posix()}", path) for path in sorted(root.rglob("*.py"))]
+
+
+def files_digest(files: Iterable[tuple[str, Path]]) -> str:
+    """Digest of named Python files; comments, docstrings and layout do not count, Python's version does."""
     found = hashlib.sha256()
-    root = Path(str(files("teleop_core")))
-    for path in sorted(root.rglob("*.py")):
-        found.update(path.relative_to(root).as_posix().encode() + b"\0" + path.read_bytes())
-    return f"{teleop_core.__version__}-{found.hexdigest()[:16]}"
+    for name, path in files:
+        code = compile(path.read_bytes(), "", "exec", dont_inherit=True, optimize=2)
+        found.update(f"{name}\0{_done_by(code)}".encode())
+    return found.hexdigest()[:16]
 
 
+def _done_by(code: CodeType) -> str:
+    """What compiled code does, wherever its lines stand."""
+    constants = [
+        _done_by(one) if isinstance(one, CodeType) else sorted(map(repr, one)) if isinstance(one, frozenset) else one
+        for one in code.co_consts
+    ]
+    names = (code.co_names, code.co_varnames, code.co_freevars, code.co_cellvars)
+    counts = (code.co_argcount, code.co_posonlyargcount, code.co_kwonlyargcount, code.co_flags)
+    return repr((code.co_name, code.co_code, code.co_exceptiontable, constants, names, counts))
+
+
+_NO_PARTS = {"teleop_core.commands", "teleop_core.pages", "teleop_core.readers"}
 _READ_MORE: set[tuple[str, ...]] = set()
 """Scores for which everything has to be kept."""
 

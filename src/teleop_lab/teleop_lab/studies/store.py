@@ -108,5 +108,9 @@ def write_result(folder: Path, result: Result) -> None:
 def write_whole(path: Path, text: str) -> None:
     """Write a file under another name, then rename it, so that it is never seen half written."""
     half = path.with_name(f".{path.name}.{os.getpid()}")
-    half.write_text(text, "utf-8")
+    try:
+        half.write_text(text, "utf-8")
+    except OSError:
+        half.unlink(missing_ok=True)
+        raise
     half.replace(path)

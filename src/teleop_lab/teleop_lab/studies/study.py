@@ -15,7 +15,7 @@ from teleop_core.evaluation.score import SESSION_KEYS, keys
 from teleop_core.graph.layers import SESSION
 from teleop_core.session import api, runner
 from teleop_lab.studies.checks import insist_on_reach, insist_on_scores
-from teleop_lab.studies.point import Point, code_digest, point_key, recipe_of
+from teleop_lab.studies.point import Point, code_digest, own_digest, point_key, recipe_of
 from teleop_lab.studies.store import Store
 
 if TYPE_CHECKING:
@@ -28,8 +28,8 @@ _SPEED = 25.0
 """Simulated seconds that a process makes in a second, with scores; measured on a busy machine."""
 _BEGIN, _START = 0.1, 4.0
 """Time that a session costs beside that, and the processes before the first one [s]."""
-_RESULT = 600
-"""Bytes of a stored result."""
+_RESULT = 4096
+"""Bytes of a stored result: a file takes a block of a disk."""
 _SECOND = 200_000
 """Bytes of a recorded second, compressed."""
 
@@ -127,7 +127,7 @@ class Study:
         Raises:
             TeleopError: They cannot run; the text names the value.
         """
-        found, code = [], code_digest()
+        found, code = [], code_digest() + own_digest()
         given = {**self.settings, **chosen}
         made = api.configuration(self.scenario, settings=given)
         insist_on_scores(made, self.metrics)

@@ -1,17 +1,20 @@
 """Workers: points on the processes of this machine, or on those of a Dask cluster."""
 
+import atexit
 import os
 import tempfile
 from collections.abc import Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from functools import partial
-from multiprocessing import get_context
+from functools import lru_cache, partial
+from multiprocessing import current_process, get_context, parent_process
 from pathlib import Path
-from typing import TYPE_CHECKING
+from shutil import rmtree
+from threading import Thread
+from typing import TYPE_CHECKING, Any
 
 from teleop_core.base.errors import SessionError
-from teleop_core.base.own_parts import load_own_parts
+from teleop_core.base.own_parts import forget_own_parts, load_own_parts
 from teleop_lab.studies.point import Point, Result, code_digest, compute
 from teleop_lab.studies.store import write_result
 
@@ -32,7 +35,12 @@ def in_processes(
 
     Whoever computes a result writes it. A process that dies costs the sessions that were at work
     then, which are tried again.
+
+    Raises:
+        SessionError: No process begins.
     """
+    if getattr(current_process(), "_inheriting", False):
+        raise SystemExit(1)  # one of them reads a program that would begin others; who began it says so
     place = None if recordings is None else Path(recordings)
     do = partial(_computed, metrics=tuple(study.metrics), store=store, recordings=place)
     count = max(1, min(jobs or len(os.sched_getaffinity(0)), len(points)))
@@ -41,16 +49,30 @@ def in_processes(
         return
     left = {point.name: point for point in points}
     for _ in range(_TRIES):
-        with ProcessPoolExecutor(count, get_context("spawn"), load_own_parts, (tuple(study.parts),)) as pool:
+        with ProcessPoolExecutor(count, get_context("spawn"), _begin, (tuple(study.parts),)) as pool:
             try:
                 for result in _as_they_come(pool, do, list(left.values()), 2 * count):
                     del left[result.name]
                     yield result
             except BrokenProcessPool:
-                continue
+                if len(left) < len(points):
+                    continue
+                text = "no process of the study begins; each reads your program first: call the study"
+                raise SessionError(f"{text} below `if __name__ == '__main__':`, in a file") from None
         return
     for point in left.values():
         yield Result(point.name, point.key, {}, f"its process died {_TRIES} times", 0.0)
+
+
+def _begin(parts: tuple[Path, ...]) -> None:
+    """Make a process ready, which ends as soon as the one that began it is gone."""
+    Thread(target=_end_with, args=(parent_process(),), daemon=True).start()
+    load_own_parts(parts)
+
+
+def _end_with(other: Any) -> None:
+    other.join()
+    os._exit(1)  # what it has written is whole
 
 
 def _as_they_come(pool: ProcessPoolExecutor, do: "partial[Result]", points: list[Point], most: int) -> Iterator[Result]:
@@ -81,24 +103,29 @@ def on_dask(client: "Client", study: "Study", points: Sequence[Point]) -> Iterat
     """
     from distributed import as_completed
 
-    own, found = code_digest(), client.run(code_digest)
-    if not found:
+    own = code_digest()
+    fit, others = _codes(client, own)
+    for worker, code in others.items():
+        raise SessionError(f"worker {worker} has code {code}, must be ours, {own}")
+    if not fit:
         raise SessionError(f"{client.scheduler.address} has no workers")  # type: ignore[union-attr]
-    for worker, code in found.items():
-        if code != own:
-            raise SessionError(f"worker {worker} has code {code}, must be ours, {own}")
     parts = tuple((part.name, part.read_text("utf-8")) for part in study.parts)
-    size = max(1, min(BATCH, len(points) // (4 * len(found)) or 1))
+    do = partial(_batch, metrics=tuple(study.metrics), parts=parts, code=own)
+    size = max(1, min(BATCH, len(points) // (4 * len(fit)) or 1))
     batches = [points[at : at + size] for at in range(0, len(points), size)]
-    futures = {
-        client.submit(_batch, batch, tuple(study.metrics), parts, pure=False, retries=_TRIES): batch
-        for batch in batches
-    }
+    futures = {client.submit(do, batch, pure=False, retries=_TRIES): batch for batch in batches}
+    repeated = set[str]()
+    waiting = as_completed(list(futures), loop=client.loop)
     try:
-        for future in as_completed(list(futures), loop=client.loop):
-            batch = futures[future]
+        for future in waiting:
+            batch = futures.pop(future)
             if future.status == "finished":
                 yield from future.result()
+            elif future.key not in repeated and all(codes := _codes(client, own)):  # one with other code came later
+                again = client.submit(do, batch, pure=False, retries=_TRIES, workers=codes[0])
+                futures[again] = batch
+                repeated.add(again.key)
+                waiting.add(again)
             else:
                 raised = future.exception()
                 text = f"{type(raised).__name__}: {' '.join(str(raised).split())}"
@@ -109,10 +136,32 @@ def on_dask(client: "Client", study: "Study", points: Sequence[Point]) -> Iterat
         client.cancel(list(futures))
 
 
-def _batch(points: Sequence[Point], metrics: tuple[str, ...], parts: tuple[tuple[str, str], ...]) -> list[Result]:
-    """Results of some points on a worker; parts of a user travel as texts."""
-    with tempfile.TemporaryDirectory() as folder:
-        for name, text in parts:
-            (Path(folder) / name).write_text(text, "utf-8")
-        load_own_parts([Path(folder) / name for name, _ in parts])
-        return [compute(point, metrics, None) for point in points]
+def _codes(client: "Client", own: str) -> tuple[list[str], dict[str, object]]:
+    """Addresses of workers with our code, and the code of each other; workers may come later than the study."""
+    found = client.run(code_digest, on_error="return")
+    return [worker for worker, code in found.items() if code == own], {w: c for w, c in found.items() if c != own}
+
+
+def _batch(
+    points: Sequence[Point], metrics: tuple[str, ...], parts: tuple[tuple[str, str], ...], code: str
+) -> list[Result]:
+    """Results of some points on a worker; parts of a user travel as texts.
+
+    Raises:
+        SessionError: This worker came later and has other code.
+    """
+    if code_digest() != code:
+        raise SessionError(f"this worker has code {code_digest()}, must be {code}")
+    load_own_parts(_written(parts))
+    return [compute(point, metrics, None) for point in points]
+
+
+@lru_cache(1)
+def _written(parts: tuple[tuple[str, str], ...]) -> list[Path]:
+    """Files of parts, for as long as this process lives; those of another study are forgotten."""
+    forget_own_parts()
+    folder = Path(tempfile.mkdtemp(prefix="teleop_parts_"))
+    atexit.register(rmtree, folder, ignore_errors=True)
+    for name, text in parts:
+        (folder / name).write_text(text, "utf-8")
+    return [folder / name for name, _ in parts]

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from teleop_core.evaluation import Context, Metric, Row, Window, keys_of, number, row
+from teleop_core.evaluation import Context, Metric, TableRow, Window, keys_of, number, row
 from teleop_core.evaluation.metric import figure
 from teleop_core.evaluation.metrics.fixture import GROUP
 from teleop_core.graph.topics import MASTER_CONTACT
@@ -93,16 +93,16 @@ class ContactMetric(Metric):
             largest_force_min_n=self._most,
         )
 
-    def rows(self) -> list[Row]:
+    def rows(self) -> list[TableRow]:
         """Contacts and the worst of them; "none" where the recording does not tell."""
         score = self.values()
         if score.count is None:
-            return [Row(GROUP, "energy of contacts", "", "none recorded")]
+            return [TableRow(GROUP, "energy of contacts", "", "none recorded")]
         worst = f" at {score.worst_s:.1f} s" if score.worst_s is not None else ""
         share = None if score.returned_max is None else 100.0 * score.returned_max
         return [
-            Row(GROUP, "contacts, touches", "", f"{score.count}, {score.touches}"),
-            Row(GROUP, "energy given back of taken, max", "%", f"{number(share)}{worst}"),
-            Row(GROUP, "contacts that gave more, wall/device", "", f"{score.feeding}/{score.feeding_device}"),
+            TableRow(GROUP, "contacts, touches", "", f"{score.count}, {score.touches}"),
+            TableRow(GROUP, "energy given back of taken, max", "%", f"{number(share)}{worst}"),
+            TableRow(GROUP, "contacts that gave more, wall/device", "", f"{score.feeding}/{score.feeding_device}"),
             row(GROUP, "least force that warmth allowed", "N", score.largest_force_min_n),
         ]

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from teleop_core.bags.reader import Bag
-from teleop_core.evaluation import MISSING, TRACKED, Context, Key, Metric, Row, Window, keys_of, tracked
+from teleop_core.evaluation import MISSING, TRACKED, Context, Key, Metric, TableRow, Window, keys_of, tracked
 from teleop_core.evaluation.metric import figure
 from teleop_core.evaluation.stamps import StampTallies
 from teleop_core.graph.graph import RECORDER_NAME
@@ -97,13 +97,13 @@ class TicksMetric(Metric):
         dropped = gaps if missed is None else missed - (made_up or 0)
         return Ticks(own.get("ticks", self._samples), own.get("late"), made_up, dropped)
 
-    def rows(self) -> list[Row]:
+    def rows(self) -> list[TableRow]:
         """A row for each way in which a tick is not in time."""
         ticks = self.values()
         late, made_up = (MISSING if n is None else str(n) for n in (ticks.late, ticks.made_up))
         return [
-            Row(GROUP, "ticks executed", "", str(ticks.executed)),
-            Row(GROUP, "late/made up/dropped", "", f"{late}/{made_up}/{ticks.dropped}"),
+            TableRow(GROUP, "ticks executed", "", str(ticks.executed)),
+            TableRow(GROUP, "late/made up/dropped", "", f"{late}/{made_up}/{ticks.dropped}"),
         ]
 
 
@@ -166,13 +166,13 @@ class TopicsMetric(Metric):
         tally = self._stamps.of.get(name)
         return None if tally is None or tally.topic.is_seldom else tally.gaps()
 
-    def rows(self) -> list[Row]:
+    def rows(self) -> list[TableRow]:
         """Sums over all topics."""
         topics = self.values().values()
         return [
-            Row(GROUP, "messages", "", str(sum(topic.count for topic in topics))),
-            Row(GROUP, "messages missing", "", str(sum(topic.gaps or 0 for topic in topics))),
-            Row(GROUP, "lost on the way", "", str(sum(topic.lost or 0 for topic in topics))),
+            TableRow(GROUP, "messages", "", str(sum(topic.count for topic in topics))),
+            TableRow(GROUP, "messages missing", "", str(sum(topic.gaps or 0 for topic in topics))),
+            TableRow(GROUP, "lost on the way", "", str(sum(topic.lost or 0 for topic in topics))),
         ]
 
 
@@ -208,6 +208,6 @@ class SamplesMetric(Metric):
         """Counts so far."""
         return Samples(self._scored, self._unpaired, self._invalid)
 
-    def rows(self) -> list[Row]:
+    def rows(self) -> list[TableRow]:
         """None: tables count messages and ticks."""
         return []

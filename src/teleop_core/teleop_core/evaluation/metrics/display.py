@@ -1,30 +1,18 @@
 """Display: how late the operator saw the slave, and how often."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
-from teleop_core.evaluation import Context, Metric, Window, keys_of
+from teleop_core.evaluation import Context, Metric, Window
 from teleop_core.evaluation.metric import figure
 from teleop_core.graph.topics import DISPLAY_MEASURED_CP, NO_COMMAND_NS
 
 
-@dataclass(frozen=True)
-class DisplayScore:
-    """How late the operator saw the slave; None without a display."""
-
-    age_mean_ms: float | None = figure(
-        "ms", "mean age of the newest frame that was on the screen", "age of what is seen, mean"
-    )
-    rate_hz: float | None = figure("Hz", "frames with another pose that were shown in a second", "frames")
-
-
 class DisplayMetric(Metric):
-    """Age of what the operator saw, from when the slave was there to the end of each frame."""
+    """Age of what the operator saw, from when the slave was there to the end of each frame; None without a display."""
 
-    name = "display"
-    keys = keys_of("display", DisplayScore)
-    topics = (DISPLAY_MEASURED_CP,)
+    name, topics = "display", (DISPLAY_MEASURED_CP,)
+    age_mean_ms = figure("ms", "mean age of the newest frame that was on the screen", "age of what is seen, mean")
+    rate_hz = figure("Hz", "frames with another pose that were shown in a second", "frames")
 
     def __init__(self, _: Context) -> None:
         self._log_ns = self._stamp_ns = NO_COMMAND_NS  # of the newest frame
@@ -47,9 +35,5 @@ class DisplayMetric(Metric):
         self._span_s += float(until.sum())
         self._frames += int(is_new.sum())
         self._log_ns, self._stamp_ns = int(logs[-1]), int(stamps[-1])
-
-    def values(self) -> DisplayScore:
-        """Score of everything so far."""
-        if not self._span_s:
-            return DisplayScore(None, None)
-        return DisplayScore(1e3 * self._seen / self._span_s, (self._frames - 1) / self._span_s)
+        if self._span_s:
+            self.age_mean_ms, self.rate_hz = 1e3 * self._seen / self._span_s, (self._frames - 1) / self._span_s

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from teleop_core.chain.fixtures.reported_fixture import ReportedFixture
-from teleop_core.evaluation import MISSING, Context, Metric, Moments, Row, Window, keys_of, row
+from teleop_core.coupling.fixtures.reported_fixture import ReportedFixture
+from teleop_core.evaluation import MISSING, Context, Metric, Moments, TableRow, Window, keys_of, row
 from teleop_core.evaluation.metric import figure
 from teleop_core.evaluation.published import BOX_OVERSHOOT_MM, Gains
 from teleop_core.evaluation.stamps import StampTallies
@@ -104,7 +104,7 @@ class FixtureMetric(Metric):
             unscored="; ".join(f"{kind}: {fault}" for kind, fault in unknown.items()) or None,
         )
 
-    def rows(self) -> list[Row]:
+    def rows(self) -> list[TableRow]:
         """All of it, the slave beside the overshoot that was published of a box.
 
         None if no fixture ever was on.
@@ -117,11 +117,11 @@ class FixtureMetric(Metric):
         is_comparable = kind == BOX.name and self._gains.published is not None
         published = BOX_OVERSHOOT_MM if is_comparable else None
         rows = [
-            Row(GROUP, f"{kind} on for", "s", f"{score.on_s:.1f}"),
+            TableRow(GROUP, f"{kind} on for", "s", f"{score.on_s:.1f}"),
             row(GROUP, "slave outside, max", "mm", score.penetration_max_mm, published),
             row(GROUP, "slave outside, RMS", "mm", score.penetration_rms_mm),
-            Row(GROUP, "slave outside, time", "%", MISSING if share is None else f"{share:.1f}"),
+            TableRow(GROUP, "slave outside, time", "%", MISSING if share is None else f"{share:.1f}"),
             row(GROUP, "hand outside, max", "mm", score.hand_penetration_max_mm),
         ]
         unknown = dict.fromkeys(fixture.kind for fixture in self._on if fixture.fault)
-        return rows + [Row(GROUP, "shape not known", "", ", ".join(unknown))] * bool(unknown)
+        return rows + [TableRow(GROUP, "shape not known", "", ", ".join(unknown))] * bool(unknown)

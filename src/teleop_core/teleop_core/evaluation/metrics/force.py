@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from teleop_core.evaluation import Context, Envelope, Moments, Row, Spread, Window, number, row
-from teleop_core.evaluation.figure import DARK, FIRST, SECOND, THIRD, Figure, line, time_axis
+from teleop_core.evaluation import Context, Envelope, Moments, Spread, TableRow, Window, number, row
+from teleop_core.evaluation.figure import Figure, force_figure
 from teleop_core.evaluation.metric import SPREAD_MEANING, Key, Metric
 from teleop_core.evaluation.metrics.fixture import GROUP
 from teleop_core.evaluation.outlines import kinds_of, outlines_of
@@ -34,7 +34,7 @@ class ForceMetric(Metric):
         """Spread so far, [N]."""
         return self._magnitude.spread()
 
-    def rows(self) -> list[Row]:
+    def rows(self) -> list[TableRow]:
         """The maximum, beside the penetration that caused it."""
         return [row(GROUP, "force on hand, max", "N", self.values().max)]
 
@@ -43,13 +43,7 @@ class ForceMetric(Metric):
         times, values = self._trace.line()
         if not len(times):
             return []
-        traces = [
-            line(times, values[:, i], f"{axis} (master)", color, 1.2, "N")
-            for i, (axis, color) in enumerate(zip("xyz", (FIRST, SECOND, THIRD), strict=True))
-        ]
-        traces.append(line(times, values[:, 3], "magnitude", DARK, 1.4, "N"))
         kinds = kinds_of(outlines_of(self._context))
         sentence = f"The device pushes the hand with {number(self.values().max)} N at most"
         sentence += f"; the {kinds} pushes back only where the hand is beyond a wall" * bool(kinds)
-        layout = {"xaxis": time_axis(), "yaxis": {"title": {"text": "force [N]"}}, "hovermode": "x unified"}
-        return [Figure("Force on the hand", f"{sentence}.", traces, layout, 340)]
+        return [force_figure("Force on the hand", f"{sentence}.", times, values, "master")]

@@ -1,41 +1,32 @@
 """Force sensing: how far measured and estimated forces are from that on the tip, in touch."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
-from teleop_core.evaluation import Context, Metric, Moments, Window, keys_of, latest
+from teleop_core.evaluation import Context, Metric, Moments, Window, latest
 from teleop_core.evaluation.metric import figure
 from teleop_core.graph.topics import SLAVE_ESTIMATED_CF, SLAVE_MEASURED_CF, SLAVE_TRUE_CF, Topic
 from teleop_core.kernels.geometry import Array
 
 
-@dataclass(frozen=True)
-class ForceSensingScore:
-    """Errors of told forces; None where nothing was touched, or nobody knows the true force."""
-
-    measured_rms_n: float | None = figure(
-        "N",
-        "root mean square of the distance of slave/measured_cf from slave/true_cf, at all samples "
-        "of both in touch; null without a touch, or if nobody tells the true force",
-        "measured, error, rms",
-    )
-    measured_max_n: float | None = figure("N", "largest such distance")
-    estimated_rms_n: float | None = figure(
-        "N", "the same of slave/estimated_cf; null too if nothing was estimated", "estimated, error, rms"
-    )
-    estimated_max_n: float | None = figure("N", "largest such distance")
-
-
 class ForceSensingMetric(Metric):
-    """Distance of told forces from the true one.
+    """Distance of told forces from the true one; None where nothing was touched, or nobody knows the true force.
 
     All three are sent where they change, so each holds until its next sample.
     """
 
     name, group = "force_sensing", "force on the tip as it was told"
-    keys = keys_of("force_sensing", ForceSensingScore)
     topics = (SLAVE_TRUE_CF, SLAVE_MEASURED_CF, SLAVE_ESTIMATED_CF)
+    measured_rms_n = figure(
+        "N",
+        "root mean square of the distance of slave/measured_cf from slave/true_cf, at all samples "
+        "of both in touch; null without a touch, or if nobody tells the true force",
+        "measured, error, rms",
+    )
+    measured_max_n = figure("N", "largest such distance")
+    estimated_rms_n = figure(
+        "N", "the same of slave/estimated_cf; null too if nothing was estimated", "estimated, error, rms"
+    )
+    estimated_max_n = figure("N", "largest such distance")
 
     def __init__(self, context: Context) -> None:
         super().__init__(context)
@@ -47,12 +38,11 @@ class ForceSensingMetric(Metric):
         self._measured.add(force_errors(window, SLAVE_MEASURED_CF))
         self._estimated.add(force_errors(window, SLAVE_ESTIMATED_CF))
         self._is_estimated |= bool(window.samples(SLAVE_ESTIMATED_CF).values.any())
-
-    def values(self) -> ForceSensingScore:
-        """Score of everything so far."""
         measured = self._measured.spread()
-        estimated = (self._estimated if self._is_estimated else Moments()).spread()
-        return ForceSensingScore(measured.rms, measured.max, estimated.rms, estimated.max)
+        self.measured_rms_n, self.measured_max_n = measured.rms, measured.max
+        if self._is_estimated:
+            estimated = self._estimated.spread()
+            self.estimated_rms_n, self.estimated_max_n = estimated.rms, estimated.max
 
 
 def force_errors(window: Window, told: Topic) -> Array:

@@ -4,7 +4,7 @@ from itertools import cycle
 
 import numpy as np
 
-from teleop_core.evaluation import MISSING, Context, Key, Metric, Row, Window, fixed, number, same_stamp
+from teleop_core.evaluation import MISSING, Context, Key, Metric, TableRow, Window, fixed, number, same_stamp
 from teleop_core.evaluation.accumulators import Delay, Distribution, Integers
 from teleop_core.evaluation.figure import DARK, FIRST, SECOND, THIRD, Figure, line
 from teleop_core.evaluation.pairing import NONE
@@ -67,13 +67,13 @@ class LatencyMetric(Metric):
             found[ASKED] = Delay(*(None if p is None else p + self._asked_ms for p in parts))
         return found
 
-    def rows(self) -> list[Row]:
+    def rows(self) -> list[TableRow]:
         """One row per stage."""
         rows = []
         for stage, delay in self.values().items():
             known = (delay.median, delay.p99, delay.max)
             text = MISSING if delay.max is None else "/".join(map(_short, known))
-            rows.append(Row("latency: median/p99/max", stage.replace("_", " "), "ms", text))
+            rows.append(TableRow("latency: median/p99/max", stage.replace("_", " "), "ms", text))
         return rows
 
     def figures(self) -> list[Figure]:

@@ -5,7 +5,7 @@ from teleop_core.evaluation.metric import figure
 
 
 class MissesMetric(AttemptsMetric):
-    """Counts of errors, in the order of :class:`~teleop_core.chain.tasks.Miss`."""
+    """Counts of errors, in the order of :class:`~teleop_core.hand.tasks.Miss`."""
 
     name, below = "misses", "task"
     beside = figure("1", "errors: it ended beside the goal", "errors: beside")

@@ -6,9 +6,7 @@ from itertools import pairwise
 import numpy as np
 
 from teleop_core.base import TeleopError, build
-from teleop_core.chain.operators import OPERATORS
-from teleop_core.chain.operators.parameters import OperatorParameters
-from teleop_core.evaluation import Context, Key, Metric, Row, Window, keys_of, number, row
+from teleop_core.evaluation import Context, Key, Metric, TableRow, Window, keys_of, number, row
 from teleop_core.evaluation.figure import DARK, MEASURED, Figure, line, time_axis
 from teleop_core.evaluation.motion_figures import Kinematics, Mask, MotionFigures
 from teleop_core.evaluation.motion_measures import RATE
@@ -16,6 +14,8 @@ from teleop_core.evaluation.motion_samples import MotionSamples
 from teleop_core.evaluation.state_history import States
 from teleop_core.graph import STATE
 from teleop_core.graph.topics import MASTER_MEASURED_CP, SLAVE_MEASURED_CP, Topic
+from teleop_core.hand.operators import OPERATORS
+from teleop_core.hand.operators.behaviour import OperatorParameters
 
 
 def approach_end_ns(context: Context) -> int:
@@ -151,16 +151,16 @@ class MotionMetric(Metric):
             segment_median=_medians(segments),
         )
 
-    def rows(self) -> list[Row]:
+    def rows(self) -> list[TableRow]:
         """What tables show."""
         found = self.values()
         hand, fixture, middle = found.hand, found.in_fixture, found.segment_median
         has_fixture = fixture.time_s > 0.0
         return [
             *_hand_rows(hand),
-            Row(HAND, "clutch strokes", "", str(found.clutch.count)),
+            TableRow(HAND, "clutch strokes", "", str(found.clutch.count)),
             row(HAND, "time clutched", "s", found.clutch.time_s),
-            Row(SEGMENTS, "segments", "", f"{middle['count']:.0f}"),
+            TableRow(SEGMENTS, "segments", "", f"{middle['count']:.0f}"),
             row(SEGMENTS, "time", "s", middle["time_s"]),
             row(SEGMENTS, "path", "mm", middle["path_mm"]),
             row(SEGMENTS, "smoothness SPARC", "", middle["sparc"]),
@@ -266,7 +266,7 @@ def _percent(share: float | None) -> str:
     return number(None if share is None else 100.0 * share)
 
 
-def _hand_rows(hand: MotionFigures) -> list[Row]:
+def _hand_rows(hand: MotionFigures) -> list[TableRow]:
     numbers = (
         ("path", "mm", hand.path_mm),
         ("speed, median", "mm/s", hand.speed_median_mm_s),
@@ -278,9 +278,9 @@ def _hand_rows(hand: MotionFigures) -> list[Row]:
     shares = (("power in 1–3 Hz", hand.power_1_3), ("time below 5 mm/s", hand.idle_share))
     return [
         *(row(HAND, label, unit, value) for label, unit, value in numbers),
-        *(Row(HAND, label, "%", _percent(value)) for label, value in shares),
+        *(TableRow(HAND, label, "%", _percent(value)) for label, value in shares),
         row(HAND, "submovements", "1/s", hand.peaks_per_s),
-        Row(HAND, "reversals", "", str(hand.reversals)),
+        TableRow(HAND, "reversals", "", str(hand.reversals)),
         row(HAND, "smoothness SPARC", "", hand.sparc),
         row(HAND, "smoothness LDLJ", "", hand.ldlj),
         row(HAND, "tremor, 8–12 Hz", "µm", hand.tremor_um),

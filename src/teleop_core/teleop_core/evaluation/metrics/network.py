@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from teleop_core.evaluation import Context, Envelope, Metric, Row, Window, keys_of, latest, number, row
+from teleop_core.evaluation import Context, Envelope, Metric, TableRow, Window, keys_of, latest, number, row
 from teleop_core.evaluation.accumulators import Distribution, Integers
 from teleop_core.evaluation.figure import FIRST, SECOND, Figure, line, time_axis
 from teleop_core.evaluation.metric import figure
@@ -132,7 +132,7 @@ class NetworkMetric(Metric):
         there, back = (ages.score(*self._packets(k)) for k, ages in enumerate(self._ways))
         return NetworkScore(there, back)
 
-    def rows(self) -> list[Row]:
+    def rows(self) -> list[TableRow]:
         """Ages and losses of both directions; nothing without a network."""
         found, score = [], self.values()
         for (name, _), way in zip(_WAYS, (score.there, score.back), strict=True):

@@ -6,7 +6,7 @@ from teleop_core.evaluation import TRACKED, Context, Moments, Spread, Window, fi
 from teleop_core.evaluation.metric import SPREAD_MEANING, Key, Metric
 from teleop_core.evaluation.metrics.position_error import COMMAND_GROUP, GROUP
 from teleop_core.evaluation.published import ANGLE_FACTOR, Gains, agrees_by_factor
-from teleop_core.evaluation.rows import Row, error_rows, number, spread_rows
+from teleop_core.evaluation.rows import TableRow, error_rows, number, spread_rows
 from teleop_core.evaluation.tracking import ErrorTrace, PoseErrors
 
 TURNS = ("roll", "pitch", "yaw")
@@ -81,7 +81,7 @@ class OrientationErrorMetric(Metric):
         """Spread so far, [deg]."""
         return self._error.error()
 
-    def rows(self) -> list[Row]:
+    def rows(self) -> list[TableRow]:
         """The spreads beside the published figures of the mode."""
         error, mode, group = self.values(), self._gains.published, GROUP
         published = (mode.roll_deg, mode.pitch_deg, mode.yaw_deg) if mode else (None, None, None)
@@ -154,6 +154,6 @@ class CommandOrientationErrorMetric(Metric):
         """Spread so far, [deg]."""
         return self._error.error()
 
-    def rows(self) -> list[Row]:
+    def rows(self) -> list[TableRow]:
         """Root mean square and maximum of the one rotation."""
         return error_rows(COMMAND_GROUP, "rotation", "deg", self.values().angle)

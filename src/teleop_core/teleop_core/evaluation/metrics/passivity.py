@@ -4,8 +4,8 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from teleop_core.chain.passivity.port import DRIFT, HEARD, IN, LAW, MARGIN, OUT, ROUND, WITHHELD
-from teleop_core.evaluation import Context, Envelope, Integers, Metric, Row, Window, keys_of, number, row
+from teleop_core.coupling.passivity.port import DRIFT, HEARD, IN, LAW, MARGIN, OUT, ROUND, WITHHELD
+from teleop_core.evaluation import Context, Envelope, Integers, Metric, TableRow, Window, keys_of, number, row
 from teleop_core.evaluation.figure import FIRST, FIXTURE, SECOND, THIRD, Figure, line, time_axis
 from teleop_core.evaluation.metric import figure
 from teleop_core.evaluation.traces import Rows
@@ -127,7 +127,7 @@ class PassivityMetric(Metric):
         chatter = self._variation / self._seconds if self._seconds else None
         return PassivityScore(hand.score(), slave.score(), chatter, *(1e3 * drift for drift in slave.drifts))
 
-    def rows(self) -> list[Row]:
+    def rows(self) -> list[TableRow]:
         """Energies of both ports and the costs; nothing without a stage ``passivity``."""
         score, found = self.values(), []
         if score.chatter_ns is None:

@@ -10,7 +10,7 @@ from teleop_core.evaluation import TRACKED, Context, Window, same_stamp, tracked
 from teleop_core.evaluation.figure import COMMAND, MEASURED, Figure, line, time_axis
 from teleop_core.evaluation.metric import SpreadMetric
 from teleop_core.evaluation.published import POSITION_SHARE, Gains, agrees
-from teleop_core.evaluation.rows import Row, number, spread_rows
+from teleop_core.evaluation.rows import TableRow, number, spread_rows
 from teleop_core.evaluation.tracking import ErrorTrace, pose_errors, rows_of
 from teleop_core.graph.topics import SLAVE_TRUE_CP
 from teleop_core.kernels.geometry import Array
@@ -66,7 +66,7 @@ class PositionErrorMetric(SpreadMetric):
         """Distances (N,) [mm]."""
         return tracked(window).against.position_mm
 
-    def rows(self) -> list[Row]:
+    def rows(self) -> list[TableRow]:
         """The spread beside the published figures of the mode."""
         mode = self._gains.published
         if mode is None:

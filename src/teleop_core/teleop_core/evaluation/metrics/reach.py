@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from teleop_core.evaluation import MISSING, Context, Integers, Moments, Row, Spread, Window, error_rows, row
+from teleop_core.evaluation import MISSING, Context, Integers, Moments, Spread, TableRow, Window, error_rows, row
 from teleop_core.evaluation.metric import SPREAD_MEANING, Metric, figure, keys_of
 from teleop_core.evaluation.stamps import StampTallies
 from teleop_core.graph.signals import DT
@@ -125,21 +125,21 @@ class ReachMetric(Metric):
         is_slow = self._interpolation != "none" and period_us > 1.5e6 * DT
         return period_us * 1e-3 if is_slow else 0.0
 
-    def rows(self) -> list[Row]:
+    def rows(self) -> list[TableRow]:
         """Shares in percent, the longest stretch, residuals, and whether figures compare."""
         score = self.values()
         return [
-            Row(GROUP, "followed, time", "%", _percent(score.followed_share)),
+            TableRow(GROUP, "followed, time", "%", _percent(score.followed_share)),
             row(GROUP, "longest not followed", "s", score.longest_s),
-            Row(GROUP, "at a joint's end", "%", _percent(score.joint_share)),
-            Row(GROUP, "beyond the workspace", "%", _percent(score.workspace_share)),
-            Row(GROUP, "near a singularity", "%", _percent(score.singularity_share)),
-            Row(GROUP, "joints too slow", "%", _percent(score.speed_share)),
-            Row(GROUP, "aligned anew", "%", _percent(score.aligning_share)),
+            TableRow(GROUP, "at a joint's end", "%", _percent(score.joint_share)),
+            TableRow(GROUP, "beyond the workspace", "%", _percent(score.workspace_share)),
+            TableRow(GROUP, "near a singularity", "%", _percent(score.singularity_share)),
+            TableRow(GROUP, "joints too slow", "%", _percent(score.speed_share)),
+            TableRow(GROUP, "aligned anew", "%", _percent(score.aligning_share)),
             *error_rows(GROUP, "left by IK", "mm", score.residual_mm),
             row(GROUP, "left by IK, max", "deg", score.residual_deg.max),
             row(GROUP, "commands", "Hz", score.master_hz),
-            Row(GROUP, "interpolation", "", _way(score)),
+            TableRow(GROUP, "interpolation", "", _way(score)),
         ]
 
 

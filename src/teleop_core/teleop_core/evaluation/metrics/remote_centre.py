@@ -1,27 +1,12 @@
 """Remote centre: how far the tool's shaft passes from the place that it must pass through."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
-from teleop_core.evaluation import Context, Metric, Moments, Window, keys_of
+from teleop_core.evaluation import Context, Metric, Moments, Window
 from teleop_core.evaluation.metric import figure
 from teleop_core.evaluation.metrics.motion import approach_end_ns
 from teleop_core.graph.topics import REMOTE_CENTRE, SLAVE_MEASURED_CP
 from teleop_core.kernels.geometry import Array, rotations_from_quaternions
-
-
-@dataclass(frozen=True)
-class RemoteCentreScore:
-    """Distances after the approach; None without a remote centre."""
-
-    off_rms_mm: float | None = figure(
-        "mm",
-        "RMS distance from the centre to the line of the shaft, of slave/measured_cp",
-        "shaft beside the centre, RMS",
-    )
-    off_max_mm: float | None = figure("mm", "largest such distance", "shaft beside the centre, max")
-    least_depth_mm: float | None = figure("mm", "least distance from the centre to the tip", "least depth of the tip")
 
 
 def distances(poses: Array, centre: Array, shaft: Array) -> tuple[Array, Array]:
@@ -39,11 +24,17 @@ def distances(poses: Array, centre: Array, shaft: Array) -> tuple[Array, Array]:
 
 
 class RemoteCentreMetric(Metric):
-    """How well a tool keeps to its remote centre."""
+    """How well a tool keeps to its remote centre after the approach; None without one."""
 
     name, group = "remote_centre", "remote centre"
-    keys = keys_of("remote_centre", RemoteCentreScore)
     topics = (REMOTE_CENTRE, SLAVE_MEASURED_CP)
+    off_rms_mm = figure(
+        "mm",
+        "RMS distance from the centre to the line of the shaft, of slave/measured_cp",
+        "shaft beside the centre, RMS",
+    )
+    off_max_mm = figure("mm", "largest such distance", "shaft beside the centre, max")
+    least_depth_mm = figure("mm", "least distance from the centre to the tip", "least depth of the tip")
 
     def __init__(self, context: Context) -> None:
         self._begin_ns = approach_end_ns(context) if context.span is None else context.span.first_ns
@@ -61,9 +52,6 @@ class RemoteCentreMetric(Metric):
         off, depth = distances(poses.values[counts, :7], self._last[:3], self._last[3:])
         self._off.add(1e3 * off)
         self._least = min(self._least, float(depth.min()))
-
-    def values(self) -> RemoteCentreScore:
-        """Score of everything so far."""
-        off = self._off.spread()
-        least = 1e3 * self._least if self._off.count else None
-        return RemoteCentreScore(off.rms, off.max, least)
+        found = self._off.spread()
+        self.off_rms_mm, self.off_max_mm = found.rms, found.max
+        self.least_depth_mm = 1e3 * self._least if self._off.count else None

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from teleop_core.chain.tasks.transfer import STEPS
 from teleop_core.evaluation import Context, Key, Metric, Window
 from teleop_core.graph.topics import TASK_STATE
+from teleop_core.hand.tasks.transfer import STEPS
 
 _ATTEMPTS, _STEP = (TASK_STATE.columns.index(name) for name in ("attempts", "step"))
 

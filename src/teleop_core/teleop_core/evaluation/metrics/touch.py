@@ -1,11 +1,9 @@
 """Touch: what the slave's tip felt of the world."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
-from teleop_core.evaluation import Context, Envelope, Metric, Moments, Window, keys_of, number
-from teleop_core.evaluation.figure import DARK, FIRST, SECOND, THIRD, Figure, line, time_axis
+from teleop_core.evaluation import Context, Envelope, Metric, Moments, Window, number
+from teleop_core.evaluation.figure import Figure, force_figure
 from teleop_core.evaluation.metric import figure
 from teleop_core.evaluation.objects import object_of
 from teleop_core.graph.topics import SLAVE_MEASURED_CF, SLAVE_TRUE_CF, SLAVE_TRUE_CP
@@ -14,22 +12,6 @@ from teleop_core.slave.world.button import ButtonParameters, count_presses
 
 _NEXT_NS = 5_000_000
 """Largest time between samples of which the later follows at once [ns]."""
-
-
-@dataclass(frozen=True)
-class TouchScore:
-    """Forces on the slave's tip; None where none were recorded."""
-
-    count: int | None = figure("1", "touches: how often the force on the slave's tip set in", "touches")
-    peak_n: float | None = figure("N", "largest force on the tip; null without a touch", "force on the tip, max")
-    rms_n: float | None = figure("N", "root mean square of the samples with a force")
-    share: float | None = figure("1", "share of the recorded time in touch", "share of the time in touch")
-    drop_n: float | None = figure(
-        "N", "largest fall of the force from sample to sample within 5 ms, as of a puncture", "largest fall of it"
-    )
-    presses: int | None = figure(
-        "1", "how often a button was pressed to its stop, from click to click; null without one", "presses"
-    )
 
 
 class _Presses:
@@ -57,19 +39,28 @@ class _Presses:
 
 
 class TouchMetric(Metric):
-    """Touches of the tip with the world, and their forces.
+    """Touches of the tip with the world, and their forces; None where none were recorded.
 
     Of the true force where it was recorded: noise and bias of a sensor are no touch.
     """
 
     name, group = "touch", "what the slave touched"
-    keys = keys_of("touch", TouchScore)
     topics = (SLAVE_TRUE_CF, SLAVE_MEASURED_CF)
+    count = figure("1", "touches: how often the force on the slave's tip set in", "touches")
+    peak_n = figure("N", "largest force on the tip; null without a touch", "force on the tip, max")
+    rms_n = figure("N", "root mean square of the samples with a force")
+    share = figure("1", "share of the recorded time in touch", "share of the time in touch")
+    drop_n = figure(
+        "N", "largest fall of the force from sample to sample within 5 ms, as of a puncture", "largest fall of it"
+    )
+    presses = figure(
+        "1", "how often a button was pressed to its stop, from click to click; null without one", "presses"
+    )
 
     def __init__(self, context: Context) -> None:
         self._presses = _Presses(context)
         self._force = Moments()
-        self._count, self._time_ns, self._seen = 0, 0, 0
+        self._touches, self._time_ns, self._seen = 0, 0, 0
         self._last = (0, 0.0)  # stamp, and force
         self._drop = 0.0
         self._begin_ns = 0
@@ -79,6 +70,7 @@ class TouchMetric(Metric):
         """Take one window; the topic is sent where it changes, and now and then."""
         if self._presses.count is not None:
             self._presses.add(window.samples(SLAVE_TRUE_CP).values[:, :3])
+            self.presses = self._presses.count if self._seen else None
         is_known = len(window.around(SLAVE_TRUE_CF)) > 0
         samples = window.samples(SLAVE_TRUE_CF if is_known else SLAVE_MEASURED_CF)
         if not len(samples.values):
@@ -94,33 +86,20 @@ class TouchMetric(Metric):
         times = np.diff(np.append(self._last[0], samples.log_ns))
         falls = -np.diff(forces)[times <= _NEXT_NS]
         self._drop = max(self._drop, float(falls.max(initial=0.0)))
-        self._count += int(np.sum(touches & ~before))
+        self._touches += int(np.sum(touches & ~before))
         self._time_ns += int(times[before].sum())  # a value holds until the next one
         self._last = int(samples.log_ns[-1]), float(forces[-1])
         self._force.add(magnitude[touches])
         self._trace.add(samples.log_ns, np.column_stack((force, magnitude)))
-
-    def values(self) -> TouchScore:
-        """Score of everything so far."""
-        if not self._seen:
-            return TouchScore(None, None, None, None, None, None)
-        spread, whole = self._force.spread(), self._last[0] - self._begin_ns
-        share = self._time_ns / whole if whole else 0.0
-        drop = self._drop if self._count else None
-        return TouchScore(self._count, spread.max, spread.rms, share, drop, self._presses.count)
+        found, whole = self._force.spread(), self._last[0] - self._begin_ns
+        self.count, self.peak_n, self.rms_n, self.presses = self._touches, found.max, found.rms, self._presses.count
+        self.share = self._time_ns / whole if whole else 0.0
+        self.drop_n = self._drop if self._touches else None
 
     def figures(self) -> list[Figure]:
         """Force on the tip against time; none where nothing was touched."""
         times, values = self._trace.line()
-        if not self._count:
+        if not self.count:
             return []
-        traces = [
-            line(times, values[:, i], f"{axis} (slave)", color, 1.2, "N")
-            for i, (axis, color) in enumerate(zip("xyz", (FIRST, SECOND, THIRD), strict=True))
-        ]
-        traces.append(line(times, values[:, 3], "magnitude", DARK, 1.4, "N"))
-        score = self.values()
-        sentence = f"The world pushes the slave's tip with {number(score.peak_n)} N at most"
-        layout = {"xaxis": time_axis(), "yaxis": {"title": {"text": "force [N]"}}, "hovermode": "x unified"}
-        text = f"{sentence}, in {score.count} touches."
-        return [Figure("Force on the slave's tip", text, traces, layout, 340)]
+        text = f"The world pushes the slave's tip with {number(self.peak_n)} N at most, in {self.count} touches."
+        return [force_figure("Force on the slave's tip", text, times, values, "slave")]

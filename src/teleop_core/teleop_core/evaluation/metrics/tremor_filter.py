@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from teleop_core.evaluation import Context, Integers, Metric, Row, Window, keys_of, motion_measures, row
+from teleop_core.evaluation import Context, Integers, Metric, TableRow, Window, keys_of, motion_measures, row
 from teleop_core.evaluation.metric import figure
 from teleop_core.evaluation.metrics.motion import approach_end_ns
 from teleop_core.evaluation.motion_samples import MotionSamples
@@ -141,7 +141,7 @@ class TremorFilterMetric(Metric):
         longest = max(parts, key=lambda part: part.stop - part.start)
         return passage(*(motion_measures.velocities(motion[longest, :3]) for motion in (before, after)))
 
-    def rows(self) -> list[Row]:
+    def rows(self) -> list[TableRow]:
         """Tremor before and after, delay and gain; nothing without a filter."""
         score = self.values()
         if score.after_um is None and score.delay_ms is None:

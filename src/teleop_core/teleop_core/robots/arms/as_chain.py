@@ -7,8 +7,8 @@ import numpy as np
 
 from teleop_core.base.errors import ParameterError
 from teleop_core.kernels.geometry import Array
+from teleop_core.kinematics import dh_kernels
 from teleop_core.robots.arms import dh, rcrt1
-from teleop_core.robots.chains import dh_kernels
 from teleop_core.robots.link_errors import Chain, LinkErrors
 from teleop_core.robots.robot import Robot
 

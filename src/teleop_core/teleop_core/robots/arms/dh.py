@@ -41,9 +41,9 @@ from typing import Any
 
 from teleop_core.base import ParameterError, UnknownNameError, damage_told, plain_yaml
 from teleop_core.base.ranges import MOST_OF_ARM, check
+from teleop_core.kinematics import DIRECTIONS
 from teleop_core.robots.arms.dh_chain import CONVENTIONS, DhJoint, DhRow, DhTable, elementary
 from teleop_core.robots.arms.dh_drives import parse_drives
-from teleop_core.robots.kinematics import DIRECTIONS
 from teleop_core.robots.robot import Robot
 
 __all__ = [

@@ -8,11 +8,11 @@ import numpy as np
 
 from teleop_core.base import ShapeError
 from teleop_core.kernels import Array, checked_array, product, rotation, transform
+from teleop_core.kinematics import DIRECTIONS
+from teleop_core.kinematics.closed_form.decomposition import SEARCH, Solution, solution_of
 from teleop_core.robots.arms.dh_drives import drives_of
-from teleop_core.robots.chains.followers import Followers
-from teleop_core.robots.closed_form.decomposition import SEARCH, Solution, solution_of
 from teleop_core.robots.drives import Drives
-from teleop_core.robots.kinematics import DIRECTIONS
+from teleop_core.robots.dynamics.followers import Followers
 from teleop_core.robots.robot import Robot
 
 # Elementary motions of one row, left to right: what, along or about which axis, by which symbol.

@@ -16,9 +16,9 @@ import numpy as np
 from teleop_core.base import ParameterError
 from teleop_core.kernels import Array, inner, kernel
 from teleop_core.kernels.room import room
+from teleop_core.kinematics import IkStatus, Kernels, is_askable, pose_residual
+from teleop_core.kinematics.branches import BESIDE, bounded, cost_of, hold, is_allowed, turn, wrapped
 from teleop_core.robots.arms import rcrt1_dynamics, rcrt1_hardware
-from teleop_core.robots.branches import BESIDE, bounded, cost_of, hold, is_allowed, turn, wrapped
-from teleop_core.robots.kinematics import IkStatus, Kernels, is_askable, pose_residual
 from teleop_core.robots.robot import Robot, geometry_of
 
 JOINTS = ("theta1", "theta2", "d3", "theta4", "theta5", "theta6")

@@ -16,9 +16,9 @@ import numpy as np
 
 from teleop_core.base.errors import ParameterError
 from teleop_core.kernels.geometry import Array
+from teleop_core.kinematics import DIRECTIONS
 from teleop_core.robots.arms.dh import parse_table
 from teleop_core.robots.drives import ENTRIES, Drives
-from teleop_core.robots.kinematics import DIRECTIONS
 from teleop_core.robots.robot import Robot, geometry_of
 
 _MOST = 10.0  # [m], of a length

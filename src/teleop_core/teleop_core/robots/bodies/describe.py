@@ -17,7 +17,7 @@ from teleop_core.robots.bodies.body import HERE, Bodies, Body, Joint
 from teleop_core.robots.bodies.chain import axes_of, chain, places, tip_of
 from teleop_core.robots.bodies.frames import pose_of, tips
 from teleop_core.robots.bodies.solids import ball, cylinder
-from teleop_core.robots.chains.followers import followers_of
+from teleop_core.robots.dynamics.followers import followers_of
 from teleop_core.robots.robot import Robot
 
 _KNOWN: "WeakKeyDictionary[Robot, Bodies]" = WeakKeyDictionary()

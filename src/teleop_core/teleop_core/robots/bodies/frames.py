@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from teleop_core.kernels import geometry, kernel, portable
-from teleop_core.robots.kinematics import FkStatus
+from teleop_core.kinematics import FkStatus
 from teleop_core.robots.robot import Robot
 
 

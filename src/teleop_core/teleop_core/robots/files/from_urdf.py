@@ -1,9 +1,9 @@
 """Robots from URDF: the chain from the root link to a tip, with what the file says of its drives.
 
 What moves the tip are the joints between root and tip; all others stay at zero, and weigh. A joint between them that
-mimics another moves with it (:mod:`teleop_core.robots.chains.followers`). The kinematics are those of
-Denavit-Hartenberg chains (:mod:`teleop_core.robots.chains.dh_kernels`), the dynamics those of rigid bodies
-(:mod:`teleop_core.robots.chains.chain_dynamics`). Effort and velocity limits, damping and friction are the drives'
+mimics another moves with it (:mod:`teleop_core.robots.dynamics.followers`). The kinematics are those of
+Denavit-Hartenberg chains (:mod:`teleop_core.kinematics.dh_kernels`), the dynamics those of rigid bodies
+(:mod:`teleop_core.robots.dynamics.chain_dynamics`). Effort and velocity limits, damping and friction are the drives'
 where they stand in the file and are above zero. The inertia of a drive is that of the links at home; that of its motor
 is in no URDF. A file of drives may state it, and what else a URDF leaves out. Whatever is left out there too is assumed
 as for tables (:mod:`teleop_core.robots.arms.dh_drives`), and ``Robot.drives.assumed`` names it. Meshes are read where
@@ -25,32 +25,14 @@ import numpy as np
 
 from teleop_core.base import ParameterError, UnknownNameError
 from teleop_core.kernels import Array, dot, length, product
+from teleop_core.kinematics import DIRECTIONS
+from teleop_core.kinematics.closed_form.decomposition import SEARCH, solution_of
 from teleop_core.robots.arms import dh_chain, dh_drives
-from teleop_core.robots.chains.chain_dynamics import body_row, chain_dynamics, chain_row
-from teleop_core.robots.chains.followers import Follower, Followers, dynamics_row, follower_dynamics, follower_inertia
-from teleop_core.robots.closed_form.decomposition import SEARCH, solution_of
 from teleop_core.robots.drives import ENTRIES, Drives, Dynamics
-from teleop_core.robots.files import urdf_notes, xacro_files
-from teleop_core.robots.files.urdf_tree import (
-    KINDS,
-    UNITS,
-    Links,
-    UrdfJoint,
-    chain_to,
-    elements_of,
-    is_endless,
-    joint_of,
-    joints_by_child,
-    limits_of,
-    numbers_of,
-    origin_of,
-    root_link,
-    root_of,
-    tip_of,
-    turn_of_z,
-)
+from teleop_core.robots.dynamics.chain_dynamics import body_row, chain_dynamics, chain_row
+from teleop_core.robots.dynamics.followers import Follower, Followers, dynamics_row, follower_dynamics, follower_inertia
+from teleop_core.robots.files import urdf_notes, urdf_tree, xacro_files
 from teleop_core.robots.files.visuals import visuals_of
-from teleop_core.robots.kinematics import DIRECTIONS
 from teleop_core.robots.rank import directions_of
 from teleop_core.robots.robot import Robot
 
@@ -88,7 +70,7 @@ def load_urdf(
 
     Returns:
         The robot, its base the root link, with inverse kinematics in closed form if it is of a
-        class of :mod:`~teleop_core.robots.closed_form.decomposition`, else by search. Home is zero,
+        class of :mod:`~teleop_core.kinematics.closed_form.decomposition`, else by search. Home is zero,
         or the middle of limits without zero; continuous joints turn two rounds (assumed: ±2π).
 
     Raises:
@@ -101,12 +83,14 @@ def load_urdf(
     """
     if dynamics not in MODELS:
         raise UnknownNameError("dynamics", dynamics, MODELS)
-    root = root_of(Path(path), xacro_files.xml_of(Path(path), arguments or {}))
-    links = elements_of(root, "link")
-    joints = [joint_of(name, element, links) for name, element in elements_of(root, "joint").items()]
-    by_child = joints_by_child(joints)
-    base = root_link(links, by_child)
-    chain = chain_to(tip_of(tip, links, joints), by_child)
+    root = urdf_tree.root_of(Path(path), xacro_files.xml_of(Path(path), arguments or {}))
+    links = urdf_tree.elements_of(root, "link")
+    joints = [
+        urdf_tree.joint_of(name, element, links) for name, element in urdf_tree.elements_of(root, "joint").items()
+    ]
+    by_child = urdf_tree.joints_by_child(joints)
+    base = urdf_tree.root_link(links, by_child)
+    chain = urdf_tree.chain_to(urdf_tree.tip_of(tip, links, joints), by_child)
     moving = [joint for joint in chain if joint.axis is not None]
     if not moving:
         raise ParameterError("tip", tip or chain, "a link that some joint between it and the root moves")
@@ -115,7 +99,7 @@ def load_urdf(
     limits = [_narrowed(train) for train in trains]
     fixed, kinds = _frames(chain)
     reach = sum(float(length(joint.origin[:3, 3])) for joint in chain)
-    reach += sum(max(map(abs, limits_of(j))) for j in moving if j.kind == "prismatic")
+    reach += sum(max(map(abs, urdf_tree.limits_of(j))) for j in moving if j.kind == "prismatic")
     home, n = np.array([limit.home for limit in limits]), len(limits)
     may_be_any = dynamics == "independent"  # whose inertia counts as assumed
     bodies, inertia = _bodies(moving, base, links, joints, may_be_any), np.zeros((n, n))
@@ -156,12 +140,14 @@ def load_urdf(
 class _Geared:
     """A joint that turns or slides by ``factor`` times what its leader does, plus ``offset``."""
 
-    joint: UrdfJoint
+    joint: urdf_tree.UrdfJoint
     factor: float = 1.0
     offset: float = 0.0
 
 
-def _trains(moving: list[UrdfJoint], named: Mapping[str, UrdfJoint]) -> tuple[list[list[_Geared]], Followers]:
+def _trains(
+    moving: list[urdf_tree.UrdfJoint], named: Mapping[str, urdf_tree.UrdfJoint]
+) -> tuple[list[list[_Geared]], Followers]:
     """For each joint of the robot itself and all that follow it to the tip; and the motions."""
     trains: dict[str, list[_Geared]] = {}
     motions = []
@@ -172,20 +158,22 @@ def _trains(moving: list[UrdfJoint], named: Mapping[str, UrdfJoint]) -> tuple[li
             train.append(_Geared(joint=joint, factor=factor, offset=offset))
         place = list(trains).index(leader.name)
         motions.append(Follower(leader=place, factor=factor, offset=offset))
-    kinds = tuple(1.0 if KINDS[t[0].joint.kind] == "turn" else 2.0 for t in trains.values())
+    kinds = tuple(1.0 if urdf_tree.KINDS[t[0].joint.kind] == "turn" else 2.0 for t in trains.values())
     return list(trains.values()), Followers(motions=tuple(motions), kinds=kinds)
 
 
-def _leader(joint: UrdfJoint, named: Mapping[str, UrdfJoint]) -> tuple[UrdfJoint, float, float]:
+def _leader(
+    joint: urdf_tree.UrdfJoint, named: Mapping[str, urdf_tree.UrdfJoint]
+) -> tuple[urdf_tree.UrdfJoint, float, float]:
     """Joint that a joint follows in the end, itself if none, with factor and offset."""
     factor, offset, passed = 1.0, 0.0, [joint.name]
     while (mimic := joint.element.find("mimic")) is not None:
         where = f"mimic of joint {joint.name}"
-        own = float(numbers_of(where, mimic, "multiplier", (1.0,))[0])
+        own = float(urdf_tree.numbers_of(where, mimic, "multiplier", (1.0,))[0])
         if own == 0.0:
             raise ParameterError(f"multiplier of {where}", own, "not 0: what never moves is fixed")
-        unit = UNITS[KINDS[joint.kind]]
-        offset += factor * float(numbers_of(where, mimic, "offset", (0.0,), unit)[0])
+        unit = urdf_tree.UNITS[urdf_tree.KINDS[joint.kind]]
+        offset += factor * float(urdf_tree.numbers_of(where, mimic, "offset", (0.0,), unit)[0])
         factor, name = factor * own, mimic.get("joint", "")
         movable = [other for other in named if named[other].axis is not None]
         if name not in movable:
@@ -197,7 +185,9 @@ def _leader(joint: UrdfJoint, named: Mapping[str, UrdfJoint]) -> tuple[UrdfJoint
     return joint, factor, offset
 
 
-def _refuse_beside(leaders: list[UrdfJoint], moving: list[UrdfJoint], joints: list[UrdfJoint]) -> None:
+def _refuse_beside(
+    leaders: list[urdf_tree.UrdfJoint], moving: list[urdf_tree.UrdfJoint], joints: list[urdf_tree.UrdfJoint]
+) -> None:
     """Refuse what moves with a joint of the robot, but not between root and tip: it would weigh."""
     named = {joint.name: joint for joint in joints}
     for joint in joints:
@@ -206,7 +196,7 @@ def _refuse_beside(leaders: list[UrdfJoint], moving: list[UrdfJoint], joints: li
             raise ParameterError("dynamics", "links", needed)
 
 
-def _refuse_weak(leaders: list[UrdfJoint], drives: Drives, home: Array, model: Dynamics) -> None:
+def _refuse_weak(leaders: list[urdf_tree.UrdfJoint], drives: Drives, home: Array, model: Dynamics) -> None:
     """Refuse drives that cannot hold the arm at home."""
     weight = np.zeros(len(leaders))
     model.gravity(home, model.parameters.copy(), weight)
@@ -227,10 +217,10 @@ def _task(task: str) -> tuple[str, ...]:
 def _narrowed(train: list[_Geared]) -> dh_chain.DhJoint:
     """Joint with the limits in which it and all that follow it are within theirs."""
     leader = train[0].joint
-    lower, upper = limits_of(leader)
+    lower, upper = urdf_tree.limits_of(leader)
     for geared in train[1:]:
-        if not is_endless(geared.joint):
-            ends = sorted((x - geared.offset) / geared.factor for x in limits_of(geared.joint))
+        if not urdf_tree.is_endless(geared.joint):
+            ends = sorted((x - geared.offset) / geared.factor for x in urdf_tree.limits_of(geared.joint))
             lower, upper = max(lower, ends[0]), min(upper, ends[1])
     if not lower < upper:
         names = ", ".join(geared.joint.name for geared in train[1:])
@@ -240,22 +230,22 @@ def _narrowed(train: list[_Geared]) -> dh_chain.DhJoint:
     return dh_chain.DhJoint(name=leader.name, symbol="", sign=1.0, lower=lower, upper=upper, home=home)
 
 
-def _frames(chain: list[UrdfJoint]) -> tuple[list[Array], list[float]]:
+def _frames(chain: list[urdf_tree.UrdfJoint]) -> tuple[list[Array], list[float]]:
     """Constant transforms between the joints, whose axes become z, and the kind of each joint."""
     fixed, kinds, last = [], [], np.eye(4)
     for joint in chain:
         last = product(last, joint.origin)
         if joint.axis is not None:
-            sign, align = turn_of_z(joint.axis)
+            sign, align = urdf_tree.turn_of_z(joint.axis)
             fixed.append(product(last, align))
-            kinds.append(sign * (1.0 if KINDS[joint.kind] == "turn" else 2.0))
+            kinds.append(sign * (1.0 if urdf_tree.KINDS[joint.kind] == "turn" else 2.0))
             last = np.ascontiguousarray(align.T)
     return [*fixed, last], kinds
 
 
 def _drives(trains: list[list[_Geared]], inertias: list[float], file: str) -> Drives:
     """Drives of the leaders, which bear friction and keep speed limits of what follows them."""
-    kinds, stated = [KINDS[train[0].joint.kind] for train in trains], {}
+    kinds, stated = [urdf_tree.KINDS[train[0].joint.kind] for train in trains], {}
     names = [train[0].joint.name for train in trains]
     given = dh_drives.read_drives(Path(file).expanduser(), names, kinds) if file else [{}] * len(trains)
     for train, kind, inertia, drive in zip(trains, kinds, inertias, given, strict=True):
@@ -282,8 +272,8 @@ def _drives(trains: list[list[_Geared]], inertias: list[float], file: str) -> Dr
     return replace(drives, assumed=assumed)
 
 
-def _drive_entries(joint: UrdfJoint) -> dict[str, float]:
-    where, found, is_turn = f"joint {joint.name}", {}, KINDS[joint.kind] == "turn"
+def _drive_entries(joint: urdf_tree.UrdfJoint) -> dict[str, float]:
+    where, found, is_turn = f"joint {joint.name}", {}, urdf_tree.KINDS[joint.kind] == "turn"
     for tag, key, entry, units in (
         ("limit", "effort", "effort_limit", ("N·m", "N")),
         ("limit", "velocity", "speed_limit", ("rad/s", "m/s")),
@@ -291,7 +281,7 @@ def _drive_entries(joint: UrdfJoint) -> dict[str, float]:
         ("dynamics", "friction", "coulomb", ("N·m", "N")),
     ):
         element, unit = joint.element.find(tag), units[0 if is_turn else 1]
-        value = float(numbers_of(where, element, key, (0.0,), unit)[0])
+        value = float(urdf_tree.numbers_of(where, element, key, (0.0,), unit)[0])
         if value < 0.0:
             raise ParameterError(f"{key} of {where}", value, ">= 0")
         if value > 0.0:  # a limit of 0 is what files say that do not know it
@@ -299,12 +289,18 @@ def _drive_entries(joint: UrdfJoint) -> dict[str, float]:
     return found
 
 
-def _bodies(moving: list[UrdfJoint], base: str, links: Links, joints: list[UrdfJoint], may_be_any: bool) -> Array:
+def _bodies(
+    moving: list[urdf_tree.UrdfJoint],
+    base: str,
+    links: urdf_tree.Links,
+    joints: list[urdf_tree.UrdfJoint],
+    may_be_any: bool,
+) -> Array:
     """What each joint moves up to the next, (n, 13), see :func:`body_row`; other joints at zero.
 
     Files give many an inertia that no body has. It does no harm where nothing moves it, and where ``may_be_any``.
     """
-    carried: dict[str, list[UrdfJoint]] = {}
+    carried: dict[str, list[urdf_tree.UrdfJoint]] = {}
     for joint in joints:
         carried.setdefault(joint.parent, []).append(joint)
     places = {joint.name: i for i, joint in enumerate(moving)}
@@ -319,7 +315,7 @@ def _bodies(moving: list[UrdfJoint], base: str, links: Links, joints: list[UrdfJ
             sums[mover] += body_row(mass, centre[:3, 3], turned)
         for joint in carried.get(link, ()):
             if joint.name in places and joint.axis is not None:
-                stack.append((joint.child, turn_of_z(joint.axis)[1].T, places[joint.name]))
+                stack.append((joint.child, urdf_tree.turn_of_z(joint.axis)[1].T, places[joint.name]))
             else:
                 stack.append((joint.child, product(T, joint.origin), mover))
     return sums
@@ -330,10 +326,11 @@ def _mass(name: str, link: Xml.Element, may_be_any: bool) -> tuple[float, Array,
     element, where = link.find("inertial"), f"link {name}"
     if element is None:
         return 0.0, np.zeros((3, 3)), np.eye(4)
-    mass = float(numbers_of(where, element.find("mass"), "value", (0.0,), "kg")[0])
+    mass = float(urdf_tree.numbers_of(where, element.find("mass"), "value", (0.0,), "kg")[0])
     tensor = element.find("inertia")
     xx, xy, xz, yy, yz, zz = (
-        float(numbers_of(where, tensor, key, (0.0,), "kg·m²")[0]) for key in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+        float(urdf_tree.numbers_of(where, tensor, key, (0.0,), "kg·m²")[0])
+        for key in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
     )
     inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
     if 0.0 <= mass < _NO_MASS and abs(inertia).max() < _NO_MASS:  # a frame that has to weigh
@@ -341,7 +338,7 @@ def _mass(name: str, link: Xml.Element, may_be_any: bool) -> tuple[float, Array,
     if mass < 0.0 or not (may_be_any or _is_possible(inertia)):
         needed = "that of a body; dynamics=independent takes any"
         raise ParameterError(f"inertial of {where}", (mass, inertia.tolist()), needed)
-    return mass, inertia, origin_of(where, element)
+    return mass, inertia, urdf_tree.origin_of(where, element)
 
 
 def _is_possible(inertia: Array) -> bool:

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from teleop_core.base import Choice, ParameterError, choice, parameter
+from teleop_core.base import Choice, ParameterError, Within, choice, parameter
 from teleop_core.graph import DT, RunningStage, Stage, topics
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots import load_robot_set
-from teleop_core.robots.parameters import RobotParameters
+from teleop_core.robots.selection import RobotParameters
 from teleop_core.slave.bridges import BRIDGES, Command
 from teleop_core.slave.bridges.hearing import Hearing, Sample
 from teleop_core.slave.bridges.leading import Lead
@@ -37,12 +37,10 @@ class BridgeParameters:
     )
     rate: int = parameter(
         500,
-        unit="1/s",
-        lower=100,
-        upper=1000,
+        Within(100, 1000, "1/s"),
+        "commands a second, one of " + ", ".join(map(str, RATES)),
         fixed=True,
         source="assumed",
-        doc="commands a second, one of " + ", ".join(map(str, RATES)),
     )
     stamps: str = parameter(
         "header",
@@ -53,40 +51,32 @@ class BridgeParameters:
     )
     oldest_stamp: float = parameter(
         0.1,
-        unit="s",
-        lower=0.001,
-        upper=1.0,
+        Within(0.001, 1.0, "s"),
+        "samples whose stamps differ by more from our clock are refused",
         fixed=True,
         source="assumed",
-        doc="samples whose stamps differ by more from our clock are refused",
     )
     jump_tolerance: float = parameter(
         0.02,
-        unit="rad or m",
-        lower=1e-4,
-        upper=0.1,
+        Within(1e-4, 0.1, "rad or m"),
+        "what a joint may move between two samples beyond twice its rated speed",
         fixed=True,
         source="assumed",
-        doc="what a joint may move between two samples beyond twice its rated speed",
     )
     arm_timeout: float = parameter(
         0.3,
-        unit="s",
-        lower=0.02,
-        upper=5.0,
+        Within(0.02, 5.0, "s"),
+        "without a sound sample for longer the arm is commanded no more; the server holds "
+        "before, at its command_timeout",
         fixed=True,
         source="assumed",
-        doc="without a sound sample for longer the arm is commanded no more; the server holds "
-        "before, at its command_timeout",
     )
     setpoint_timeout: float = parameter(
         0.1,
-        unit="s",
-        lower=0.005,
-        upper=5.0,
+        Within(0.005, 5.0, "s"),
+        "without slave/setpoint_js for longer the arm is commanded no more",
         fixed=True,
         source="assumed",
-        doc="without slave/setpoint_js for longer the arm is commanded no more",
     )
 
     def __post_init__(self) -> None:
@@ -102,12 +92,11 @@ class ArmBridgeParameters(RobotParameters, BridgeParameters):
     joints: tuple[str, ...] = parameter((), fixed=True, doc="ours=theirs for each joint that the arm calls otherwise")
     signs: tuple[float, ...] = parameter(
         (),
-        lower=-1.0,
-        upper=1.0,
+        Within(-1.0, 1.0),
+        "1.0 or -1.0 for each of our joints: ours = sign * theirs + offset; empty: 1.0",
         fixed=True,
-        doc="1.0 or -1.0 for each of our joints: ours = sign * theirs + offset; empty: 1.0",
     )
-    offsets: tuple[float, ...] = parameter((), unit="rad or m", fixed=True, doc="of each of our joints; empty: 0.0")
+    offsets: tuple[float, ...] = parameter((), Within(unit="rad or m"), "of each of our joints; empty: 0.0", fixed=True)
     order: tuple[str, ...] = parameter(
         (),
         fixed=True,
@@ -116,12 +105,10 @@ class ArmBridgeParameters(RobotParameters, BridgeParameters):
     )
     start_tolerance: float = parameter(
         0.02,
-        unit="rad or m",
-        lower=1e-4,
-        upper=0.1,
+        Within(1e-4, 0.1, "rad or m"),
+        "the arm is commanded once each joint is as near to its setpoint",
         fixed=True,
         source="assumed",
-        doc="the arm is commanded once each joint is as near to its setpoint",
     )
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from teleop_core.base import ParameterError, parameter
+from teleop_core.base import ParameterError, Within, parameter
 from teleop_core.graph import DT, Stage
 from teleop_core.graph.topics import JAW, NO_COMMAND_NS, SLAVE_JAW_MEASURED_JS, SLAVE_JAW_SETPOINT_JS, SLAVE_OPERATION
 from teleop_core.slave.bridges import Command, arm_bridge, leading
@@ -27,21 +27,17 @@ class JawBridgeParameters(arm_bridge.BridgeParameters):
     joint: str = parameter("jaw", fixed=True, doc="what the gripper calls its joint")
     scale: float = parameter(
         1.0,
-        unit="1 or rad/m",
-        lower=-1e4,
-        upper=1e4,
+        Within(-1e4, 1e4, "1 or rad/m"),
+        "our angle = scale * theirs + offset; negative where theirs grows as it closes",
         fixed=True,
-        doc="our angle = scale * theirs + offset; negative where theirs grows as it closes",
     )
-    offset: float = parameter(0.0, unit="rad", lower=-10.0, upper=10.0, fixed=True, doc="our angle where theirs is 0")
+    offset: float = parameter(0.0, Within(-10.0, 10.0, "rad"), "our angle where theirs is 0", fixed=True)
     speed_limit: float = parameter(
         4.0,
-        unit="rad/s",
-        lower=0.01,
-        upper=100.0,
+        Within(0.01, 100.0, "rad/s"),
+        "rated speed, which commands exceed by a fifth at most",
         fixed=True,
         source="assumed",
-        doc="rated speed, which commands exceed by a fifth at most",
     )
 
     def __post_init__(self) -> None:

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from teleop_core.base.parameters import parameter
+from teleop_core.base.parameters import Within, parameter
 from teleop_core.slave.bridges import Bridge, Command, write_time
 
 _POINT = "trajectory_msgs/msg/JointTrajectoryPoint"
@@ -19,12 +19,7 @@ class JointTrajectoryParameters:
     """Parameters of trajectories of one point."""
 
     ahead: int = parameter(
-        2,
-        unit="periods",
-        lower=2,
-        upper=100,
-        source="assumed",
-        doc="time from start of the point: the arm follows so much later",
+        2, Within(2, 100, "periods"), "time from start of the point: the arm follows so much later", source="assumed"
     )
     velocity: str = parameter(
         "none",

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from teleop_core.base import parameter
+from teleop_core.base import Within, parameter
 from teleop_core.kernels import Array, kernel
 from teleop_core.robots.robot import Robot
 from teleop_core.slave.controllers import Controller, drives_and_poles, fields, motion_estimates
@@ -32,16 +32,14 @@ class AdaptiveParameters:
     filter_ratio: float = fields.ratio("filters of motion")
     rate: float = parameter(
         1.0,
-        lower=0.0,
-        upper=10.0,
-        doc="how fast it learns, over what gives load and loop three equal poles",
+        Within(0.0, 10.0),
+        "how fast it learns, over what gives load and loop three equal poles",
         source="derived: of load alone, 1 gives the poles of pid",
     )
     span: float = parameter(
         0.5,
-        lower=0.0,
-        upper=0.9,
-        doc="how far inertia may be from the table, share of it",
+        Within(0.0, 0.9),
+        "how far inertia may be from the table, share of it",
         source="assumed: inertias of links change less than that between postures",
     )
     friction_share: float = fields.friction_share("from which it begins")

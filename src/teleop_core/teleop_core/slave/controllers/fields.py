@@ -2,23 +2,20 @@
 
 from typing import Any
 
-from teleop_core.base.parameters import parameter
+from teleop_core.base.parameters import Within, parameter
 
 
 def bandwidth(poles: str, source: str = "assumed: the drive table's, as of pid") -> Any:
     """Closed-loop pole of each joint [rad/s]; ``poles``: "double" or "triple"."""
-    return parameter(
-        (), unit="rad/s", lower=0.1, upper=500.0, doc=f"{poles} closed-loop pole of each joint", source=source
-    )
+    return parameter((), Within(0.1, 500.0, "rad/s"), f"{poles} closed-loop pole of each joint", source=source)
 
 
 def ratio(what: str) -> Any:
     """Pole of the observer or of the filters of motion over that of the loop."""
     return parameter(
         3.5,
-        lower=1.0,
-        upper=10.0,
-        doc=f"pole of the {what} over that of the loop, where encoder noise allows it",
+        Within(1.0, 10.0),
+        f"pole of the {what} over that of the loop, where encoder noise allows it",
         source="assumed: the middle, √12, of the rule of two to six",
     )
 
@@ -27,9 +24,8 @@ def friction_share(use: str) -> Any:
     """Share of known dry friction, and what is done with it."""
     return parameter(
         0.8,
-        lower=0.0,
-        upper=1.5,
-        doc=f"share of known dry friction {use}",
+        Within(0.0, 1.5),
+        f"share of known dry friction {use}",
         source="assumed: less than all of it, for what is too much pushes the joint ahead",
     )
 
@@ -38,9 +34,8 @@ def friction_counts() -> Any:
     """Travel over which known dry friction turns on [encoder counts]."""
     return parameter(
         4.0,
-        lower=0.1,
-        upper=1000.0,
-        doc="encoder counts of travel that turn dry friction on",
+        Within(0.1, 1000.0),
+        "encoder counts of travel that turn dry friction on",
         source="assumed: a joint gives by a few encoder counts before it slips",
     )
 
@@ -49,8 +44,7 @@ def dead_band(use: str) -> Any:
     """Error [encoder counts] within which a joint is at rest, and what is not done there."""
     return parameter(
         0.5,
-        lower=0.0,
-        upper=100.0,
-        doc=f"encoder counts of error {use}",
+        Within(0.0, 100.0),
+        f"encoder counts of error {use}",
         source="derived: the nearest count is never farther, so that the joint may rest there",
     )

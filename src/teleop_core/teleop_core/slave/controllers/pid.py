@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from teleop_core.base import parameter
+from teleop_core.base import Within, parameter
 from teleop_core.kernels import Array, kernel
 from teleop_core.robots.robot import Robot
 from teleop_core.slave.controllers import Controller, drives_and_poles, fields, motion_estimates, per_joint
@@ -18,14 +18,13 @@ class PidParameters:
     """Gains; empty lists mean: by the rule of three equal poles, from the robot's drive table."""
 
     bandwidth: tuple[float, ...] = fields.bandwidth("triple", "assumed: the drive table's")
-    kp: tuple[float, ...] = parameter((), lower=0.0, doc="N·m/rad or N/m of each joint")
-    ki: tuple[float, ...] = parameter((), lower=0.0, doc="N·m/(rad·s) or N/(m·s) of each joint")
-    kd: tuple[float, ...] = parameter((), lower=0.0, doc="N·m·s/rad or N·s/m of each joint")
+    kp: tuple[float, ...] = parameter((), Within(0.0), "N·m/rad or N/m of each joint")
+    ki: tuple[float, ...] = parameter((), Within(0.0), "N·m/(rad·s) or N/(m·s) of each joint")
+    kd: tuple[float, ...] = parameter((), Within(0.0), "N·m·s/rad or N·s/m of each joint")
     setpoint_weight: float = parameter(
         1.0,
-        lower=0.0,
-        upper=1.0,
-        doc="share of the setpoint in the proportional action; at 1/3 no step overshoots",
+        Within(0.0, 1.0),
+        "share of the setpoint in the proportional action; at 1/3 no step overshoots",
         source="assumed: 1 tracks best, and overshoots steps that pass no filter by a quarter",
     )
 

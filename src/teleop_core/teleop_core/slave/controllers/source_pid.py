@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from teleop_core.base import parameter
+from teleop_core.base import Within, parameter
 from teleop_core.kernels import Array, kernel
 from teleop_core.robots.robot import Robot
 from teleop_core.slave.controllers import Controller, drives_and_poles, fields, per_joint
@@ -32,9 +32,9 @@ class SourcePidParameters:
         "double, or with integral action triple,",
         "assumed: the source prints no gains; critically damped, as it says they were",
     )
-    kp: tuple[float, ...] = parameter((), lower=0.0, doc="N·m/rad or N/m of each joint")
-    ki: tuple[float, ...] = parameter((), lower=0.0, doc="N·m/(rad·s) or N/(m·s) of each joint")
-    kd: tuple[float, ...] = parameter((), lower=0.0, doc="N·m·s/rad or N·s/m of each joint")
+    kp: tuple[float, ...] = parameter((), Within(0.0), "N·m/rad or N/m of each joint")
+    ki: tuple[float, ...] = parameter((), Within(0.0), "N·m/(rad·s) or N/(m·s) of each joint")
+    kd: tuple[float, ...] = parameter((), Within(0.0), "N·m·s/rad or N·s/m of each joint")
 
 
 # Columns of the table of gains, and of the memory.

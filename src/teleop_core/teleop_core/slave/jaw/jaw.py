@@ -6,7 +6,7 @@ It leads the jaw's setpoint as ``slave`` leads the arm's. Where the jaw is, it i
 import math
 from dataclasses import dataclass
 
-from teleop_core.base import parameter
+from teleop_core.base import Within, parameter
 from teleop_core.graph import DT, Row, RunningStage, Stage, assign, topics
 from teleop_core.kernels import Fields, inner, kernel, record
 from teleop_core.slave.operation.states import State
@@ -23,22 +23,17 @@ class JawParameters:
 
     command_timeout: float = parameter(
         0.1,
-        unit="s",
-        lower=0.002,
-        upper=5.0,
-        doc="the jaw stays where it is led when for longer than this no command came, or the jaw "
-        "did not say where it is",
+        Within(0.002, 5.0, "s"),
+        "the jaw stays where it is led when for longer than this no command came, or the jaw did not say where it is",
     )
     upper: float = parameter(
         0.8,
-        unit="rad",
-        lower=0.05,
-        upper=3.0,
+        Within(0.05, 3.0, "rad"),
+        "largest angle between the fingers that the jaw is led to",
         fixed=True,
         source="assumed",
-        doc="largest angle between the fingers that the jaw is led to",
     )
-    speed_limit: float = parameter(4.0, unit="rad/s", lower=0.01, upper=100.0, doc="of the setpoint", source="assumed")
+    speed_limit: float = parameter(4.0, Within(0.01, 100.0, "rad/s"), "of the setpoint", source="assumed")
 
 
 class JawNumbers(Fields):

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from teleop_core.base import ParameterError, parameter
+from teleop_core.base import ParameterError, Within, parameter
 from teleop_core.graph import DT, Row, RunningStage, Stage, assign, copy, topics
 from teleop_core.kernels import kernel, record
 from teleop_core.slave.jaw.drive import drive
@@ -20,18 +20,16 @@ class GripObjectParameters:
 
     place: tuple[float, ...] = parameter(
         (),
-        unit="m",
-        lower=-10.0,
-        upper=10.0,
-        fixed=True,
-        doc="its middle at first, half its size above the table; those of "
+        Within(-10.0, 10.0, "m"),
+        "its middle at first, half its size above the table; those of "
         "several one after the other, with the same z; empty: none",
+        fixed=True,
     )
-    size: float = parameter(0.02, unit="m", lower=1e-3, upper=0.2, doc="thickness")
-    mass: float = parameter(0.05, unit="kg", lower=1e-4, upper=10.0, doc="mass")
-    stiffness: float = parameter(4000.0, unit="N/m", lower=10.0, upper=1e6, doc="of it and both pads", source="assumed")
-    damping: float = parameter(20.0, unit="N·s/m", lower=0.0, upper=1e4, doc="of it and both pads", source="assumed")
-    friction: float = parameter(0.5, lower=0.0, upper=5.0, doc="dry friction of each pad on it", source="assumed")
+    size: float = parameter(0.02, Within(1e-3, 0.2, "m"), "thickness")
+    mass: float = parameter(0.05, Within(1e-4, 10.0, "kg"), "mass")
+    stiffness: float = parameter(4000.0, Within(10.0, 1e6, "N/m"), "of it and both pads", source="assumed")
+    damping: float = parameter(20.0, Within(0.0, 1e4, "N·s/m"), "of it and both pads", source="assumed")
+    friction: float = parameter(0.5, Within(0.0, 5.0), "dry friction of each pad on it", source="assumed")
 
     def __post_init__(self) -> None:
         n, rest = divmod(len(self.place), 3)
@@ -45,23 +43,16 @@ class PegParameters:
     """Pegs of the table, upright, which go through objects."""
 
     place: tuple[float, ...] = parameter(
-        (),
-        unit="m",
-        lower=-10.0,
-        upper=10.0,
-        fixed=True,
-        doc="x, y of the axis of each, one after the other; empty: none",
+        (), Within(-10.0, 10.0, "m"), "x, y of the axis of each, one after the other; empty: none", fixed=True
     )
     height: float = parameter(
-        0.015, unit="m", lower=1e-3, upper=0.5, source="assumed", doc="by which an object must be lifted to come off"
+        0.015, Within(1e-3, 0.5, "m"), "by which an object must be lifted to come off", source="assumed"
     )
     clearance: float = parameter(
         0.0015,
-        unit="m",
-        lower=0.0,
-        upper=0.1,
+        Within(0.0, 0.1, "m"),
+        "way of an object from the axis on which the peg does not touch it",
         source="assumed",
-        doc="way of an object from the axis on which the peg does not touch it",
     )
 
     def __post_init__(self) -> None:
@@ -80,44 +71,31 @@ class JawSimParameters:
 
     upper: float = parameter(
         0.8,
-        unit="rad",
-        lower=0.05,
-        upper=3.0,
+        Within(0.05, 3.0, "rad"),
+        "angle between the fingers at the drive's stop, where it begins",
         fixed=True,
         source="assumed",
-        doc="angle between the fingers at the drive's stop, where it begins",
     )
-    effort_limit: float = parameter(0.15, unit="N·m", lower=0.0, upper=100.0, doc="of the drive", source="assumed")
-    inertia: float = parameter(1e-4, unit="kg·m²", lower=1e-7, upper=1.0, doc="of drive and fingers", source="assumed")
-    viscous: float = parameter(1e-3, unit="N·m·s/rad", lower=0.0, upper=10.0, doc="friction", source="assumed")
+    effort_limit: float = parameter(0.15, Within(0.0, 100.0, "N·m"), "of the drive", source="assumed")
+    inertia: float = parameter(1e-4, Within(1e-7, 1.0, "kg·m²"), "of drive and fingers", source="assumed")
+    viscous: float = parameter(1e-3, Within(0.0, 10.0, "N·m·s/rad"), "friction", source="assumed")
     bandwidth: float = parameter(
-        100.0,
-        unit="rad/s",
-        lower=1.0,
-        upper=200.0,
-        source="assumed",
-        doc="of the control law, which is damped critically",
+        100.0, Within(1.0, 200.0, "rad/s"), "of the control law, which is damped critically", source="assumed"
     )
-    finger_length: float = parameter(
-        0.04, unit="m", lower=1e-3, upper=0.5, doc="from the pivot to the pads", source="assumed"
-    )
+    finger_length: float = parameter(0.04, Within(1e-3, 0.5, "m"), "from the pivot to the pads", source="assumed")
     origin: tuple[float, ...] = parameter(
         (0.0, 0.0, 0.0),
-        unit="m",
-        lower=-10.0,
-        upper=10.0,
+        Within(-10.0, 10.0, "m"),
+        "of the board, in the base of the first arm; objects and pegs are placed from there",
         length=3,
         fixed=True,
-        doc="of the board, in the base of the first arm; objects and pegs are placed from there",
     )
     second_base: tuple[float, ...] = parameter(
         (0.0, 0.0, 0.0),
-        unit="m",
-        lower=-10.0,
-        upper=10.0,
+        Within(-10.0, 10.0, "m"),
+        "where the base of the second arm is in that of the first, axes parallel",
         length=3,
         fixed=True,
-        doc="where the base of the second arm is in that of the first, axes parallel",
     )
     object: GripObjectParameters = field(default_factory=GripObjectParameters)
     pegs: PegParameters = field(default_factory=PegParameters)

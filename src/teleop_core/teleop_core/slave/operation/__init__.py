@@ -1,9 +1,9 @@
 """Operation: whether an arm may move, what stops it, and what it takes to move again."""
 
 from teleop_core.slave.operation.faults import FAULTS, Fault, Reaction
-from teleop_core.slave.operation.parameters import OperationParameters
 from teleop_core.slave.operation.report import operation_level, operation_text
 from teleop_core.slave.operation.states import Answer, Event, State, command_event
+from teleop_core.slave.operation.thresholds import OperationParameters
 
 __all__ = [
     "FAULTS", "Answer", "Event", "Fault", "OperationParameters", "Reaction", "State",

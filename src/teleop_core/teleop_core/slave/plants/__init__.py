@@ -39,7 +39,7 @@ class Physics:
         encoder_step: Smallest difference that is measured [rad or m].
         play: Half width of the play between encoder and joint [rad or m].
         coupling: (n, n), below its diagonal: what a joint moves per lag of an earlier one.
-        tip_geometry: Row of :func:`teleop_core.robots.chains.dh_kernels.fk` for the true links;
+        tip_geometry: Row of :func:`teleop_core.kinematics.dh_kernels.fk` for the true links;
             empty for the robot's own forward kinematics.
         dynamics: Parameter row of the true dynamics; empty for those that the control law knows.
         effort_delay: Time from an asked effort to the motor's, beyond the tick [s]: whole ticks.

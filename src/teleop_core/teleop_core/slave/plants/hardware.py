@@ -8,12 +8,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from teleop_core.base import ParameterError, UnknownNameError, parameter
+from teleop_core.base import ParameterError, UnknownNameError, Within, parameter
 from teleop_core.graph import DT
 from teleop_core.kernels import Array, pointer
 from teleop_core.robots.arms.as_chain import true_chain
-from teleop_core.robots.chains.rigid_body import write_model
 from teleop_core.robots.drives import ACCELERATION, Drives
+from teleop_core.robots.dynamics.rigid_body import write_model
 from teleop_core.robots.hardware import Hardware
 from teleop_core.robots.robot import Robot
 from teleop_core.slave.controllers import per_joint
@@ -42,75 +42,62 @@ class HardwareParameters:
         (), choices=tuple(FAULTS), fixed=True, doc="faults that are left out, to see what they add"
     )
     coulomb: tuple[float, ...] = parameter(
-        (), unit="N·m or N", lower=0.0, doc="dry friction of each joint; empty: the robot's"
+        (), Within(0.0, None, "N·m or N"), "dry friction of each joint; empty: the robot's"
     )
     wander: tuple[float, ...] = parameter(
-        (),
-        lower=0.0,
-        upper=2.0,
-        doc="standard deviation of each joint's dry friction over its mean; empty: the robot's",
+        (), Within(0.0, 2.0), "standard deviation of each joint's dry friction over its mean; empty: the robot's"
     )
     bias: tuple[float, ...] = parameter(
-        (), unit="N·m or N", doc="effort of each amplifier when none is asked; empty: the robot's"
+        (), Within(unit="N·m or N"), "effort of each amplifier when none is asked; empty: the robot's"
     )
     play: tuple[float, ...] = parameter(
-        (), unit="rad or m", lower=0.0, doc="half width of the play behind each encoder; empty: the robot's"
+        (), Within(0.0, None, "rad or m"), "half width of the play behind each encoder; empty: the robot's"
     )
     weights: tuple[str, ...] = parameter(
         (), fixed=True, doc="symbol=value of the dynamics that the source does not state; empty: the robot's"
     )
     bristle_frequency: float = parameter(
         250.0,
-        unit="rad/s",
-        lower=10.0,
-        upper=2000.0,
-        doc="at which a joint swings on its friction before it slips",
+        Within(10.0, 2000.0, "rad/s"),
+        "at which a joint swings on its friction before it slips",
         source="assumed: a joint gives by a few encoder counts before it slips",
     )
     wander_travel: float = parameter(
         2000.0,
-        unit="encoder counts",
-        lower=1.0,
-        upper=1e7,
-        doc="way on which dry friction changes as a joint slips; at rest it stays",
+        Within(1.0, 1e7, "encoder counts"),
+        "way on which dry friction changes as a joint slips; at rest it stays",
         source="assumed: about a turn of the motor, in which gears and bearings meet themselves",
     )
     drive_bits: int = parameter(
         14,
-        lower=4,
-        upper=32,
-        doc="of the converter that commands the amplifier, peak to peak",
+        Within(4, 32),
+        "of the converter that commands the amplifier, peak to peak",
         source="assumed: usual for cards of analog outputs; the source names no number",
     )
     # Faults that no source of the RCRT-1 speaks of; `teleop experiment robustness` turns them on.
     effort_delay: float = parameter(
         0.0,
-        unit="s",
-        lower=0.0,
-        upper=0.03,
-        doc="from the control law to the motor, beyond the tick, in whole ticks",
+        Within(0.0, 0.03, "s"),
+        "from the control law to the motor, beyond the tick, in whole ticks",
         source="assumed: none; buses of drives take 1 to 5 ms",
     )
     drive_gain: float = parameter(
         1.0,
-        lower=0.1,
-        upper=20.0,
-        doc="effort of the drives over the one asked for",
+        Within(0.1, 20.0),
+        "effort of the drives over the one asked for",
         source="assumed: 1; torque constants are good to some 10 %",
     )
     gear_stiffness: tuple[float, ...] = parameter(
         (),
-        unit="N·m/rad or N/m",
-        lower=0.0,
+        Within(0.0, None, "N·m/rad or N/m"),
+        "stiffness of each gear between motor, with its encoder, and link; 0 or empty: rigid",
         fixed=True,
-        doc="stiffness of each gear between motor, with its encoder, and link; 0 or empty: rigid",
     )
     motor_inertia: tuple[float, ...] = parameter(
         (),
-        unit="kg·m² or kg",
-        lower=1e-12,
+        Within(1e-12, None, "kg·m² or kg"),
+        "of each motor through its gear, a part of its axis's; where gears bend. Empty: known",
         fixed=True,
-        doc="of each motor through its gear, a part of its axis's; where gears bend. Empty: known",
     )
 
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from teleop_core.base import ParameterError, parameter
+from teleop_core.base import ParameterError, Within, parameter
 from teleop_core.kernels import Array, Fields, inner
 from teleop_core.shapes import Shape
 from teleop_core.shapes.basis import drawing
@@ -42,21 +42,17 @@ class ButtonState(Fields):
 class ButtonParameters(CylinderParameters):
     """A post that is pressed from above, or from any other side."""
 
-    radius: float = parameter(0.02, unit="m", lower=1e-3, upper=1.0, doc="of the post")
-    length: float = parameter(0.03, unit="m", lower=1e-3, upper=2.0, doc="from end to end")
-    direction: tuple[float, ...] = parameter(
-        (0.0, 0.0, 1.0), lower=-1.0, upper=1.0, length=3, doc="upwards, of any length"
-    )
-    click_force: float = parameter(
-        1.0, unit="N", lower=0.01, upper=_LARGEST, doc="on the way in, where it snaps", source="assumed"
-    )
-    click_travel: float = parameter(2e-3, unit="m", lower=1e-4, upper=0.1, doc="way to the click", source="assumed")
+    radius: float = parameter(0.02, Within(1e-3, 1.0, "m"), "of the post")
+    length: float = parameter(0.03, Within(1e-3, 2.0, "m"), "from end to end")
+    direction: tuple[float, ...] = parameter((0.0, 0.0, 1.0), Within(-1.0, 1.0), "upwards, of any length", length=3)
+    click_force: float = parameter(1.0, Within(0.01, _LARGEST, "N"), "on the way in, where it snaps", source="assumed")
+    click_travel: float = parameter(2e-3, Within(1e-4, 0.1, "m"), "way to the click", source="assumed")
     contact_force: float = parameter(
-        0.4, unit="N", lower=0.0, upper=_LARGEST, doc="on the way in, just before the stop", source="assumed"
+        0.4, Within(0.0, _LARGEST, "N"), "on the way in, just before the stop", source="assumed"
     )
-    stroke: float = parameter(3e-3, unit="m", lower=2e-4, upper=0.1, doc="way to the stop", source="assumed")
+    stroke: float = parameter(3e-3, Within(2e-4, 0.1, "m"), "way to the stop", source="assumed")
     hysteresis: float = parameter(
-        0.3, lower=0.0, upper=1.0, source="assumed", doc="share of the spring's force that is missing on the way out"
+        0.3, Within(0.0, 1.0), "share of the spring's force that is missing on the way out", source="assumed"
     )
 
     def __post_init__(self) -> None:

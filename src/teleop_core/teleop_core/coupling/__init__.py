@@ -1,0 +1,1 @@
+"""Coupling: what lies between master and slave: mapping, fixtures, filters, network, passivity, architectures."""

@@ -1,0 +1,29 @@
+"""Four channels: places and forces go both ways, and the slave yields to what forces differ by."""
+
+from dataclasses import dataclass
+
+from teleop_core.base.parameters import Within, parameter
+from teleop_core.coupling.architectures import Architecture
+from teleop_core.coupling.architectures.position_force import force_scale
+from teleop_core.coupling.architectures.three_channel import ThreeChannelParameters, channels_push
+
+
+@dataclass(frozen=True, kw_only=True)
+class FourChannelParameters(ThreeChannelParameters):
+    """What comes back, and what the slave gets of the hand's force."""
+
+    hand_gain: float = parameter(
+        1.0,
+        Within(0.0, 10.0, "N/N"),
+        "force that leads the slave over the hand's; with 1/force_gain a press that lasts "
+        "moves the tip no way from its command",
+    )
+
+
+def _lead(parameters: FourChannelParameters) -> float:
+    return parameters.hand_gain
+
+
+FOUR_CHANNEL = Architecture(
+    "four_channel", FourChannelParameters, channels_push, force_scale=force_scale, lead_gain=_lead, needs_impedance=True
+)

@@ -1,0 +1,109 @@
+"""Impedance as a stage: the slave's tip yields to its force, as on a mass with spring and damper.
+
+What leads an arm is a place, so the force on its tip moves the place that it is led to. The hand's
+force, of an architecture that sends it, does the same with the other sign. Everything behind this
+stage holds as before: passivity, reach, limits and faults see the one command that is left.
+"""
+
+import math
+from dataclasses import dataclass
+
+from teleop_core.base import Within, parameter
+from teleop_core.graph import Row, Stage, copy, topics
+from teleop_core.kernels import Fields, Vector3, inner, kernel
+
+_LONGEST = 0.1
+"""Time for which it yields at once [s], after a pause of the commands."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ImpedanceParameters:
+    """The mass, spring and damper between where the hand leads the tip and where it goes."""
+
+    mass: float = parameter(
+        1.0,
+        Within(0.0, 100.0, "kg"),
+        "of the tip as it yields",
+        source="assumed: with spring and damper it does not swing",
+    )
+    damping: float = parameter(
+        100.0,
+        Within(1.0, 10_000.0, "N·s/m"),
+        "force over the speed of yielding",
+        source="assumed: what keeps an arm that lags by 50 ms calm before silicone of 1000 N/m",
+    )
+    stiffness: float = parameter(
+        1000.0,
+        Within(10.0, 100_000.0, "N/m"),
+        "force over the way of yielding",
+        source="assumed: five times that of tissue, as much as silicone's",
+    )
+    force_gain: float = parameter(1.0, Within(0.0, 10.0, "N/N"), "force that it yields to over slave/measured_cf")
+    largest_way: float = parameter(
+        0.02, Within(0.0, 0.5, "m"), "how far it yields at most, whatever the force", source="assumed"
+    )
+
+
+class ImpedanceState(Fields):
+    """State record of the impedance."""
+
+    way: Vector3  # from the command to where the tip goes [m]
+    speed: Vector3  # [m/s]
+    last_ns: int  # stamp of the command before
+
+
+@inner
+def _yield(p: ImpedanceParameters, s: ImpedanceState, row: Row, time: float) -> None:
+    """Step way and speed by a time [s] under both forces."""
+    lead = 1.0 if row.slave_setpoint_cp_ns > topics.NO_COMMAND_NS else 0.0
+    inertia, square = p.mass + time * (p.damping + time * p.stiffness), 0.0
+    for i in range(3):
+        force = lead * (row.slave_servo_cf[i] + p.force_gain * row.slave_measured_cf[i])
+        s.speed[i] = (p.mass * s.speed[i] + time * (force - p.stiffness * s.way[i])) / inertia
+        s.way[i] += time * s.speed[i]
+        square += s.way[i] * s.way[i]
+    if square > p.largest_way * p.largest_way:
+        share = p.largest_way / math.sqrt(square)
+        for i in range(3):
+            s.way[i] *= share
+            s.speed[i] = 0.0
+
+
+@kernel
+def impedance_step(p: ImpedanceParameters, s: ImpedanceState, row: Row, dt: float) -> None:
+    """One command: yield for the time since the one before, and write impedance_servo_cp.
+
+    A step backwards in time, which is calm whatever mass and time:
+    ``speed = (M speed + t (f - K way)) / (M + t B + t² K)``. While the slave goes its own way no
+    force counts, so that it is taken up without a way; what is left of one fades by itself.
+
+    Args:
+        p: Parameters.
+        s: State; written.
+        row: Signals.
+        dt: Tick [s].
+
+    Source:
+        Hogan 1985, impedance control, in the form of an admittance for an arm led by places.
+    """
+    time = min(1e-9 * (row.slave_servo_cp_ns - s.last_ns), _LONGEST)
+    if time > 0.0:
+        s.last_ns = row.slave_servo_cp_ns
+        _yield(p, s, row, time)
+    copy(row.slave_servo_cp, row.impedance_servo_cp)
+    for i in range(3):
+        row.impedance_servo_cp[i] += s.way[i]
+
+
+IMPEDANCE = Stage(
+    "impedance",
+    ImpedanceParameters,
+    reads=(topics.SLAVE_SERVO_CP, topics.SLAVE_SERVO_CF, topics.SLAVE_MEASURED_CF, topics.SLAVE_SETPOINT_CP),
+    writes=(topics.IMPEDANCE_SERVO_CP,),
+    step=impedance_step,
+    state=ImpedanceState,
+    late=(topics.SLAVE_MEASURED_CF, topics.SLAVE_SETPOINT_CP),
+    trigger=topics.SLAVE_SERVO_CP,
+    replaces=topics.SLAVE_SERVO_CP,
+    needs=(topics.SLAVE_MEASURED_CF,),
+)

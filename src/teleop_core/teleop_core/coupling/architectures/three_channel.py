@@ -1,0 +1,32 @@
+"""Three channels: the hand gets force and place of the slave, which yields to its own force.
+
+The slave gets the hand's place, and its stage ``impedance`` the force on its own tip.
+"""
+
+from dataclasses import dataclass
+
+from teleop_core.coupling.architectures import Architecture
+from teleop_core.coupling.architectures.position_force import PositionForceParameters, force_scale
+from teleop_core.coupling.architectures.position_position import PositionPositionParameters
+from teleop_core.kernels import Array, kernel
+
+
+@dataclass(frozen=True, kw_only=True)
+class ThreeChannelParameters(PositionPositionParameters, PositionForceParameters):
+    """What comes back of the slave's force, first, and of its place."""
+
+
+@kernel
+def channels_push(numbers: Array, memory: Array, felt: Array, away: Array, period: float, out: Array) -> None:
+    """Write the push (3,) [N]: the force on the tip times its gain, and a spring towards the tip.
+
+    Source:
+        Lawrence 1993, channels of force and place back to the hand, without a damper.
+    """
+    for i in range(3):
+        out[i] = numbers[0] * felt[i] + numbers[1] * away[i]
+
+
+THREE_CHANNEL = Architecture(
+    "three_channel", ThreeChannelParameters, channels_push, force_scale=force_scale, needs_impedance=True
+)

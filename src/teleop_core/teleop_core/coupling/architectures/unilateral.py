@@ -1,0 +1,15 @@
+"""Unilateral: the slave gets the hand's place, the hand gets nothing back."""
+
+from teleop_core.base import NoParameters
+from teleop_core.coupling.architectures import Architecture
+from teleop_core.kernels import Array, kernel
+
+
+@kernel
+def unilateral_push(numbers: Array, memory: Array, felt: Array, away: Array, period: float, out: Array) -> None:
+    """Write no push (3,) [N]."""
+    for i in range(3):
+        out[i] = 0.0
+
+
+UNILATERAL = Architecture("unilateral", NoParameters, unilateral_push)

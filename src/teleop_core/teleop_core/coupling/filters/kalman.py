@@ -1,0 +1,122 @@
+"""Kalman: a hand that keeps its speed until it is pushed, and a tremor that swings beside it."""
+
+import math
+from dataclasses import dataclass
+
+from teleop_core.base import Within, parameter
+from teleop_core.coupling.filters import TremorFilter
+from teleop_core.kernels import Array, inner, kernel
+from teleop_core.kernels.room import room
+
+_COVARIANCE, _HAS_BEGUN = 4, 20
+"""Places in the memory, behind place and speed of the hand, then of its tremor: their covariance
+(4, 4), and whether there is any."""
+FASTEST = 1.0
+"""Standard deviation of the speed with which a hand may begin [m/s]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class KalmanParameters:
+    """How much the hand accelerates and trembles, and how exact readings are, at any rate."""
+
+    acceleration_noise: float = parameter(
+        0.02,
+        Within(1e-6, 100.0, "m/s²/√Hz"),
+        "root of the density of the meant acceleration, which is white",
+        source="derived: least distance from what was meant, of a hand as in scenario human",
+    )
+    reading_noise: float = parameter(
+        1.6e-7,
+        Within(1e-9, 0.1, "m/√Hz"),
+        "root of the density of what the readings add, which is white",
+        source="derived: as acceleration_noise; 5 µm a sample at 1 kHz",
+    )
+    frequency: float = parameter(10.0, Within(4.0, 20.0, "Hz"), "of the tremor")
+    half_width: float = parameter(
+        1.0,
+        Within(0.01, 5.0, "Hz"),
+        "from the peak of the tremor's spectrum to half of it; the wider, the less is taken",
+        source="assumed: tremor of 8 to 12 Hz (Elble and Koller 1990)",
+    )
+    tremor: float = parameter(
+        45e-6,
+        Within(0.0, 0.1, "m"),
+        "tremor on each axis, root mean square",
+        source="derived: 77 µm over three axes, as of operator human",
+    )
+
+
+@inner
+def _model(numbers: Array, period: float, F: Array, W: Array) -> None:
+    """Write the transition (4, 4) of a period, and the covariance (4, 4) of what it adds.
+
+    The tremor is a swing that noise drives and damping stops: its variance stays.
+    """
+    damping, rate = 2.0 * math.pi * numbers[3], 2.0 * math.pi * numbers[2]
+    square, push = rate * rate + damping * damping, numbers[0] * numbers[0] * period
+    left = math.exp(-damping * period)
+    c, s = left * math.cos(rate * period), left * math.sin(rate * period) / rate
+    for i in range(4):
+        for j in range(4):
+            F[i, j] = 1.0 if i == j else 0.0
+            W[i, j] = 0.0
+    F[0, 1] = period
+    F[2, 2], F[2, 3], F[3, 2], F[3, 3] = c + damping * s, s, -square * s, c - damping * s
+    W[0, 0], W[1, 1] = push * period * period / 3.0, push
+    W[0, 1] = W[1, 0] = 0.5 * push * period
+    place, speed = numbers[4] * numbers[4], numbers[4] * numbers[4] * square
+    for i in range(2, 4):
+        for j in range(2, 4):
+            kept = F[i, 2] * place * F[j, 2] + F[i, 3] * speed * F[j, 3]
+            W[i, j] = (place if i == 2 else speed) - kept if i == j else -kept
+
+
+@inner
+def _begin(numbers: Array, spread: float, memory: Array) -> None:
+    """Know of the first reading what it says: place and tremor together are 0."""
+    damping, rate = 2.0 * math.pi * numbers[3], 2.0 * math.pi * numbers[2]
+    tremor, P = numbers[4] * numbers[4], memory[_COVARIANCE:]
+    memory[_HAS_BEGUN] = 1.0
+    P[0], P[2], P[8], P[10] = tremor + spread, -tremor, -tremor, tremor
+    P[5], P[15] = FASTEST * FASTEST, tremor * (rate * rate + damping * damping)
+
+
+@kernel
+def kalman_filter(numbers: Array, memory: Array, value: float, period: float) -> float:
+    """Place of the meant motion, of which the reading shows the sum with a tremor.
+
+    Both are predicted, the hand at constant speed and the tremor as it swings, and then moved
+    towards the reading, each as far as it is uncertain.
+
+    Source:
+        Kalman 1960, theorem 3; Bar-Shalom, Li and Kirubarajan 2001, section 6.2.2 (white noise
+        of the acceleration) and 5.2.3 (gain and covariance). Tremor as a resonance that noise
+        drives: Gantert, Honerkamp and Timmer 1992 (an autoregressive process of order two).
+    """
+    F, W, M, at, shared = room(4, 4), room(4, 4), room(4, 4), room(4), room(4)
+    spread, P = numbers[1] * numbers[1] / period, memory[_COVARIANCE:]
+    _model(numbers, period, F, W)
+    if memory[_HAS_BEGUN] == 0.0:
+        _begin(numbers, spread, memory)
+    for i in range(4):
+        at[i] = 0.0
+        for j in range(4):
+            at[i] += F[i, j] * memory[j]
+            M[i, j] = 0.0
+            for k in range(4):
+                M[i, j] += F[i, k] * P[4 * k + j]
+    for i in range(4):
+        for j in range(4):
+            for k in range(4):
+                W[i, j] += M[i, k] * F[j, k]
+        shared[i] = W[i, 0] + W[i, 2]
+    expected = shared[0] + shared[2] + spread
+    off = value - at[0] - at[2]
+    for i in range(4):
+        memory[i] = at[i] + shared[i] / expected * off
+        for j in range(4):
+            P[4 * i + j] = W[i, j] - shared[i] * shared[j] / expected
+    return memory[0]
+
+
+KALMAN = TremorFilter("kalman", KalmanParameters, kalman_filter)

@@ -1,0 +1,49 @@
+"""Notch: takes out one frequency and, the lower its quality, what is beside it."""
+
+import math
+from dataclasses import dataclass
+
+from teleop_core.base import ParameterError, Within, parameter
+from teleop_core.coupling.filters import LONGEST_NS, TremorFilter, sections
+from teleop_core.kernels import Array, kernel
+
+_WIDEST = 0.45
+"""Width of a notch times the period of samples, below the pole of its tangent at a half."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class NotchParameters:
+    """Where the notch is, and how narrow."""
+
+    frequency: float = parameter(10.0, Within(3.0, 25.0, "Hz"), "frequency that is taken out")
+    quality: float = parameter(
+        1.0,
+        Within(0.3, 30.0),
+        "frequency over the width in which more than 3 dB are taken out; slow motion is late "
+        "by 1/(2π frequency quality)",
+    )
+
+    def __post_init__(self) -> None:
+        """Refuse a notch so wide that slow samples cannot show it."""
+        least = self.frequency * 1e-9 * LONGEST_NS / _WIDEST
+        if self.quality < least:
+            text = f">= {least:.3g} at {self.frequency:g} Hz, or samples of 100 Hz cannot show it"
+            raise ParameterError("quality", self.quality, text)
+
+
+@kernel
+def notch_filter(numbers: Array, memory: Array, value: float, period: float) -> float:
+    """Value without what is near the notch's frequency.
+
+    The width is as wanted after the bilinear transform too: its tangent is taken, not its value.
+
+    Source:
+        Orfanidis 1996 (Introduction to Signal Processing), section 11.3.
+    """
+    angle = 2.0 * math.pi * numbers[0] * period
+    damping = 2.0 * math.tan(0.5 * angle / numbers[1]) / math.sin(angle)
+    sections.advance_section(memory, 0, value, math.tan(0.5 * angle), damping)
+    return value - damping * memory[0]
+
+
+NOTCH = TremorFilter("notch", NotchParameters, notch_filter)

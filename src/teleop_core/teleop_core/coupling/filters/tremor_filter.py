@@ -1,0 +1,194 @@
+"""Tremor filter: a stage between the master and the mapping, which takes tremor out of the hand.
+
+The slave is led by the filtered stylus. An operator sees and feels the stylus itself, and so does
+everyone who reads ``master/measured_cp`` from outside. What pushes the hand goes by the stylus
+itself too: a push that is late gives back more energy than it took.
+"""
+
+import math
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from teleop_core.base import Choice, Within, choice, parameter
+from teleop_core.coupling.filters import LONGEST_NS, MEMORY, TREMOR_FILTERS
+from teleop_core.coupling.mapping import plausibility
+from teleop_core.graph import DT, Row, RunningStage, Stage, assign, topics
+from teleop_core.kernels import Array, Vector3, inner, kernel, record
+
+_FADE = 0.2
+"""Time constant with which the difference between old and new parameters goes away [s]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class TremorFilterParameters:
+    """Parameters of :class:`RunningTremorFilter`."""
+
+    kind: Choice = choice(TREMOR_FILTERS, "wflc", doc="how tremor is taken out")
+    longest_pause: float = parameter(
+        0.3, Within(0.002, 5.0, "s"), "after a longer pause of the master the filter begins anew at the reading"
+    )
+    plausible: plausibility.HandLimits = field(default_factory=plausibility.HandLimits)
+
+
+class FilterState(plausibility.PlausibilityState):
+    """State record of the tremor filter."""
+
+    origin: Vector3  # reading at which it began [m]
+    value: Vector3  # last reading, from there
+    told: Vector3  # last answer
+    shift: Vector3  # what is left of the difference between old and new parameters
+    begun: int
+    is_retuned: int
+    is_other: int
+
+
+class Part(NamedTuple):
+    """The kind's filter, its numbers, and what it remembers of each coordinate (3, 32)."""
+
+    filter: Any
+    numbers: Array
+    memory: Array
+
+
+@inner
+def _begin(s: FilterState, memory: Array, pose: Array, filtered: Array) -> None:
+    """Begin anew at a reading: it passes, and nothing of before is remembered."""
+    s.begun += 1
+    s.is_retuned = s.is_other = 0
+    for i in range(3):
+        s.origin[i], s.value[i], s.shift[i], filtered[i] = pose[i], 0.0, 0.0, pose[i]
+        for k in range(memory.shape[1]):
+            memory[i, k] = 0.0
+
+
+@inner
+def _filter(s: FilterState, part: Part, i: int, value: float, elapsed_ns: int) -> float:
+    """Filtered value of a coordinate; a long period is split, on a straight line between values."""
+    pieces = 1 + (elapsed_ns - 1) // LONGEST_NS
+    period = 1e-9 * elapsed_ns / pieces
+    memory, before = part.memory[i], s.value[i]
+    for k in range(1, pieces):
+        part.filter(part.numbers, memory, before + (value - before) * (k / pieces), period)
+    s.value[i] = value
+    return part.filter(part.numbers, memory, value, period)
+
+
+@inner
+def _is_finite(values: Array) -> bool:
+    total = 0.0
+    for i in range(values.shape[0]):
+        total += abs(values[i])
+    return math.isfinite(total)
+
+
+@inner
+def _fade(s: FilterState, period: float, filtered: Array) -> None:
+    """Fade from the output of the old parameters to that of the new ones."""
+    for i in range(3):
+        if s.is_retuned > 0:
+            s.shift[i] = s.told[i] - filtered[i]
+        filtered[i] += s.shift[i]
+        s.shift[i] *= _FADE / (_FADE + period)
+    s.is_retuned = 0
+
+
+@inner
+def _follow(s: FilterState, part: Part, pose: Array, elapsed_ns: int, filtered: Array) -> None:
+    """Write the filtered position of a sample that follows another one."""
+    if s.is_other > 0:
+        _begin(s, part.memory, pose, filtered)
+        s.is_retuned = 1
+    else:
+        for i in range(3):
+            filtered[i] = s.origin[i] + _filter(s, part, i, pose[i] - s.origin[i], elapsed_ns)
+    _fade(s, 1e-9 * elapsed_ns, filtered)
+
+
+@kernel
+def tremor_filter_step(p: plausibility.PlausibilityNumbers, s: FilterState, part: Part, row: Row, dt: float) -> None:
+    """One master sample: write master_filtered_cp and master_filtered_out.
+
+    The position is filtered coordinate by coordinate, over the time between stamps; the orientation passes. A reading
+    that is not finite, or of the same stamp as the last one, changes nothing: what was written stays. The filter begins
+    anew at the first reading, after a pause, where stamps go back, and at a reading that no hand can have made. That
+    passes as it is, so that ``motion_scaling`` judges the same jump. Nothing rings after it.
+
+    Args:
+        p: Parameter record.
+        s: State record; written.
+        part: :class:`Part`; its memory is written.
+        row: Signals.
+        dt: Tick [s].
+    """
+    pose, filtered = row.master_measured_cp, row.master_filtered_cp
+    elapsed_ns = row.master_measured_cp_ns - s.raw_ns
+    if not _is_finite(pose) or (elapsed_ns == 0 and s.begun > 0):
+        return
+    goes_on = s.begun > 0 and 0 < elapsed_ns <= p.pause_ns
+    goes_on = plausibility.is_plausible(p, s, pose, row.master_measured_cp_ns) and goes_on
+    for i in range(3, 7):
+        filtered[i] = pose[i]
+    if goes_on:
+        _follow(s, part, pose, elapsed_ns, filtered)
+    if not (goes_on and _is_finite(filtered)):  # a filter of one's own may run away
+        _begin(s, part.memory, pose, filtered)
+    for i in range(3):
+        s.told[i] = filtered[i]
+        row.master_filtered_out[i] = pose[i] - filtered[i]
+
+
+class RunningTremorFilter(RunningStage):
+    """Stage that takes tremor out of the master's pose."""
+
+    def __init__(self, parameters: TremorFilterParameters, dt: float = DT) -> None:
+        super().__init__(TREMOR_FILTER, 0, dt)
+        self.parameters, self.state = record(plausibility.PlausibilityNumbers), record(FilterState)
+        self.kernel = tremor_filter_step
+        self._part = Part(None, np.empty(0), np.zeros((3, MEMORY)))
+        self._begin = self.signals.copy()
+        self.retune(parameters)
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget everything: the next reading is the first one."""
+        assign(self.state, 0)
+        assign(self.signals, self._begin)
+        self._part.memory[:] = 0.0
+        self._told = 0
+
+    def retune(self, parameters: TremorFilterParameters) -> None:
+        """Take new parameters from the next sample on; what differs fades, and nothing jumps."""
+        plausibility.take_hand(self.parameters, parameters.plausible)
+        self.parameters["pause_ns"] = math.floor(parameters.longest_pause * 1e9 + 0.5)
+        kind = TREMOR_FILTERS.find(parameters.kind.kind)
+        numbers, step = kind.numbers(parameters.kind.parameters), kind.filter_pointer
+        if step is self._part.filter and len(numbers) == len(self._part.numbers):
+            self.state["is_retuned"] |= not np.array_equal(numbers, self._part.numbers)
+            self._part.numbers[:] = numbers  # the tick that is composed already goes on
+            return
+        self._part = Part(step, numbers, self._part.memory)
+        self.arguments = (self.parameters, self.state, self._part)
+        self._bound = None
+        self.state["is_retuned"] = self.state["is_other"] = 1
+
+    def concerns(self) -> list[str]:
+        """Readings that no hand can have made, in words."""
+        count, told = int(self.state["implausible"]), self._told
+        self._told = count
+        if count <= told:
+            return []
+        return [f"began anew at {count - told} samples of the master that no hand can make"]
+
+
+TREMOR_FILTER = Stage(
+    "tremor_filter",
+    TremorFilterParameters,
+    reads=(topics.MASTER_MEASURED_CP,),
+    writes=(topics.MASTER_FILTERED_CP, topics.MASTER_FILTERED_OUT),
+    trigger=topics.MASTER_MEASURED_CP,
+    replaces=topics.MASTER_MEASURED_CP,
+    spares=("operator",),
+    make=RunningTremorFilter,
+)

@@ -1,0 +1,178 @@
+"""Gains of motion scaling, its axes, its fixture, and the force of the limits of the slave."""
+
+import math
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from teleop_core.base import Choice, ParameterError, Within, choice, parameter
+from teleop_core.coupling.architectures import ARCHITECTURES
+from teleop_core.coupling.fixtures import Fixture
+from teleop_core.coupling.mapping import plausibility, walls
+from teleop_core.coupling.mapping.side import SIDES
+from teleop_core.coupling.passivity import PASSIVITIES
+from teleop_core.kernels.axes import AXES, axis_map
+from teleop_core.kernels.geometry import Array, quaternion_from_rotation, rotation
+from teleop_core.kernels.portable import product
+from teleop_core.shapes import SHAPES, files_of
+
+MODES = ("coarse", "fine")
+
+
+@dataclass(frozen=True, kw_only=True)
+class FixtureParameters:
+    """What the fixture button puts around the hand."""
+
+    kind: Choice = choice(SHAPES, "box", doc="shape of the fixture")
+    place: tuple[float, ...] = parameter(
+        (0.0, 0.0, 0.0),
+        Within(-0.5, 0.5, "m"),
+        "from the middle, where the hand was, to that of the shape, in the master's base",
+        length=3,
+    )
+    keep_out: bool = parameter(False, doc="whether the hand stays outside of the shape in place of inside")
+    side: str = parameter(
+        "hand",
+        choices=SIDES,
+        doc="whom it holds: hand: it pushes the hand, and the slave goes where that goes; slave: "
+        "the slave's command stays inside, and the hand feels nothing of it; both: both",
+    )
+    wall: str = parameter(
+        "damped",
+        choices=tuple(walls.WALLS),
+        doc="damped: spring and damper up to max_force, passive if soft enough (up to 1000 N/m); "
+        "hard: the same, as steep as sampling allows; source: the published spring, full after "
+        "1 mm; soft: a spring; step: max_force at once, which buzzes",
+    )
+    stiffness: float = parameter(
+        1000.0,
+        Within(1.0, 5000.0, "N/m"),
+        "spring of the damped and the soft wall",
+        source="assumed: below the least stiffness of the device, 1020 N/m; none is published",
+    )
+    damping: float = parameter(
+        10.0,
+        Within(0.0, 50.0, "N·s/m"),
+        "damper of the damped and the hard wall; at least stiffness times period is taken",
+        source="assumed: what keeps slow contacts of a trembling hand passive too, twenty times "
+        "K T / 2 of 1000 N/m at 1 kHz (Colgate and Schenkel 1997)",
+    )
+    max_force: float = parameter(
+        3.3,
+        Within(0.0, 10.0, "N"),
+        "largest push; the device limits it further",
+        source="published: Vongbunyong 2008, section 6.3, the peak force of the device",
+    )
+
+    @property
+    def pushes(self) -> bool:
+        """Whether the hand can feel it."""
+        return self.side != "slave" and self.max_force > 0.0
+
+    @cached_property
+    def made(self) -> Fixture:
+        """The fixture; that of a shape from a file is checked when it is used first."""
+        shape = SHAPES.find(self.kind.kind)
+        return Fixture(shape, self.kind.parameters, self.place, self.keep_out)
+
+    def __post_init__(self) -> None:
+        if not files_of(self.kind.parameters):
+            self.made.check()
+
+
+@dataclass(frozen=True, kw_only=True)
+class ReachForceParameters:
+    """The push that the hand feels where the slave cannot follow."""
+
+    is_on: bool = parameter(True, doc="whether the hand feels the slave's limits as a wall")
+    stiffness: float = parameter(
+        500.0,
+        Within(1.0, 5000.0, "N/m"),
+        "spring of it",
+        source="assumed: half of the fixture's, so that one feels which of the two it is",
+    )
+    max_force: float = parameter(
+        1.5, Within(0.0, 10.0, "N"), "largest push", source="assumed: half of the fixture's, for the same reason"
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class ReflectionParameters:
+    """What the hand feels of the slave, and of what the slave touches."""
+
+    architecture: Choice = choice(ARCHITECTURES, "unilateral", doc="what the hand feels of the slave")
+    max_force: float = parameter(
+        3.3,
+        Within(0.0, 10.0, "N"),
+        "largest push; the device limits it further",
+        source="published: Vongbunyong 2008, section 6.3, the peak force of the device",
+    )
+    passivity: Choice = choice(
+        PASSIVITIES,
+        "none",
+        doc="tank: the push gives the hand no more energy than it took from it in this touch, "
+        "however late it comes; tdpa: no more than the slave got back, and with a stage passivity "
+        "the slave gives no more than the hand did; wave: waves of force and speed, if there is "
+        "that stage; none: what the slave feels, which may throw the hand",
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class MotionScalingParameters:
+    """Parameters of :class:`MotionScaling`."""
+
+    coarse_gain: float = parameter(1.0, Within(1e-3, 10.0, "m/m"), "slave motion per master motion, coarse mode")
+    fine_gain: float = parameter(0.1, Within(1e-3, 10.0, "m/m"), "slave motion per master motion, fine mode")
+    mode: str = parameter("coarse", choices=MODES, doc="mode; the mode button changes it too")
+    tool_roll: float = parameter(
+        math.pi / 2,
+        Within(-math.pi, math.pi, "rad"),
+        "turn of the slave's tool about its axis; π/2 aligns it with the home pose",
+    )
+    axes: tuple[str, ...] = parameter(
+        ("-z", "-x", "+y"),
+        choices=AXES,
+        length=3,
+        doc="the slave's x, y, z as axes of the master's base; the default is that of the source",
+    )
+    tool_axes: tuple[str, ...] = parameter(
+        ("+x", "-y", "-z"), choices=AXES, length=3, doc="the tool's x, y, z as axes of the stylus, before tool_roll"
+    )
+    rotation_gain: float = parameter(
+        1.0,
+        Within(0.0, 1.0, "rad/rad"),
+        "tool turn per stylus turn; below 1 the tool keeps no fixed relation to the stylus",
+    )
+    longest_pause: float = parameter(
+        0.3, Within(0.002, 5.0, "s"), "after a longer pause of the master the slave is aligned anew and does not jump"
+    )
+    feedback_timeout: float = parameter(
+        0.1,
+        Within(0.002, 5.0, "s"),
+        "slave counts as not following when its setpoint lags behind the last command by more, "
+        "and no newer one was heard of for as long; of slow masters twice their period counts",
+    )
+    fixture: FixtureParameters = field(default_factory=FixtureParameters)
+    reach_force: ReachForceParameters = field(default_factory=ReachForceParameters)
+    reflection: ReflectionParameters = field(default_factory=ReflectionParameters)
+    plausible: plausibility.PlausibilityParameters = field(default_factory=plausibility.PlausibilityParameters)
+
+    def __post_init__(self) -> None:
+        if self.fine_gain > self.coarse_gain:
+            raise ParameterError("fine_gain", self.fine_gain, f"<= coarse_gain {self.coarse_gain}")
+        for name in ("axes", "tool_axes"):
+            axis_map(name, getattr(self, name))
+
+
+def tool_maps(parameters: MotionScalingParameters) -> tuple[Array, Array]:
+    """Quaternions (4,) from the master's base to the slave's axes, and from the stylus to the tool.
+
+    Source:
+        Vongbunyong 2008, section 6.2.
+    """
+    tool = product(axis_map("tool_axes", parameters.tool_axes).T, rotation("z", parameters.tool_roll))
+    found = np.empty(4), np.empty(4)
+    for matrix, quaternion in zip((axis_map("axes", parameters.axes), tool), found, strict=True):
+        quaternion_from_rotation(np.ascontiguousarray(matrix), quaternion)
+    return found

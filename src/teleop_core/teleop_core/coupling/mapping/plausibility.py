@@ -1,0 +1,154 @@
+"""Plausibility: samples that no hand can have made move nothing.
+
+A sample is measured against the one before. What is too fast, too sudden or too far away holds the
+command, as a pressed clutch does, and so does a way in a gap of the samples that is long for their
+stream; from the next plausible sample on the hand is followed again,
+from where it is then. So a teleport moves nothing, and neither do random poses.
+"""
+
+import math
+from dataclasses import dataclass
+
+from teleop_core.base import Within, parameter
+from teleop_core.graph import Row
+from teleop_core.kernels import Array, Fields, PoseRow, Vector3, inner
+
+
+@dataclass(frozen=True, kw_only=True)
+class HandLimits:
+    """What a hand on the master can do."""
+
+    speed: float = parameter(
+        3.0,
+        Within(0.01, 1000.0, "m/s"),
+        "largest speed of the stylus",
+        source="assumed: across the Phantom's workspace in a twentieth of a second",
+    )
+    acceleration: float = parameter(
+        1000.0,
+        Within(1.0, 1e6, "m/s²"),
+        "largest acceleration of the stylus",
+        source="assumed: ten times that of a fast arm, for one reading step in 1 ms is 55 m/s²",
+    )
+    turn: float = parameter(
+        60.0, Within(0.1, 1e4, "rad/s"), "largest speed of its turn", source="assumed: three times that of a fast wrist"
+    )
+    reach: float = parameter(
+        2.0, Within(0.01, 100.0, "m"), "farthest stylus from the master's base", source="assumed: longer than an arm"
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class PlausibilityParameters(HandLimits):
+    """What a hand on the master can do, and how long its buttons may be silent."""
+
+    button_silence: float = parameter(
+        0.5,
+        Within(0.01, 60.0, "s"),
+        "a stream of buttons that fell silent for longer counts as a pressed clutch; 0: never",
+        off=0.0,
+    )
+
+
+class PlausibilityNumbers(Fields):
+    """Fields of a parameter record with what a hand can do."""
+
+    hand_speed: float  # [m/s]
+    hand_acceleration: float  # [m/s²]
+    hand_turn: float  # [rad/s]
+    hand_reach: float  # [m]
+    silence_ns: int  # of buttons
+    pause_ns: int  # after which anything is plausible
+
+
+class PlausibilityState(Fields):
+    """Fields of a state record with the last readings."""
+
+    raw: PoseRow
+    raw_rate: Vector3
+    raw_ns: int
+    raw_elapsed_ns: int  # from the sample before
+    implausible: int
+    is_doubted: int
+    is_lost: int
+    in_row: int
+    buttons_ns: int
+
+
+# Samples that come faster than this [s] are taken to be so far apart: stamps may be uneven.
+_SHORTEST = 1e-3
+# In a gap of the samples nobody sees whether a hand moves or jumps: it is given no more way than
+# its limit allows in this time [s], or in two periods of a slower stream.
+_GAP = 20e-3
+# So many messages no farther apart than this are a stream [ns]. A pause takes so many away from at
+# most twice as many: the one in which the poses were silent too leaves a stream one, two do not.
+_STREAM, _STREAM_NS = 20, 100_000_000
+
+
+def take_hand(p: PlausibilityNumbers, hand: HandLimits) -> None:
+    """Write what a hand can do into a parameter record."""
+    p["hand_speed"], p["hand_acceleration"] = hand.speed, hand.acceleration
+    p["hand_turn"], p["hand_reach"] = hand.turn, hand.reach
+
+
+@inner
+def is_plausible(p: PlausibilityNumbers, s: PlausibilityState, pose: Array, stamp_ns: int) -> bool:
+    """Whether a hand can have come from the last sample to this one; counts those that cannot.
+
+    Args:
+        p: Parameters.
+        s: State; written.
+        pose: Sample (7,).
+        stamp_ns: Its stamp [ns].
+    """
+    elapsed_ns = stamp_ns - s.raw_ns
+    period = max(1e-9 * elapsed_ns, _SHORTEST)
+    is_first = s.raw_ns == 0 or elapsed_ns > p.pause_ns
+    far, fast, sudden = 0.0, 0.0, 0.0
+    for i in range(3):
+        rate = 0.0 if is_first else (pose[i] - s.raw[i]) / period
+        change = 0.0 if is_first or s.is_doubted else (rate - s.raw_rate[i]) / period
+        far += pose[i] * pose[i]
+        fast += rate * rate
+        sudden += change * change
+        s.raw_rate[i] = rate
+    turn = 0.0 if is_first else _turn(s.raw[3:7], pose[3:7]) / period
+    share = min(1.0, max(_GAP, 2e-9 * s.raw_elapsed_ns) / period)
+    is_sound = (
+        math.sqrt(far) <= p.hand_reach
+        and math.sqrt(fast) <= p.hand_speed * share
+        and math.sqrt(sudden) <= p.hand_acceleration
+        and turn <= p.hand_turn * share
+    )
+    for i in range(7):
+        s.raw[i] = pose[i]
+    s.raw_ns, s.raw_elapsed_ns = stamp_ns, 0 if is_first else elapsed_ns
+    if not is_sound:
+        s.implausible += 1
+    s.is_doubted = 0 if is_sound else 1
+    return is_sound
+
+
+@inner
+def _turn(before: Array, after: Array) -> float:
+    """Angle between two orientations [rad]."""
+    cosine = 0.0
+    for i in range(4):
+        cosine += before[i] * after[i]
+    return 2.0 * math.acos(min(abs(cosine), 1.0))
+
+
+@inner
+def has_lost_buttons(p: PlausibilityNumbers, s: PlausibilityState, row: Row) -> bool:
+    """Whether the buttons came as a stream and are silent now, so that the state of the clutch is unknown.
+
+    Masters that send them where they change only have no stream of them.
+    """
+    stamp_ns = row.master_buttons_ns
+    if stamp_ns != s.buttons_ns:
+        is_next = stamp_ns - s.buttons_ns <= _STREAM_NS
+        s.in_row = min(s.in_row + 1, 2 * _STREAM) if is_next else max(s.in_row - _STREAM, 0)
+        s.buttons_ns = stamp_ns
+    silence_ns = row.master_measured_cp_ns - stamp_ns
+    s.is_lost = 1 if s.in_row >= _STREAM and 0 < p.silence_ns < silence_ns else 0
+    return bool(s.is_lost)

@@ -1,0 +1,224 @@
+"""Reflection: what the hand feels of the slave, and what its passivity leaves of that."""
+
+import math
+from typing import Annotated, Any, NamedTuple
+
+import numpy as np
+
+from teleop_core.coupling.architectures import MEMORY, Architecture
+from teleop_core.coupling.mapping.following import FollowingNumbers, FollowingState, is_felt, is_seen
+from teleop_core.coupling.passivity import MEMORY as PASSIVE_MEMORY
+from teleop_core.coupling.passivity import Passivity
+from teleop_core.coupling.passivity.port import (
+    IMPEDANCE,
+    IN,
+    LAW,
+    MARGIN,
+    ROUND,
+    WAVE,
+    WITHHELD,
+    begin_round,
+    count,
+    hear_energy,
+    port_work,
+)
+from teleop_core.coupling.passivity.tdpa import pay_push
+from teleop_core.graph import Row, copy, topics
+from teleop_core.kernels import Array, Integers, PoseRow, Vector3, inner
+
+
+class ReflectionNumbers(FollowingNumbers):
+    """Fields of a parameter record with what comes back."""
+
+    is_reflected: int
+    reflected_most: float  # [N]
+    law: float  # kind of passivity
+    force_scale: float  # force at the hand over that on the tip
+    lead_gain: float  # force that leads the slave over that of the hand
+    gain: Annotated[Array, 2]  # motion of the slave over the hand's: coarse, fine
+    axis: Annotated[Integers, 3]  # axes of master and slave
+    sign: Vector3
+
+
+class ReflectionState(FollowingState):
+    """Fields of a state record with what the hand feels."""
+
+    heard: float  # share of the force that counts
+    seen: float  # share of the slave's place that counts
+    push: Vector3  # the last one [N]
+    pushed_at: Vector3  # where it began [m]
+    scale: float  # the hand's energy over the slave's
+    command: PoseRow  # where the hand leads the slave
+    led_from: PoseRow  # the same before
+    is_fine: int
+
+
+# Time [s] over which what comes from afar sets in, or fades where nothing comes any more.
+_FADE = 0.1
+_ROUNDING = 1.0 + 1e-12
+
+
+class Law(NamedTuple):
+    """Architecture and passivity: kernels, numbers, memory, what they get and what they write."""
+
+    push: Any
+    numbers: Array
+    memory: Array
+    felt: Array
+    away: Array
+    out: Array
+    hand: Any
+    kept: Array  # numbers of the passivity
+    left: Array  # its memory
+    last: Array
+    moved: Array
+    led: Array
+    asked: Array
+    flow: Array
+    heard: Array  # energies of the slave, its wave along the master's base
+    port: Array
+    wall: Array  # force of fixture and limits since the sample before [N]
+    walls: Array  # its energies
+
+    def clear(self) -> None:
+        """Forget what happened."""
+        for array in (
+            self.memory, self.felt, self.away, self.out, self.left, self.last, self.moved,
+            self.led, self.asked, self.flow, self.heard, self.port, self.wall, self.walls,
+        ):  # fmt: skip
+            array[:] = 0.0
+
+
+def make_law(part: Architecture, numbers: Array, passivity: Passivity, kept: Array) -> Law:
+    """The law of an architecture and a passivity, at rest."""
+    return Law(
+        part.push_pointer, numbers, np.zeros(MEMORY), np.zeros(3), np.zeros(3), np.zeros(3),
+        passivity.hand_pointer, kept, np.zeros(PASSIVE_MEMORY), np.zeros(3), np.zeros(3),
+        np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(len(topics.ENERGY)), np.zeros(len(topics.ENERGY)),
+        np.zeros(3), np.zeros(len(topics.ENERGY)),
+    )  # fmt: skip
+
+
+@inner
+def reflect(
+    p: ReflectionNumbers, s: ReflectionState, law: Law, is_following: bool, period: float, stylus: Array, row: Row
+) -> None:
+    """Add to the hand's force (3,) [N] what it feels of the slave. The force of a silent slave fades.
+
+    Args:
+        p: Parameters.
+        s: State; written.
+        law: What comes back, and how; written.
+        is_following: Whether the slave is led by the hand; where it goes its own way is not felt.
+        period: Since the sample before [s].
+        stylus: Where the tip of the stylus is (3,) [m].
+        row: Signals.
+    """
+    if p.is_reflected == 0:
+        if row.master_energy[LAW] != 0.0:  # nothing is asked of the slave's side any more
+            begin_round(row.master_energy, 0.0, 1e-9 * row.master_measured_cp_ns)
+        return
+    _count(p, s, law, is_following, stylus, row)
+    step = period / _FADE
+    s.heard = min(max(s.heard + (step if is_felt(p, s, row) else -step), 0.0), 1.0)
+    is_led = is_following and is_seen(p, s, row)
+    s.seen = min(max(s.seen + (step if is_led else -step), 0.0), 1.0)
+    for i in range(3):
+        law.felt[i] = s.heard * row.slave_measured_cf[i]
+        law.away[i] = s.seen * (row.slave_measured_cp[i] - s.command[i])
+    law.push(law.numbers, law.memory, law.felt, law.away, period, law.out)
+    _bound(law.out, p.reflected_most, 1.0)
+    for i in range(3):
+        law.asked[p.axis[i]] = p.sign[i] * law.out[i]
+    _make_passive(p, s, law, period, row)
+    if p.law != 0.0:
+        _hold_wall(law, row.master_servo_cf)
+    for i in range(3):
+        row.master_servo_cf[i] += s.push[i]
+
+
+@inner
+def _hold_wall(law: Law, force: Array) -> None:
+    """Limit the force (3,) of fixture and limits to what the energy that they absorbed pays for.
+
+    With passivity a wall gives back no more energy than it took, however stiff it is. Its energy is counted apart, so
+    that reflection cannot spend it.
+    """
+    square = way = 0.0
+    for i in range(3):
+        law.walls[MARGIN] -= law.wall[i] * law.moved[i]
+        way += abs(law.moved[i])
+        square += force[i] * force[i]
+    if square == 0.0:
+        law.walls[MARGIN] = min(law.walls[MARGIN], 0.0)
+    pay_push(law.walls, force, math.sqrt(square), way, 1.0)
+    for i in range(3):
+        law.wall[i] = force[i]
+
+
+@inner
+def lead_by_force(p: ReflectionNumbers, s: ReflectionState, row: Row) -> None:
+    """Write slave_servo_cf: what the hand bears of the push that answers the slave.
+
+    A device that can be moved freely gives the hand's force on so; it has no sensor of it.
+    """
+    for i in range(3):
+        row.slave_servo_cf[i] = -p.lead_gain * p.sign[i] * s.push[p.axis[i]]
+
+
+@inner
+def _bound(push: Array, most: float, rounding: float) -> None:
+    """Shorten a push (3,) to ``most`` [N]; one that is longer by rounding alone stays."""
+    square = 0.0
+    for i in range(3):
+        square += push[i] * push[i]
+    if square > most * most * rounding:
+        share = most / math.sqrt(square)
+        for i in range(3):
+            push[i] *= share
+
+
+@inner
+def _count(p: ReflectionNumbers, s: ReflectionState, law: Law, is_following: bool, stylus: Array, row: Row) -> None:
+    """Add the work of the last push on the hand; a law that begins anew has no energy.
+
+    Energies begin anew with another law or scale, and while the hand does not lead the slave.
+    """
+    scale = p.force_scale / p.gain[s.is_fine]
+    is_other = law.port[LAW] != p.law or s.scale != scale or law.port[ROUND] == 0.0
+    if is_other or not is_following:
+        s.scale = scale
+        begin_round(law.port, p.law, 1e-9 * row.master_measured_cp_ns)
+        copy(s.command, s.led_from)
+        copy(stylus, s.pushed_at)  # where it was before may be another grip, or nowhere yet
+    for i in range(3):
+        law.moved[i] = stylus[i] - s.pushed_at[i]
+        s.pushed_at[i] = stylus[i]
+        law.led[p.axis[i]] = p.sign[i] * (s.command[i] - s.led_from[i]) / p.gain[s.is_fine]
+        s.led_from[i] = s.command[i]
+    came = -port_work(s.push, law.moved) / scale
+    count(law.port, IN, came)
+    for i in range(law.heard.shape[0]):
+        law.heard[i] = row.slave_energy[i]
+    for i in range(3):
+        law.heard[WAVE + p.axis[i]] = p.sign[i] * row.slave_energy[WAVE + i]
+    law.flow[0] = hear_energy(law.port, law.heard)
+    law.flow[1], law.flow[2] = max(came, 0.0), max(-came, 0.0)
+
+
+@inner
+def _make_passive(p: ReflectionNumbers, s: ReflectionState, law: Law, period: float, row: Row) -> None:
+    """Limit the wanted push to a passive one, and report the energies."""
+    for i in range(3):
+        law.last[i], s.push[i] = s.push[i], law.asked[i]
+    law.hand(law.kept, law.left, law.last, law.moved, law.led, law.flow, law.heard, law.port, s.push, s.scale, period)
+    _bound(s.push, p.reflected_most, _ROUNDING)
+    for i in range(3):
+        lost = (s.push[i] - law.asked[i]) * law.moved[i] / s.scale
+        if lost > 0.0:
+            law.port[WITHHELD] += lost
+    for i in range(law.port.shape[0]):
+        row.master_energy[i] = law.port[i]
+    row.master_energy[IMPEDANCE] /= p.force_scale * p.gain[s.is_fine]
+    for i in range(3):
+        row.master_energy[WAVE + i] = p.sign[i] * law.port[WAVE + p.axis[i]]

@@ -1,0 +1,78 @@
+"""Network: how packets travel between the master's side and the slave's, one file per kind.
+
+A kind says of every packet how long it is on the way beside the least time, or that it is lost.
+Order, rate, and what a packet carries are the same for all (:mod:`teleop_core.coupling.network.link`).
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numba import types
+
+from teleop_core.base import PartError, Registry, part_check
+from teleop_core.base.registry import places, tried
+from teleop_core.kernels import Array, fenced, is_whole, numbers_of, pointer
+
+__all__ = ["CHANCES", "LOST", "MEMORY", "NETWORKS", "Network", "register_network"]
+
+_ROW = types.float64[::1]
+DRAW = types.float64(_ROW, _ROW, _ROW, types.float64)
+"""Signature of a draw kernel, so that one compiled stage serves every kind."""
+LOST = -1.0
+"""What a draw says of a packet that never arrives."""
+CHANCES, MEMORY = 3, 4
+"""Random numbers that every packet has, and numbers that a direction remembers."""
+
+
+@dataclass(frozen=True)
+class Network:
+    """A kind of network, as one direction of it goes.
+
+    Attributes:
+        name: What ``--set network.there.kind=`` calls it.
+        parameters: Its parameter group.
+        draw: ``draw(numbers, memory, chances, now)``, a kernel or a plain function, called once for every packet.
+            ``numbers`` are those of the parameters; ``memory`` (4,) is kept from packet to packet, and zero at the
+            start; ``chances`` (3,) are random numbers, even from 0 to 1; ``now`` is the time since the start [s].
+            Returns the time on the way beside the least one [s], or :data:`LOST`.
+        numbers: ``numbers(parameters)`` gives what ``draw`` takes, if that is
+            something else than the numbers of the parameters in their order.
+    """
+
+    name: str
+    parameters: type
+    draw: Callable[[Array, Array, Array, float], float]
+    numbers: Callable[[Any], Array] = numbers_of
+
+    draw_pointer = cached_property(lambda self: pointer(self.draw, DRAW))
+    """The draw as an argument for kernels."""
+
+
+def _try(part: Network) -> None:
+    """Draw for some packets, so that what cannot work is told before anything runs."""
+    needs = "one with draw(numbers, memory, chances, now) -> float and parameters that all have defaults"
+    with tried("network", part.name, needs):
+        numbers, _ = fenced(part.numbers(part.parameters()))  # one too far is NaN
+        memory, fence = fenced(np.zeros(MEMORY))
+        for i, chance in enumerate(np.linspace(0.0, 0.999, 32)):
+            drawn = float(part.draw(numbers, memory, np.full(CHANCES, chance), 1e-3 * i))
+            if not (math.isfinite(drawn) and is_whole(fence)):
+                text = f"one whose draw is finite and remembers {MEMORY} numbers; it is {drawn!r}"
+                raise PartError("network", part.name, text)
+
+
+NETWORKS: Registry[Network] = Registry(
+    "network",
+    "networks",
+    places("teleop_core.coupling.network", "constant jitter gilbert_elliott outages trace"),
+    part_check("network", Network, "draw"),
+    _try,
+)
+"""All kinds by name."""
+
+register_network = NETWORKS.register
+"""Adds one of yours under its own name; see :meth:`Registry.register`."""

@@ -1,0 +1,41 @@
+"""Jitter: packets take different times, each its own or many in a row the same."""
+
+import math
+from dataclasses import dataclass
+
+from teleop_core.base import Within, parameter
+from teleop_core.coupling.network import Network
+from teleop_core.kernels import Array, kernel
+
+
+@dataclass(frozen=True, kw_only=True)
+class JitterParameters:
+    """Time beside the least one: of most packets about one mean, of some another."""
+
+    mean: float = parameter(0.02, Within(0.0, 5.0, "s"), "mean of most packets, exponentially distributed")
+    slow_mean: float = parameter(0.05, Within(0.0, 5.0, "s"), "mean of the slow ones")
+    slow_share: float = parameter(0.0, Within(0.0, 1.0), "share of the slow ones")
+    hold: float = parameter(
+        0.0,
+        Within(0.0, 60.0, "s"),
+        "time for which the same delay lasts, on average; 0: every packet has its own, and one "
+        "that is late is overtaken",
+    )
+
+
+@kernel
+def jitter_draw(numbers: Array, memory: Array, chances: Array, now: float) -> float:
+    """Time beside the least one [s]: drawn anew, or that of the packet before.
+
+    ``memory`` holds the delay, when the last packet was sent, and whether there was one.
+    """
+    held = memory[2] > 0.0 and numbers[3] > 0.0
+    if held and chances[0] < math.exp(-(now - memory[1]) / numbers[3]):
+        memory[1] = now
+        return memory[0]
+    mean = numbers[1] if chances[1] < numbers[2] else numbers[0]
+    memory[0], memory[1], memory[2] = -mean * math.log(1.0 - chances[2]), now, 1.0
+    return memory[0]
+
+
+JITTER = Network("jitter", JitterParameters, jitter_draw)

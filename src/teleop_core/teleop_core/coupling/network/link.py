@@ -1,0 +1,229 @@
+"""Link: packets on their way, one direction of a network.
+
+A packet waits in a queue while the line is busy with those before it. Its transmission begins at ``max(sent, end of the
+one before)`` and takes its size over the bandwidth: a queue of one server (Kleinrock 1975, section 1.2). Every packet
+is due at a tick, found when its transmission begins. What is due at the same tick shares a place in a calendar of
+ticks, where the newest packet stays; so a tick costs the same with any delay.
+"""
+
+from typing import Annotated, Any, NamedTuple
+
+import numpy as np
+
+from teleop_core.coupling.network import CHANCES, MEMORY, packet_size
+from teleop_core.kernels import Array, Fields, Integers, inner
+
+LONGEST = 16384
+"""Ticks that a packet may be on the way; one that would take longer is lost."""
+QUEUE = 1024
+"""Packets for which a queue has places."""
+BLOCK = 1000
+"""Ticks for which random numbers are drawn at once."""
+_BothWays = Annotated[Integers, 2]
+
+
+class LinkNumbers(Fields):
+    """Fields of a parameter record with both directions."""
+
+    least_delay: Annotated[Array, 2]  # [s]
+    loss: Annotated[Array, 2]
+    keeps_order: _BothWays
+    every: _BothWays  # least ticks from packet to packet
+    byte_ticks: Annotated[Array, 2]  # ticks that a byte takes; 0 without a bound
+    queue: _BothWays  # packets that wait at most
+
+
+class LinkState(Fields):
+    """Fields of a state record with both directions."""
+
+    tick: int
+    next: int  # random numbers used
+    behind: int  # ticks by which the present one comes late
+    sent: _BothWays
+    lost: _BothWays
+    newest: _BothWays  # that arrived
+    last_due: _BothWays  # tick
+    sent_tick: _BothWays
+    arrived: _BothWays  # whether one just came
+    free: Annotated[Array, 2]  # tick, with fractions, at which the line is free
+    head: _BothWays  # place of the packet that waits longest
+    waits: _BothWays  # packets that wait
+
+
+class Way(NamedTuple):
+    """One direction: how it draws, what is in a packet, and the calendar of what is due."""
+
+    draw: Any
+    numbers: Array
+    memory: Array
+    chances: Array  # (BLOCK, CHANCES + 1)
+    packet: Array  # values of the packet that is made (W,), and stamps of its topics (K,)
+    packet_ns: Any
+    came: Array  # the same of the newest packet that arrived
+    came_ns: Any
+    values: Array  # calendar: values (LONGEST, W), stamps (LONGEST, K), tick and number of each
+    stamps: Any
+    due: Any
+    number: Any
+    sizes: Array  # bytes of a message of each topic (K,)
+    waiting: Array  # queue: values, motion, bytes (QUEUE, W + 4); stamps, number (QUEUE, K + 1)
+    waiting_ns: Any
+    way: Array  # motion since the packet before, of all packets due then (LONGEST, 3) [m]
+    moved: Array  # motion of the packet that is made, and of those that arrived (2, 3) [m]
+
+    def clear(self) -> None:
+        """Forget everything on the way."""
+        self.due[:] = 0
+        for array in (self.memory, self.came, self.came_ns, self.moved):
+            array[...] = 0
+
+
+def make_way(width: int, sizes: Array, draw: Any, numbers: Array) -> Way:
+    """Direction whose packets carry some numbers of topics with messages of some sizes (K,)."""
+    topics = len(sizes)
+    return Way(
+        draw=draw, numbers=numbers, memory=np.zeros(MEMORY), chances=np.zeros((BLOCK, CHANCES + 1)),
+        packet=np.zeros(width), packet_ns=np.zeros(topics, np.int64),
+        came=np.zeros(width), came_ns=np.zeros(topics, np.int64),
+        values=np.zeros((LONGEST, width)), stamps=np.zeros((LONGEST, topics), np.int64),
+        due=np.zeros(LONGEST, np.int64), number=np.zeros(LONGEST, np.int64),
+        sizes=sizes, waiting=np.zeros((QUEUE, width + 4)),
+        waiting_ns=np.zeros((QUEUE, topics + 1), np.int64),
+        way=np.zeros((LONGEST, 3)), moved=np.zeros((2, 3)),
+    )  # fmt: skip
+
+
+@inner
+def may_send(p: LinkNumbers, s: LinkState, k: int) -> bool:
+    """Whether the rate of packets of direction ``k`` allows one more in this tick."""
+    return bool(s.sent[k] == 0 or s.tick - s.sent_tick[k] >= p.every[k])
+
+
+@inner
+def _due(p: LinkNumbers, s: LinkState, way: Way, k: int, dt: float) -> int:
+    """Tick at which the packet arrives whose transmission ends at ``s.free``; 0 if it is lost."""
+    chances = way.chances[s.next]
+    drawn = way.draw(way.numbers, way.memory, chances[:CHANCES], s.tick * dt)
+    if drawn < 0.0 or chances[CHANCES] < p.loss[k]:
+        return 0
+    busy = s.free[k] - s.tick
+    due = s.tick + s.behind + int((p.least_delay[k] + drawn) / dt + busy + 0.5)
+    if p.keeps_order[k]:
+        due = max(due, s.last_due[k])
+    if due - s.tick >= LONGEST:
+        return 0
+    s.last_due[k] = due
+    return due
+
+
+@inner
+def _packet_bytes(way: Way) -> float:
+    """Bytes of ``way.packet``: a topic that nobody has written yet is not in it."""
+    size = float(packet_size.HEADER)
+    for i in range(way.sizes.shape[0]):
+        if way.packet_ns[i] != 0:
+            size += way.sizes[i]
+    return size
+
+
+@inner
+def send_packet(p: LinkNumbers, s: LinkState, way: Way, k: int, dt: float) -> None:
+    """Send ``way.packet``; the motion in ``way.moved[0]`` goes with it.
+
+    Where the queue is full, the oldest packet in it is lost, or this one if order is kept.
+
+    Args:
+        p: Parameters.
+        s: State; written.
+        way: Written.
+        k: Which direction it is.
+        dt: Tick [s].
+    """
+    s.sent[k] += 1
+    s.sent_tick[k] = s.tick
+    if p.keeps_order[k] and s.waits[k] >= p.queue[k]:
+        s.lost[k] += 1
+        return
+    while s.waits[k] >= p.queue[k]:
+        s.lost[k] += 1
+        _leave_queue(s, k)
+    if s.waits[k] == 0:
+        s.free[k] = max(s.free[k], float(s.tick))
+    at = (s.head[k] + s.waits[k]) % QUEUE
+    width, topics = way.packet.shape[0], way.packet_ns.shape[0]
+    for i in range(width):
+        way.waiting[at, i] = way.packet[i]
+    for i in range(3):
+        way.waiting[at, width + i] = way.moved[0, i]
+    way.waiting[at, width + 3] = _packet_bytes(way)
+    for i in range(topics):
+        way.waiting_ns[at, i] = way.packet_ns[i]
+    way.waiting_ns[at, topics] = s.sent[k]
+    s.waits[k] += 1
+    serve_line(p, s, way, k, dt)
+
+
+@inner
+def _leave_queue(s: LinkState, k: int) -> None:
+    s.head[k] = (s.head[k] + 1) % QUEUE
+    s.waits[k] -= 1
+
+
+@inner
+def serve_line(p: LinkNumbers, s: LinkState, way: Way, k: int, dt: float) -> None:
+    """Begin the transmission of what waits, for as long as the line is free.
+
+    Args:
+        p: Parameters.
+        s: State; written.
+        way: Written.
+        k: Which direction it is.
+        dt: Tick [s].
+    """
+    while s.waits[k] > 0 and s.free[k] <= s.tick:
+        at = s.head[k]
+        s.free[k] += way.waiting[at, way.packet.shape[0] + 3] * p.byte_ticks[k]
+        due = _due(p, s, way, k, dt)
+        if due == 0:
+            s.lost[k] += 1
+        else:
+            _put_in_calendar(way, at, due)
+        _leave_queue(s, k)
+
+
+@inner
+def _put_in_calendar(way: Way, waiting: int, due: int) -> None:
+    """Put the packet at a place of the queue where it is due."""
+    width, topics = way.packet.shape[0], way.packet_ns.shape[0]
+    at = due % LONGEST
+    if way.due[at] != due:
+        way.due[at] = due
+        for i in range(3):
+            way.way[at, i] = 0.0
+    way.number[at] = way.waiting_ns[waiting, topics]  # newer than what is due then already
+    for i in range(width):
+        way.values[at, i] = way.waiting[waiting, i]
+    for i in range(topics):
+        way.stamps[at, i] = way.waiting_ns[waiting, i]
+    for i in range(3):
+        way.way[at, i] += way.waiting[waiting, width + i]
+
+
+@inner
+def take_packet(s: LinkState, way: Way, k: int) -> None:
+    """Take what is due now: ``way.came`` is the newest packet, ``s.arrived`` whether it is new.
+
+    ``way.moved[1]`` gets the motion of all that is due, overtaken or not.
+    """
+    s.arrived[k] = 0
+    at = s.tick % LONGEST
+    is_due = way.due[at] == s.tick
+    for i in range(3):
+        way.moved[1, i] = way.way[at, i] if is_due else 0.0
+    if not is_due or way.number[at] <= s.newest[k]:
+        return
+    s.newest[k], s.arrived[k] = way.number[at], 1
+    for i in range(way.came.shape[0]):
+        way.came[i] = way.values[at, i]
+    for i in range(way.came_ns.shape[0]):
+        way.came_ns[i] = way.stamps[at, i]

@@ -1,0 +1,52 @@
+"""Outages: at times nothing passes."""
+
+from dataclasses import dataclass
+
+from teleop_core.base import Within, parameter
+from teleop_core.coupling.network import LOST, Network
+from teleop_core.kernels import Array, kernel
+
+_LEVEL = "published: UVA-DSA telesurgery QoS analysis 2026, the first level of outages"
+
+
+@dataclass(frozen=True, kw_only=True)
+class OutagesParameters:
+    """How long everything passes between outages, and how long nothing does at most.
+
+    The share ``longest / (longest + 2 pause)`` is lost over a long time.
+    """
+
+    pause: float = parameter(
+        8.5,
+        Within(1e-3, 1e6, "s"),
+        "from the end of an outage to the beginning of the next; in packets with in_packets",
+        source=_LEVEL,
+    )
+    longest: float = parameter(
+        3.0,
+        Within(0.0, 1e6, "s"),
+        "longest outage; each lasts for any time up to it; in packets with in_packets",
+        source=_LEVEL,
+    )
+    in_packets: bool = parameter(False, doc="count pause and longest in packets that are sent, in place of seconds")
+
+
+@kernel
+def outages_draw(numbers: Array, memory: Array, chances: Array, now: float) -> float:
+    """Nothing beside the least time, or lost.
+
+    The first packet begins an outage. The packet that begins one is lost; the first one at or after
+    its end passes, and begins the pause (NetFI's communication loss).
+
+    ``memory`` holds when the outage or pause ends [s or packets], whether it is an outage, and the
+    number of packets before this one.
+    """
+    at = memory[2] if numbers[2] > 0.0 else now
+    memory[2] += 1.0
+    if memory[2] == 1.0 or at >= memory[0]:
+        memory[1] = 1.0 - memory[1]
+        memory[0] = at + (chances[0] * numbers[1] if memory[1] > 0.0 else numbers[0])
+    return LOST if memory[1] > 0.0 else 0.0
+
+
+OUTAGES = Network("outages", OutagesParameters, outages_draw)

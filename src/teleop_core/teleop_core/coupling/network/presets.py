@@ -1,0 +1,125 @@
+"""Presets of the network, measured ones among them, and its parameters: two directions, each of a kind."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from teleop_core.base.parameters import Choice, Within, build, choice, parameter
+from teleop_core.base.ranges import LONGEST_DELAY
+from teleop_core.coupling.network import NETWORKS, link
+from teleop_core.coupling.network.deadband import DeadbandParameters
+
+_QOS = "UVA-DSA telesurgery QoS analysis 2026"
+
+
+def _bursts(good: tuple[float, float], bad: tuple[float, float]) -> dict[str, Any]:
+    lost = {"kind": "gilbert_elliott", "gilbert_elliott.good": good, "gilbert_elliott.bad": bad}
+    return {"there": lost, "back": {}}
+
+
+def _delays(least: float, mean: float, slow_mean: float, slow_share: float) -> dict[str, Any]:
+    late = {
+        "kind": "jitter",
+        "least_delay": least,
+        "jitter.mean": mean,
+        "jitter.slow_mean": slow_mean,
+        "jitter.slow_share": slow_share,
+    }
+    return {"there": late, "back": {}}
+
+
+def _outages(pause: float, longest: float, packet_rate: float = 0.0) -> dict[str, Any]:
+    """Parameters of outages, in seconds, or in packets if a ``packet_rate`` is given."""
+    gone = {"kind": "outages", "outages.pause": pause, "outages.longest": longest}
+    if packet_rate > 0.0:
+        gone |= {"outages.in_packets": True, "packet_rate": packet_rate}
+    return {"there": gone, "back": {}}
+
+
+def _far(least: float, mean: float) -> dict[str, Any]:
+    far = {"kind": "jitter", "least_delay": least, "jitter.mean": mean, "jitter.hold": 1.0}
+    return {"there": far, "back": far}
+
+
+PRESETS: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
+    "loss_10": _bursts((4.428, 1.638), (4.966, 0.271)),
+    "loss_30": _bursts((4.604, 3.552), (3.901, 1.466)),
+    "loss_50": _bursts((3.859, 3.324), (3.797, 6.049)),
+    "delay_100": _delays(0.070, 1e-3 / 0.0271, 1e-3 / 0.0853, 0.274),
+    "delay_300": _delays(0.210, 1e-3 / 0.0108, 1e-3 / 0.0162, 0.107),
+    "delay_500": _delays(0.406, 1e-3 / 0.0102, 1e-3 / 0.0155, 0.104),
+    "outages_3_of_8": _outages(8.5, 3.0),
+    "outages_1_of_1": _outages(1.0, 1.0),
+    "outages_2_of_1": _outages(1.0, 2.0),
+    "outages_3_of_8_packets": _outages(8500.0, 3000.0, 517.0),
+    "outages_1_of_1_packets": _outages(1000.0, 1000.0, 517.0),
+    "outages_2_of_1_packets": _outages(1000.0, 2000.0, 517.0),
+    "iss": _far(0.4, 0.05),
+    "ets7": _far(3.4, 0.1),
+}
+"""Networks by name. Loss, delay and outages are the nine levels of the UVA-DSA telesurgery QoS
+analysis 2026, on the way to the slave alone. Its table gives outages in milliseconds, the program
+it ships counts packets (``_packets``), of which its recording has 517 a second. ``iss`` takes 0.8
+to 1 s there and back, ``ets7`` 7 s (ETS-VII 1999); how the delay of these two varies is assumed."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class WayParameters:
+    """One direction of the network."""
+
+    kind: Choice = choice(NETWORKS, "constant", doc="how packets travel")
+    least_delay: float = parameter(0.0, Within(0.0, LONGEST_DELAY, "s"), "least time of a packet on the way")
+    loss: float = parameter(0.0, Within(0.0, 1.0), "share of packets that are lost, each by itself")
+    packet_order: str = parameter(
+        "newest",
+        choices=("newest", "kept"),
+        doc="newest: a packet that was overtaken is thrown away; kept: the packets behind a late one wait for it",
+    )
+    packet_rate: float = parameter(1000.0, Within(1.0, 1e6, "Hz"), "packets sent in a second, at most")
+    bandwidth: float = parameter(
+        0.0,
+        Within(0.0, 1e12, "bit/s"),
+        "bits that the line carries in a second; packets wait while it is busy; 0: no bound",
+    )
+    queue: int = parameter(
+        100,
+        Within(1, link.QUEUE),
+        "packets that wait for the line at most; one more costs the oldest of them, or where order is kept itself",
+        source="assumed",
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class NetworkParameters:
+    """Parameters of :class:`~teleop_core.coupling.network.network.NetworkLink`."""
+
+    seed: int = parameter(1, Within(0), "seed of everything random in the session", fixed=True)
+    preset: str = parameter(
+        "own",
+        choices=("own", *PRESETS),
+        doc="a network that was measured, in place of both directions below; own: these",
+        source=f"published: {_QOS} for all but iss and ets7, which are assumed",
+    )
+    commands: str = parameter(
+        "absolute",
+        choices=("absolute", "incremental"),
+        doc="what a packet to the slave says: where the tip shall be, or by how much it moves, so "
+        "that a lost packet is lost motion",
+    )
+    clock_offset: float = parameter(
+        0.0, Within(-3600.0, 3600.0, "s"), "by how much the slave's clock is ahead of the master's at the start"
+    )
+    clock_drift: float = parameter(
+        0.0, Within(-1000.0, 1000.0, "ppm"), "by how much the slave's clock is faster than the master's"
+    )
+    deadband: DeadbandParameters = field(default_factory=DeadbandParameters)
+    there: WayParameters = field(default_factory=WayParameters)
+    back: WayParameters = field(default_factory=WayParameters)
+
+    @property
+    def ways(self) -> tuple[WayParameters, WayParameters]:
+        """To the slave, and back from it: of the preset, or one's own."""
+        if self.preset == "own":
+            return self.there, self.back
+        named = PRESETS[self.preset]
+        return build(WayParameters, named["there"]), build(WayParameters, named["back"])

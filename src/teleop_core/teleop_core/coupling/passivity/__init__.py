@@ -1,0 +1,111 @@
+"""Passivity: what keeps force that comes late from giving energy, one file per kind.
+
+Hand and slave are joined at two ports. At the hand's, the push on it and its motion; at the
+slave's, the force on the tip and the tip's motion. What goes in and out is counted at both for
+every kind (:mod:`teleop_core.coupling.passivity.port`); a kind says what is done about it, on either
+side, knowing its own port and what it heard of the other one.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numba import types
+
+from teleop_core.base import PartError, Registry, part_check
+from teleop_core.base.registry import places, tried
+from teleop_core.graph import topics
+from teleop_core.kernels import Array, fenced, is_whole, kernel, numbers_of, pointer
+
+__all__ = ["MEMORY", "PASSIVITIES", "Passivity", "leave_command", "register_passivity"]
+
+_ROW = types.float64[::1]
+HAND = types.void(_ROW, _ROW, _ROW, _ROW, _ROW, _ROW, _ROW, _ROW, _ROW, types.float64, types.float64)
+SLAVE = types.void(_ROW, _ROW, _ROW, _ROW, _ROW, _ROW, _ROW, _ROW, _ROW, types.float64)
+"""Signatures of both kernels, so that one compiled stage serves every kind."""
+MEMORY = 12
+"""Numbers that each side of a kind remembers."""
+
+
+@kernel
+def leave_command(
+    numbers: Array, memory: Array, flow: Array, force: Array, tip: Array, last: Array,
+    heard: Array, port: Array, command: Array, period: float,
+) -> None:  # fmt: skip
+    """Let the slave have the command as it came."""
+
+
+@dataclass(frozen=True)
+class Passivity:
+    """A kind of passivity: what it makes of the push on the hand, and of the slave's command.
+
+    Both kernels may write to ``port``, their row of :data:`~teleop_core.graph.topics.ENERGY`, and get ``heard``, the
+    other side's, as it arrived; energies are those of the slave [J]. ``flow`` (3,) is what the other side told since
+    the last call, what went in and what went out at this port. ``memory`` (12,) is kept from call to call, and zero at
+    the start; energies begin anew with every ``round``, and at the slave ``memory`` with them.
+
+    Attributes:
+        name: What ``--set reflection.passivity=`` calls it.
+        parameters: Its parameter group.
+        hand: ``hand(numbers, memory, last, moved, led, flow, heard, port, push, scale, period)``, called for every
+            sample of the master. ``last`` (3,) is the push since the sample before [N]; ``moved`` (3,) how far the hand
+            went under it; ``led`` (3,) how far it led the slave, over the gain of motion [m]; all along the master's
+            base; ``push`` (3,) the one that is asked for, to be made the one that is given; ``scale`` the hand's energy
+            over that of the slave; ``period`` the time since the sample before [s].
+        slave: ``slave(numbers, memory, flow, force, tip, last, heard, port, command, period)``, called for every
+            command that arrives, with a stage ``passivity`` alone. ``numbers`` are those of that stage; ``force`` (6,)
+            is on the tip [N, N m], whose pose is ``tip`` (7,); ``last`` (7,) the command before it, as it was given;
+            ``command`` (7,) the one that came, to be made the one that is given.
+        numbers: ``numbers(parameters)`` gives what ``hand`` takes, if that is
+            something else than the numbers of the parameters in their order.
+        needs_slave: Whether it works with a stage ``passivity`` alone.
+    """
+
+    name: str
+    parameters: type
+    hand: Callable[..., None]
+    slave: Callable[..., None] = leave_command
+    numbers: Callable[[Any], Array] = numbers_of
+    needs_slave: bool = False
+
+    hand_pointer = cached_property(lambda self: pointer(self.hand, HAND))
+    slave_pointer = cached_property(lambda self: pointer(self.slave, SLAVE))
+    """Both sides as arguments for kernels."""
+
+
+def _try(part: Passivity) -> None:
+    """Call both sides for some samples, so that what cannot work is told before anything runs."""
+    needs = (
+        "one with hand(numbers, memory, last, moved, led, flow, heard, port, push, scale, period) "
+        "and parameters that all have defaults"
+    )
+    with tried("passivity", part.name, needs):
+        (numbers, _), width = fenced(part.numbers(part.parameters())), len(topics.ENERGY)
+        memory, fence = fenced(np.zeros(MEMORY))
+        push, behind = fenced(np.zeros(3))
+        command, after = fenced(np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]))
+        last = command.copy()
+        heard, port, flow = np.zeros(width), np.zeros(width), np.full(3, 1e-6)
+        for size in (0.0, 1.0, -1.0):
+            push[:], moved = size, np.full(3, 1e-4 * size)
+            part.hand(numbers, memory, push.copy(), moved, moved, flow, heard, port, push, 1.0, 1e-3)
+            part.slave(np.ones(7), memory, flow, np.full(6, size), last, last, heard, port, command, 1e-3)
+            is_sound = np.isfinite(push).all() and np.isfinite(command).all()
+            if not (is_sound and is_whole(fence) and is_whole(behind) and is_whole(after)):
+                text = f"one whose push and command are finite, not {push!r} and {command!r}"
+                raise PartError("passivity", part.name, text)
+
+
+PASSIVITIES: Registry[Passivity] = Registry(
+    "passivity",
+    "passivities",
+    {**places("teleop_core.coupling.passivity", "none tank tdpa"), "wave": "teleop_core.coupling.passivity.wave:WAVES"},
+    part_check("passivity", Passivity, "hand", "slave"),
+    _try,
+)
+"""All kinds by name."""
+
+register_passivity = PASSIVITIES.register
+"""Adds one of yours under its own name; see :meth:`Registry.register`."""

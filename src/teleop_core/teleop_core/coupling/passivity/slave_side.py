@@ -1,0 +1,207 @@
+"""Passivity as a stage: the slave's port, between what arrives of the hand and inverse kinematics.
+
+It counts what goes through the slave's tip and lets the passivity that the hand's side names change the command.
+Without it nobody limits what the slave gives.
+"""
+
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from teleop_core.base import Within, parameter
+from teleop_core.coupling.passivity import MEMORY, PASSIVITIES
+from teleop_core.coupling.passivity.port import IN, LAW, ROUND, TURN_IN, begin_round, count, hear_energy, port_work
+from teleop_core.graph import DT, Row, RunningStage, Stage, assign, copy, topics
+from teleop_core.kernels import Array, Fields, PoseRow, Wrench, inner, kernel, record, records
+from teleop_core.kernels.geometry import turn_between
+from teleop_core.kernels.room import room
+
+
+@dataclass(frozen=True, kw_only=True)
+class PassivityParameters:
+    """Parameters of the slave's side, of every kind of passivity."""
+
+    recovery: float = parameter(
+        0.2, Within(1e-3, 100.0, "s"), "time constant with which what a command lost is made up for", source="assumed"
+    )
+    recovery_speed: float = parameter(
+        5e-3,
+        Within(0.0, 1.0, "m/s"),
+        "largest speed of the same, and of going back from what is overdrawn",
+        source="assumed: at it an arm meets steel with some 2 N",
+    )
+    least_force: float = parameter(
+        0.01,
+        Within(0.0, 10.0, "N"),
+        "a smaller force on the tip is none; above what the sensor tells of nothing",
+        source="assumed: that of an ideal sensor",
+    )
+    credit: float = parameter(
+        2e-4,
+        Within(0.0, 1.0, "J"),
+        "energy that the arm lends before the hand has paid: once with tank and tdpa, in each "
+        "touch with wave; what the world gives back goes to it first, never to the hand",
+        source="assumed: moves the arm by half a millimetre until the hand has paid",
+    )
+    credit_force: float = parameter(
+        1.0,
+        Within(1e-3, 100.0, "N"),
+        "with wave, force on the tip up to which it lends all of that; from twice the force on "
+        "it lends nothing, and what an arm that ran into something hard overdrew is given back",
+        source="assumed: a gentle touch",
+    )
+    stop_force: float = parameter(
+        5.0,
+        Within(0.1, 1000.0, "N"),
+        "force on the tip at which a tank stops a command that goes against it; the arm, which "
+        "comes behind its command, presses harder",
+        source="assumed: below what RCRT-1's drives give for long",
+    )
+    approach_stiffness: float = parameter(
+        1300.0,
+        Within(1.0, 1e6, "N/m"),
+        "stiffness of what may be met: with tank and tdpa the command is ahead of the tip no "
+        "farther than what is left pays for on the way into it",
+        source="assumed: silicone; into softer things the arm needs less, and harder ones stop it",
+    )
+
+
+class Laws(NamedTuple):
+    """The slave's side of all kinds, and what they remember."""
+
+    slaves: Any
+    numbers: Array
+    memory: Array
+    flow: Array  # heard, in and out since the last command
+    last: Array  # the command that was given last (7,)
+
+
+class PortState(Fields):
+    """State record of the slave's port."""
+
+    tip: PoseRow
+    tip_ns: int
+    force: Wrench
+    felt: Wrench  # mean over the way of the tip
+    before: Wrench
+    command_ns: int
+    has_last: int
+
+
+@inner
+def _observe(s: PortState, laws: Laws, row: Row, port: Array) -> None:
+    """Count what went through the tip since it was measured last.
+
+    The force is that of the time when the tip was measured: the mean of both ends of its way, so
+    that a spring takes and gives the same.
+    """
+    is_late = row.slave_measured_cf_ns > row.slave_measured_cp_ns
+    for i in range(6):
+        now = s.before[i] if is_late else row.slave_measured_cf[i]
+        s.felt[i], s.force[i] = 0.5 * (s.force[i] + now), now
+        s.before[i] = row.slave_measured_cf[i]
+    step, turn = room(3), room(3)
+    if s.tip_ns != 0 and row.slave_measured_cp_ns > s.tip_ns:
+        for i in range(3):
+            step[i] = row.slave_measured_cp[i] - s.tip[i]
+        turn_between(s.tip[3:7], row.slave_measured_cp[3:7], turn)
+        came = port_work(s.felt[0:3], step)
+        count(port, IN, came)
+        turned = port_work(s.felt[3:6], turn)
+        count(port, TURN_IN, turned)
+        came += turned
+        laws.flow[1] += max(came, 0.0)
+        laws.flow[2] += max(-came, 0.0)
+    copy(row.slave_measured_cp, s.tip)
+    s.tip_ns = row.slave_measured_cp_ns
+
+
+@inner
+def _begin(s: PortState, laws: Laws, heard: Array, port: Array) -> None:
+    """Begin the round that the hand tells of, without any drift."""
+    begin_round(port, heard[LAW], heard[ROUND])
+    for i in range(laws.memory.shape[0]):
+        laws.memory[i] = 0.0
+    for i in range(3):
+        laws.flow[i] = 0.0
+    s.has_last = 0
+
+
+@kernel
+def passivity_step(p: Fields, s: PortState, laws: Laws, row: Row, dt: float) -> None:
+    """One tick: count the energy at the tip, and answer a command that has come.
+
+    Args:
+        p: Nothing.
+        s: State record; written.
+        laws: :class:`Laws`; written.
+        row: Signals; ``slave_energy`` and ``passivity_servo_cp`` are written.
+        dt: Tick [s].
+    """
+    port, heard = row.slave_energy, row.master_energy
+    if heard[ROUND] > port[ROUND]:
+        _begin(s, laws, heard, port)
+    _observe(s, laws, row, port)
+    laws.flow[0] += hear_energy(port, heard)
+    if row.slave_servo_cp_ns == s.command_ns:
+        return
+    elapsed = max(1e-9 * (row.slave_servo_cp_ns - s.command_ns), dt) if s.has_last else dt
+    s.command_ns = row.slave_servo_cp_ns
+    copy(row.slave_servo_cp, row.passivity_servo_cp)
+    law = int(port[LAW])
+    # The first command of a round is where the slave is; while it goes its own way all are.
+    if s.has_last and 0 <= law < len(laws.slaves):
+        laws.slaves[law](
+            laws.numbers, laws.memory, laws.flow, s.force, s.tip, laws.last, heard, port,
+            row.passivity_servo_cp, elapsed,
+        )  # fmt: skip
+    copy(row.passivity_servo_cp, laws.last)
+    s.has_last = 1
+    for i in range(3):
+        laws.flow[i] = 0.0
+
+
+class SlaveSide(RunningStage):
+    """Stage of the slave's port."""
+
+    def __init__(self, parameters: PassivityParameters, dt: float = DT) -> None:
+        super().__init__(PASSIVITY, 0, dt)
+        self.parameters, self.state = records([("none", "i8")])[0], record(PortState)
+        self.kernel = passivity_step
+        slaves = tuple(PASSIVITIES.find(name).slave_pointer for name in PASSIVITIES)
+        self._laws = Laws(slaves, np.zeros(7), np.zeros(MEMORY), np.zeros(3), np.zeros(7))
+        self.arguments = (self.parameters, self.state, self._laws)
+        self._start = self.signals.copy()
+        self.retune(parameters)
+        self.reset()
+
+    def reset(self) -> None:
+        """No energy, no drift, no command."""
+        assign(self.state, 0)
+        assign(self.signals, self._start)
+        for array in self._laws[2:]:
+            array[:] = 0.0
+
+    def retune(self, parameters: PassivityParameters) -> None:
+        """Take new parameters from the next command on."""
+        self._laws.numbers[:] = (
+            parameters.recovery,
+            parameters.recovery_speed,
+            parameters.least_force,
+            parameters.credit,
+            parameters.credit_force,
+            parameters.stop_force,
+            parameters.approach_stiffness,
+        )
+
+
+PASSIVITY = Stage(
+    "passivity",
+    PassivityParameters,
+    reads=(topics.SLAVE_SERVO_CP, topics.MASTER_ENERGY, topics.SLAVE_MEASURED_CF, topics.SLAVE_MEASURED_CP),
+    writes=(topics.PASSIVITY_SERVO_CP, topics.SLAVE_ENERGY),
+    late=(topics.SLAVE_MEASURED_CF, topics.SLAVE_MEASURED_CP),
+    replaces=topics.SLAVE_SERVO_CP,
+    make=SlaveSide,
+)

@@ -1,0 +1,143 @@
+"""Gamepad: two sticks that steer the stylus while a shoulder button is held, through SDL."""
+
+import os
+from collections.abc import Iterator
+from dataclasses import dataclass
+from importlib import import_module
+from typing import Any
+
+import numpy as np
+
+from teleop_core.base import SessionError, Within, parameter
+from teleop_core.hand.devices import Reading, pilot
+from teleop_core.hand.operators import Operator
+from teleop_core.hand.operators.remote import AHEAD, make_remote
+
+_FULL = 32767.0
+_RUMBLE_TIME = 0.2  # a rumble that is not renewed ends [s]
+_HINTS = {
+    "SDL_VIDEODRIVER": "dummy",  # events need a video driver; this one opens no window
+    "SDL_JOYSTICK_ALLOW_BACKGROUND_EVENTS": "1",
+    "SDL_NO_SIGNAL_HANDLERS": "1",  # signals are the node's
+    "PYGAME_HIDE_SUPPORT_PROMPT": "1",
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class GamepadParameters(pilot.PilotParameters):
+    """How a gamepad moves the stylus, and how it tells the force."""
+
+    rumble: float = parameter(1.0, Within(0.0, 1.0), "rumble at the device's peak force; 0: none", fixed=True)
+    triggers: str = parameter(
+        "roll",
+        choices=("roll", "jaw"),
+        fixed=True,
+        doc="what they do: they roll the stylus, or the right one closes the jaw and nothing rolls",
+    )
+
+
+class Sdl:
+    """SDL's joysticks and those of them whose layout it knows.
+
+    Raises:
+        SessionError: pygame-ce is not installed.
+    """
+
+    def __init__(self) -> None:
+        for name, value in _HINTS.items():
+            os.environ.setdefault(name, value)
+        try:
+            self.pygame: Any = import_module("pygame")
+            self.controllers: Any = import_module("pygame._sdl2.controller")
+        except ImportError as error:
+            text = "a gamepad needs pygame-ce: pip install 'teleop_core[devices]'"
+            raise SessionError(text) from error
+        self.pygame.display.init()
+        self.pygame.joystick.init()
+        self.controllers.init()
+        self.pygame.event.pump()
+
+    def names(self) -> Iterator[tuple[int, str, bool]]:
+        """Number and name of each joystick, and whether SDL knows its layout."""
+        for number in range(self.pygame.joystick.get_count()):
+            is_known = bool(self.controllers.is_controller(number))
+            yield number, str(self.pygame.joystick.Joystick(number).get_name()), is_known
+
+
+class Gamepad:
+    """A gamepad that is open; see :class:`teleop_core.hand.devices.Device`.
+
+    The left stick moves the stylus to the sides and away, the right one up, and turns it about the vertical; the
+    triggers roll it, or the right one closes the jaw; the cross tips it. It moves while a shoulder button is held. The
+    lower button of the right hand (A) is the fixture, the right one (B) the mode.
+
+    Args:
+        wanted: Part of its name; empty: the first.
+        leads_jaw: Whether the right trigger closes the jaw.
+
+    Raises:
+        SessionError: There is none; the text says what was found.
+    """
+
+    def __init__(self, wanted: str = "", *, leads_jaw: bool = False) -> None:
+        self._sdl, self._leads_jaw = Sdl(), leads_jaw
+        found = list(self._sdl.names())
+        for number, name, is_known in found:
+            if is_known and wanted.lower() in name.lower():
+                self.name, self._own = name, self._sdl.controllers.Controller(number)
+                return
+        texts = [name if known else f"{name} (of unknown layout)" for _, name, known in found]
+        called = f" with {wanted!r} in its name" if wanted else ""
+        raise SessionError(f"no gamepad{called}; found: {', '.join(texts) or 'none'}")
+
+    def read(self) -> Reading:
+        """What it says now; raises SessionError if it is gone."""
+        self._sdl.pygame.event.pump()
+        self._sdl.pygame.event.clear()
+        if not self._own.attached():
+            raise SessionError(f"gamepad {self.name} is gone")
+        pad, axis, button = self._sdl.pygame, self._axis, self._button
+        right, left = map(axis, (pad.CONTROLLER_AXIS_TRIGGERRIGHT, pad.CONTROLLER_AXIS_TRIGGERLEFT))
+        rates = np.array(
+            [
+                axis(pad.CONTROLLER_AXIS_LEFTX),
+                -axis(pad.CONTROLLER_AXIS_RIGHTY),  # pushed away is negative
+                axis(pad.CONTROLLER_AXIS_LEFTY),
+                button(pad.CONTROLLER_BUTTON_DPAD_DOWN) - button(pad.CONTROLLER_BUTTON_DPAD_UP),
+                -axis(pad.CONTROLLER_AXIS_RIGHTX),
+                0.0 if self._leads_jaw else left - right,
+            ]
+        )
+        shoulders = pad.CONTROLLER_BUTTON_LEFTSHOULDER, pad.CONTROLLER_BUTTON_RIGHTSHOULDER
+        return Reading(
+            rates,
+            any(map(button, shoulders)),
+            button(pad.CONTROLLER_BUTTON_A),
+            button(pad.CONTROLLER_BUTTON_B),
+            right if self._leads_jaw else None,
+        )
+
+    def _axis(self, number: int) -> float:
+        return max(float(self._own.get_axis(number)) / _FULL, -1.0)
+
+    def _button(self, number: int) -> bool:
+        return bool(self._own.get_button(number))
+
+    def rumble(self, share: float) -> None:
+        """Rumble with a share, 0 to 1; nothing where it cannot."""
+        if share > 0.0:
+            self._own.rumble(share, share, round(1000 * _RUMBLE_TIME))
+        else:
+            self._own.stop_rumble()
+
+    def close(self) -> None:
+        """Give it back."""
+        self._own.quit()
+
+
+def open_gamepad(parameters: GamepadParameters) -> Gamepad:
+    """The gamepad that is wanted; raises as :class:`Gamepad`."""
+    return Gamepad(parameters.device, leads_jaw=parameters.triggers == "jaw")
+
+
+GAMEPAD = Operator("gamepad", make_remote, GamepadParameters, ahead=AHEAD, trembles=True, opens=open_gamepad)

@@ -1,0 +1,201 @@
+"""Device: what the haptic master reads of the hand, as a Phantom Omni or as a jointed handle."""
+
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from teleop_core.base import Within, parameter
+from teleop_core.kernels import Fields, Quaternion, Vector3, inner, inverse_motion, kernel, product
+from teleop_core.kernels.geometry import (
+    Array,
+    compose,
+    multiply_quaternions,
+    pose_from_transform,
+    rotate_by_vector,
+    transform_from_pose,
+)
+from teleop_core.kernels.room import room
+from teleop_core.robots import load_robot_set
+
+_OMNI = "published: Vongbunyong 2008, table 5.1"
+
+
+@dataclass(frozen=True, kw_only=True)
+class DeviceParameters:
+    """The Phantom Omni: what its maker publishes, and what follows or is assumed beside it."""
+
+    workspace: tuple[float, ...] = parameter(
+        (0.16, 0.12, 0.07),
+        Within(0.01, 1.0, "m"),
+        "width, height, depth within which the tip can move",
+        length=3,
+        source=_OMNI,
+    )
+    start: tuple[float, ...] = parameter(
+        (0.0, 0.0, -0.03),
+        Within(-0.5, 0.5, "m"),
+        "place of the inkwell relative to the middle of the workspace",
+        length=3,
+        fixed=True,
+        source="assumed: the inkwell is behind the middle; no source says how far",
+    )
+    position_resolution: float = parameter(
+        0.055e-3, Within(0.0, 1e-2, "m"), "step of the position reading; 0: none", source=_OMNI
+    )
+    gimbal_noise: float = parameter(
+        2e-3,
+        Within(0.0, 0.1, "rad"),
+        "largest noise of each gimbal potentiometer",
+        source="derived: raw fluctuation of the slave's reference at rest (Vongbunyong 2008, "
+        "section 6.2), not a specification of the potentiometers",
+    )
+    peak_force: float = parameter(3.3, Within(0.0, 50.0, "N"), "largest force, for a short time", source=_OMNI)
+    continuous_force: float = parameter(
+        0.88,
+        Within(1e-3, 50.0, "N"),
+        "root mean square of the force that its motors bear; peak_force or more: no limit",
+        source=_OMNI,
+    )
+    thermal_time: float = parameter(
+        60.0,
+        Within(0.1, 1e4, "s"),
+        "time constant with which its motors grow warm",
+        source="assumed: between the winding (some 10 s) and the housing (some 100 s) of coreless "
+        "motors of this size, by their makers' data sheets",
+    )
+    stiffness: tuple[float, ...] = parameter(
+        (1260.0, 2310.0, 1020.0),
+        Within(10.0, 1e7, "N/m"),
+        "of the tip against its motors and encoders, on x, y, z; in series with every wall",
+        length=3,
+        source=_OMNI,
+    )
+    structure_damping: float = parameter(
+        5.0,
+        Within(0.0, 1e4, "N·s/m"),
+        "of the same, beside the stiffness",
+        source="assumed: a quarter to a third of critical for apparent_mass on this stiffness",
+    )
+    apparent_mass: float = parameter(0.045, Within(1e-3, 5.0, "kg"), "mass at the tip", source=_OMNI)
+    friction: float = parameter(0.26, Within(0.0, 5.0, "N"), "backdrive friction: it sticks below", source=_OMNI)
+    handle: str = parameter("", fixed=True, doc="robot whose joints read the hand, such as mma; empty: the Phantom's")
+    handle_geometry: tuple[str, ...] = parameter(
+        (), fixed=True, doc="symbol=value in place of the handle's lengths and options [m, rad]"
+    )
+
+
+class Handle(NamedTuple):
+    """A jointed handle: its kinematics, where it stands, and its last joints."""
+
+    ik: Any
+    fk: Any
+    limits: Array
+    geometry: Array
+    T_base_handle: Array
+    T_handle_base: Array
+    encoder_step: Array
+    joints: Array
+    q: Array
+
+
+class ReadingNumbers(Fields):
+    """Fields of a parameter record with how finely the device reads."""
+
+    resolution: float  # of its place [m]
+    gimbal: float  # bound of the noise of its attitude [rad]
+
+
+class ReadingState(Fields):
+    """Fields of a state record with what was read last."""
+
+    reading: Vector3  # [m]
+    rate: Vector3  # [m/s]
+    attitude: Quaternion
+    turning: Vector3  # [rad/s]
+
+
+@kernel
+def read_phantom(p: ReadingNumbers, position: Array, attitude: Array, noise: Array, pose: Array) -> None:
+    """Write the pose (7,) that the Phantom reads: place in steps, attitude with noise (3,)."""
+    wobble = room(3)
+    for i in range(3):
+        pose[i] = position[i]
+        if p.resolution > 0.0:
+            pose[i] = round(position[i] / p.resolution) * p.resolution
+        # The noise counts as two standard deviations and never exceeds its bound.
+        wobble[i] = p.gimbal * min(max(0.5 * noise[i], -1.0), 1.0)
+    rotate_by_vector(attitude, wobble[0], wobble[1], wobble[2], pose[3:7])
+
+
+@kernel
+def read_handle(handle: Handle, position: Array, attitude: Array, pose: Array) -> None:
+    """Write the pose (7,) that a jointed handle reads: its joints in encoder steps, through fk.
+
+    The hand moves the tip; the joints that go with it come from the inverse kinematics, next to
+    those of the last sample.
+    """
+    T, U, residual, q = room(4, 4), room(4, 4), room(2), handle.q
+    for i in range(3):
+        pose[i] = position[i]
+    for i in range(4):
+        pose[3 + i] = attitude[i]
+    transform_from_pose(pose, T)
+    compose(handle.T_handle_base, T, U)
+    handle.ik(U, handle.joints, handle.limits, handle.geometry, q, residual)
+    for i in range(q.shape[0]):
+        handle.joints[i] = q[i]
+        q[i] = round(q[i] / handle.encoder_step[i]) * handle.encoder_step[i]
+    handle.fk(q, handle.geometry, U)
+    compose(handle.T_base_handle, U, T)
+    pose_from_transform(T, pose)
+
+
+@inner
+def measure_twist(s: ReadingState, pose: Array, twist: Array, dt: float) -> None:
+    """Write the twist (6,) from the readings of two samples through a 5 ms low-pass."""
+    share = dt / (dt + 5e-3)
+    for i in range(3):
+        s.rate[i] += ((pose[i] - s.reading[i]) / dt - s.rate[i]) * share
+        s.reading[i] = pose[i]
+        twist[i] = s.rate[i]
+    back = room(4)
+    back[0] = s.attitude[0]
+    for i in range(1, 4):
+        back[i] = -s.attitude[i]
+    multiply_quaternions(pose[3:7], back, back)
+    sign = 1.0 if back[0] >= 0.0 else -1.0
+    for i in range(3):
+        # Small turn between two samples: twice the vector part, in base axes.
+        s.turning[i] += (sign * 2.0 * back[1 + i] / dt - s.turning[i]) * share
+        twist[3 + i] = s.turning[i]
+    for i in range(4):
+        s.attitude[i] = pose[3 + i]
+
+
+def make_handle(parameters: DeviceParameters, T_base_rest: Array) -> Handle | None:
+    """Arguments of :func:`read_handle` for the wanted handle, None for the Phantom.
+
+    The handle's home is laid onto the place where the stylus rests, so that the same paths and
+    the same motion scaling serve every device.
+
+    Args:
+        parameters: Which handle.
+        T_base_rest: Pose of the resting tip in the master's base (4, 4).
+
+    Returns:
+        The handle; its joints start at home.
+
+    Raises:
+        UnknownNameError: No such robot or symbol.
+    """
+    if not parameters.handle:
+        return None
+    robot = load_robot_set(parameters.handle, parameters.handle_geometry)
+    T_base_handle = product(T_base_rest, inverse_motion(robot.fk(robot.home)))
+    step = np.full(robot.n, 1e-5) if robot.drives is None else robot.drives.encoder_step.copy()
+    return Handle(
+        robot.ik_pointer, robot.fk_pointer, robot.limits(), robot.geometry_row.copy(),
+        T_base_handle, inverse_motion(T_base_handle), step, robot.home.copy(),
+        np.zeros(robot.n),
+    )  # fmt: skip

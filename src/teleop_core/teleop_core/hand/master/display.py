@@ -1,0 +1,102 @@
+"""Display: a stage that shows the operator the slave as a screen does, frame by frame and with latency."""
+
+from dataclasses import dataclass
+from typing import Annotated
+
+from teleop_core.base import ParameterError, Within, parameter
+from teleop_core.graph import Row, Stage, topics
+from teleop_core.kernels import Array, Fields, Integers, kernel
+
+_FRAMES = 512
+"""Frames that can be on their way to the screen."""
+SHOWS = ("slave", "command")
+"""What a frame shows: what the slave says of itself, or where it was told to go."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class DisplayParameters:
+    """How often and how late the operator sees the slave."""
+
+    rate: float = parameter(
+        60.0,
+        Within(1.0, 240.0, "Hz"),
+        "frames a second",
+        source="published: UVA-DSA telesurgery QoS analysis 2026 draws at 60 Hz",
+    )
+    latency: float = parameter(
+        0.033,
+        Within(0.0, 2.0, "s"),
+        "from when a frame is taken to when it is on the screen, beside any network",
+        source="assumed: two frames at 60 Hz",
+    )
+    shows: str = parameter(
+        "slave",
+        choices=SHOWS,
+        doc="slave: what it says of itself; command: where it is told to go, which no network "
+        "delays: a predictive display",
+    )
+
+    def __post_init__(self) -> None:
+        if self.rate * self.latency > _FRAMES - 2:
+            needed = f"{_FRAMES - 2} frames at most on the way ({self.rate:g} Hz x latency)"
+            raise ParameterError("display.latency", self.latency, needed)
+
+
+class DisplayNumbers(Fields):
+    """Parameter record of the display, as its group has it."""
+
+    rate: float
+    latency: float
+    shows: int
+
+
+class DisplayState(Fields):
+    """Frames on their way to the screen."""
+
+    taken: int  # frames so far
+    shown: int
+    due_ns: int  # when the next one is taken
+    frames: Annotated[Array, 7 * _FRAMES]
+    stamps: Annotated[Integers, _FRAMES]
+    times: Annotated[Integers, _FRAMES]
+
+
+@kernel
+def display_step(p: DisplayNumbers, s: DisplayState, row: Row, dt: float) -> None:
+    """One tick: take a frame if one is due, and show the newest whose latency is over.
+
+    Args:
+        p: Parameter record.
+        s: State record; written.
+        row: Signals; ``display_measured_cp`` is written, with the stamp of what it shows.
+        dt: Tick [s].
+    """
+    stamp_ns = row.slave_servo_cp_ns if p.shows == 1 else row.slave_measured_cp_ns
+    if row.now_ns >= s.due_ns and stamp_ns > 0:  # else there is nothing to see yet
+        s.due_ns = max(s.due_ns, row.now_ns - 1_000_000_000) + int(1e9 / p.rate)
+        at = s.taken % _FRAMES
+        shown = row.slave_servo_cp if p.shows == 1 else row.slave_measured_cp
+        for i in range(7):
+            s.frames[7 * at + i] = shown[i]
+        s.stamps[at] = stamp_ns
+        s.times[at] = row.now_ns
+        s.taken += 1
+    latest_ns = row.now_ns - int(1e9 * p.latency + 0.5)
+    while s.shown < s.taken and s.times[s.shown % _FRAMES] <= latest_ns:
+        at = s.shown % _FRAMES
+        for i in range(7):
+            row.display_measured_cp[i] = s.frames[7 * at + i]
+        row.display_measured_cp_ns = s.stamps[at]
+        s.shown += 1
+
+
+DISPLAY = Stage(
+    "display",
+    DisplayParameters,
+    reads=(topics.SLAVE_MEASURED_CP, topics.SLAVE_SERVO_CP),
+    writes=(topics.DISPLAY_MEASURED_CP,),
+    step=display_step,
+    state=DisplayState,
+    replaces=topics.SLAVE_MEASURED_CP,
+    serves=("operator",),
+)

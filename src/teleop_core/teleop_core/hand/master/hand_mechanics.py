@@ -1,0 +1,162 @@
+"""Hand: the operator as a mass on a spring and damper that wants to follow a path."""
+
+import math
+from dataclasses import dataclass
+from typing import Annotated
+
+import numpy as np
+
+from teleop_core.base import Within, parameter
+from teleop_core.hand.master.device import DeviceParameters
+from teleop_core.kernels import Array, Fields, Vector3, inner
+from teleop_core.kernels.portable import matrix_exponential
+from teleop_core.kernels.room import room
+
+_FASTEST = 1.5
+"""Largest part of an oscillation of hand against device in a step between two frictions [rad]."""
+_PLACE, _SPEED, _HAND, _HAND_SPEED = range(4)  # what a step gives
+_PUSH = 5  # the last of what a step takes
+
+
+@dataclass(frozen=True, kw_only=True)
+class HandParameters:
+    """The operator's hand: a mass on a spring and damper that wants to follow the path."""
+
+    mass: float = parameter(
+        0.15,
+        Within(0.01, 5.0, "kg"),
+        "mass moved with the tip",
+        source="assumed: fingers and a part of the hand of some 0.4 kg; a fingertip alone "
+        "has some grams (Hajian and Howe 1997)",
+    )
+    stiffness: float = parameter(
+        300.0,
+        Within(1.0, 5000.0, "N/m"),
+        "how firmly the hand holds its path",
+        source="assumed: some 100 to 1000 N/m by grip, as of fingertips (Hajian and Howe 1997) and "
+        "wrists that hold a stylus (Kuchenbecker, Park and Niemeyer 2003)",
+    )
+    damping: float = parameter(
+        12.0,
+        Within(0.1, 200.0, "N·s/m"),
+        "damping of the arm",
+        source="assumed: 0.8 of critical with the masses and the stiffness here; fingertips have "
+        "some 5 N·s/m (Hajian and Howe 1997), a firm grip more",
+    )
+
+
+class HandNumbers(Fields):
+    """Fields of a parameter record with the mechanics of hand and device."""
+
+    friction: float  # dry, of the device [N]
+    steps: int  # of equal length, in a tick
+    flow: Annotated[Array, 2, 3, 4, 6]  # of join()
+    center: Vector3  # of the workspace [m]
+    half: Vector3  # of its sides [m]
+
+
+class HandState(Fields):
+    """Fields of a state record with where both are."""
+
+    position: Vector3  # of the device [m]
+    speed: Vector3  # [m/s]
+    hand: Vector3  # where the hand is [m]
+    hand_speed: Vector3
+    wanted: Vector3  # where it wants to be [m]
+
+
+@inner
+def move_hand(p: HandNumbers, s: HandState, wanted: Array, force: Array, dt: float) -> None:
+    """Move hand and device on by one tick under the motors' force (3,) [N].
+
+    Two masses on each axis: the hand, which a spring and a damper pull along its path, and the device with its motors,
+    encoders and dry friction; between them the device's structure, a spring and a damper. The motors' force is held and
+    the path is straight within the tick, so each step is exact. Friction is a force of any direction up to its bound,
+    held for a step. It takes all speed that it can, so the device sticks, without creep, until what pulls is larger.
+
+    Source:
+        Exact step of a linear system under held input, as in any book on sampled control (Astrom and Wittenmark 1997,
+        section 2.3). Friction as a set of forces: Kikuuwe, Takesue, Sano, Mochiyama and Fujimoto 2006; Moreau 1988.
+    """
+    h, aim_speed = dt / p.steps, room(3)
+    for i in range(3):
+        aim_speed[i] = (wanted[i] - s.wanted[i]) / dt
+    for step in range(p.steps):
+        _push_on(p, s, aim_speed, force, h * step)
+    for i in range(3):
+        s.wanted[i] = wanted[i]
+        low, high = p.center[i] - p.half[i], p.center[i] + p.half[i]
+        if s.position[i] < low or s.position[i] > high:  # the device's stops
+            s.position[i] = min(max(s.position[i], low), high)
+            s.speed[i] = 0.0
+            # They are in its joints; a hand that leans on one shall bend nothing.
+            s.hand[i], s.hand_speed[i] = s.position[i], 0.0
+
+
+@inner
+def _push_on(p: HandNumbers, s: HandState, aim_speed: Array, force: Array, time: float) -> None:
+    """Make one step that begins ``time`` [s] after the tick."""
+    given, needed = room(3, 6), room(3)
+    square, rests = 0.0, True
+    for i in range(3):
+        given[i, 0], given[i, 1] = s.speed[i], s.hand_speed[i]
+        given[i, 2] = s.hand[i] - s.position[i]
+        given[i, 3] = s.wanted[i] + time * aim_speed[i] - s.hand[i]
+        given[i, 4], given[i, _PUSH] = aim_speed[i], force[i]
+        # Force against which the device would stand still at the end of the step.
+        needed[i] = _flows(p.flow[0, i, _SPEED], given[i]) / p.flow[0, i, _SPEED, _PUSH]
+        square += needed[i] * needed[i]
+        rests = rests and s.speed[i] == 0.0
+    sticks = square <= p.friction * p.friction
+    share = 1.0 if sticks else p.friction / math.sqrt(square)
+    held = 1 if sticks and rests else 0
+    for i in range(3):
+        s.speed[i] = (1.0 - share) * needed[i] * p.flow[0, i, _SPEED, _PUSH]
+        given[i, _PUSH] -= share * needed[i]
+        s.position[i] += _flows(p.flow[held, i, _PLACE], given[i])
+        s.hand[i] += _flows(p.flow[held, i, _HAND], given[i])
+        s.hand_speed[i] = _flows(p.flow[held, i, _HAND_SPEED], given[i])
+
+
+@inner
+def _flows(row: Array, given: Array) -> float:
+    total = 0.0
+    for k in range(6):
+        total += row[k] * given[k]
+    return total
+
+
+def join(p: HandNumbers, hand: HandParameters, device: DeviceParameters, dt: float) -> None:
+    """Write the exact step of hand and device, and how many of them make a tick.
+
+    ``flow[0]`` (3, 4, 6) gives on each axis the way of the device, its speed, the way of the hand and its speed after a
+    step, from: the speeds of device and hand, the hand from the device, the aim from the hand, the speed of the aim,
+    and the force on the device. ``flow[1]`` is the same while friction holds the device.
+
+    Args:
+        p: Parameter record; ``flow`` and ``steps`` are written.
+        hand: The hand.
+        device: The device.
+        dt: Tick [s].
+    """
+    lightness = 1.0 / hand.mass + 1.0 / device.apparent_mass
+    fastest = math.sqrt(max(device.stiffness) * lightness)
+    p["steps"] = max(1, math.ceil(fastest * dt / _FASTEST))
+    for i, stiffness in enumerate(device.stiffness):
+        bend = np.array([0.0, -1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0]) * device.structure_damping
+        bend[4] = stiffness
+        pull = np.array([0.0, 0.0, 0.0, -1.0, 0.0, 0.0, 1.0, 0.0]) * hand.damping
+        pull[5] = hand.stiffness
+        # Rates of the way of the device, its speed, the way of the hand, its speed, and of what a
+        # step takes besides: hand from device, aim from hand, speed of the aim, force.
+        rates = np.zeros((8, 8))
+        rates[0, 1] = rates[2, 3] = rates[4, 3] = rates[5, 6] = 1.0
+        rates[4, 1] = rates[5, 3] = -1.0
+        rates[3] = (pull - bend) / hand.mass
+        p["flow"][1, i] = _step(rates, dt / p["steps"])
+        rates[1], rates[1, 7] = bend / device.apparent_mass, 1.0 / device.apparent_mass
+        p["flow"][0, i] = _step(rates, dt / p["steps"])
+
+
+def _step(rates: Array, h: float) -> Array:
+    return matrix_exponential(rates * h)[:4, [1, 3, 4, 5, 6, 7]]

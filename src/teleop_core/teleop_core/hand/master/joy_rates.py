@@ -1,0 +1,60 @@
+"""Joy rates: poses from the axes of a Joy, as drivers of gamepads and 3-D mice say them."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from teleop_core.base import Within, parameter
+from teleop_core.hand.devices.pilot import RateParameters, steer
+from teleop_core.kernels import Array
+
+_LONGEST = 0.1  # a driver that was silent for longer has lost time, not made way [s]
+
+
+@dataclass(frozen=True, kw_only=True)
+class JoyParameters(RateParameters):
+    """How a device that says rates as a Joy moves the stylus, in the device's own frame."""
+
+    axes: tuple[int, ...] = parameter(
+        (0, 1, 2, 3, 4, 5),
+        Within(-1, 63),
+        "which axes of the Joy move along x, y, z and turn about x, y, z; -1: none does",
+        length=6,
+        fixed=True,
+    )
+    held_button: int = parameter(-1, Within(-1, 63), "button that must be held to move; -1: none", fixed=True)
+    reach: float = parameter(
+        0.1, Within(0.001, 1.0, "m"), "largest way from the start along each axis", fixed=True, source="assumed"
+    )
+
+
+class JoyRates:
+    """Pose (7,) that the rates of a Joy add up to; it begins at the origin, not turned.
+
+    Args:
+        parameters: Axes, speeds and bounds.
+    """
+
+    def __init__(self, parameters: JoyParameters) -> None:
+        self._parameters, self._stamp_ns = parameters, 0
+        self.pose: Array = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
+
+    def step(self, axes: Sequence[float], buttons: Sequence[int], stamp_ns: int) -> str:
+        """Go on to the stamp [ns] of a message; what is wrong with it in words, empty if nothing.
+
+        Nothing moves by a message that is wrong.
+        """
+        p = self._parameters
+        if max(p.axes) >= len(axes) or p.held_button >= len(buttons):
+            return f"its Joy has {len(axes)} axes and {len(buttons)} buttons, fewer than are named"
+        said = np.array([axes[place] if place >= 0 else 0.0 for place in p.axes], np.float64)
+        if not np.isfinite(said).all():
+            return "an axis of its Joy is not a finite number"
+        time = min(max(1e-9 * (stamp_ns - self._stamp_ns), 0.0), _LONGEST) if self._stamp_ns else 0.0
+        self._stamp_ns = max(stamp_ns, self._stamp_ns)
+        if p.held_button >= 0 and not buttons[p.held_button]:
+            return ""
+        ends = np.full(3, p.reach)
+        steer(self.pose, np.clip(said, -1.0, 1.0), time, p, -ends, ends)
+        return ""

@@ -1,0 +1,275 @@
+"""Master bridge: the stage that brings a real device in, in the place of ``haptic_master``.
+
+It says where the device's stylus is, in ``master_base``, and hands the device the force that it
+shall give. It does not pass on samples that cannot be true: the slave holds then.
+"""
+
+import math
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from teleop_core.base import ParameterError, Within, parameter
+from teleop_core.graph import DT, RunningStage, Stage, topics
+from teleop_core.hand.master.joy_rates import JoyParameters, JoyRates
+from teleop_core.kernels import dot, geometry
+from teleop_core.kernels.axes import AXES, axis_map
+from teleop_core.robots import load_robot_set
+from teleop_core.slave.bridges.hearing import wrong_stamp
+from teleop_core.slave.bridges.names import JointMap
+
+POSE_MESSAGES = (
+    "geometry_msgs/msg/PoseStamped",
+    "geometry_msgs/msg/TransformStamped",
+    "geometry_msgs/msg/Pose",
+    "sensor_msgs/msg/JointState",
+)
+"""Messages in which devices say where their stylus is; the last one says where their joints are."""
+RATE_MESSAGE = "sensor_msgs/msg/Joy"
+"""Message in which gamepads and 3-D mice say how fast the stylus goes."""
+_OFF_UNIT = 1e-2  # of a quaternion's length
+_THREE = ("+x", "+y", "+z")
+
+
+@dataclass(frozen=True, kw_only=True)
+class MasterBridgeParameters:
+    """Parameters of :class:`MasterBridge`."""
+
+    pose_topic: str = parameter("device/measured_cp", fixed=True, doc="where the device says where its stylus is")
+    pose_message: str = parameter(
+        POSE_MESSAGES[0], choices=(*POSE_MESSAGES, RATE_MESSAGE), fixed=True, doc="type of these messages"
+    )
+    joy: JoyParameters = field(default_factory=JoyParameters)
+    device_axes: tuple[str, ...] = parameter(
+        _THREE,
+        choices=AXES,
+        length=3,
+        fixed=True,
+        doc="the x (right), y (up), z (towards the person) of master_base as axes of the device",
+    )
+    stylus_axes: tuple[str, ...] = parameter(
+        _THREE, choices=AXES, length=3, fixed=True, doc="the x, y, z of our stylus as axes of that of the device"
+    )
+    unit: float = parameter(
+        1.0, Within(1e-6, 10.0, "m"), "length in which the device counts: 0.001 for millimetres", fixed=True
+    )
+    handle: str = parameter(
+        "", fixed=True, doc="robot whose tip is the stylus, by name or file, where the device says its joints"
+    )
+    handle_geometry: tuple[str, ...] = parameter(
+        (), fixed=True, doc="symbol=value in place of its lengths and options [m, rad]"
+    )
+    handle_joints: tuple[str, ...] = parameter(
+        (), fixed=True, doc="ours=theirs for each joint that the device calls otherwise"
+    )
+    handle_signs: tuple[float, ...] = parameter(
+        (),
+        Within(-1.0, 1.0),
+        "1.0 or -1.0 for each of our joints: ours = sign * theirs + offset; empty: 1.0",
+        fixed=True,
+    )
+    handle_offsets: tuple[float, ...] = parameter(
+        (), Within(unit="rad or m"), "of each of our joints; empty: 0.0", fixed=True
+    )
+    buttons_topic: str = parameter(
+        "", fixed=True, doc="where the device says its buttons, as sensor_msgs/Joy; empty: nowhere"
+    )
+    button_places: tuple[int, ...] = parameter(
+        (0, 1, 2),
+        Within(-1, 63),
+        "which of them are clutch, fixture and mode, counted from 0; -1: it has none",
+        length=3,
+        fixed=True,
+    )
+    pose_stamps: str = parameter(
+        "header",
+        choices=("header", "sent"),
+        fixed=True,
+        doc="when a pose was taken: as its header says, or when it was sent, for devices on a "
+        "clock of their own; a Pose has no header",
+    )
+    oldest_pose: float = parameter(
+        0.1,
+        Within(0.001, 1.0, "s"),
+        "poses whose stamps differ by more from our clock are refused",
+        fixed=True,
+        source="assumed",
+    )
+    force_topic: str = parameter(
+        "", fixed=True, doc="where the device takes forces, as geometry_msgs/WrenchStamped; empty: it has none"
+    )
+    force_gain: float = parameter(1.0, Within(0.0, 10.0), "force of the device over the one that is asked for")
+    largest_force: float = parameter(
+        3.3,
+        Within(0.0, 100.0, "N"),
+        "the device is asked for no more",
+        source="published: peak force of the Phantom Omni",
+    )
+    force_timeout: float = parameter(
+        0.1,
+        Within(0.002, 5.0, "s"),
+        "without master/servo_cf for longer, or a pose of the device, it is given no force",
+        source="assumed",
+    )
+
+    def __post_init__(self) -> None:
+        """Refuse axes that mirror, and joints without a robot."""
+        for name in ("device_axes", "stylus_axes"):
+            axis_map(f"master_bridge.{name}", getattr(self, name))
+        if self.says_joints != bool(self.handle):
+            text = f"a robot with {POSE_MESSAGES[-1]}, and none with other messages"
+            raise ParameterError("master_bridge.handle", self.handle, text)
+
+    @property
+    def says_joints(self) -> bool:
+        """Whether the device says where its joints are."""
+        return self.pose_message == POSE_MESSAGES[-1]
+
+
+class MasterBridge(RunningStage):
+    """Stage that says where a real device's stylus is, and what force the device shall give.
+
+    Its node calls it: ``hear``, ``hear_joints`` or ``hear_joy`` for each message of the device,
+    ``press`` for its buttons, ``force`` for what it is sent.
+
+    Attributes:
+        wrong: What is wrong with the newest pose, in words; empty if it is sound.
+        heard_ns: When the newest sound pose came [ns]; 0 before the first.
+        refused: Number of poses that were not believed, by reason.
+
+    Raises:
+        TeleopError: There is no such robot, or its joints do not fit.
+    """
+
+    def __init__(self, parameters: MasterBridgeParameters, dt: float = DT) -> None:
+        super().__init__(MASTER_BRIDGE, 0, dt)
+        self.kernel, self.parameters, p = _nothing, parameters, parameters
+        self._rows = axis_map("device_axes", p.device_axes)
+        self._base, self._stylus = np.empty(4), np.empty(4)
+        geometry.quaternion_from_rotation(self._rows, self._base)
+        columns = np.ascontiguousarray(axis_map("stylus_axes", p.stylus_axes).T)
+        geometry.quaternion_from_rotation(columns, self._stylus)
+        self.refused: Counter[str] = Counter()
+        self.wrong, self.heard_ns, self._stamp_ns = "", 0, 0
+        self._rates = JoyRates(p.joy)
+        if p.says_joints:
+            self._robot = load_robot_set(p.handle, p.handle_geometry)
+            self._joints = JointMap(
+                self._robot.joint_names,
+                p.handle_joints,
+                p.handle_signs,
+                p.handle_offsets,
+                owner="master_bridge.handle_",
+            )
+
+    def retune(self, parameters: MasterBridgeParameters) -> None:
+        """Take another gain, bound or timeout of the force."""
+        self.parameters = parameters
+
+    def hear(self, pose: geometry.Array, stamp_ns: int, now_ns: int) -> bool:
+        """Take a pose of the stylus; whether ``master/measured_cp`` is new.
+
+        Args:
+            pose: Place in the device's unit and quaternion w, x, y, z, (7,), in its frame.
+            stamp_ns: When it was taken [ns].
+            now_ns: Time [ns].
+        """
+        reason, self.wrong = self._doubt(pose, stamp_ns, now_ns)
+        if reason:
+            self.refused[reason] += 1
+            return False
+        out = self.signals["master_measured_cp"]
+        out[:3] = self.parameters.unit * dot(self._rows, pose[:3])
+        turned = pose[3:7] / math.sqrt(float((pose[3:7] ** 2).sum()))
+        geometry.multiply_quaternions(self._base, turned, turned)
+        geometry.multiply_quaternions(turned, self._stylus, turned)
+        out[3:7] = turned
+        self._stamp_ns, self.heard_ns = stamp_ns, now_ns
+        return True
+
+    def hear_joints(self, names: Sequence[str], position: Sequence[float], stamp_ns: int, now_ns: int) -> bool:
+        """Take where the joints of a jointed device are [rad or m]; otherwise as :meth:`hear`."""
+        places = self._joints.places(names)
+        if isinstance(places, str) or len(position) != len(names):
+            self.wrong = places if isinstance(places, str) else "not one position for each name"
+            self.refused["names"] += 1
+            return False
+        theirs = np.array([position[place] for place in places], np.float64)
+        pose = np.full(7, np.nan)
+        if np.isfinite(theirs).all():
+            geometry.pose_from_transform(self._robot.fk(self._joints.position(theirs)), pose)
+        return self.hear(pose, stamp_ns, now_ns)
+
+    def hear_joy(self, axes: Sequence[float], buttons: Sequence[int], stamp_ns: int, now_ns: int) -> bool:
+        """Take the axes of a Joy, as rates of the stylus; otherwise as :meth:`hear`."""
+        if text := self._rates.step(axes, buttons, stamp_ns):
+            self.wrong = text
+            self.refused["form"] += 1
+            return False
+        return self.hear(self._rates.pose, stamp_ns, now_ns)
+
+    def press(self, buttons: Sequence[int]) -> bool:
+        """Take the buttons of the device; false if it has fewer than are named."""
+        places = self.parameters.button_places
+        if max(places) >= len(buttons):
+            self.refused["buttons"] += 1
+            return False
+        pressed = [float(bool(buttons[place])) if place >= 0 else 0.0 for place in places]
+        self.signals["master_buttons"] = pressed
+        return True
+
+    def is_heard(self, now_ns: int) -> bool:
+        """Whether the device has said lately where it is; ``now_ns`` is the time [ns]."""
+        silence = 1e-9 * (now_ns - self.heard_ns)
+        return self.heard_ns > 0 and silence <= self.parameters.force_timeout
+
+    def force(self, age: float, now_ns: int) -> geometry.Array:
+        """Force (3,) that the device shall give, along its own axes [N].
+
+        Zero if no force was commanded lately, or the place of the device is unknown.
+
+        Args:
+            age: Time since ``master/servo_cf`` came [s]; infinite before the first.
+            now_ns: Time [ns].
+        """
+        p = self.parameters
+        asked = p.force_gain * np.array(self.signals["master_servo_cf"][:3])
+        is_asked = age <= p.force_timeout and self.is_heard(now_ns)
+        if not (is_asked and np.isfinite(asked).all()):
+            return np.zeros(3)
+        size = math.sqrt(float((asked**2).sum()))
+        share = p.largest_force / size if size > p.largest_force else 1.0
+        return share * dot(self._rows.T, asked)
+
+    def concerns(self) -> list[str]:
+        """Why the place of the stylus is not published."""
+        if self.wrong:
+            return [f"the device is not believed: {self.wrong}"]
+        if not self.heard_ns:
+            return [f"waits for the device on {self.parameters.pose_topic}"]
+        return []
+
+    def _doubt(self, pose: geometry.Array, stamp_ns: int, now_ns: int) -> tuple[str, str]:
+        """Reason not to believe a pose, in a word and in a line; empty if there is none."""
+        size = float((pose[3:7] ** 2).sum()) if np.isfinite(pose).all() else math.nan
+        if not abs(size - 1.0) <= _OFF_UNIT:
+            return "form", f"its pose is not seven finite numbers with a unit quaternion: {pose}"
+        oldest = self.parameters.oldest_pose
+        text = wrong_stamp(stamp_ns, self._stamp_ns, now_ns, oldest, "pose_stamps")
+        return ("stamp", text) if text else ("", "")
+
+
+def _nothing(row: object, dt: float) -> None:
+    """Stand in for a kernel: the node calls the stage."""
+
+
+MASTER_BRIDGE = Stage(
+    "master_bridge",
+    MasterBridgeParameters,
+    reads=(topics.MASTER_SERVO_CF,),
+    writes=(topics.MASTER_MEASURED_CP, topics.MASTER_BUTTONS),
+    make=MasterBridge,
+    node="teleop_core.nodes.master_bridge:MasterBridgeNode",
+)

@@ -1,0 +1,181 @@
+"""Operators: what the hand wants to do, one file per kind.
+
+An operator is asked for motion at some times, a block of ticks at once, and answers with places and
+turns of the hand relative to where the stylus rests. The simulated hand then tries to get there
+against its mass, its tremor and the device's force.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, is_dataclass
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from teleop_core.base import NoParameters, PartError, Registry
+from teleop_core.kernels.geometry import Array
+
+if TYPE_CHECKING:
+    from teleop_core.hand.devices import Device
+
+__all__ = ["OPERATORS", "Motion", "Operator", "Seen", "Setting", "following", "register_operator"]
+
+Motion = Callable[[Array], Array]
+"""Times (N,) since the start [s] to rows (N, 3), (N, 6), (N, 9), (N, 12) or (N, 13).
+
+Columns: position x, y, z [m] and rotation vector [rad] relative to the start, in the master's base; then the buttons
+clutch, fixture, mode (1 pressed); then tremor x, y, z [m], by which the tip is off whatever the device's friction is;
+then how far the jaw is closed, from 0 to 1. What is left out is zero.
+"""
+
+
+class Seen(NamedTuple):
+    """What an operator sees and feels, as it was told when it last made a step.
+
+    Views of the signals: read them when the motion is asked for. Who answers to them is asked as
+    late as possible: ``ahead=1``. What is told of the slave comes as late as a declared delay says:
+    ``delays=["slave/measured_cp@operator=0.3"]``.
+
+    Attributes:
+        slave: Pose (7,) of the slave's tip in its base; zero before it is told.
+        stylus: Pose (7,) of the stylus in the master's base.
+        force: Force and torque (6,) that the device gives the hand.
+        state: Numbers of ``teleop/state``, as :data:`~teleop_core.graph.topics.TELEOP_STATE` names them.
+        task: Numbers of ``task/state``, as :data:`~teleop_core.graph.topics.TASK_STATE` names them;
+            zero without a task, and before it begins.
+    """
+
+    slave: Array
+    stylus: Array
+    force: Array
+    state: Array
+    task: Array
+
+
+class Setting(NamedTuple):
+    """What an operator is made with beside parameters of its own.
+
+    Attributes:
+        common: The whole group ``operator``.
+        phases: Random phases (6, 4) [rad] of the session's seed, the same for every operator.
+        seed: Seed of the session, for more random numbers.
+        seen: What the operator sees and feels; None where only the length of a motion is asked for.
+    """
+
+    common: Any
+    phases: Array
+    seed: int
+    seen: Seen | None = None
+
+
+@dataclass(frozen=True)
+class Operator:
+    """A kind of operator.
+
+    Attributes:
+        name: What ``--set operator=`` calls it.
+        make: ``make(parameters, setting)`` gives the :data:`Motion` of one session.
+        parameters: Its parameter group, beside those that all operators share.
+        ahead: Ticks for which it can be asked at once: 1 for one who answers to what happens.
+        trembles: Whether its motion has all its tremor, so that ``operator.tremor_amplitude`` is not added.
+        approaches: Whether it begins with a smooth move to ``operator.center`` that takes ``operator.approach_time``.
+        length: ``length(parameters, setting)`` says how long its motion lasts [s], which a session
+            then does too if its duration is not given; None for a motion without end.
+        needs: Names of stages without which it does nothing.
+        is_here: False for one in whose place another node sends ``hand/servo_cp``.
+        opens: ``opens(parameters)`` opens a device of this machine that moves the hand, which is
+            a :class:`~teleop_core.hand.operators.remote.RemoteHand`; in live sessions alone.
+    """
+
+    name: str
+    make: Callable[[Any, Setting], Motion]
+    parameters: type = NoParameters
+    ahead: int = 1000
+    trembles: bool = False
+    approaches: bool = False
+    length: Callable[[Any, Setting], float] | None = None
+    opens: "Callable[[Any], Device] | None" = None
+    needs: tuple[str, ...] = ()
+    is_here: bool = True
+
+
+def following(name: str, times: object, rows: object) -> Operator:
+    """Operator who follows given samples, linear in between, and rests before and after them.
+
+    Args:
+        name: What it is called.
+        times: Times (N,) since the start [s], rising.
+        rows: Rows as of :data:`Motion`; buttons are held, not interpolated.
+
+    Raises:
+        PartError: Shapes do not fit, times do not rise, or a number is not finite.
+    """
+    motion = sampled_motion(name, times, rows)
+    return Operator(name, lambda parameters, setting: motion)
+
+
+def sampled_motion(name: str, times: object, rows: object) -> Motion:
+    """Motion through samples; see :func:`following`."""
+    at, wanted = np.array(times, np.float64), np.array(rows, np.float64)
+    if at.ndim != 1 or wanted.ndim != 2 or len(at) != len(wanted) or not len(at):
+        text = f"given as times (N,) and rows (N, 3), (N, 6) or (N, 9), not {at.shape}, {wanted.shape}"
+        raise PartError("operator", name, text)
+    if wanted.shape[1] not in {3, 6, 9}:
+        raise PartError("operator", name, f"given in 3, 6 or 9 columns, not {wanted.shape[1]}")
+    if not (np.isfinite(at).all() and np.isfinite(wanted).all()):
+        bad = int(np.flatnonzero(~(np.isfinite(wanted).all(axis=1) & np.isfinite(at)))[0])
+        raise PartError("operator", name, f"given in finite numbers; row {bad} is not")
+    if (np.diff(at) <= 0.0).any():
+        bad = int(np.flatnonzero(np.diff(at) <= 0.0)[0]) + 1
+        raise PartError("operator", name, f"given at rising times; row {bad} is not later")
+
+    def motion(times: Array) -> Array:
+        smooth = [np.interp(times, at, column) for column in wanted[:, :6].T]
+        held = wanted[np.maximum(np.searchsorted(at, times, side="right") - 1, 0), 6:]
+        return np.column_stack((*smooth, held))
+
+    return motion
+
+
+def _checked(name: str, part: object) -> Operator:
+    if isinstance(part, Operator):
+        if not callable(part.make) or part.ahead < 1:
+            raise PartError("operator", name, "one whose make can be called, asked >= 1 tick ahead")
+        if part.length is not None and not callable(part.length):
+            raise PartError("operator", name, "one whose length is length(parameters, setting)")
+        if part.opens is not None and not callable(part.opens):
+            raise PartError("operator", name, "one whose opens is opens(parameters)")
+        if not (isinstance(part.parameters, type) and is_dataclass(part.parameters)):
+            text = "one whose parameters are a dataclass, not an instance of one"
+            raise PartError("operator", name, text)
+        return part
+    if callable(part):  # a motion alone: the shortest way to an own operator
+        motion: Motion = part
+        return Operator(name, lambda parameters, setting: motion)
+    raise PartError("operator", name, f"an Operator or motion(times), not a {type(part).__name__}")
+
+
+OPERATORS: Registry[Operator] = Registry(
+    "operator",
+    "operators",
+    {
+        **{
+            kind: f"teleop_core.hand.operators.shapes:{kind.upper()}"
+            for kind in ("random", "line", "circle", "points", "hold", "elsewhere")
+        },
+        "tour": "teleop_core.hand.operators.tour:TOUR",
+        "human": "teleop_core.hand.operators.human:HUMAN",
+        "observer": "teleop_core.hand.operators.observer:OBSERVER",
+        "remote": "teleop_core.hand.operators.remote:REMOTE",
+        "gamepad": "teleop_core.hand.devices.gamepad:GAMEPAD",
+        "spacemouse": "teleop_core.hand.devices.spacemouse:SPACEMOUSE",
+        "bag": "teleop_core.session.recorded_hand:BAG",
+        "file": "teleop_core.session.recorded_hand:FILE",
+    },
+    _checked,
+)
+"""All operators by name."""
+
+
+def register_operator(name: str, operator: Operator | Motion, *, replace: bool = False) -> Operator:
+    """Add an operator, or a motion alone, for the rest of the program; see :meth:`Registry.add`."""
+    return OPERATORS.add(name, operator, replace=replace)

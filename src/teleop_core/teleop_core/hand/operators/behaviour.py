@@ -1,0 +1,160 @@
+"""Behaviour of the hand: which operator moves it, and what the smooth ones share."""
+
+from dataclasses import dataclass, field
+from itertools import pairwise
+
+import numpy as np
+
+from teleop_core.base import Choice, ParameterError, Within, choice, parameter
+from teleop_core.hand.operators import OPERATORS
+from teleop_core.kernels import Array
+
+PRESS_TIME = 0.1
+"""How long the operator presses the fixture or the mode button [s]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ButtonParameters:
+    """When the operator uses the buttons [s]; each press of fixture or mode lasts 0.1 s."""
+
+    clutch: tuple[float, ...] = parameter((), Within(0.0, None, "s"), "press, release, press, release, …", fixed=True)
+    fixture: tuple[float, ...] = parameter((), Within(0.0, None, "s"), "presses: each toggles the box", fixed=True)
+    mode: tuple[float, ...] = parameter((), Within(0.0, None, "s"), "presses: each toggles coarse and fine", fixed=True)
+
+    jaw: tuple[float, ...] = parameter((), Within(0.0, None, "s"), "jaw: close, open, close, open, …", fixed=True)
+
+    def __post_init__(self) -> None:
+        for name, pairs in (("clutch", self.clutch), ("jaw", self.jaw)):
+            if len(pairs) % 2 or list(pairs) != sorted(pairs):
+                needed = "rising pairs of press, release"
+                raise ParameterError(f"operator.buttons.{name}", pairs, needed)
+        for name, presses in (("fixture", self.fixture), ("mode", self.mode)):
+            if any(b - a < PRESS_TIME + 0.01 for a, b in pairwise(sorted(presses))):
+                raise ParameterError(f"operator.buttons.{name}", presses, "at least 0.11 s apart")
+
+
+@dataclass(frozen=True, kw_only=True)
+class RoomParameters:
+    """What the operator knows of the device: how far the stylus can go.
+
+    In a session it is that of the haptic master where nothing else is said.
+    """
+
+    workspace: tuple[float, ...] = parameter(
+        (0.16, 0.12, 0.07),
+        Within(0.01, 1.0, "m"),
+        "width, height, depth within which the tip can move; as haptic_master's",
+        length=3,
+        fixed=True,
+    )
+    start: tuple[float, ...] = parameter(
+        (0.0, 0.0, -0.03),
+        Within(-0.5, 0.5, "m"),
+        "place of the inkwell relative to the middle of it; as haptic_master's",
+        length=3,
+        fixed=True,
+    )
+
+    @property
+    def corners(self) -> tuple[Array, Array]:
+        """Low and high corner (3,) [m] of where the stylus can go from the inkwell, which is within them."""
+        middle, half = -np.array(self.start), 0.5 * np.array(self.workspace)
+        return np.minimum(middle - half, 0.0), np.maximum(middle + half, 0.0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class OperatorParameters:
+    """Who moves the hand; motions are relative to where the stylus starts, in its base."""
+
+    kind: Choice = choice(OPERATORS, "random", fixed=True, doc="who moves the hand, and how")
+    seed: int = parameter(1, Within(0), "seed of everything random in the session", fixed=True)
+    patience: float = parameter(
+        10.0,
+        Within(0.0, 3600.0, "s"),
+        "it begins when teleop/state says that the slave follows, or after this",
+        fixed=True,
+    )
+    center: tuple[float, ...] = parameter(
+        (0.0, 0.0, 0.0), Within(-0.3, 0.3, "m"), "centre of the motion, first point of a line", length=3, fixed=True
+    )
+    approach_time: float = parameter(4.0, Within(0.1, 60.0, "s"), "smooth move from start to the centre", fixed=True)
+    size: tuple[float, ...] = parameter(
+        (0.03, 0.03, 0.03),
+        Within(0.0, 0.3, "m"),
+        "random: width of the region; circle: diameters on x, y, z; line: from end to end",
+        length=3,
+        fixed=True,
+    )
+    period: float = parameter(
+        8.0,
+        Within(0.1, 600.0, "s"),
+        "time of one round; random: of the slowest part of the motion; points: per leg",
+        fixed=True,
+    )
+    tilt: tuple[float, ...] = parameter(
+        (0.0, 0.0, 0.0),
+        Within(-1.5, 1.5, "rad"),
+        "turn of the stylus at the centre, as a rotation vector",
+        length=3,
+        fixed=True,
+    )
+    rotation: float = parameter(
+        0.2, Within(0.0, 1.5, "rad"), "largest random turn of the stylus about each axis", fixed=True
+    )
+    points: tuple[float, ...] = parameter(
+        (),
+        Within(-0.3, 0.3, "m"),
+        "points: x, y, z of each stop relative to the centre, one after the other",
+        fixed=True,
+    )
+    bag: str = parameter("", fixed=True, doc="bag: recording whose master/measured_cp is followed")
+    longest_gap: float = parameter(
+        0.1,
+        Within(0.0, 60.0, "s"),
+        "bag, file: over longer gaps between samples the hand waits, but not below 5 periods",
+        fixed=True,
+    )
+
+    tremor_amplitude: float = parameter(
+        0.1e-3,
+        Within(0.0, 5e-3, "m"),
+        "amplitude of the wanted tremor on each axis",
+        source="assumed: within the 50 to 200 µm of microsurgery; friction swallows it at rest",
+    )
+    tremor_frequency: float = parameter(
+        10.0,
+        Within(8.0, 12.0, "Hz"),
+        "middle of the tremor's band, which is ±2 Hz",
+        source="published: physiological tremor has 8 to 12 Hz (Elble and Koller 1990)",
+    )
+    buttons: ButtonParameters = field(default_factory=ButtonParameters)
+    device: RoomParameters = field(default_factory=RoomParameters)
+
+    def __post_init__(self) -> None:
+        if self.kind.kind == "points" and (not self.points or len(self.points) % 3):
+            raise ParameterError("operator.points", self.points, "x, y, z of at least one point")
+        if self.kind.kind == "bag" and not self.bag:
+            raise ParameterError("operator.bag", self.bag, "a recording, for operator.kind bag")
+
+
+def insist_on_virtual(stage: str, group: object) -> None:
+    """Make sure that a stage's operator, if it is one, can move the hand in virtual time.
+
+    Args:
+        stage: Name of the stage.
+        group: Its parameters.
+
+    Raises:
+        ParameterError: A person must move its device; the text names who works.
+    """
+    if not isinstance(group, OperatorParameters) or _is_virtual(group.kind.kind):
+        return
+    others = ", ".join(filter(_is_virtual, OPERATORS.names()))
+    text = f"one of {others} in virtual time; {group.kind.kind} is for teleop live"
+    raise ParameterError(f"{stage}.kind", group.kind.kind, text)
+
+
+def _is_virtual(name: str) -> bool:
+    """Whether an operator can move the hand faster than time goes."""
+    operator = OPERATORS.find(name)
+    return operator.opens is None and operator.is_here

@@ -1,0 +1,66 @@
+"""Glances: what an operator who looks has seen and felt lately, and how it was at a time in between."""
+
+from collections import deque
+from typing import NamedTuple
+
+from teleop_core.hand.operators import Seen
+from teleop_core.kernels import Array, length
+
+STILL_TIME = 0.02
+"""At rest is what changes little in this time [s]."""
+
+
+class Glance(NamedTuple):
+    """What is on the screen and in the hand at a time [s]: tip (7,), goal (3,) [m], force on the hand (3,) [N]."""
+
+    time: float
+    tip: Array
+    goal: Array
+    force: Array
+
+
+class Glances:
+    """Memory of an operator who looks.
+
+    Args:
+        eye: After which what was seen or felt can be used [s].
+    """
+
+    def __init__(self, eye: float) -> None:
+        self._eye = eye
+        self._kept: deque[Glance] = deque()
+
+    def __bool__(self) -> bool:
+        return bool(self._kept)
+
+    def take(self, now: float, seen: Seen, goal: Array) -> None:
+        """Keep what is seen and felt at a time [s], and forget what the eye has long seen."""
+        kept = self._kept
+        if seen.slave[:3].any():  # else it has not been shown yet
+            kept.append(Glance(now, seen.slave.copy(), goal.copy(), seen.force[:3].copy()))
+        while len(kept) > 2 and kept[1].time <= now - self._eye - STILL_TIME:
+            kept.popleft()
+
+    def at(self, when: float) -> Glance:
+        """What can be used at a time [s]: what was seen and felt before it, between two glances."""
+        at, kept = when - self._eye, self._kept
+        later = next((i for i, glance in enumerate(kept) if glance.time > at), len(kept))
+        if later in {0, len(kept)}:
+            return kept[min(later, len(kept) - 1)]
+        a, b = kept[later - 1], kept[later]
+        share = (at - a.time) / (b.time - a.time)
+        tip, goal, force = (x + share * (y - x) for x, y in zip(a[1:], b[1:], strict=True))
+        return Glance(at, tip, goal, force)
+
+    def since(self, begin: float, until: float) -> list[Glance]:
+        """Glances from a time [s] on that can be used at another one."""
+        return [glance for glance in self._kept if begin <= glance.time <= until - self._eye]
+
+    def speed_of_goal(self, width: float) -> Array:
+        """Velocity of the goal (3,) [m/s] since it last jumped by more than its width [m]."""
+        first = last = self._kept[-1]
+        for glance in reversed(self._kept):
+            if float(length(first.goal - glance.goal)) > width:
+                break
+            first = glance
+        return (last.goal - first.goal) / max(last.time - first.time, 1e-9)

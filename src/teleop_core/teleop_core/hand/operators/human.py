@@ -1,0 +1,344 @@
+"""Human: a hand that reaches from target to target, sees what it missed, corrects, and rests.
+
+A reach is a first submovement that falls short of its target and is blurred by noise that grows
+with speed. Further ones begin a reaction time after the eye could see the error. Each is a
+minimum-jerk movement; where two overlap they add up. Between reaches the hand dwells, or goes on at
+once. Tremor goes on all the time. Where the numbers come from stands in ``docs/human_operator.md``.
+"""
+
+import math
+from collections import deque
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from teleop_core.base import ParameterError, Within, parameter
+from teleop_core.hand.operators import Motion, Operator, Setting
+from teleop_core.hand.operators.behaviour import OperatorParameters
+from teleop_core.hand.operators.shapes import minimum_jerk
+from teleop_core.kernels import Array, dot, length
+
+_TRIES = 50  # targets that are drawn before one anywhere in the region is taken
+_LINES = 16  # sines that tremor is made of, per axis
+_TREMOR_BAND = (8.0, 12.0)
+# Middle and half width of the peak of its spectrum, and where it is cut off [Hz]: the peak is known
+# to lie within the band, its width is assumed.
+_PEAK, _HALF_WIDTH, _CUT = 10.0, 1.5, (4.0, 20.0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class HumanParameters:
+    """How the hand reaches, errs, corrects, rests and trembles."""
+
+    reach: float = parameter(
+        0.0105,
+        Within(1e-3, 0.3, "m"),
+        "median distance from target to target, within the region of operator.size",
+        fixed=True,
+        source="assumed: how far apart things are is the task's",
+    )
+    reach_spread: float = parameter(
+        0.72,
+        Within(0.0, 2.0),
+        "standard deviation of its logarithm",
+        fixed=True,
+        source="assumed: with reach, fits the figures of people",
+    )
+    turn: float = parameter(
+        0.3,
+        Within(0.0, 2.0),
+        "standard deviation of the turn to the next target, in parts of operator.rotation",
+        fixed=True,
+        source="assumed: fits the figures of people",
+    )
+    width: float = parameter(
+        2.6e-3,
+        Within(1e-4, 0.1, "m"),
+        "width of a target, as of Fitts",
+        fixed=True,
+        source="assumed: fits the figures of people",
+    )
+    tolerance: float = parameter(
+        2.4e-3,
+        Within(1e-4, 0.1, "m"),
+        "distance from the target at which no correction is made",
+        fixed=True,
+        source="assumed: a little below width",
+    )
+    movement_time: float = parameter(
+        0.055,
+        Within(0.05, 2.0, "s"),
+        "duration of a submovement of no difficulty",
+        fixed=True,
+        source="assumed: fits the figures of people; form of Fitts 1954",
+    )
+    time_per_bit: float = parameter(
+        0.195,
+        Within(0.0, 2.0, "s"),
+        "what each bit of difficulty adds to the duration of a submovement",
+        fixed=True,
+        source="assumed: 5 bit/s, as of a mouse (Soukoreff, MacKenzie 2004); pen: 10 (Fitts 1954)",
+    )
+    time_spread: float = parameter(
+        0.23,
+        Within(0.0, 1.0),
+        "standard deviation of its logarithm",
+        fixed=True,
+        source="assumed: fits the figures of people",
+    )
+    shortfall: float = parameter(
+        0.05,
+        Within(0.0, 0.5),
+        "share of the distance that a first submovement aims short by",
+        fixed=True,
+        source="assumed: first submovements fall short (Engelbrecht, Berthier and O'Sullivan 2003)",
+    )
+    noise_along: float = parameter(
+        0.05,
+        Within(0.0, 0.2, "s"),
+        "standard deviation of a submovement's end along its way, per mean speed",
+        fixed=True,
+        source="assumed: ends spread with mean speed (Schmidt et al. 1979; Meyer et al. 1988)",
+    )
+    noise_across: float = parameter(
+        0.018,
+        Within(0.0, 0.2, "s"),
+        "the same across its way",
+        fixed=True,
+        source="assumed: smaller than along (Gordon, Ghilardi and Ghez 1994)",
+    )
+    reaction_time: float = parameter(
+        0.22,
+        Within(0.05, 1.0, "s"),
+        "from seeing an error, half way through a submovement, to its correction",
+        fixed=True,
+        source="published: 0.19 to 0.26 s (Keele and Posner 1968)",
+    )
+    corrections: int = parameter(
+        3,
+        Within(0, 10),
+        "largest number of corrections of a reach",
+        fixed=True,
+        source="assumed: more are hardly ever needed",
+    )
+    dwell_time: float = parameter(
+        0.22,
+        Within(0.01, 10.0, "s"),
+        "median rest at a target",
+        fixed=True,
+        source="assumed: fits the figures of people",
+    )
+    dwell_spread: float = parameter(
+        0.4,
+        Within(0.0, 2.0),
+        "standard deviation of its logarithm",
+        fixed=True,
+        source="assumed: fits the figures of people",
+    )
+    passing: float = parameter(
+        0.75,
+        Within(0.0, 1.0),
+        "share of targets at which the hand rests not",
+        fixed=True,
+        source="assumed: fits the figures of people",
+    )
+    overlap: float = parameter(
+        0.32,
+        Within(0.0, 0.5),
+        "share of the last submovement into which the next reach begins at such a target",
+        fixed=True,
+        source="assumed: that submovements overlap: Flash and Henis 1991",
+    )
+    tremor: float = parameter(
+        63e-6,
+        Within(0.0, 5e-3, "m"),
+        "tremor of the tip from 8 to 12 Hz, at rest too: root mean square over three axes",
+        fixed=True,
+        source="fitted: to the tremor of a hand that rests, docs/human_operator.md",
+    )
+
+    def __post_init__(self) -> None:
+        if self.tolerance > self.reach:
+            raise ParameterError("human.tolerance", self.tolerance, f"<= reach ({self.reach} m)")
+
+
+class Submovement(NamedTuple):
+    """A minimum-jerk movement: when it begins, how long it takes [s], and where it leads.
+
+    ``step`` (6,) is the way [m] and the turn as a rotation vector [rad].
+    """
+
+    begin: float
+    duration: float
+    step: Array
+
+    @property
+    def end(self) -> float:
+        """When it is over [s]."""
+        return self.begin + self.duration
+
+
+def submovements(p: HumanParameters, region: OperatorParameters, rng: np.random.Generator) -> Iterator[Submovement]:
+    """All that the hand does after the approach, without end, each later than the one before.
+
+    Args:
+        p: How it reaches.
+        region: Size and largest turn.
+        rng: Random numbers; the same ones give the same movements.
+    """
+    room = np.array([0.5 * side for side in region.size] + [region.rotation] * 3)
+    place, time = np.zeros(6), 0.0
+    while True:
+        target = _next_target(p, room, place, rng)
+        for last in _reach(p, target, place, time, rng):
+            place = place + last.step
+            yield last
+        if rng.random() < p.passing:
+            time = last.end - p.overlap * last.duration
+        else:
+            time = last.end + _spread(p.dwell_time, p.dwell_spread, rng)
+
+
+def _spread(median: float, spread: float, rng: np.random.Generator) -> float:
+    """Log-normal random number."""
+    return median * math.exp(spread * rng.standard_normal())
+
+
+def _next_target(p: HumanParameters, room: Array, place: Array, rng: np.random.Generator) -> Array:
+    """Target (6,) in the region, about ``p.reach`` away where there is room for that."""
+    half, largest = room[:3], room[3:]
+    turn = np.clip(place[3:] + p.turn * largest * rng.standard_normal(3), -largest, largest)
+    for _ in range(_TRIES):
+        way = half * rng.standard_normal(3)
+        way *= _spread(p.reach, p.reach_spread, rng) / max(float(length(way)), 1e-12)
+        if (np.abs(place[:3] + way) <= half).all():
+            return np.concatenate((place[:3] + way, turn))
+    return np.concatenate((rng.uniform(-half, half), turn))
+
+
+def _reach(
+    p: HumanParameters, target: Array, place: Array, time: float, rng: np.random.Generator
+) -> Iterator[Submovement]:
+    """First submovement to a target, which may be a turn alone, and its corrections.
+
+    The duration is that of Fitts (1954) in MacKenzie's (1992) form. The end is off by as
+    much as the submovement is fast (Schmidt et al. 1979; Meyer et al. 1988), as noise that grows
+    with the motor command makes it (Harris and Wolpert 1998).
+    """
+    for number in range(p.corrections + 1):
+        way = target - place
+        distance = float(length(way[:3]))
+        is_first = number == 0
+        if distance <= p.tolerance and not is_first:
+            return
+        bits = math.log2(distance / p.width + 1.0)
+        duration = _spread(p.movement_time + p.time_per_bit * bits, p.time_spread, rng)
+        aimed = way * (1.0 - p.shortfall * is_first)
+        found = Submovement(time, duration, _blurred(p, aimed, duration, rng))
+        yield found
+        place = place + found.step
+        time = min(found.end, time + 0.5 * duration + p.reaction_time)
+
+
+def _blurred(p: HumanParameters, way: Array, duration: float, rng: np.random.Generator) -> Array:
+    """A wanted way and turn (6,) with the noise of its execution; no way, no noise."""
+    out = way.copy()
+    for part in (slice(0, 3), slice(3, 6)):
+        size = float(length(way[part]))
+        if size > 0.0:
+            along = way[part] / size
+            noise = rng.standard_normal(3)
+            ahead = along * dot(along, noise)
+            off = p.noise_along * ahead + p.noise_across * (noise - ahead)
+            out[part] += size / duration * off
+    return out
+
+
+class _Walk:
+    """Sum of all submovements at any times, in memory that does not grow with them.
+
+    What is over is added up in the order of its beginning, so that the sum is the same to the bit
+    in whatever blocks it is asked for. Times that lie before what is over begin anew.
+    """
+
+    def __init__(self, p: HumanParameters, region: OperatorParameters, seed: int) -> None:
+        self._made_of = (p, region, seed)
+        self._begin()
+
+    def _begin(self) -> None:
+        p, region, seed = self._made_of
+        self._plan = submovements(p, region, np.random.default_rng((seed, 1)))
+        self._next = next(self._plan)
+        self._active: deque[Submovement] = deque()
+        self._place, self._over = np.zeros(6), 0.0
+
+    def at(self, times: Array) -> Array:
+        """Place [m] and turn [rad] (N, 6) at rising times (N,) [s] since the approach."""
+        if not len(times):
+            return np.empty((0, 6))
+        if times[0] < self._over:
+            self._begin()
+        while self._next.begin < times[-1]:
+            self._active.append(self._next)
+            self._next = next(self._plan)
+        while self._active and self._active[0].end <= times[0]:
+            self._over = self._active[0].end
+            self._place = self._place + self._active.popleft().step
+        rows = np.tile(self._place, (len(times), 1))
+        for movement in self._active:
+            share = minimum_jerk((times - movement.begin) / movement.duration)
+            rows += share[:, None] * movement.step
+        return rows
+
+
+def tremor(size: float, rng: np.random.Generator) -> Motion:
+    """Tremor of the tip: times (N,) [s] to offsets (N, 3) [m], the same for the same times.
+
+    Sines of random frequencies and phases, which come close to noise and never repeat. There are
+    most of them near 10 Hz and fewer farther away, so that the spectrum is that of a resonance.
+
+    Args:
+        size: Root mean square of the length of the offset within 8 to 12 Hz [m].
+        rng: Random numbers.
+
+    Source:
+        Rice 1944, section 2.8: noise as a sum of sines. Band: Elble and Koller 1990.
+    """
+    first, last = (math.atan((edge - _PEAK) / _HALF_WIDTH) for edge in _CUT)
+    low, high = (math.atan((edge - _PEAK) / _HALF_WIDTH) for edge in _TREMOR_BAND)
+    places = (np.arange(_LINES) + rng.uniform(0.0, 1.0, (3, _LINES))) / _LINES
+    angles = first + (last - first) * places
+    rates = 2.0 * math.pi * (_PEAK + _HALF_WIDTH * np.sin(angles) / np.cos(angles))
+    phases = rng.uniform(0.0, 2.0 * math.pi, (3, _LINES))
+    share = (high - low) / (last - first)  # of its power within the band
+    amplitude = size * math.sqrt(2.0 / (3 * _LINES * share))
+
+    def motion(times: Array) -> Array:
+        sines = times[:, None, None] * rates
+        sines += phases
+        np.sin(sines, out=sines)  # in its place: fresh memory would take as long as the sines
+        found: Array = amplitude * sines.sum(axis=2)
+        return found
+
+    return motion
+
+
+def _human(p: HumanParameters, setting: Setting) -> Motion:
+    """Approach of the centre, then reaches around it; tremor in the last three columns."""
+    common: OperatorParameters = setting.common
+    walk = _Walk(p, common, setting.seed)
+    trembling = tremor(p.tremor, np.random.default_rng((setting.seed, 2)))
+    center = np.concatenate((common.center, common.tilt))
+
+    def motion(times: Array) -> Array:
+        approach = minimum_jerk(times / common.approach_time)[:, None]
+        moved = walk.at(np.maximum(times - common.approach_time, 0.0))
+        shaking = minimum_jerk(times)[:, None] * trembling(times)
+        return np.hstack((approach * center + moved, np.zeros((len(times), 3)), shaking))
+
+    return motion
+
+
+HUMAN = Operator("human", _human, HumanParameters, trembles=True, approaches=True)

@@ -1,0 +1,308 @@
+"""Observer: an operator who looks at the slave, plans from what it saw, moves, and looks again.
+
+Each look-move cycle is one submovement towards the goal of a task, with the noise of a fast hand. Its end is seen as
+late as display, network and eye make it, and only then the next one begins. So a delay slows it down by its share of
+the cycle, and nothing in here knows how long the delay is. What is pressed is felt, which no display delays. Where the
+constants come from stands in ``docs/tasks.md``.
+"""
+
+import math
+
+import numpy as np
+
+from teleop_core.graph import STATE, topics
+from teleop_core.hand.operators import Operator, Setting
+from teleop_core.hand.operators.glances import STILL_TIME, Glance, Glances
+from teleop_core.hand.operators.hand_room import HandRoom, turned
+from teleop_core.hand.operators.observer_parameters import ObserverParameters
+from teleop_core.hand.operators.shapes import minimum_jerk
+from teleop_core.hand.operators.submovement import Move, Way
+from teleop_core.hand.tasks import Act
+from teleop_core.kernels import Array, dot, length, product
+from teleop_core.kernels.axes import axis_map
+from teleop_core.kernels.geometry import turn_within
+
+AHEAD = 16
+"""Ticks for which it is asked at once, about a frame: the eye needs longer, so nothing is late."""
+_COLUMNS = ("number", "act", "goal_x", "width", "goal_qw", "turn", "force", "clearance")
+_NUMBER, _ACT, _GOAL, _WIDTH, _ATTITUDE, _TURN, _FORCE, _CLEARANCE = map(topics.TASK_STATE.columns.index, _COLUMNS)
+_BOX, _SIZE = STATE["fixture_center_x"], STATE["fixture_size_x"]
+_ENDS = (topics.Limit.JOINT, topics.Limit.WORKSPACE)
+_PRESS_TIME = 0.06  # for which the hand stays closed, and the clutch is down before and after the hand moves [s]
+_STILL = 0.05  # at rest it goes this share of its way in STILL_TIME
+_SHORTEST = 0.1  # of a width: a way that is not worth a submovement
+_FELT = 0.03  # least force that is felt [N]
+_SURE = 2.0  # standard deviations that a submovement's end stays off a wall
+
+
+class Observer:
+    """Motion of one session: it reads what is seen at the time that it is asked.
+
+    Args:
+        p: Its constants.
+        setting: What it is made with; ``seen`` must have a task.
+    """
+
+    def __init__(self, p: ObserverParameters, setting: Setting) -> None:
+        seen = setting.seen
+        assert seen is not None
+        self._p, self._seen = p, seen
+        self._hand_of_slave = axis_map("operator.observer.axes", p.axes).T
+        self._stylus_of_tool = axis_map("operator.observer.tool_axes", p.tool_axes).T
+        self._room = HandRoom(setting.common.device.corners, p.largest_turn)
+        self._rng = np.random.default_rng((setting.seed, 3))
+        self._glances = Glances(p.eye)
+        self._hand = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])  # where the last submovement ends
+        self._softness = p.softness  # way for a newton, as it was felt last [m/N]
+        self._move: Move | None = None
+        self._turns = False  # whether the stylus is turned in it
+        self._number = 0.0
+        self._next = 0.0  # when it may move again, whatever it sees [s]
+        self._half_seen = math.inf  # when half of the last way was seen [s]
+        self._is_still = self._was_felt = False  # whether its end was seen, or was felt alone
+        self._close = -math.inf  # when the hand closes, and for a moment [s]
+        self._holds, self._since = False, -math.inf  # whether the hand stays closed, and since when
+        self._lag = -1.0  # how late the last motion was seen, beside the eye [s]; < 0: not known
+
+    def __call__(self, times: Array) -> Array:
+        """Rows (N, 13) of :data:`~teleop_core.hand.operators.Motion` for times (N,) [s]."""
+        now, until = float(times[0]), float(times[-1])
+        self._glances.take(now, self._seen, self._seen.task[_GOAL : _GOAL + 3])
+        rows = np.zeros((len(times), 13))
+        self._draw(times, rows)
+        if self._seen.task[_NUMBER] > 0.0 and self._glances and self._decide(now, until):
+            self._draw(times, rows)
+        if now < self._since <= until:
+            rows[:, 12] = (times >= self._since) == self._holds
+        else:
+            rows[:, 12] = (now >= self._since) == self._holds
+        if self._close <= until and now < self._close + _PRESS_TIME:
+            rows[(times >= self._close) & (times < self._close + _PRESS_TIME), 12] = 1.0
+        return rows
+
+    def _draw(self, times: Array, rows: Array) -> None:
+        """Write the present submovement, from its begin on."""
+        if (move := self._move) is None:
+            return
+        if not move.is_clutched and not self._turns and move.begin + move.duration < times[0]:
+            rows[:, :3] = move.start[:3] + move.step  # it is over
+            return
+        share, has_begun = minimum_jerk((times - move.begin) / move.duration), times >= move.begin
+        moved = move.start[:3] + share[:, None] * move.step
+        rows[:, :3] = np.where(has_begun[:, None], moved, rows[:, :3])
+        if self._turns:
+            turns = np.array([turned(move.start[3:], s * move.turn)[1] for s in share])
+            rows[:, 3:6] = np.where(has_begun[:, None], turns, rows[:, 3:6])
+        if move.is_clutched:
+            rows[:, 6] = (times >= move.begin - _PRESS_TIME) & (times < move.begin + move.duration + _PRESS_TIME)
+
+    def _decide(self, now: float, until: float) -> bool:
+        """Begin the next submovement, or press, if the time for either comes until then.
+
+        Returns:
+            Whether it begins a submovement.
+        """
+        p, task = self._p, self._seen.task
+        width, act = float(task[_WIDTH]), int(task[_ACT])
+        if task[_NUMBER] != self._number and act != Act.PASS:
+            self._number = float(task[_NUMBER])
+            self._next = now + p.reaction
+        when = max(self._next, self._seen_at(until), now)
+        if when > until:
+            return False
+        glance = self._glances.at(when)
+        way = self._way(glance)
+        off, turn = float(length(way.step)), float(length(way.turn))
+        if act != Act.PASS and off <= 0.5 * width and turn <= 0.5 * task[_TURN]:
+            self._press(when, act)
+        elif off > _SHORTEST * width or turn > _SHORTEST * task[_TURN] or abs(way.missing) > _SHORTEST:
+            self._begin(when, glance, way)
+            return True
+        return False
+
+    def _way(self, glance: Glance) -> Way:
+        """What is to be done by what is seen, and where something is pressed, by what is felt."""
+        p, task, turn, lever, missing = self._p, self._seen.task, np.zeros(3), 0.0, 0.0
+        is_moving = int(task[_ACT]) == Act.PASS
+        goal = glance.goal if is_moving else task[_GOAL : _GOAL + 3]
+        step = goal - glance.tip[:3]
+        if is_moving:
+            step = step + self._glances.speed_of_goal(float(task[_WIDTH])) * (p.eye + p.least_time)
+        if task[_TURN] > 0.0:
+            turn_within(glance.tip[3:], task[_ATTITUDE : _ATTITUDE + 4], turn)
+            lever = float(task[_WIDTH] / task[_TURN])
+        felt = float(length(glance.force))
+        if task[_FORCE] > 0.0 and felt >= _FELT:
+            self._feel_softness(felt)
+            out = product(self._hand_of_slave.T, glance.force) / felt
+            step = step - float(dot(step, out)) * out
+            aside = 1.0 if length(step) > 0.5 * task[_WIDTH] else 0.0
+            step = aside * step - (task[_FORCE] - felt) * self._softness * out
+            missing = 1.0 - felt / float(task[_FORCE])
+        return Way(step, turn, lever, missing)
+
+    def _feel_softness(self, felt: float) -> None:
+        """Learn from the last submovement how far it is for a newton [m/N]; by a factor of three at most."""
+        if (move := self._move) is None or length(move.seen.force) < _FELT:
+            return
+        more, pressed = felt - float(length(move.seen.force)), self._pressed(move)
+        if abs(more) >= _FELT and more * pressed > 0.0:
+            self._softness *= min(max(pressed / more / self._softness, 1.0 / 3.0), 3.0)
+
+    def _pressed(self, move: Move) -> float:
+        """How far a submovement went against the force that was felt before it [m]."""
+        force = move.seen.force
+        return -float(dot(product(self._hand_of_slave, move.way.step), force)) / max(float(length(force)), _FELT)
+
+    def _seen_at(self, until: float) -> float:
+        """When the end of the last submovement is seen or felt [s]; infinite if not until then.
+
+        It is seen as long after half of the way was, as the hand took from there to the end; a
+        slower arm is seen to move on.
+        """
+        move = self._move
+        if move is None or move.is_clutched:  # nobody begins while the arm is seen to go to its start
+            return -math.inf if move is not None or self._is_at_rest(until) else math.inf
+        end = move.begin + move.duration
+        is_pressed = self._seen.task[_FORCE] > 0.0 and length(move.seen.force) >= _FELT
+        self._was_felt = bool(is_pressed and self._is_felt(move, end + self._p.eye, until))
+        if self._was_felt:
+            return end + self._p.eye
+        if math.isinf(self._half_seen) and not is_pressed:
+            self._half_seen = self._half_way(move, until)
+        if math.isinf(self._half_seen):
+            late = end + self._patience()
+            return late if late <= until else math.inf
+        when = self._half_seen + 0.5 * move.duration
+        if when > until or self._is_still:
+            return when
+        gone = float(length(self._gone(self._glances.at(when), self._glances.at(when + STILL_TIME))))
+        self._is_still = gone <= _STILL * float(length(move.way.both))
+        if not self._is_still:  # it still moves: half of it is seen later
+            self._half_seen += until - when + 1e-3
+            return math.inf
+        return when
+
+    def _is_at_rest(self, until: float) -> bool:
+        """Whether the tip was seen to stand still lately."""
+        gone = self._gone(self._glances.at(until - STILL_TIME), self._glances.at(until))
+        return bool(length(gone) <= _STILL * self._seen.task[_WIDTH])
+
+    def _is_felt(self, move: Move, when: float, until: float) -> bool:
+        """Whether the force tells, at rest, what a submovement did; not as long as it is the one of before."""
+        if when > until:
+            return False
+        still = _STILL * float(self._seen.task[_FORCE])
+        felt, later = (float(length(self._glances.at(time).force)) for time in (until - STILL_TIME, until))
+        expected = self._pressed(move) / self._softness
+        more = (felt - float(length(move.seen.force))) * math.copysign(1.0, expected)
+        return more >= min(0.5 * abs(expected), _FELT) - still and abs(later - felt) <= still
+
+    def _gone(self, a: Glance, b: Glance) -> Array:
+        """Way and turn (6,) [m] from one glance to another, as they count in the present submovement."""
+        turn, lever = np.zeros(3), 0.0 if self._move is None else self._move.way.lever
+        if lever > 0.0:
+            turn_within(a.tip[3:], b.tip[3:], turn)
+        return np.concatenate((b.tip[:3] - a.tip[:3], lever * turn))
+
+    def _half_way(self, move: Move, until: float) -> float:
+        """When the tip was seen half way [s]; infinite if it was not until then."""
+        unseen, whole = move.unseen, float(dot(move.unseen, move.unseen))
+        half = 1.0 - 0.5 * float(length(move.way.both)) / math.sqrt(whole)
+        before: tuple[float, float] | None = None
+        for glance in self._glances.since(move.begin, until):
+            gone = float(dot(self._gone(move.seen, glance), unseen)) / whole
+            if gone >= half:
+                at = glance.time
+                if before is not None and gone > before[1]:
+                    share = (half - before[1]) / (gone - before[1])
+                    at = before[0] + share * (at - before[0])
+                late = at - move.begin - 0.5 * move.duration
+                self._lag = max(late, 0.0)
+                return at + self._p.eye
+            before = (glance.time, gone)
+        return math.inf
+
+    def _patience(self) -> float:
+        """How long after its end a motion that does not show is waited for [s]."""
+        p = self._p
+        if self._lag < 0.0:
+            return p.longest_wait
+        return min(p.longest_wait, p.eye + 1.5 * self._lag + p.reaction)
+
+    def _begin(self, now: float, seen: Glance, way: Way) -> None:
+        """Begin a submovement along a way, as long as it is; or bring the hand back, where it or the arm ends."""
+        p, task = self._p, self._seen.task
+        gain, width = float(self._seen.state[STATE["gain"]]) or 1.0, float(task[_WIDTH])
+        distance, angle = float(length(way.step)), float(length(way.turn))
+        duration = p.least_time + p.time_per_bit * math.log2(distance / width + 1.0)
+        duration = max(duration, distance / gain / p.fastest, self._careful(seen.tip[:3], way.step))
+        if angle > 0.0:
+            bits = p.time_per_bit * math.log2(angle / float(task[_TURN]) + 1.0)
+            duration = max(duration, p.least_time + bits, angle / p.fastest_turn)
+        ended = Way(self._ended(way.step, duration), self._ended(way.turn, duration) if angle else way.turn, way.lever)
+        step = product(self._hand_of_slave, ended.step) / gain
+        turn = product(self._stylus_of_tool, ended.turn) if angle else way.turn
+        was_back, fits = self._move is not None and self._move.is_clutched, self._room.share(self._hand, step, turn)
+        has_stopped = self._seen.state[STATE["limit"]] in _ENDS and self._move is not None
+        if ((has_stopped and math.isinf(self._half_seen)) or fits < 1.0) and not was_back:
+            self._bring_back(now, seen, *(fits < 1.0) * np.stack((step, turn)))
+            return
+        ended = Way(fits * ended.step, fits * ended.turn, way.lever)
+        unseen = ended.both
+        if self._move is not None and self._was_felt:
+            seen, unseen = seen._replace(tip=self._move.seen.tip), unseen + self._move.unseen
+        self._go(Move(now, duration, self._hand, fits * step, fits * turn, seen, ended, unseen))
+        spread = p.noise * distance / duration
+        missed = math.erfc(0.5 * width / (math.sqrt(2.0) * max(spread, 1e-12)))
+        is_press = int(task[_ACT]) == Act.PRESS and p.error_cost > 0.0
+        if is_press and missed * p.error_cost < max(self._lag, 0.0) + p.eye:
+            self._press(now + duration, Act.PRESS)
+
+    def _careful(self, tip: Array, step: Array) -> float:
+        """Duration [s] with which the noise of a step (3,) [m] of the tip stays off walls and edges, 0 for none.
+
+        The fixture's walls are those of its box. Nobody aims more exactly than a goal asks for.
+        """
+        p, state, task = self._p, self._seen.state, self._seen.task
+        across, slowest = p.noise_across, 0.0
+        if task[_CLEARANCE] > 0.0:
+            slowest = across * float(length(step)) / float(task[_CLEARANCE])
+        if state[STATE["is_fixture_on"]] > 0.0 and state[_SIZE] > 0.0:
+            gap = 0.5 * state[_SIZE : _SIZE + 3] - np.abs(tip + step - state[_BOX : _BOX + 3])
+            lean = np.sqrt(step * step * (1.0 - across**2) + across**2 * float(dot(step, step)))
+            slowest = max(slowest, float((lean / np.maximum(gap, 0.5 * task[_WIDTH])).max()))
+        return _SURE * p.noise * slowest
+
+    def _ended(self, way: Array, duration: float) -> Array:
+        """A way or turn (3,) with the noise of a hand that makes it in a time [s]."""
+        p, distance, noise = self._p, float(length(way)), self._rng.standard_normal(3)
+        along = way / max(distance, 1e-12)
+        ahead = along * float(dot(along, noise))
+        return way + p.noise * distance / duration * (ahead + p.noise_across * (noise - ahead))
+
+    def _bring_back(self, now: float, seen: Glance, step: Array, turn: Array) -> None:
+        """Clutch, and bring the hand to where it can go by a step (3,) [m] and a turn (3,) [rad] the farthest."""
+        p = self._p
+        way, angle = self._room.back(self._hand, step, turn)
+        duration = max(p.least_time, float(length(way)) / p.fastest, float(length(angle)) / p.fastest_turn)
+        nothing = Way(np.zeros(3), np.zeros(3), 0.0)
+        self._go(Move(now + _PRESS_TIME, duration, self._hand, way, angle, seen, nothing, nothing.both, True))
+        self._next += 2.0 * _PRESS_TIME
+
+    def _go(self, move: Move) -> None:
+        """Make a submovement the present one."""
+        self._move, self._turns = move, bool(move.turn.any() or move.start[4:].any())
+        self._hand = np.concatenate((move.start[:3] + move.step, turned(move.start[3:], move.turn)[0]))
+        self._next, self._half_seen = move.begin + move.duration, math.inf
+        self._is_still = self._was_felt = False
+
+    def _press(self, when: float, act: int) -> None:
+        """Close or open the hand at a time [s]; a press waits for another goal."""
+        if act == Act.PRESS:
+            self._close, self._next = when, math.inf
+        elif self._holds != (act == Act.GRIP):
+            self._holds, self._since = act == Act.GRIP, when
+
+
+OBSERVER = Operator("observer", Observer, ObserverParameters, ahead=AHEAD, needs=("task",))

@@ -1,0 +1,367 @@
+"""Remote: a person as the hand, who says now and then where the stylus shall be.
+
+Poses come at any low rate, from a mouse, a gamepad or a program; the stylus follows them smoothly.
+Nobody is there until a first pose comes, and nobody is there again when they fall silent: the
+clutch is pressed then, so that the slave holds.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, NamedTuple, cast
+
+import numpy as np
+
+from teleop_core.base import ShapeError, UnknownNameError, Within, parameter
+from teleop_core.hand.operators import Motion, Operator, Setting, follower, rest
+from teleop_core.kernels import geometry
+
+__all__ = ["REMOTE", "Person", "RemoteHand", "RemoteParameters", "remote_operator"]
+
+AHEAD = follower.MOST
+"""Largest number of ticks per call. A new target takes effect at most this many ticks late."""
+BUTTONS = ("clutch", "fixture", "mode")
+_PRESSED, _BETWEEN = 0.1, 0.05  # how long a button is pressed, and released at least [s]
+_UNIT = 1e-3  # how far a quaternion may be from unit length
+_FARTHEST = 10.0  # no stylus is wanted so far from the master's base [m]
+
+
+@dataclass(frozen=True, kw_only=True)
+class RemoteParameters:
+    """How a hand follows what a person wants from afar."""
+
+    delay: float = parameter(
+        0.045,
+        Within(0.005, 0.5, "s"),
+        "how far the stylus is behind a steady motion that is wanted",
+        fixed=True,
+        source="assumed: smooths 30 to 60 poses a second; less than a third of what people feel",
+    )
+    timeout: float = parameter(
+        0.2,
+        Within(0.02, 5.0, "s"),
+        "silence that lets go of the stylus: the clutch is pressed until the next pose",
+        fixed=True,
+        source="assumed: some six frames of a slow page",
+    )
+    speed: float = parameter(
+        0.5,
+        Within(0.01, 2.5, "m/s"),
+        "largest speed of the stylus",
+        fixed=True,
+        source="assumed: through the Phantom's workspace in a third of a second",
+    )
+    acceleration: float = parameter(
+        30.0,
+        Within(0.1, 500.0, "m/s²"),
+        "largest acceleration of the stylus",
+        fixed=True,
+        source="assumed: three times that of a free fall",
+    )
+    turn_speed: float = parameter(
+        6.0,
+        Within(0.05, 50.0, "rad/s"),
+        "largest speed of its turn",
+        fixed=True,
+        source="assumed: about one turn a second",
+    )
+    turn_acceleration: float = parameter(
+        300.0,
+        Within(1.0, 5000.0, "rad/s²"),
+        "largest acceleration of its turn",
+        fixed=True,
+        source="assumed: reaches turn_speed in half of the delay",
+    )
+
+
+Person = Callable[["RemoteHand", float], None]
+"""Person of a program: tells a hand what is wanted at a time [s] since the hand began to move."""
+
+
+class _Wanted(NamedTuple):
+    """What was said last.
+
+    ``time`` is when [s], NaN for when it is first looked at; ``grip`` how often the stylus had been let go of before.
+    """
+
+    pose: geometry.Array
+    time: float
+    grip: int
+
+
+class RemoteHand:
+    """Hand of a person who is not here: follows poses that are wanted, and lets go in silence.
+
+    A grip is relative: its first pose is taken as where the stylus is then, later ones move it by the difference.
+    :meth:`want`, :meth:`press` and :meth:`let_go` may be called by one other thread than :meth:`motion`.
+
+    Args:
+        parameters: Delay, timeout and bounds.
+        start: Pose (7,) of the stylus at the beginning: place [m] in the master's base, quaternion
+            w, x, y, z; None for where the stylus of the haptic master rests.
+        room: Corners low and high (3,) [m] of the box that the stylus stays in; None for no bound.
+
+    Attributes:
+        room: Corners low and high (3,) [m] of the box that the stylus stays in.
+        closing: How far the hand closes the jaw, 0 open to 1 closed; silence leaves it as it is.
+        refused: Number of poses that were not used.
+    """
+
+    def __init__(
+        self,
+        parameters: RemoteParameters | None = None,
+        start: geometry.Array | None = None,
+        room: tuple[geometry.Array, geometry.Array] | None = None,
+    ) -> None:
+        p = self._parameters = parameters or RemoteParameters()
+        begin = rest.rest_pose() if start is None else _row("start", start)
+        corners = (np.full(3, -_FARTHEST), np.full(3, _FARTHEST)) if room is None else room
+        self.room = corners
+        self._follower = follower.Follower(
+            p.delay, (p.speed, p.turn_speed), (p.acceleration, p.turn_acceleration), begin, corners
+        )
+        self._wanted = self._seen = _Wanted(begin, math.nan, 0)
+        self._end, self._shown = -math.inf, (False, False, False)
+        self._start = begin
+        self._first, self._held, self._turn = begin, begin, np.array([1.0, 0.0, 0.0, 0.0])
+        self._is_held = False
+        self._down = dict.fromkeys(BUTTONS, False)
+        self._buttons = {name: _Button() for name in BUTTONS[1:]}
+        self.refused, self.closing = 0, 0.0
+
+    # -- what the person wants, in any thread ----------------------------------------------------
+
+    def want(self, pose: geometry.Array, time: float | None = None) -> bool:
+        """Want the stylus at a pose; the first one after silence is where it is then.
+
+        Args:
+            pose: Place [m] in the master's base and quaternion w, x, y, z of unit length, (7,).
+            time: When it was wanted, in the time of :meth:`motion` [s]; None for now.
+
+        Returns:
+            Whether it is used: not if it is not finite, its quaternion is none, or it is more than 10 m away.
+
+        Raises:
+            ShapeError: It has another shape.
+        """
+        row = _row("pose", pose)
+        numbers = row.tolist()
+        is_sound = (
+            all(map(math.isfinite, numbers))
+            and abs(math.hypot(*numbers[3:]) - 1.0) <= _UNIT
+            and max(map(abs, numbers[:3])) <= _FARTHEST
+        )
+        if not is_sound:
+            self.refused += 1
+            return False
+        row[3:] /= math.hypot(*numbers[3:])
+        self._wanted = _Wanted(row, math.nan if time is None else time, self._wanted.grip)
+        return True
+
+    def let_go(self) -> None:
+        """Let go now; the next pose is a new grip."""
+        self._wanted = _Wanted(self._wanted.pose, -math.inf, self._wanted.grip + 1)
+
+    def press(self, name: str, *, is_pressed: bool = True) -> None:
+        """Press or release a button; each new press of fixture or mode lasts 0.1 s at least.
+
+        Args:
+            name: ``clutch``, ``fixture`` or ``mode``.
+            is_pressed: Whether it is pressed from now on.
+
+        Raises:
+            UnknownNameError: There is no such button.
+        """
+        if name not in BUTTONS:
+            raise UnknownNameError("button", name, BUTTONS)
+        if is_pressed and not self._down[name] and name in self._buttons:
+            self._buttons[name].presses += 1
+        self._down[name] = is_pressed
+
+    def close(self, share: float) -> None:
+        """Close the jaw so far: 0 open to 1 closed; what is beyond is cut, NaN changes nothing."""
+        if not math.isnan(share):
+            self.closing = min(max(share, 0.0), 1.0)
+
+    def tap(self, name: str) -> None:
+        """Press and release a button; raises as :meth:`press`."""
+        self.press(name)
+        self.press(name, is_pressed=False)
+
+    # -- what the stylus does --------------------------------------------------------------------
+
+    @property
+    def is_held(self) -> bool:
+        """Whether somebody holds the stylus."""
+        return self._is_held
+
+    @property
+    def pose(self) -> geometry.Array:
+        """Where the stylus is wanted by the hand now (7,), in the master's base."""
+        return self._follower.pose
+
+    @property
+    def time(self) -> float:
+        """Time that the motion has come to [s]."""
+        return self._follower.time
+
+    def motion(self, times: geometry.Array) -> geometry.Array:
+        """Where the stylus goes: the :data:`~teleop_core.hand.operators.Motion` of an operator.
+
+        Args:
+            times: Times (N,) [s], a tick apart from each other, later than those of the last call.
+
+        Returns:
+            Rows (N, 13): place and turn relative to the start, buttons, no tremor, and the jaw.
+        """
+        rows = np.zeros((len(times), 13))
+        tick = float(times[1] - times[0]) if len(times) > 1 else 0.0
+        for first in range(0, len(times), follower.MOST):
+            part = rows[first : first + follower.MOST]
+            drawn = self.draw(float(times[first]), tick, len(part))
+            part[:, :3] = drawn["wanted"] - self._start[:3]
+            part[:, 6:9], part[:, 12] = drawn["buttons"], drawn["jaw"]
+            for row, wanted in zip(part, drawn, strict=True):
+                geometry.turn_within(self._start[3:], wanted["attitude"], row[3:6])
+        return rows
+
+    __call__ = motion
+
+    def draw(self, first: float, tick: float, count: int) -> Any:
+        """The same as records, for a few ticks, as the haptic master needs them.
+
+        Args:
+            first: Time of the first tick [s].
+            tick: Length of a tick [s].
+            count: How many ticks, 1 to 4.
+
+        Returns:
+            Records (count,) of :class:`teleop_core.hand.operators.follower.Wanted`: places and
+            attitudes in the master's base. The next call writes them again.
+        """
+        if self._wanted is not self._seen:
+            self._listen(first)
+        if self._is_held and first > self._end:
+            self._release()
+        fixture, mode = self._buttons.values()
+        pressed = (
+            self._down["clutch"] or not self._is_held,
+            fixture.at(first, is_down=self._down["fixture"]),
+            mode.at(first, is_down=self._down["mode"]),
+        )
+        if pressed != self._shown:
+            self._follower.press(pressed)
+            self._shown = pressed
+        rows = self._follower.go_on(first, tick, count)
+        rows["jaw"] = self.closing
+        return rows
+
+    def _listen(self, now: float) -> None:
+        wanted, before = self._wanted, self._seen
+        self._seen = wanted
+        came = now if math.isnan(wanted.time) else min(wanted.time, now)
+        if wanted.grip != before.grip or came > self._end:
+            self._release()
+        self._end = came + self._parameters.timeout
+        if now > self._end:
+            return
+        if not self._is_held:
+            self._is_held = True
+            self._first, self._held = wanted.pose, self._follower.pose
+            geometry.invert_quaternion(self._first[3:], self._turn)
+        self._follower.aim(self._moved(wanted.pose))
+
+    def _moved(self, pose: geometry.Array) -> geometry.Array:
+        """Where the stylus was gripped, moved by as much as the wanted pose was since then."""
+        target = np.empty(7)
+        target[:3] = self._held[:3] + (pose[:3] - self._first[:3])
+        geometry.multiply_quaternions(pose[3:], self._turn, target[3:])
+        geometry.multiply_quaternions(target[3:], self._held[3:], target[3:])
+        return target
+
+    def _release(self) -> None:
+        if self._is_held:
+            self._is_held = False
+            self._follower.brake()
+
+
+class _Button:
+    """Button whose presses are all seen, however short and close they are.
+
+    Attributes:
+        presses: How many there were.
+    """
+
+    def __init__(self) -> None:
+        self.presses = self._shown = 0
+        self._until = self._next = -math.inf
+        self._is_pressed = False
+
+    def at(self, now: float, *, is_down: bool) -> bool:
+        """Whether it is pressed at a time [s], which rises from call to call.
+
+        It is released between two presses, also where the time between them was slept through.
+        """
+        if self._shown < self.presses and now >= self._next:
+            if self._is_pressed:
+                self._until, self._next = -math.inf, now + _BETWEEN
+            else:
+                self._shown += 1
+                self._until = now + _PRESSED
+                self._next = self._until + _BETWEEN
+        is_last = self._shown == self.presses
+        if is_down and is_last and self._shown:
+            self._until = max(self._until, now)
+            self._next = now + _BETWEEN
+        self._is_pressed = now <= self._until
+        return self._is_pressed
+
+
+def _row(name: str, pose: object) -> geometry.Array:
+    """Copy of a pose (7,).
+
+    Raises:
+        ShapeError: It has another shape.
+    """
+    row = np.array(pose, dtype=np.float64)
+    if row.shape != (7,):
+        raise ShapeError(name, (7,), row.shape)
+    return row
+
+
+def hand_of(setting: Setting) -> RemoteHand:
+    """Hand for a session, within the room of its device; its parameters are ``operator.remote``."""
+    p = cast(RemoteParameters, setting.common.kind.groups["remote"])
+    start, (low, high) = rest.rest_pose(), setting.common.device.corners
+    return RemoteHand(p, start, (start[:3] + low, start[:3] + high))
+
+
+def make_remote(_: object, setting: Setting) -> Motion:
+    """A hand, which ``hand`` of the stage ``operator`` gives to feed it."""
+    return hand_of(setting)
+
+
+REMOTE = Operator("remote", make_remote, RemoteParameters, ahead=AHEAD, trembles=True)
+
+
+def remote_operator(name: str, person: Person) -> Operator:
+    """Operator whose hand is told by a program what is wanted, as from afar.
+
+    The parameters of the hand are ``operator.remote``.
+
+    Args:
+        name: What it is called.
+        person: Asked once every 4 ticks; calls :meth:`RemoteHand.want`, :meth:`RemoteHand.let_go`
+            or :meth:`RemoteHand.press` as often as it likes, or not at all.
+    """
+
+    def make(_: object, setting: Setting) -> Motion:
+        hand = hand_of(setting)
+
+        def motion(times: geometry.Array) -> geometry.Array:
+            person(hand, float(times[0]))
+            return hand.motion(times)
+
+        return motion
+
+    return Operator(name, make, ahead=AHEAD, trembles=True)

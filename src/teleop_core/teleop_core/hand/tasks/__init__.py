@@ -1,0 +1,131 @@
+"""Tasks: what an operator is to do, and whether it was done, one file per task.
+
+A task says where the tip shall be now and how near, and what to do there. It sees where the tip
+really is and what the hand does, and counts attempts, successes and errors. The same task is for
+people and for simulated operators; its state is a topic, and a score.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import IntEnum
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numba import types
+
+from teleop_core.base import PartError, Registry, part_check
+from teleop_core.base.registry import places, tried
+from teleop_core.graph import topics
+from teleop_core.kernels import Array, fenced, is_whole, numbers_of, pointer
+
+__all__ = ["MEMORY", "SCENE", "TASKS", "Act", "Miss", "Task", "register_task"]
+
+_ROW = types.float64[::1]
+JUDGE = types.void(_ROW, _ROW, _ROW, _ROW)
+"""Signature of a task's kernel, so that one compiled stage serves every task."""
+MEMORY = 64
+"""Numbers that a task remembers."""
+SCENE = (
+    "time", "x", "y", "z", "qw", "qx", "qy", "qz", "closing", "fx", "fy", "fz", "is_second",
+    "grips", "other_grips", "transferred", "dropped",
+    *(f"{axis}{i}" for i in range(topics.JAW_OBJECTS) for axis in "xyz"),
+)  # fmt: skip
+"""What a task sees: time since it began [s]; the tip's true pose in slave_base [m]; how far the hand closes, 0 to 1;
+the world's force on the tip [N]; whether the arm is the second one; whether its jaw grips, and that of the other arm;
+how many blocks came onto another peg, and onto none; the middle of each block [m], zero for one that is not there."""
+
+
+class Act(IntEnum):
+    """What a task asks for at its goal."""
+
+    PRESS = 0  # close the hand there, as a mouse is clicked
+    PASS = 1  # be there
+    GRIP = 2  # be there, and have the hand closed from then on
+    LET_GO = 3  # be there, and have it open from then on
+
+
+class Miss(IntEnum):
+    """What was wrong with an attempt at a task."""
+
+    NONE = 0  # nothing
+    BESIDE = 1  # it ended beside the goal
+    LATE = 2  # it took too long
+    FORCE = 3  # it pressed too hard
+    DROP = 4  # what was carried came to rest beside its goal
+    WRONG = 5  # what was carried came to rest on a goal of another one
+
+
+@dataclass(frozen=True)
+class Task:
+    """A task.
+
+    Attributes:
+        name: What ``--set task=`` calls it.
+        parameters: Its parameter group.
+        judge: ``judge(numbers, memory, scene, state)``, a kernel or a plain function, called every
+            tick once the slave follows. ``numbers`` are those of the parameters; ``memory`` (64,)
+            is kept from tick to tick, and zero at first; ``scene`` has the numbers that
+            :data:`SCENE` names; ``state`` those of ``task/state``, which it writes, as they were.
+        numbers: ``numbers(parameters)`` gives what ``judge`` takes, if that is something else than
+            the numbers of the parameters in their order.
+    """
+
+    name: str
+    parameters: type
+    judge: Callable[[Array, Array, Array, Array], None]
+    numbers: Callable[[Any], Array] = numbers_of
+
+    judge_pointer = cached_property(lambda self: pointer(self.judge, JUDGE))
+    """The judge as an argument for kernels."""
+
+
+def _try(part: Task) -> None:
+    """Judge some ticks, so that what cannot work is told before anything runs."""
+    needs = "one with judge(numbers, memory, scene, state) and parameters that all have defaults"
+    with tried("task", part.name, needs):
+        numbers, _ = fenced(part.numbers(part.parameters()))  # one too far is NaN
+        memory, fence = fenced(np.zeros(MEMORY))
+        state, beyond = fenced(np.zeros(len(topics.TASK_STATE.columns)))
+        scene = np.zeros(len(SCENE))
+        scene[SCENE.index("qw")] = 1.0
+        for i in range(64):
+            scene[0], scene[SCENE.index("closing")] = 1e-3 * i, float(i % 8 == 7)
+            part.judge(numbers, memory, scene, state)
+        _lead(part, numbers, memory, scene, state)
+    if not (np.isfinite(state).all() and is_whole(fence) and is_whole(beyond)):
+        text = f"one that writes {len(state)} finite numbers and remembers {MEMORY}"
+        raise PartError("task", part.name, f"{text}; it writes {state.tolist()}")
+    if not (state[0] >= 1.0 and state[topics.TASK_STATE.columns.index("width")] > 0.0):
+        text = "one that sets a first goal at once, with a width > 0"
+        raise PartError("task", part.name, f"{text}; it writes {state.tolist()}")
+    needs_jaw = state[topics.TASK_STATE.columns.index("act")] in (Act.GRIP, Act.LET_GO)
+    if not (needs_jaw or state[topics.TASK_STATE.columns.index("attempts")] > 0.0):
+        text = "one that counts an attempt: `end_attempt` of tasks.attempts, at its goal or after a time"
+        raise PartError("task", part.name, f"{text}; it counts none in ten minutes at its goals")
+
+
+def _lead(part: Task, numbers: Array, memory: Array, scene: Array, state: Array) -> None:
+    """Be at each goal for ten minutes, press, and be pressed as asked, until an attempt is counted."""
+    at = {name: i for i, name in enumerate(topics.TASK_STATE.columns)}
+    for i in range(12_000):
+        if state[at["attempts"]] > 0.0:
+            return
+        scene[0], scene[SCENE.index("closing")] = 0.064 + 0.05 * i, float(i % 8 == 7)
+        scene[1:4], scene[SCENE.index("fz")] = state[at["goal_x"] : at["goal_x"] + 3], state[at["force"]]
+        if state[at["turn"]] > 0.0:
+            scene[4:8] = state[at["goal_qw"] : at["goal_qw"] + 4]
+        part.judge(numbers, memory, scene, state)
+
+
+TASKS: Registry[Task] = Registry(
+    "task",
+    "tasks",
+    places("teleop_core.hand.tasks", "follow insert palpate peg_transfer point reach trace"),
+    part_check("task", Task, "judge"),
+    _try,
+)
+"""All tasks by name."""
+
+register_task = TASKS.register
+"""Adds one of yours under its own name; see :meth:`Registry.register`."""

@@ -1,0 +1,40 @@
+"""Follow: stay near a point that nobody can foresee, as pilots are tested with."""
+
+import math
+from dataclasses import dataclass
+
+from teleop_core.base import Within, parameter
+from teleop_core.hand.tasks import Task, attempts
+from teleop_core.kernels import Array, kernel
+
+# Rounds in a period, three for each of y and z: prime numbers, so that nothing comes again in it.
+_ROUNDS = (2, 5, 11, 3, 7, 13)
+
+
+@dataclass(frozen=True, kw_only=True)
+class FollowParameters(attempts.LedParameters):
+    """A point that wanders in the slave's y-z plane, from where the task begins.
+
+    Source:
+        Sums of sines as targets: McRuer and Jex 1967, IEEE Trans. Human Factors in Electronics 8.
+    """
+
+    size: float = parameter(0.02, Within(1e-3, 0.5, "m"), "farthest that it goes along each axis")
+    period: float = parameter(60.0, Within(1.0, 3600.0, "s"), "after which its way repeats itself")
+
+
+@kernel
+def follow_judge(numbers: Array, memory: Array, scene: Array, state: Array) -> None:
+    """Move the goal on, and count at each step whether the tip is near it.
+
+    Of the three sines of an axis a faster one is smaller.
+    """
+    angle, y, z = 2.0 * math.pi * scene[0] / numbers[3], 0.0, 0.0
+    for i in range(3):
+        share = numbers[2] * (0.5, 0.3, 0.2)[i]
+        y += share * math.sin(_ROUNDS[i] * angle)
+        z += share * math.sin(_ROUNDS[3 + i] * angle)
+    attempts.lead_on(numbers, memory, scene, state, y, z)
+
+
+FOLLOW = Task("follow", FollowParameters, follow_judge)

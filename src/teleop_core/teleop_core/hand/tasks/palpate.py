@@ -1,0 +1,56 @@
+"""Palpate: press down on one place after another with a force, hold it there, and let go."""
+
+import math
+from dataclasses import dataclass
+
+from teleop_core.base import Within, parameter
+from teleop_core.graph import topics
+from teleop_core.hand.tasks import Task, attempts
+from teleop_core.kernels import Array, kernel
+
+_FORCE = topics.TASK_STATE.columns.index("force")
+
+
+@dataclass(frozen=True, kw_only=True)
+class PalpateParameters(attempts.PressedParameters):
+    """Places below a row along y, in whose middle the tip is when the task begins."""
+
+    count: int = parameter(5, Within(1, 99), "places of the row")
+    spacing: float = parameter(0.005, Within(0.0, 0.1, "m"), "between places")
+    force: float = parameter(0.5, Within(0.01, 100.0, "N"), "along z, to press with")
+    tolerance: float = parameter(0.2, Within(1e-3, 100.0, "N"), "it may be so far off")
+    hold: float = parameter(0.5, Within(0.0, 60.0, "s"), "it must last so long")
+    yielding: float = parameter(
+        0.003, Within(1e-5, 0.1, "m/N"), "the goal is so much deeper than the tip for each newton that is missing"
+    )
+
+
+@kernel
+def palpate_judge(numbers: Array, memory: Array, scene: Array, state: Array) -> None:
+    """Lead the tip above a place, down until the force is right, and on when it was held.
+
+    ``memory`` holds the beginning (3,), whether it presses, and since when the force is right [s].
+    """
+    if state[0] == 0.0:
+        for i in range(3):
+            memory[i] = scene[1 + i]
+    elif memory[3] == 0.0:
+        if attempts.is_at_goal(scene, state):
+            memory[3], memory[4], state[_FORCE] = 1.0, scene[0], numbers[5]
+        return
+    else:
+        missing = numbers[5] - scene[11]
+        state[4] = scene[3] - missing * numbers[8]
+        beside = math.hypot(scene[1] - state[2], scene[2] - state[3])
+        if beside > 0.5 * numbers[0] or abs(missing) > numbers[6]:
+            memory[4] = scene[0]
+        miss = attempts.failed(numbers, memory, scene)
+        if miss == attempts.NONE and scene[0] - memory[4] < numbers[7]:
+            return
+        attempts.end_attempt(memory, scene, state, miss)
+    memory[3], state[_FORCE], place = 0.0, 0.0, state[0] % numbers[3] - 0.5 * (numbers[3] - 1.0)
+    y = memory[1] + place * numbers[4]
+    attempts.begin_goal(memory, scene, state, attempts.PASS, memory[0], y, memory[2], numbers[0])
+
+
+PALPATE = Task("palpate", PalpateParameters, palpate_judge)

@@ -1,0 +1,54 @@
+"""Peg transfer: bring each block to the peg of its colour, by one arm, two, or from jaw to jaw."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from teleop_core.base import ParameterError, Within, parameter
+from teleop_core.graph.topics import JAW_OBJECTS
+from teleop_core.hand.tasks import Task, transfer
+from teleop_core.kernels import Array, kernel
+
+_ONE_WAY, _WAYS = 2, 2 * JAW_OBJECTS
+
+
+@dataclass(frozen=True, kw_only=True)
+class PegTransferParameters:
+    """What is to be done with the blocks of ``jaw_sim``; the kinds are those of Hwang et al. 2020, arXiv 2012.12844."""
+
+    arms: str = parameter(
+        "one",
+        choices=transfer.KINDS,
+        doc="who transfers: one arm all blocks; each of two every other one; the first hands each over to the second",
+    )
+    ways: tuple[float, ...] = parameter(
+        (0.0, -0.04),
+        Within(-1.0, 1.0, "m"),
+        "x, y of the way from each block to the peg of its colour; one way holds for all",
+    )
+    lift: float = parameter(0.03, Within(1e-3, 0.5, "m"), "above where blocks stand")
+    clearance: float = parameter(
+        0.0015, Within(0.0, 0.1, "m"), "of a block that is on a peg, as jaw_sim.pegs.clearance"
+    )
+    width: float = parameter(0.002, Within(1e-4, 0.1, "m"), "of a goal, a ball")
+    longest: float = parameter(60.0, Within(1.0, 600.0, "s"), "a transfer that takes longer is an error")
+    tries: int = parameter(2, Within(1, 99), "how often a block is taken up, if it is dropped")
+
+    def __post_init__(self) -> None:
+        if len(self.ways) not in {_ONE_WAY, _WAYS}:
+            raise ParameterError("task.peg_transfer.ways", self.ways, f"x, y of one way, or of {JAW_OBJECTS}")
+
+
+def numbers(p: PegTransferParameters) -> Array:
+    """Numbers that the judge takes: lift, width, longest, kind, six ways, clearance, tries."""
+    kind = transfer.KINDS.index(p.arms)
+    return np.array([p.lift, p.width, p.longest, kind, *np.resize(p.ways, _WAYS), p.clearance, p.tries], np.float64)
+
+
+@kernel
+def peg_transfer_judge(numbers: Array, memory: Array, scene: Array, state: Array) -> None:
+    """Lead each hand from step to step, and judge each block where it comes to rest: :mod:`.transfer`."""
+    transfer.lead(numbers, memory, scene, state)
+
+
+PEG_TRANSFER = Task("peg_transfer", PegTransferParameters, peg_transfer_judge, numbers)

@@ -1,0 +1,60 @@
+"""Point: press in targets on a ring, one across from the other, as pointing devices are tested."""
+
+import math
+from dataclasses import dataclass
+
+from teleop_core.base import Within, parameter
+from teleop_core.hand.tasks import Task, attempts
+from teleop_core.kernels import Array, kernel
+
+
+@dataclass(frozen=True, kw_only=True)
+class PointParameters:
+    """A ring of targets around the place where the tip is when the task begins."""
+
+    count: int = parameter(
+        13,
+        Within(3, 99),
+        "targets of the ring",
+        source="published: ISO/TS 9241-411 2012 has an odd number, 13 and 25 in its figures",
+    )
+    diameter: float = parameter(0.03, Within(1e-3, 0.5, "m"), "of the ring")
+    width: float = parameter(0.004, Within(1e-4, 0.1, "m"), "diameter of a target, a ball")
+    normal: tuple[float, ...] = parameter(
+        (1.0, 0.0, 0.0), Within(-1.0, 1.0), "axis of the ring in the slave's base, of any length but 0", length=3
+    )
+
+
+@kernel
+def point_judge(numbers: Array, memory: Array, scene: Array, state: Array) -> None:
+    """Count presses inside and outside of the target; each press sets the next target.
+
+    Targets lie across from each other in turn (ISO/TS 9241-411 2012, annex B).
+
+    ``memory`` holds the middle of the ring (3,), then what
+    :mod:`~teleop_core.hand.tasks.attempts` keeps.
+    """
+    if state[0] == 0.0:
+        for i in range(3):
+            memory[i] = scene[1 + i]
+    elif not attempts.was_pressed(memory, scene[8]):
+        return
+    else:
+        attempts.tell_attempt(memory, scene, state)
+    n, radius = int(numbers[0]), 0.5 * numbers[1]
+    at = int(state[0]) * ((n + 1) // 2) % n
+    angle = 2.0 * math.pi * at / n
+    x, y, z = numbers[3], numbers[4], numbers[5]
+    size = max(math.sqrt(x * x + y * y + z * z), 1e-12)
+    x, y, z = x / size, y / size, z / size
+    # Two axes across the normal: one level where there is such, and the one across both.
+    flat = math.sqrt(x * x + y * y)
+    ax, ay = (-y / flat, x / flat) if flat > 1e-6 else (1.0, 0.0)
+    along, across = radius * math.cos(angle), radius * math.sin(angle)
+    goal_x = memory[0] + along * ax - across * z * ay
+    goal_y = memory[1] + along * ay + across * z * ax
+    goal_z = memory[2] + across * (x * ay - y * ax)
+    attempts.begin_goal(memory, scene, state, attempts.PRESS, goal_x, goal_y, goal_z, numbers[2])
+
+
+POINT = Task("point", PointParameters, point_judge)

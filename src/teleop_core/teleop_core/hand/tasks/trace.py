@@ -1,0 +1,27 @@
+"""Trace: follow a point that goes round on a ring, as near as a target is wide."""
+
+import math
+from dataclasses import dataclass
+
+from teleop_core.base import Within, parameter
+from teleop_core.hand.tasks import Task, attempts
+from teleop_core.kernels import Array, kernel
+
+
+@dataclass(frozen=True, kw_only=True)
+class TraceParameters(attempts.LedParameters):
+    """A ring in the slave's y-z plane, on which the place where the task begins lies lowest."""
+
+    diameter: float = parameter(0.03, Within(1e-3, 0.5, "m"), "of the ring")
+    period: float = parameter(12.0, Within(0.5, 600.0, "s"), "in which the point goes round once")
+
+
+@kernel
+def trace_judge(numbers: Array, memory: Array, scene: Array, state: Array) -> None:
+    """Move the goal on, and count at each step whether the tip is near it."""
+    radius, angle = 0.5 * numbers[2], 2.0 * math.pi * scene[0] / numbers[3]
+    y, z = radius * math.sin(angle), radius * (1.0 - math.cos(angle))
+    attempts.lead_on(numbers, memory, scene, state, y, z)
+
+
+TRACE = Task("trace", TraceParameters, trace_judge)

@@ -1,0 +1,25 @@
+"""Selection of a robot: which arm a stage works for, for every stage whose topics have joints."""
+
+from dataclasses import dataclass
+
+from teleop_core.base.parameters import parameter
+from teleop_core.robots import load_robot_set
+
+
+@dataclass(frozen=True, kw_only=True)
+class RobotParameters:
+    """The arm; all stages of one arm must name the same."""
+
+    robot: str = parameter("rcrt1", fixed=True, doc="slave robot, one of `teleop robot`")
+    geometry: tuple[str, ...] = parameter(
+        (), fixed=True, doc="symbol=value in place of the robot's lengths and options [m, rad]"
+    )
+
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        """Names of its joints.
+
+        Raises:
+            TeleopError: There is no such robot, or it has no such lengths.
+        """
+        return load_robot_set(self.robot, self.geometry).joint_names

@@ -1,0 +1,180 @@
+"""Contents of the world: the object, where it is, and what it is made of."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from teleop_core.base import Choice, ParameterError, Value, Within, choice, parameter
+from teleop_core.kernels.geometry import Array
+from teleop_core.slave.world import WORLD_OBJECTS
+
+
+class Material(NamedTuple):
+    """What an object is made of.
+
+    Attributes:
+        stiffness: Of its surface [N/m].
+        damping: Of Hunt and Crossley's law [s/m]: share of the force per speed.
+        friction: Dry friction over normal force.
+    """
+
+    stiffness: float
+    damping: float
+    friction: float
+
+
+MATERIALS = {
+    "tissue": Material(200.0, 2.0, 0.1),
+    "silicone": Material(1000.0, 1.5, 0.6),
+    "rubber": Material(5000.0, 1.0, 0.8),
+    "wood": Material(20000.0, 0.7, 0.4),
+    "steel": Material(50000.0, 0.5, 0.2),
+}
+"""Materials by name. All numbers are assumed: what a tip meets depends on its own size as well."""
+_USUAL: dict[str, Value] = {
+    "box.size": (0.06, 0.06, 0.03),
+    "cylinder.radius": 0.02,
+    "cylinder.direction": (0.0, 0.0, 1.0),
+}
+"""Parameters of objects that are something else where nothing is said than for a fixture."""
+_FARTHEST = 3.0  # below a tip, where an object is looked for [m]
+
+
+@dataclass(frozen=True, kw_only=True)
+class WorldParameters:
+    """What the tip can touch."""
+
+    kind: Choice = choice(WORLD_OBJECTS, "empty", fixed=True, doc="what the tip can touch", usual=_USUAL)
+    place: tuple[float, ...] = parameter(
+        (),
+        Within(-10.0, 10.0, "m"),
+        "middle of the object in the slave's base; empty: straight below the tip of the robot's start, gap apart",
+        fixed=True,
+    )
+    base: tuple[float, ...] = parameter(
+        (0.0, 0.0, 0.0),
+        Within(-10.0, 10.0, "m"),
+        "where the base of this arm is, with parallel axes, from where place is given: that of a second arm in the "
+        "base of the first, so that both touch the same object",
+        length=3,
+        fixed=True,
+    )
+    gap: float = parameter(
+        0.01, Within(0.0, 1.0, "m"), "between that tip and the object, if no place is given", fixed=True
+    )
+    material: str = parameter(
+        "tissue",
+        choices=(*MATERIALS, "own"),
+        doc="what it is made of; own: of the following three numbers",
+        source="assumed: all five; what a tip meets depends on its own size as well",
+    )
+    stiffness: float = parameter(1000.0, Within(1.0, 1e5, "N/m"), "of the surface, if the material is own")
+    damping: float = parameter(
+        1.0,
+        Within(0.0, 100.0, "s/m"),
+        "share of the force per speed, if the material is own",
+        source="assumed: the number; the law is that of Hunt and Crossley 1975",
+    )
+    friction_coefficient: float = parameter(0.3, Within(0.0, 2.0), "over the normal force, if the material is own")
+
+    tool_points: int = parameter(
+        1,
+        Within(1, 16),
+        "places where the tool touches: its tip, and others behind it along its axis, which is z of the tip",
+        fixed=True,
+    )
+    tool_length: float = parameter(
+        0.02, Within(1e-3, 1.0, "m"), "from the tip to the last of several points", fixed=True, source="assumed"
+    )
+    tool_radius: float = parameter(0.0, Within(0.0, 0.1, "m"), "of the tool at each of its points", fixed=True)
+
+    puncture_force: float = parameter(
+        0.0,
+        Within(0.0, 100.0, "N"),
+        "push along the normal at which the surface gives way to the tip, of any material; 0: it never does",
+    )
+    cutting_force: float = parameter(
+        0.2,
+        Within(0.0, 100.0, "N"),
+        "push against a tip that goes deeper than before, behind a punctured surface",
+        source="assumed: the number; the law is that of Okamura, Simone and O'Leary 2004",
+    )
+    shaft_friction: float = parameter(
+        20.0,
+        Within(0.0, 1e4, "N/m"),
+        "dry friction of the needle's shaft over its depth behind a punctured surface",
+        source="assumed: the number; the law is that of Okamura, Simone and O'Leary 2004",
+    )
+    hole_radius: float = parameter(
+        0.002,
+        Within(1e-4, 0.1, "m"),
+        "how near to the last hole the tip enters it again without a puncture",
+        source="assumed",
+    )
+
+    @property
+    def made_of(self) -> Material:
+        """The material, the own one or that of the name."""
+        if self.material == "own":
+            return Material(self.stiffness, self.damping, self.friction_coefficient)
+        return MATERIALS[self.material]
+
+    @cached_property
+    def shape(self) -> Array:
+        """Numbers of the object, as its distance takes them; a mesh is read, and may be refused."""
+        return WORLD_OBJECTS.find(self.kind.kind).numbers(self.kind.parameters)
+
+    def tool(self, T_base_tip: Array) -> Array:
+        """Places (N, 3) [m] of the tool's points in the slave's base, of the tip's pose (4, 4)."""
+        behind = np.linspace(0.0, self.tool_length, self.tool_points)
+        places: Array = T_base_tip[:3, 3] - behind[:, None] * T_base_tip[:3, 2]
+        return places
+
+    def distance(self, tool: Array, center: Array) -> float:
+        """How far outside the object the nearest point of a tool is [m].
+
+        Args:
+            tool: Places of its points (N, 3) [m].
+            center: Middle of the object (3,) [m].
+        """
+        part = WORLD_OBJECTS.find(self.kind.kind)
+        found = (part.distance(place - center, self.shape, np.zeros(3)) for place in tool)
+        return float(min(found)) - self.tool_radius
+
+    def __post_init__(self) -> None:
+        if len(self.place) not in {0, 3}:
+            raise ParameterError("world.place", self.place, "x, y, z, or empty")
+        if self.puncture_force > 0.0 and getattr(self.kind.parameters, "click_force", 0.0) > 0.0:
+            raise ParameterError("world.puncture_force", self.puncture_force, "0 for a button")
+        is_needle = self.puncture_force > 0.0 or hasattr(self.kind.parameters, "click_force")
+        if is_needle and (self.tool_points > 1 or self.tool_radius > 0.0):
+            name = "tool_points" if self.tool_points > 1 else "tool_radius"
+            text = "that of a needle (1 point, radius 0) for a button, or with a puncture_force"
+            raise ParameterError(f"world.{name}", getattr(self, name), text)
+
+    def center(self, T_base_tip: Array) -> Array:
+        """Middle of the object (3,) [m] in the arm's base, where its tip begins at a pose (4, 4).
+
+        Raises:
+            ParameterError: As :meth:`below`.
+        """
+        return np.array(self.place) - np.array(self.base) if self.place else self.below(T_base_tip)
+
+    def below(self, T_base_tip: Array) -> Array:
+        """Middle of the object (3,) [m] that lies straight below a tip's pose (4, 4), a gap apart.
+
+        Raises:
+            ParameterError: There is none.
+        """
+        tool, tip = self.tool(T_base_tip), T_base_tip[:3, 3]
+        down, near, far = np.array([0.0, 0.0, -1.0]), 0.0, _FARTHEST
+        if not self.distance(tool, tip) < self.gap <= self.distance(tool, tip + far * down):
+            text = f"given for a {self.kind.kind} that cannot lie straight below the tip"
+            raise ParameterError("world.place", self.place, text)
+        for _ in range(60):  # to a rounding of the place
+            way = 0.5 * (near + far)
+            is_apart = self.distance(tool, tip + way * down) >= self.gap
+            near, far = (near, way) if is_apart else (way, far)
+        return tip + far * down

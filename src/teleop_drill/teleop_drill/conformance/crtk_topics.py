@@ -1,0 +1,94 @@
+"""CRTK topics: those of the Collaborative Robotics Toolkit that an arm may have.
+
+Source:
+    Su, Munawar, Deguet et al. 2020 (Collaborative Robotics Toolkit); its pages "Robot operating
+    state" and "Robot motion".
+"""
+
+from dataclasses import dataclass
+from enum import Enum
+
+
+class Group(Enum):
+    """What a topic is for."""
+
+    STATE = "state"
+    QUERY = "query"
+    COMMAND = "command"
+
+
+class Verdict(Enum):
+    """What was found."""
+
+    OK = "ok"
+    ABSENT = "absent"  # and not required
+    SKIPPED = "not tried"
+    NOTED = "noted"  # works, but not as one would wish
+    FAILED = "FAILED"
+
+
+_JOINTS, _POSE = "sensor_msgs/msg/JointState", "geometry_msgs/msg/PoseStamped"
+_TWIST, _WRENCH = "geometry_msgs/msg/TwistStamped", "geometry_msgs/msg/WrenchStamped"
+
+
+@dataclass(frozen=True)
+class CrtkTopic:
+    """One topic.
+
+    Attributes:
+        name: Name below the arm's namespace.
+        group: What it is for.
+        ros_type: Type of its messages.
+        is_required: Whether an arm without it is none of CRTK. That is so for the operating state
+            and for one of ``measured_js`` and ``measured_cp``; commands that an arm cannot do are
+            left out, as CRTK says.
+    """
+
+    name: str
+    group: Group
+    ros_type: str
+    is_required: bool = False
+
+
+def _typed(names: str, group: Group, ros_type: str) -> tuple[CrtkTopic, ...]:
+    return tuple(CrtkTopic(name, group, ros_type) for name in names.split())
+
+
+CRTK_TOPICS = (
+    CrtkTopic("operating_state", Group.STATE, "crtk_msgs/msg/OperatingState", is_required=True),
+    CrtkTopic("state_command", Group.STATE, "crtk_msgs/msg/StringStamped", is_required=True),
+    *_typed("measured_js setpoint_js goal_js", Group.QUERY, _JOINTS),
+    *_typed("measured_cp setpoint_cp goal_cp", Group.QUERY, _POSE),
+    *_typed("measured_cv setpoint_cv", Group.QUERY, _TWIST),
+    *_typed("measured_cf setpoint_cf", Group.QUERY, _WRENCH),
+    *_typed("jacobian", Group.QUERY, "std_msgs/msg/Float64MultiArray"),
+    *_typed("move_jp move_jr", Group.COMMAND, _JOINTS),
+    *_typed("move_cp move_cr", Group.COMMAND, _POSE),
+    *_typed("interpolate_jp", Group.COMMAND, _JOINTS),
+    *_typed("interpolate_cp", Group.COMMAND, _POSE),
+    *_typed("servo_jp servo_jr servo_jv servo_jf", Group.COMMAND, _JOINTS),
+    *_typed("servo_cp servo_cr", Group.COMMAND, _POSE),
+    *_typed("servo_cv", Group.COMMAND, _TWIST),
+    *_typed("servo_cf", Group.COMMAND, _WRENCH),
+    *_typed("hold free", Group.COMMAND, "std_msgs/msg/Empty"),
+)
+"""All topics that are looked for, in the order of the table."""
+STATES = ("DISABLED", "ENABLED", "PAUSED", "FAULT")
+"""Names of the operating states."""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What was found in one row.
+
+    Attributes:
+        row: The row, or what was tried with several of them.
+        verdict: How it is.
+        found: What there is, in a few words.
+        note: What is wrong with it, or why it was not tried.
+    """
+
+    row: CrtkTopic
+    verdict: Verdict
+    found: str = ""
+    note: str = ""
