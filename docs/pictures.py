@@ -195,10 +195,8 @@ def states(folder: Path) -> None:
         tab.click("Pause")
         tab.shows("PAUSED")
         state(tab, "paused", "desk")
-        tab.click("Settings")
-        state(tab, "settings", "desk", "phone")
-        tab.click("View")
-        state(tab, "view", "desk")
+        state(tab, "settings", "desk", "phone", opens="Settings")
+        state(tab, "view", "desk", opens="View")
         with Tab(folder / "second", *SIZES["desk"]) as second:
             second.visit(console.url)
             second.shows("you watch", STARTS)
@@ -229,8 +227,8 @@ def choose(tab: Tab, name: str, word: str) -> None:
     }})()""")
 
 
-def state(tab: Tab, name: str, *sizes: str) -> None:
-    """Keep what is seen now, at some sizes."""
+def state(tab: Tab, name: str, *sizes: str, opens: str = "") -> None:
+    """Keep what is seen now, at some sizes, with a tab of the panel opened: on a phone it has tabs of its own."""
     tab.value(NOTICE)
     for size in sizes:
         width, height = SIZES[size]
@@ -241,6 +239,8 @@ def state(tab: Tab, name: str, *sizes: str) -> None:
             deviceScaleFactor=1,
             mobile=size == "phone",
         )
+        if opens:
+            tab.click(opens)
         end = time.monotonic() + SETTLE
         while time.monotonic() < end or tab.value(SLIDES):
             picture = shot(tab)

@@ -604,6 +604,8 @@ CODE_MUTANTS = (
             "            self._ghost.move(reference)\n", "            pass\n", "console_scene"),
     _mutant("stylus_arrow", "no arrow of the force on the stylus", "teleop_console/master_nodes.py",
             "return 0.0 if force is None else self._force.draw(pose[:3], force)", "return 0.0", "console_scene"),
+    _mutant("handles_everywhere", "a page that watches has handles that do nothing", "teleop_console/view_tab.py",
+            "is_shown=may_drive)", "is_shown=True)", "tests/scenario/test_console_desk.py"),
     _mutant("narrow_panel", "after a phone the panel of a desk is cut off", "teleop_console/panel.py",
             "        self._gui.main_panel.set_width(WIDTH)", "        pass", "tests/scenario/test_console_desk.py"),
     _mutant("stopped_twice", "the end of a slow press is a second press", "teleop_console/page.js",

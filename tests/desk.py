@@ -94,6 +94,11 @@ class Desk:
         return self.saved
 
 
+def connected(server: ConsoleServer) -> list[Any]:
+    """What viser keeps of each page that is connected, those that have not come up yet included."""
+    return list(server.viser._websock_server._client_state_from_id.values())
+
+
 @contextmanager
 def shown(desk: Any, renew: Any = None, *, can_end: bool = False) -> Iterator[tuple[ConsoleServer, Desk]]:
     """Server of the page of a desk, drawn as the command draws it, and the desk; further arguments as of the page."""

@@ -123,7 +123,10 @@ class Firefox(Tab):
             return
         kind = MOVES[told["type"]]
         acts: list[Any] = [{"type": "pointerMove", **place}]
-        if kind != "pointerMove":
+        is_second = told.get("clickCount") == 2  # a double click is one act: two that come late are none
+        if is_second and kind == "pointerUp":
+            acts += [{"type": one, "button": 0} for one in ("pointerDown", "pointerUp") * 2]
+        elif kind != "pointerMove" and not is_second:
             acts.append({"type": kind, "button": 0})
         self._act(type="pointer", id="mouse", actions=acts)
 
@@ -155,7 +158,7 @@ def plain(told: Any) -> Any:
     if kind in {"array", "nodelist", "htmlcollection"}:
         return [plain(one) for one in value]
     if kind == "object":
-        return {name: plain(one) for name, one in value}
+        return {name: plain(one) for name, one in value or ()}  # deeper than BiDi tells: none
     if kind == "number" and isinstance(value, str):
         return float(value.replace("Infinity", "inf"))
     return value

@@ -48,7 +48,7 @@ def page(console: Any, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Hea
     with Tab(tmp_path_factory.mktemp("browser"), *SIZE) as tab:
         tab.visit(console.url)
         tab.shows("ENABLED", STARTS)
-        tab.shows("has control")
+        tab.shows("you have control")
         yield tab
 
 

@@ -11,11 +11,13 @@ import pytest
 pytest.importorskip("viser")
 
 import teleop_core as tc
-from browser import PULLED, VIEWER, Tab, arrow, until
+from browser import GRIP, PULLED, VIEWER, Tab, arrow, until
 from desk import POSE, Desk, shown
+from page_client import PageClient
 from teleop_console.answers import Situation
 from teleop_console.app import Console
 from teleop_console.link import ParameterInfo
+from teleop_console.look import DARK, LIGHT
 from teleop_console.server import ConsoleServer
 from teleop_core.base.errors import TeleopError
 from teleop_core.session import api
@@ -23,6 +25,12 @@ from teleop_core.session import api
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
 EXAMPLE = Path(__file__).parents[2] / "bags" / "example"
+PIXEL = f"""(() => {{
+    const pen = Object.assign(document.createElement('canvas'), {{ width: 1, height: 1 }}).getContext('2d');
+    pen.drawImage({VIEWER}.canvas, 0, 0);
+    return [...pen.getImageData(0, 0, 1, 1).data].slice(0, 3);
+}})()"""
+"""What is seen in the corner of the scene: its ground."""
 PANEL = "document.querySelector('[data-testid=floating-panel]')?.getBoundingClientRect()"
 
 
@@ -71,6 +79,17 @@ def test_stylus_that_is_pulled_by_an_arrow_is_wanted_along_it_and_let_go_with_th
         assert sign * way[axis] == pytest.approx(PULLED, rel=0.5)  # as far as the screen tells
         assert np.abs(np.delete(way, axis)).max() < 1e-6  # along the arrow alone, and not turned
         assert not tab.faults()
+
+
+def test_page_that_watches_has_no_handles_until_it_takes_control(tab: Any) -> None:
+    seen = f"__viserSceneTree.getState()['{GRIP}']?.effectiveVisibility"
+    with shown(Desk()) as (server, _), PageClient(server.port):
+        until(lambda: server.drivers.driver is not None, "another page drives")
+        ready(tab, server.url)
+        tab.shows("you watch")
+        tab.until(f"{seen} === false")
+        tab.click("Take control")
+        tab.until(f"{seen} === true")
 
 
 @pytest.mark.soak
@@ -159,7 +178,13 @@ def test_scene_that_software_draws_has_few_pixels_and_other_ones_where_the_addre
         for width, height in ((390, 844), (1400, 900)):
             tab.resize(width, height)
             tab.until(f"innerWidth === {width} && {canvas}.width * {canvas}.height <= 320000")
-        assert not tab.value(f"{canvas}.getContext('webgl2').getContextAttributes().antialias")
+        told = tab.value(f"{canvas}.getContext('webgl2').getContextAttributes()")
+        assert (told["antialias"], told["alpha"]) == (False, False)
+        for scheme, ground in (("light", LIGHT), ("dark", DARK)):
+            if scheme == "dark":
+                tab.click("View")
+                tab.click("dark")
+            tab.until(f"({PIXEL}).join() === '{','.join(map(str, ground))}'")
         ready(tab, f"{server.url}?fixedDpr=1")
         tab.until(f"{canvas}.width === {canvas}.clientWidth")
 

@@ -18,7 +18,7 @@ pytest.importorskip("viser")
 
 import hostile
 from browser import until
-from desk import Desk, shown
+from desk import Desk, connected, shown
 from page_client import PageClient, ask
 from teleop_console.connection import Crowd
 from teleop_console.filter import BURST, FLOOD, Budget
@@ -56,7 +56,7 @@ def test_page_that(
         assert driver.ask("/alive")[1]["drives"] is True
         assert not driver.is_cut
     assert not [r for r in caplog.records if r.levelno >= logging.ERROR and "teleop" in r.name]
-    until(lambda: server.viser.connections() == 1, "the page has gone")
+    until(lambda: len(connected(server)) == 1, "the page has gone")
 
 
 def handle_state(server: ConsoleServer, uuid: str) -> tuple[str | bool, str, bool, bool, int, bool] | None:

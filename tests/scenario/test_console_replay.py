@@ -12,7 +12,7 @@ from teleop_core.kernels.geometry import Array
 
 pytest.importorskip("viser")
 
-from browser import Tab
+from browser import both, opened
 from console_process import STARTS, ConsoleProcess
 from teleop_core.bags.reader import Bag
 from teleop_core.graph.topics import SLAVE_MEASURED_CP
@@ -39,15 +39,17 @@ INK = """(() => {  // columns of the strip left of its curves in which something
 STILL = 3e-5  # poses that differ less from what is drawn are not sent [m]
 
 
-@pytest.fixture(scope="module")
-def page(recording: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Headless]:
+@pytest.fixture(scope="module", params=both())
+def page(
+    request: pytest.FixtureRequest, recording: Path, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[Headless]:
     """Page of a recording in a browser."""
     folder = tmp_path_factory.mktemp("console")
     for name in ("session", "other"):
         shutil.copytree(recording, folder / "bags" / name)
     console = ConsoleProcess(folder, folder / "bags" / "session")
     try:
-        with Tab(tmp_path_factory.mktemp("browser"), 1000, 700) as tab:
+        with opened(request.param, tmp_path_factory.mktemp("browser"), 1000, 700) as tab:
             tab.visit(console.url)
             tab.shows("Play", STARTS)
             yield tab

@@ -47,9 +47,9 @@ def test_whoever_is_not_the_person_at_the_page_is_said_to_lead(kind: str) -> Non
 def test_ages_and_rate_are_told_as_far_as_they_are_known() -> None:
     assert facts(View()) == ""
     known = View(rate=1000.2, delay=(0.0013, 0.004), age=0.033)
-    assert facts(known) == "1000 ticks/s · command 1.3 ms old · picture 33 ms old"
+    assert facts(known) == "1000 Hz · command 1.3 ms · picture 33 ms old"
     known.delay = (math.nan, math.nan)
-    assert facts(known) == "1000 ticks/s · picture 33 ms old"
+    assert facts(known) == "1000 Hz · picture 33 ms old"
 
 
 def test_nothing_is_red_that_is_not_wrong() -> None:

@@ -158,8 +158,8 @@ def _said(chosen: Chosen) -> tuple[str, ...]:
             stages = (*stages, field.stage)
     if stages != before:
         said.insert(0, f"{SESSION}.stages=[{','.join(stages)}]")
-    if (path := _PATHS.get(chosen.get("operator", ""))) is not None:
-        said.append(f"{path}={chosen.get(FOLLOWED) or repr('')}")
+    if (path := _PATHS.get(chosen.get("operator", ""))) and (followed := chosen.get(FOLLOWED)):
+        said.append(f"{path}={followed}")
     if tip := chosen.get(TIP):
         said.append(f"geometry=[tip={tip}]")
     return tuple(said)

@@ -12,12 +12,12 @@ import asyncio
 import http
 import logging
 import threading
-from collections.abc import Awaitable, Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from functools import partial
 from socket import socket
-from types import SimpleNamespace, TracebackType
-from typing import Any, TypedDict, Unpack
+from types import SimpleNamespace
+from typing import Any
 
 import rich
 import viser
@@ -27,7 +27,7 @@ from viser import _messages
 from viser.infra import _async_message_buffer, _infra
 from websockets.datastructures import Headers
 from websockets.http11 import Request, Response
-from websockets.typing import Data, Subprotocol
+from websockets.typing import Data
 
 from teleop_console.answers import Answers, answer_of
 from teleop_console.connection import Connection, Crowd, Gate
@@ -44,15 +44,6 @@ _NOTICE = 5.0  # for which a page is told something, and nothing else [s]
 _STARTING = threading.Lock()
 
 Answer = Callable[[ws.ServerConnection, Request], Response | None]
-
-
-class ServeOptions(TypedDict, total=False):
-    """What viser asks of its server beside the port and the answers."""
-
-    max_size: int
-    compression: str | None
-    subprotocols: list[Subprotocol] | None
-    select_subprotocol: Callable[[ws.ServerConnection, Sequence[Subprotocol]], Subprotocol | None]
 
 
 class Wake(asyncio.Event):
@@ -138,7 +129,14 @@ class Server(viser.ViserServer):
             (_messages.TransformControlsUpdateMessage, drivers.heard),
             (_messages.TransformControlsDragEndMessage, drivers.let_go),
         ):
-            self._websock_server.register_handler(message, _telling(tell))
+            self._websock_server.register_handler(message, lambda page, _, tell=tell: tell(page))  # type: ignore[misc]
+
+    def show_on(self, page: int, name: str, *, is_shown: bool) -> None:
+        """Show a node of the scene on one page, if it is shown at all; or hide it there until all are told anew."""
+        client, node = self._connected_clients.get(page), self.scene.get_handle_by_name(name)
+        if client is not None and node is not None:
+            message = _messages.SetSceneNodeVisibilityMessage(name, node.visible and is_shown)
+            client._websock_connection.queue_message(message)
 
     # -- what the filter asks ----------------------------------------------------------------------
 
@@ -165,11 +163,8 @@ class Server(viser.ViserServer):
 
     def is_asked(self, page: int) -> bool:
         """Whether a page has been asked for a picture."""
-        client = self._connected_clients.get(page)
-        if client is None:
-            return False
-        handlers = client._websock_connection._incoming_handlers
-        return bool(handlers.get(_messages.GetRenderResponseMessage))
+        client, answer = self._connected_clients.get(page), _messages.GetRenderResponseMessage
+        return client is not None and bool(client._websock_connection._incoming_handlers.get(answer))
 
     # -- what connections ask ----------------------------------------------------------------------
 
@@ -200,8 +195,7 @@ class Server(viser.ViserServer):
         return next((page for page, known in live.items() if known is connection), -1)
 
     def _notify(self, page: int, text: str) -> None:
-        client = self._connected_clients.get(page)
-        if client is not None:
+        if (client := self._connected_clients.get(page)) is not None:
             client.add_notification("Not done", text, auto_close_seconds=_NOTICE, color="yellow")
 
     def _put_back(self, page: int, data: Data) -> None:
@@ -218,49 +212,18 @@ class Server(viser.ViserServer):
         """Drop what is kept of removed elements; viser does so only when a page comes."""
         self._run_garbage_collector()
 
-    def connections(self) -> int:
-        """Number of pages that are connected, those that have not come up yet included."""
-        return len(self._states())
-
-    def kept(self) -> int:
-        """Number of messages that are kept for pages: what may grow if something is wrong."""
-        buffers = [state.message_buffer for state in self._states()]
-        buffers.append(self._websock_server.get_message_buffer())
-        return sum(len(buffer.message_from_id) for buffer in buffers)
-
-    def _states(self) -> list[_infra._ClientHandleState]:
-        return list(self._websock_server._client_state_from_id.values())
-
-
-def _telling(tell: Callable[[int], object]) -> Callable[[int, _messages.Message], None]:
-    """Tells which page a message is from."""
-
-    def handler(page: int, message: _messages.Message) -> None:
-        tell(page)
-
-    return handler
-
 
 def _server_at(opened: socket, guard: Guard, answers: Answers, gate: Gate) -> Callable[..., ws.serve]:
     """A function that opens a server at the socket, whatever address it is told."""
 
-    def serve(
-        handler: Callable[[ws.ServerConnection], Awaitable[None]],
-        host: str,
-        port: int,
-        *,
-        process_request: Answer,
-        **options: Unpack[ServeOptions],
-    ) -> ws.serve:
-        options["max_size"] = LARGEST
-        crowd = Crowd()
+    def serve(handler: Any, host: str, port: int, *, process_request: Answer, **options: Any) -> ws.serve:
         return _Serving(
             handler,
             sock=opened,
             process_request=_guarded(process_request, guard, answers),
-            create_connection=partial(Connection, gate=gate, crowd=crowd),  # type: ignore[arg-type]
+            create_connection=partial(Connection, gate=gate, crowd=Crowd()),  # type: ignore[arg-type]
             logger=_logger(),
-            **options,
+            **options | {"max_size": LARGEST},
         )
 
     return serve
@@ -273,13 +236,10 @@ class _Serving(ws.serve):
     connection that began in the last turn would belong to nobody and stay open.
     """
 
-    async def __aexit__(
-        self, exc_type: type[BaseException] | None, exc_value: BaseException | None, traceback: TracebackType | None
-    ) -> None:
-        loop = asyncio.get_running_loop()
+    async def __aexit__(self, *error: Any) -> None:
         for listens in self.server.sockets:
-            loop.remove_reader(listens.fileno())
-        await super().__aexit__(exc_type, exc_value, traceback)
+            asyncio.get_running_loop().remove_reader(listens.fileno())
+        await super().__aexit__(*error)
 
 
 def _answered(guard: Guard, answers: Answers, request: Request, body: Body) -> Response:

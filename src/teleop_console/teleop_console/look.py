@@ -26,9 +26,9 @@ class Meaning(NamedTuple):
 
 MEANINGS: Mapping[str, Meaning] = MappingProxyType(
     {
-        "good": Meaning((43, 138, 62), "#247a36", "#51cf66"),  # goes, is free
-        "held": Meaning((154, 87, 0), "#9a5700", "#ffb84d"),  # holds, waits, warns, is at a limit
-        "wrong": Meaning((214, 0, 28), "#d6001c", "#ff7b83"),  # stopped, touches; the stop
+        "good": Meaning((43, 138, 62), "#127f48", "#7ee8a8"),  # goes, is free
+        "held": Meaning((157, 105, 0), "#9d6900", "#ffc14d"),  # holds, waits, warns, is at a limit
+        "wrong": Meaning((200, 0, 26), "#a80016", "#ff6060"),  # stopped, touches; the stop
         "idle": Meaning((92, 102, 112), "#5c6670", "#9aa5b1"),  # there, and no more
         "measured": Meaning((217, 95, 2), "#b34d00", "#ff9f4d"),  # paths that were measured
         "wanted": Meaning((28, 109, 208), "#1c6dd0", "#74a9f2"),  # what shall be; what to press next
@@ -55,7 +55,7 @@ ROLES: Mapping[Role, Color] = MappingProxyType(
 """Greys of solids, readable on light and on dark ground."""
 LIGHT: Color = (255, 255, 255)
 DARK: Color = (20, 20, 20)
-"""Ground behind the scene: viser's."""
+"""Ground behind the scene: viser's, which the style sheet has too."""
 GRID: Color = (196, 202, 208)
 GRID_DARK: Color = (52, 58, 64)
 """Lines of the floor."""
@@ -63,8 +63,22 @@ CURVES = ("#0072b2", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#8c6d46")
 """Of curves, in their order; told apart without seeing red or green (Okabe and Ito
 2008)."""
 
-_LIGHT = {"ground": "#ffffff", "text": "#1c2126", "muted": "#5c6670", "line": "#d9dee3", "field": "#7d8790"}
-_DARK = {"ground": "#1f2328", "text": "#e6e9ec", "muted": "#9aa5b1", "line": "#343b42", "field": "#7f8a95"}
+_LIGHT = {
+    "scene": "#ffffff",
+    "ground": "#ffffff",
+    "text": "#1c2126",
+    "muted": "#5c6670",
+    "line": "#d9dee3",
+    "field": "#7d8790",
+}
+_DARK = {
+    "scene": "#141414",
+    "ground": "#1f2328",
+    "text": "#e6e9ec",
+    "muted": "#9aa5b1",
+    "line": "#343b42",
+    "field": "#7f8a95",
+}
 
 _STYLE = """\
 :root { VARIABLES; --t-stop: STOP; --t-next: NEXT;
@@ -73,7 +87,7 @@ _STYLE = """\
 @media (prefers-color-scheme: dark) { :root.t-choosing { DARK_VARIABLES; color-scheme: dark; } }
 body { font: var(--t-text)/1.45 system-ui, -apple-system, "Segoe UI", Roboto, sans-serif; }
 .t-status { padding: 4px 14px; color: var(--t-color-text); font-size: var(--t-small);
-  box-sizing: border-box; height: 166px; overflow-y: auto; overflow-wrap: anywhere;
+  box-sizing: border-box; height: 184px; overflow-y: auto; overflow-wrap: anywhere;
   line-height: 18px;
   border-bottom: 1px solid var(--t-color-line); margin-bottom: 6px; }
 .t-role { margin: 8px 14px 0; font-weight: 600; }
@@ -85,20 +99,29 @@ body { font: var(--t-text)/1.45 system-ui, -apple-system, "Segoe UI", Roboto, sa
 #t-safety { position: fixed; left: 12px; bottom: 12px; z-index: 10000; width: 230px;
   display: flex; flex-direction: column; gap: 8px; font: inherit; }
 #t-stop[hidden], #t-end[hidden], #t-press[hidden] { display: none; }
-#t-stop { height: 56px; border: 0; border-radius: 6px; background: var(--t-stop); color: #fff;
+#t-stop { height: 56px; border: 2px solid #fff; border-radius: 6px; background: var(--t-stop); color: #fff;
   font-family: inherit; font-size: 18px; font-weight: 700; letter-spacing: 0.02em; cursor: pointer;
   box-shadow: 0 1px 4px rgba(0,0,0,.3); touch-action: manipulation; user-select: none; }
 #t-stop:hover { filter: brightness(1.08); } #t-stop:active { filter: brightness(0.85); }
 #t-stop:focus-visible { outline: 3px solid var(--t-color-text); outline-offset: 2px; }
-#t-starting { position: fixed; inset: 0; z-index: 9999; display: flex; align-items: center;
-  justify-content: center; background: var(--t-color-ground); color: var(--t-color-text);
+#t-starting { position: fixed; inset: 0; z-index: 9999; display: flex; flex-direction: column; align-items: center;
+  justify-content: center; gap: 8px; background: var(--t-color-ground); color: var(--t-color-text);
   font-size: var(--t-head); padding: 16px; box-sizing: border-box; text-align: center; }
+#t-starting::before { content: "One moment, please"; font-size: 22px; font-weight: 650; }
 #t-starting[hidden] { display: none; }
 #t-banner { display: none; position: fixed; top: 0; left: 0; z-index: 10001;
   box-sizing: border-box; padding: 10px 16px; font-size: var(--t-head); line-height: 1.4;
   background: var(--t-stop); color: #fff; }
 #t-banner b { font-weight: 700; margin-right: 0.6em; }
 .t-says #t-banner { display: block; }
+.mantine-Notification-description { color: var(--t-color-text) !important; }
+::placeholder { color: var(--t-color-muted) !important; opacity: 1; }
+#root { --mantine-color-dimmed: var(--t-color-muted); --mantine-primary-color-filled: var(--t-color-wanted);
+  --mantine-color-blue-filled: var(--t-color-wanted); }
+#root button[style*="color-blue-filled"] { background: var(--t-next); color: #fff; }
+#root .mantine-Slider-markLabel { color: var(--t-color-muted); }
+#root input:not([data-disabled]) { border-color: var(--t-color-field); }
+#root input:focus-visible { outline: 3px solid var(--t-color-wanted); outline-offset: 1px; }
 #root button[style*="color-gray-filled"] { background: var(--t-color-ground); color: var(--t-color-text);
   border: 1px solid var(--t-color-field); }
 #root button[style*="color-gray-filled"]:disabled { color: var(--t-color-muted); border-color: var(--t-color-line); }
@@ -128,7 +151,7 @@ def style(form: Path | None = None) -> str:
     curves = {f"curve{i}": color for i, color in enumerate(CURVES)}
     light = _LIGHT | curves | {name: one.light for name, one in MEANINGS.items()}
     dark = _DARK | {name: one.dark for name, one in MEANINGS.items()}
-    stop = MEANINGS["wrong"].light  # on any ground, under white letters
+    stop = f"#{bytes(WRONG).hex()}"  # on any ground, under white letters
     files = (*_PARTS, *((form,) if form is not None else ()))
     return (
         "".join((_STYLE, *(file.read_text(encoding="utf-8") for file in files)))

@@ -8,18 +8,30 @@
   let connected = true, pressed = false, shown = { can_stop: true, doing: 'starting …' };
 
   // Where software draws, each sample of each pixel costs time that a session may need: edges are not smoothed, flat
-  // drawings are left to the processor, and a large scene has fewer pixels.
+  // drawings are left to the processor, a large scene has fewer pixels, and nothing shines through it: it has the
+  // ground that viser lays behind it.
   const canvas = HTMLCanvasElement.prototype, context = canvas.getContext;
   const trial = context.call(document.createElement('canvas'), 'webgl2');
   const named = trial?.getExtension('WEBGL_debug_renderer_info');
   const soft = /swiftshader|llvmpipe|softpipe|software|basic render/i.test(named && trial.getParameter(named.UNMASKED_RENDERER_WEBGL));
   trial?.getExtension('WEBGL_lose_context')?.loseContext();
+  let ground = [1, 1, 1];
+  function clear(mask) {
+    this.clearColor(...ground, 1);
+    WebGL2RenderingContext.prototype.clear.call(this, mask);
+  }
   if (soft) {
     canvas.getContext = function (kind, wanted) {
-      return context.call(this, kind, { ...wanted, ...(kind === '2d' ? { willReadFrequently: true } : { antialias: false }) });
+      if (kind === '2d') return context.call(this, kind, { ...wanted, willReadFrequently: true });
+      const drawing = context.call(this, kind, { ...wanted, antialias: false, alpha: false });
+      return drawing && Object.assign(drawing, { clear });
     };
   }
-  function thin() { // viser takes another ratio at any time; ?fixedDpr=1 in the address keeps one
+  function thin() { // again and again: viser takes another ratio at any time; ?fixedDpr=1 in the address keeps one
+    const behind = window.__viserMutable?.backgroundMaterial; // a picture behind the scene, which has none
+    if (behind) behind.visible = false;
+    const color = getComputedStyle(document.documentElement).getPropertyValue('--t-color-scene').trim();
+    if (color) ground = [1, 3, 5].map((at) => parseInt(color.slice(at, at + 2), 16) / 255);
     const settings = soft && !location.search.includes('fixedDpr') && window.__viserTestpoints?.devSettings;
     if (settings) settings.set({ fixedDpr: Math.min(1, Math.max(0.35, Math.sqrt(PIXELS / (innerWidth * innerHeight)))) });
   }
@@ -51,7 +63,7 @@
     const [head, text] = pressed === 'unheard'
       ? ['STOP NOT CONFIRMED', 'The console does not answer. Use the emergency stop of the machine.']
       : pressed === 'early' ? ['EMERGENCY STOP', 'No arm is there yet. It is stopped as soon as it is.']
-      : !connected ? ['NO CONNECTION', 'What you see is old. The arm holds while nobody drives.']
+      : !connected ? ['NO CONNECTION', `What you see is old.${shown.can_stop ? ' The arm holds while nobody drives.' : ''}`]
       : shown.is_stopped || pressed ? ['EMERGENCY STOP', shown.text || 'All arms are being stopped.']
       : ['', ''];
     const root = document.documentElement.classList;

@@ -47,7 +47,7 @@ class Panel:
     ) -> None:
         self._server, self._gui, self._link = server, server.gui, link
         self._make_public, self._may_drive = server.make_public, drivers.may_drive
-        self._take, self._drivers, self._drawn = drivers.take, drivers, 0.0
+        self._take, self._drawn = drivers.take, 0.0
         self.scores = {arm.name: LiveScores() for arm in link.arms}
         self._gui.main_panel.dock_right()  # beside the scene, not over it
         self._gui.main_panel.set_width(WIDTH)  # without it, what a phone had room for is kept on a desk
@@ -112,7 +112,7 @@ class Panel:
 
     def _add_scores(self) -> None:
         self._live = self._gui.add_markdown("")
-        again = self._gui.add_button("begin anew", hint="the figures, not the recording")
+        again = self._gui.add_button("begin anew", hint="the figures, not the recording", color="gray")
         again.on_click(lambda _: self._begin_scores())
         self._score = self._button("Score the last saved recording", "evaluate", self._evaluate)
         self._score.disabled = True
@@ -199,11 +199,9 @@ class Panel:
         self.stylus_folder.visible = now["steps"]
 
     def _doing(self, view: View) -> str:
-        """Run, recording, and who drives."""
+        """Run, recording, and who leads where nobody at a page does."""
         where = view.recording.name if view.recording else "not recording"
-        driver = self._drivers.driver
-        who = "nobody has control" if driver is None else f"browser {driver + 1} has control"
-        return " · ".join(filter(None, (f"run {view.run + 1}", where, who, leader(self._kind))))
+        return " · ".join(filter(None, (f"run {view.run + 1}", where, leader(self._kind))))
 
     @property
     def _kind(self) -> str:

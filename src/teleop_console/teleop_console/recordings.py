@@ -1,6 +1,7 @@
 """Recordings: those of a folder, the newest first, with their verdicts as these become known."""
 
 import json
+import os
 import shutil
 import subprocess
 import sys
@@ -15,6 +16,7 @@ from teleop_core.base.errors import ParameterError, TeleopError
 _MOST = 50
 """Recordings that are listed."""
 _FILE = "metadata.yaml"
+_COLUMNS = 132  # of what a command says
 _KIND = {"score": "evaluate", "export": "export"}
 
 
@@ -85,7 +87,9 @@ class Recordings:
 
     def run(self, kind: str, names: Sequence[str]) -> str:
         """Run such a command at low priority; returns what it printed."""
-        done = subprocess.run([*_program(), *self.words(kind, names)], capture_output=True, text=True, check=False)
+        wide = os.environ | {"COLUMNS": str(_COLUMNS)}  # names of several recordings stand side by side
+        words = [*_program(), *self.words(kind, names)]
+        done = subprocess.run(words, capture_output=True, text=True, check=False, env=wide)
         return done.stdout or done.stderr
 
     def judge(self) -> None:

@@ -18,6 +18,7 @@ from teleop_core.kernels.geometry import Array
 
 _POINTS = {"tour": "tour.points", "points": "points"}
 """Operators that go to points, and where these stand."""
+_PIECES = 6  # of a line of the floor, each of which fades evenly
 
 
 def targets_of(parameters: Parameters, arm: str) -> Array:
@@ -34,6 +35,31 @@ def targets_of(parameters: Parameters, arm: str) -> Array:
     if not isinstance(points, tuple) or not points or len(points) % 3:
         return np.zeros((0, 3))
     return np.asarray(REST_POSITION + center + np.reshape(np.array(points, np.float64), (-1, 3)))
+
+
+def floor_lines(radius: float, cell: float) -> tuple[Array, Array]:
+    """Lines of a floor that fade towards its rim, every fifth of them strong.
+
+    A grid that a shader draws takes a quarter of the time of a picture that software draws.
+
+    Args:
+        radius: Where they end [m].
+        cell: Distance between two of them [m].
+
+    Returns:
+        Segments (N, 2, 3) [m] about the origin, and how strong each end of them is (N, 2), 0 to 1.
+    """
+    count = round(radius / cell)
+    joints = np.linspace(-count, count, _PIECES + 1)
+    lines = np.arange(-count, count + 1)
+    along = np.tile(np.stack((joints[:-1], joints[1:]), axis=1), (len(lines), 1))
+    across = np.repeat(lines, _PIECES)
+    ends = np.stack((along, np.stack((across, across), axis=1)), axis=-1)
+    weight = np.where(across % 5 == 0, 0.8, 0.3)[:, None]
+    strength = weight * np.clip(1.0 - np.linalg.norm(ends, axis=-1) / count, 0.0, 1.0)
+    is_seen = strength.any(axis=1)
+    points = np.insert(cell * ends[is_seen], 2, 0.0, axis=-1)
+    return np.concatenate((points, points[..., [1, 0, 2]])), np.tile(strength[is_seen], (2, 1))
 
 
 class Scene:
@@ -116,8 +142,9 @@ class Scene:
 
     def set_dark(self, *, is_dark: bool) -> None:
         """Take the colours for a dark page, or a light one."""
-        ground = DARK if is_dark else LIGHT
-        self._floor.cell_color = self._floor.section_color = GRID_DARK if is_dark else GRID
+        ground, line = (DARK, GRID_DARK) if is_dark else (LIGHT, GRID)
+        shade = np.array(ground) + self._strength[:, :, None] * (np.array(line) - np.array(ground))
+        self._floor.colors = shade.astype(np.uint8)
         for nodes in self.arms.values():
             nodes.set_background(ground)
 
@@ -159,12 +186,11 @@ class Scene:
         wide = 2.5 * float((high - low)[:2].max())
         cell = 10.0 ** np.floor(np.log10(wide / 5.0))
         middle = 0.5 * (low + high)
-        self._floor = self._server.scene.add_grid(
-            "/ground", wide, wide, cell_size=cell, section_size=5.0 * cell,
-            cell_color=GRID, section_color=GRID, cell_thickness=0.5,
-            section_thickness=1.0, fade_distance=2.5 * wide, shadow_opacity=0.0,
-            position=(middle[0], middle[1], low[2] - 1e-3),
-        )  # fmt: skip
+        points, self._strength = floor_lines(0.5 * wide, cell)
+        place = (middle[0], middle[1], low[2] - 1e-3)
+        self._floor = self._server.scene.add_line_segments(
+            "/ground", points.astype(np.float32), GRID, thickness=2.0, thickness_units="screen", position=place
+        )
 
     def _begin(self) -> None:
         first, camera = self.work(), self._server.initial_camera

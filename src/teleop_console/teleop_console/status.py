@@ -97,14 +97,14 @@ def next_step(view: View, *, is_led_here: bool) -> str:
     if button:
         return {"Initialize": "Initialize: reset, enable and home", "Start": "Start: follow again"}[button]
     rests = any(arm.state.get("is_clutched") for arm in view.arms.values())
-    return "drag the stylus by its arrows; to let go is the clutch" if is_led_here and rests else ""
+    return "drag the stylus; letting go is the clutch" if is_led_here and rests else ""
 
 
 def facts(view: View) -> str:
     """Rate of the slave, and ages of command and picture; what is not known is left out."""
     told = (
-        (view.rate, f"{view.rate:.0f} ticks/s"),
-        (view.delay[0], f"command {1e3 * view.delay[0]:.1f} ms old"),
+        (view.rate, f"{view.rate:.0f} Hz"),
+        (view.delay[0], f"command {1e3 * view.delay[0]:.1f} ms"),
         (view.age, f"picture {1e3 * view.age:.0f} ms old"),
         (view.display[1], f"display {display_text(view)}"),
     )
@@ -168,7 +168,7 @@ def status_html(view: View, title: str, doing: str, step: str = "") -> str:
 
 def _news_line(text: str) -> str:
     """A warning; a hand that rests is no more than information."""
-    signal, mark = ("muted", "ⓘ") if text.endswith(RESTS) else ("held", "⚠")
+    signal, mark = ("muted", "ℹ") if text.endswith(RESTS) else ("held", "⚠")
     return f'<span class="t-{signal}">{mark} {html.escape(text)}</span>'
 
 

@@ -208,6 +208,8 @@
     const place = x(when);
     if (place < left || place > left + wide) return;
     pen.fillStyle = color(meaning); pen.fillRect(place - 1, RULER - 6, 2, height);
+    const room = Math.max(place - left, left + wide - place) - 6;
+    while (text.length > 2 && pen.measureText(text).width > room) text = `${text.slice(0, -2)}…`;
     const long = pen.measureText(text).width, begin = place + long + 6 > left + wide ? place - long - 4 : place + 4;
     pen.textAlign = 'left';
     pen.fillStyle = color('ground'); pen.fillRect(begin - 2, 1, long + 4, RULER - 5);

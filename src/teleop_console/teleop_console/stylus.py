@@ -22,6 +22,8 @@ STEP_LENGTH, STEP_TURN = 1e-3, np.radians(1.0)
 """A small step [m, rad]."""
 LINGER = 1.0
 """Time for which the stylus is held after a small step, in which the next may come [s]."""
+GRIP = "grip"
+"""Name of a gizmo's node below that of its master."""
 _SIZE = 0.08  # of a gizmo [m]
 
 
@@ -71,7 +73,9 @@ class Stylus:
         self._may_drive, self._on_hold, self._on_let_go = may_drive, on_hold, on_let_go
         self._lock = threading.RLock()
         self._hands = {
-            arm: _Hand(server.scene.add_transform_controls(f"{node}/grip", scale=_SIZE, depth_test=False, opacity=0.8))
+            arm: _Hand(
+                server.scene.add_transform_controls(f"{node}/{GRIP}", scale=_SIZE, depth_test=False, opacity=0.8)
+            )
             for arm, node in scene.masters.items()
         }
         for arm, hand in self._hands.items():

@@ -19,6 +19,7 @@ from teleop_console.drivers import Drivers
 from teleop_console.filter import PICTURE
 from teleop_console.hooks import Server
 from teleop_console.scene import Scene
+from teleop_console.stylus import GRIP
 
 _SHOWN = (
     ("frames", "axes", "axes of all bodies"),
@@ -185,11 +186,12 @@ class Visitors:
         is_live: Whether it is a session, and not a recording.
     """
 
-    def __init__(self, server: viser.ViserServer, drivers: Drivers, scene: Scene, *, is_live: bool) -> None:
+    def __init__(self, server: Server, drivers: Drivers, scene: Scene, *, is_live: bool) -> None:
         self._server, self._drivers, self._scene, self._is_live = server, drivers, scene, is_live
         self._lines: dict[int, viser.GuiHtmlHandle] = {}
         self._fitted: dict[int, _Fit] = {}
         self._riding: dict[int, Callable[[], Camera]] = {}
+        self._grips: dict[int, tuple[bool, float]] = {}
 
     def look(self) -> None:
         """Welcome new pages, and tell every page whether it drives or watches."""
@@ -197,12 +199,13 @@ class Visitors:
         for number, client in clients.items():
             text = f'<p class="t-role">{self._role(number)}</p>'
             self._fit(number, client)
+            self._show_grips(number)
             if number not in self._lines:
                 self._lines[number] = client.gui.add_html(text, order=-10.0)
             elif self._lines[number].content != text:
                 self._lines[number].content = text
         for number in self._lines.keys() - clients.keys():
-            del self._lines[number], self._fitted[number]
+            del self._lines[number], self._fitted[number], self._grips[number]
             self._riding.pop(number, None)
 
     def give(self, client: viser.ClientHandle, find: Callable[[], Camera] | None, *, is_riding: bool = False) -> None:
@@ -226,6 +229,19 @@ class Visitors:
         if self._is_live:
             return self._drivers.role(number)
         return f"replay: {'you play it' if self._drivers.may_drive(number) else 'another page plays it'}"
+
+    def _show_grips(self, number: int) -> None:
+        """Show a page the handles of the styli if it may drive; those that watch are told again and again.
+
+        All pages are told when the handles are shown again, those that watch too.
+        """
+        may_drive, now = self._drivers.may_drive(number), time.monotonic()
+        before, told = self._grips.setdefault(number, (True, -_LOOK))
+        if may_drive == before and (may_drive or now - told < _LOOK):
+            return
+        self._grips[number] = (may_drive, now)
+        for node in self._scene.masters.values():
+            self._server.show_on(number, f"{node}/{GRIP}", is_shown=may_drive)
 
     def _fit(self, number: int, client: viser.ClientHandle) -> None:
         """Point the camera of a new page at the work; again when the window gets its size or the work grows."""
