@@ -8,6 +8,7 @@ import re
 import subprocess
 import sys
 import warnings
+from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
@@ -47,6 +48,17 @@ def bench() -> experiments.Bench:
 def test_every_experiment_runs_to_its_end_and_agrees_as_it_did(name: str, bench: experiments.Bench) -> None:
     rows = experiments.run(name, bench=bench).rows
     assert sum(row.agrees is True for row in rows) == AGREEING[name]
+    if name == "points24":
+        stops_inside_of_all_points_if_it_sees_and_else_in_none(rows)
+
+
+def stops_inside_of_all_points_if_it_sees_and_else_in_none(rows: Sequence[experiments.Row]) -> None:
+    """What is further said of a hand that goes from point to point, 24 of them."""
+    seen, blind = [row for row in rows if row.quantity.endswith("inside the inner circle")]
+    assert seen.published == seen.predicted == seen.ours == 24.0
+    assert blind.predicted == blind.ours == 0.0
+    (mean, *_) = [row.predicted for row in rows if row.unit == "mm"]
+    assert 0.05 < present(mean) < 0.2
 
 
 @pytest.mark.slow
