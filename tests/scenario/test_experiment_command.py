@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from headless import Headless
-from present import present
 from teleop_lab import experiments
 from teleop_lab.experiments.bench import Bench
 from teleop_lab.experiments.outcome import Outcome
@@ -148,11 +147,3 @@ def test_sessions_that_several_experiments_need_run_once(outcomes: list[Outcome]
     assert bench.runs == alone + 12
     found = next(outcome for outcome in outcomes if outcome.name == "master_slave")
     assert again.to_json() == found.to_json()
-
-
-def test_gravity_off_is_clearly_worse_under_the_sources_controller(bench: Bench) -> None:
-    found = experiments.run("gravity", bench=bench)
-    for mode in ("coarse", "fine"):
-        ratio = found.row("without over with", f"position error, RMS, {mode}")
-        assert present(ratio.predicted) > 1.5
-        assert present(ratio.ours) < 1.1
