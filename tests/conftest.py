@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from hypothesis import settings
 
+from browser import chromium
 from teleop_core.kernels import IS_COMPILED
 from teleop_core.nodes.starter import Starter
 from teleop_core.session.configuration import configure
@@ -70,6 +71,12 @@ def teleop() -> Run:
         return done
 
     return run
+
+
+@pytest.fixture(scope="session")
+def browser() -> str:
+    """Path of a Chromium; a test that asks for it is skipped without one, in CI it fails."""
+    return chromium()
 
 
 @pytest.fixture(scope="session")

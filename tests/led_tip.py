@@ -1,5 +1,6 @@
 """Led tip: a tip that is led along any way through an object, what it feels and what it loses."""
 
+from collections.abc import Iterable
 from itertools import pairwise
 from typing import Any, NamedTuple
 
@@ -138,6 +139,26 @@ def lead(way: Array, name: str = "plane", parameters: Any = None, **numbers: flo
     felt, lost = np.zeros((len(way) - 1, 6)), np.zeros(len(way) - 1)
     _lead(p, contacts, needle(name, parameters), fine, felt, lost)
     return felt[:, :3], lost, contacts[0]
+
+
+def assert_none_gains_energy(ways: Iterable[Array], name: str, parameters: Any, friction: float) -> None:
+    """Assert that of closed ways through an object none gets energy from it; with friction each loses some.
+
+    Args:
+        ways: Of each the places (ticks, 3) [m] from the middle of the object; those that end inside do not count.
+        name: Of the object.
+        parameters: Of its shape.
+        friction: Its coefficient of friction; 0 for an object without damping too.
+    """
+    made_of = {"world_stiffness": 1000.0, "world_friction": friction, "world_damping": 2.0 * friction}
+    shares = []
+    for way in ways:
+        force, lost, _ = lead(way, name, parameters, puncture_force=0.0, **made_of)
+        turned = np.abs((force[:-1] * np.diff(way[:-1], axis=0)).sum(axis=1)).sum()
+        if turned > 1e-3 and not force[-1].any():
+            shares.append(lost[-1] / turned)
+    assert len(shares) > 10
+    assert min(shares) > (0.0 if friction else -1e-3)
 
 
 def along_z(*heights: float, speed: float = 0.02) -> Array:

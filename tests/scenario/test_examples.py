@@ -5,7 +5,6 @@ import math
 import re
 import subprocess
 import sys
-import tempfile
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -360,24 +359,6 @@ def test_who_sees_the_slave_later_takes_longer_to_the_goal(tmp_path: Path) -> No
 
 def test_own_control_is_a_button_beside_the_others(tmp_path: Path) -> None:
     assert re.search(r"buttons: .*Start.*, Gentle$", run("own_control", tmp_path), re.MULTILINE)
-
-
-def test_examples_pass_a_strict_type_check_of_a_user() -> None:
-    with tempfile.TemporaryDirectory() as folder:
-        own = Path(folder) / "mypy.ini"  # libraries that are not installed here
-        own.write_text("[mypy]\n[mypy-mlflow.*,stable_baselines3.*]\nignore_missing_imports = True\n")
-        options = [
-            "--strict",
-            f"--config-file={own}",
-            "--follow-imports=silent",
-            "--no-error-summary",
-            "--disable-error-code=import-untyped",
-        ]
-        files = [str(EXAMPLES / f"{name}.py") for name in NAMES]
-        done = subprocess.run(
-            [sys.executable, "-m", "mypy", *options, *files], cwd=folder, capture_output=True, text=True, check=False
-        )
-    assert done.returncode == 0, done.stdout
 
 
 def test_a_bridge_is_drilled_with_a_model_of_its_controller_and_one_that_coasts_is_found(tmp_path: Path) -> None:

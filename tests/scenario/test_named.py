@@ -8,6 +8,7 @@ import re
 import subprocess
 import sys
 import warnings
+from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
@@ -45,8 +46,29 @@ def bench() -> experiments.Bench:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", experiments.EXPERIMENTS.names())
 def test_every_experiment_runs_to_its_end_and_agrees_as_it_did(name: str, bench: experiments.Bench) -> None:
-    rows = experiments.run(name, bench=bench).rows
-    assert sum(row.agrees is True for row in rows) == AGREEING[name]
+    outcome = experiments.run(name, bench=bench)
+    assert sum(row.agrees is True for row in outcome.rows) == AGREEING[name]
+    if name == "points24":
+        stops_inside_of_all_points_if_it_sees_and_else_in_none(outcome.rows)
+    if name == "gravity":
+        is_clearly_worse_without_under_the_sources_controller(outcome)
+
+
+def is_clearly_worse_without_under_the_sources_controller(outcome: experiments.Outcome) -> None:
+    """What is further said of an arm that does not hold its own weight."""
+    for mode in ("coarse", "fine"):
+        ratio = outcome.row("without over with", f"position error, RMS, {mode}")
+        assert present(ratio.predicted) > 1.5
+        assert present(ratio.ours) < 1.1
+
+
+def stops_inside_of_all_points_if_it_sees_and_else_in_none(rows: Sequence[experiments.Row]) -> None:
+    """What is further said of a hand that goes from point to point, 24 of them."""
+    seen, blind = [row for row in rows if row.quantity.endswith("inside the inner circle")]
+    assert seen.published == seen.predicted == seen.ours == 24.0
+    assert blind.predicted == blind.ours == 0.0
+    (mean, *_) = [row.predicted for row in rows if row.unit == "mm"]
+    assert 0.05 < present(mean) < 0.2
 
 
 @pytest.mark.slow

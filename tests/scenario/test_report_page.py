@@ -1,12 +1,10 @@
 """Report page: opened in a real browser, it draws every plot and asks nobody for anything."""
 
 import json
-import os
 import re
-import shutil
 import subprocess
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
@@ -23,7 +21,6 @@ from teleop_core.graph import STATE_FIELDS, TICK_NS, topics
 if TYPE_CHECKING:
     from conftest import Run
 
-BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 FLAGS = (
     "--headless", "--no-sandbox", "--disable-gpu", "--enable-unsafe-swiftshader", "--disable-quic",
     "--no-first-run", "--disable-background-networking", "--disable-component-update",
@@ -46,15 +43,6 @@ FIXTURE = {
     "fixture_size_y": 0.03,
     "fixture_size_z": 0.03,
 }
-
-
-@pytest.fixture(scope="module")
-def browser() -> str:
-    found = next(filter(None, map(shutil.which, BROWSERS)), None)
-    if found is None:
-        reason = f"no browser to open the page with; install one of {', '.join(BROWSERS)}"
-        (pytest.fail if os.environ.get("CI") else pytest.skip)(reason)
-    return found
 
 
 def record(path: Path, seed: int, fixture: dict[Any, Any] | None = None, count: int = 6000) -> Path:
@@ -136,7 +124,7 @@ def test_page_of_three_recordings_draws_everything_without_asking_the_network(br
     expected = sum(len(study(Bag(path)).figures()) for path in bags)
     assert expected == 27  # nine of each
     page = tmp_path / "report.html"
-    evaluate_bags(bags, None, page, cast(Console, _Silent()))
+    evaluate_bags(bags, None, page, Console(quiet=True))
     assert page.stat().st_size < LARGEST_PAGE
     attributes, said, urls = opened(browser, page, tmp_path)
     assert attributes.get("errors", "") == ""
@@ -169,7 +157,7 @@ def test_page_of_a_session_shows_both_arms_with_their_fixtures(
 @pytest.mark.slow
 def test_page_tells_when_a_plot_cannot_be_drawn(browser: str, tmp_path: Path) -> None:
     page = tmp_path / "report.html"
-    evaluate_bags([record(tmp_path / "live", 1)], None, page, cast(Console, _Silent()))
+    evaluate_bags([record(tmp_path / "live", 1)], None, page, Console(quiet=True))
     text = page.read_text()
     data = present(re.search(r'id="page-data" type="application/json">(.*?)</script>', text, re.DOTALL))
     broken = json.loads(data.group(1))
@@ -178,12 +166,3 @@ def test_page_tells_when_a_plot_cannot_be_drawn(browser: str, tmp_path: Path) ->
     attributes, _, _ = opened(browser, page, tmp_path)
     assert "nowhere" in attributes["errors"]
     assert int(attributes["drawn"]) == len(broken["figures"]) - 1
-
-
-class _Silent:
-    """A console without a screen."""
-
-    width = 80
-
-    def print(self, *things: object, **options: object) -> None:
-        pass

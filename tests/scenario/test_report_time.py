@@ -1,11 +1,9 @@
 """Time of the report page: driven in a real browser, its plots share one visible time."""
 
 import json
-import os
-import shutil
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 import pytest
@@ -19,7 +17,6 @@ from teleop_core.kernels.geometry import Array
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
-BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 LONG, SHORT = 600_000, 20_000
 LARGEST_PAGE = 20_000_000
 # Curves are rounded to less than this.
@@ -58,15 +55,6 @@ PLANE_COLUMNS = """
 """
 
 
-@pytest.fixture(scope="module")
-def chromium() -> str:
-    found = next(filter(None, map(shutil.which, BROWSERS)), None)
-    if found is None:
-        reason = f"no browser to open the page with; install one of {', '.join(BROWSERS)}"
-        (pytest.fail if os.environ.get("CI") else pytest.skip)(reason)
-    return found
-
-
 def noisy(count: int, seed: int) -> Recipe:
     """A recording with a moving, noisy tip and a force; limits and a clutch on the way."""
     recipe, rng = Recipe(count), np.random.default_rng(seed)
@@ -95,7 +83,7 @@ def short(tmp_path_factory: pytest.TempPathFactory) -> Any:
     recipes = {name: noisy(SHORT, seed) for seed, name in enumerate(("one", "two"))}
     for name, recipe in recipes.items():
         recipe.write(folder / name)
-    evaluate_bags([folder / name for name in recipes], None, folder / "page.html", cast(Console, _Silent()))
+    evaluate_bags([folder / name for name in recipes], None, folder / "page.html", Console(quiet=True))
     return folder / "page.html", recipes
 
 
@@ -106,7 +94,7 @@ def long(tmp_path_factory: pytest.TempPathFactory) -> Any:
     recipe = noisy(LONG, 3)
     recipe.values(topics.SLAVE_MEASURED_CP)[432_100, :3] += 0.004  # a single sample
     recipe.write(folder / "long")
-    evaluate_bags([folder / "long"], None, folder / "page.html", cast(Console, _Silent()))
+    evaluate_bags([folder / "long"], None, folder / "page.html", Console(quiet=True))
     return folder / "page.html", recipe
 
 
@@ -121,14 +109,14 @@ def tabs() -> Iterator[dict[Any, Any]]:
 
 @pytest.fixture
 def opened(
-    chromium: str, tabs: dict[tuple[Path, int], Headless], tmp_path_factory: pytest.TempPathFactory
+    browser: str, tabs: dict[tuple[Path, int], Headless], tmp_path_factory: pytest.TempPathFactory
 ) -> Iterator[Callable[..., Any]]:
     """Opens a page at a width; whatever goes wrong in it fails the test."""
     used = []
 
     def open_page(page: Any, width: int = 1200) -> Any:
         if (page, width) not in tabs:
-            tabs[page, width] = Headless(chromium, tmp_path_factory.mktemp("profile"), width)
+            tabs[page, width] = Headless(browser, tmp_path_factory.mktemp("profile"), width)
             tabs[page, width].open(page)
         tab = tabs[page, width]
         tab.value("document.querySelectorAll('.times .all').forEach((button) => button.click())")
@@ -140,15 +128,6 @@ def opened(
     for tab in used:
         assert tab.value("document.body.dataset.errors || ''") == ""
         assert not tab.said
-
-
-class _Silent:
-    """A console without a screen."""
-
-    width = 80
-
-    def print(self, *things: object, **options: object) -> None:
-        pass
 
 
 def plots(tab: Any) -> Any:
@@ -405,8 +384,8 @@ def test_page_follows_a_window_that_becomes_narrow_and_wide_again(opened: Callab
         assert tab.value("document.documentElement.scrollWidth") <= width
 
 
-def test_without_scripts_there_are_tables_and_a_word(chromium: str, short: Any, tmp_path: Path) -> None:
-    with Headless(chromium, tmp_path) as tab:
+def test_without_scripts_there_are_tables_and_a_word(browser: str, short: Any, tmp_path: Path) -> None:
+    with Headless(browser, tmp_path) as tab:
         tab.call("Emulation.setScriptExecutionDisabled", value=True)
         tab.call("Page.navigate", url=Path(short[0]).as_uri())
         while tab.value("document.readyState") != "complete":
@@ -423,8 +402,8 @@ def test_table_is_folded_where_scripts_run(opened: Callable[..., Any], short: An
     assert "position, RMS" not in tab.value("document.body.innerText")
 
 
-def test_page_in_a_browser_that_cannot_unpack_says_so(chromium: str, short: Any, tmp_path: Path) -> None:
-    with Headless(chromium, tmp_path) as tab:
+def test_page_in_a_browser_that_cannot_unpack_says_so(browser: str, short: Any, tmp_path: Path) -> None:
+    with Headless(browser, tmp_path) as tab:
         source = "delete window.DecompressionStream"
         tab.call("Page.addScriptToEvaluateOnNewDocument", source=source)
         tab.open(Path(short[0]))

@@ -48,13 +48,11 @@ SESSIONS = (
 )
 """Sessions of 5 s that are compared between processors: every law, plant and kind of robot."""
 PROCESSORS = (
-    {"OPENBLAS_CORETYPE": "Haswell"},
-    {"OPENBLAS_CORETYPE": "Sandybridge"},
+    {"OPENBLAS_CORETYPE": "Haswell", "NPY_DISABLE_CPU_FEATURES": "X86_V4,AVX512_ICL,AVX512_SPR"},
+    {"OPENBLAS_CORETYPE": "Sandybridge", "NPY_DISABLE_CPU_FEATURES": "X86_V3,X86_V4,AVX512_ICL,AVX512_SPR"},
     {"OPENBLAS_CORETYPE": "SkylakeX"},
-    {"NPY_DISABLE_CPU_FEATURES": "X86_V4,AVX512_ICL,AVX512_SPR"},
-    {"NPY_DISABLE_CPU_FEATURES": "X86_V3,X86_V4,AVX512_ICL,AVX512_SPR"},
 )
-"""What makes NumPy and OpenBLAS compute as on another processor."""
+"""What makes NumPy and OpenBLAS compute as on processors with AVX2, with AVX, and with AVX-512."""
 
 
 def arithmetic() -> str:

@@ -257,16 +257,6 @@ def test_tip_that_is_off_misses_by_as_much_in_the_plane_of_the_board() -> None:
     assert np.allclose(visits.missed_mm, (0.3, 0.4, 7.0), atol=1e-9)
 
 
-@pytest.mark.slow
-def test_a_hand_that_sees_stops_inside_of_all_24_points_and_one_that_does_not_in_none() -> None:
-    outcome = experiments.run("points24")
-    seen, blind = [row for row in outcome.rows if row.quantity.endswith("inside the inner circle")]
-    assert seen.published == seen.predicted == seen.ours == 24.0
-    assert blind.predicted == blind.ours == 0.0
-    (mean, *_) = [row.predicted for row in outcome.rows if row.unit == "mm"]
-    assert 0.05 < present(mean) < 0.2
-
-
 def test_session_that_is_over_before_its_tour_is_told() -> None:
     bench = Bench(settings={"duration": 12.0})
     with pytest.raises(TeleopError, match="give it more time"):
