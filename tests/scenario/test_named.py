@@ -62,7 +62,7 @@ def is_clearly_worse_without_under_the_sources_controller(outcome: experiments.O
         assert present(ratio.ours) < 1.1
 
 
-def stops_inside_of_all_points_if_it_sees_and_else_in_none(rows: Sequence[experiments.Row]) -> None:
+def stops_inside_of_all_points_if_it_sees_and_else_in_none(rows: Sequence[experiments.Comparison]) -> None:
     """What is further said of a hand that goes from point to point, 24 of them."""
     seen, blind = [row for row in rows if row.quantity.endswith("inside the inner circle")]
     assert seen.published == seen.predicted == seen.ours == 24.0

@@ -114,7 +114,7 @@ def on_dask(client: "Client", study: "Study", points: Sequence[Point]) -> Iterat
     size = max(1, min(BATCH, len(points) // (4 * len(fit)) or 1))
     batches = [points[at : at + size] for at in range(0, len(points), size)]
     futures = {client.submit(do, batch, pure=False, retries=_TRIES): batch for batch in batches}
-    repeated = set[str]()
+    repeated = set[object]()
     waiting = as_completed(list(futures), loop=client.loop)
     try:
         for future in waiting:
