@@ -128,7 +128,11 @@ class Console:
         if self._link.is_live:
             give_way()
         threading.Thread(target=self._ask, args=(is_over,), daemon=True).start()
-        gc.freeze()  # a stop waits 0.2 s while garbage is looked for among all that the page is made of
+        thresholds = gc.get_threshold()
+        # A stop waits while garbage is looked for: 0.2 s among all that the page is made of, so only among what
+        # came since, and so often that this is little.
+        gc.freeze()
+        gc.set_threshold(*thresholds[:2], 1)
         try:
             due = time.monotonic()
             while not is_over():
@@ -136,6 +140,7 @@ class Console:
                 due = max(due + 1.0 / RATE, time.monotonic())
                 time.sleep(max(0.0, due - time.monotonic()))
         finally:
+            gc.set_threshold(*thresholds)
             gc.unfreeze()
         self.close()
 
