@@ -62,7 +62,7 @@ def test_a_kernel_with_room_takes_no_memory() -> None:
 
 @compiled_only
 def test_room_cannot_be_returned() -> None:
-    with pytest.raises(KernelError, match="its room ends with it"):
+    with pytest.raises(KernelError, match="its scratch memory is free again"):
         kernel(gives)()
 
 

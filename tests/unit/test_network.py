@@ -278,7 +278,7 @@ def test_a_trace_is_played_row_by_row_and_begins_anew_at_its_end(tmp_path: Path)
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("0,0.1\n2,0.1\n1,0.1\n", "line 3 says 1 s after 2 s"),
+        ("0,0.1\n2,0.1\n1,0.1\n", "line 3 says 1 s, the row before 2 s"),
         ("-1,0.1\n2,0.1\n", "line 1 says -1 s"),
         ("0,-0.2\n1,0.1\n", "line 1 says -0.2 s"),
         ("time,delay\n0,0.1\n1,fast\n", "in line 3"),

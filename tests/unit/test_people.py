@@ -185,7 +185,7 @@ def test_a_store_of_another_study_is_refused_and_so_is_a_folder_with_something_e
 ) -> None:
     with pytest.raises(SessionError, match="another study"):
         Journal(journal.folder, replace(plan, people=replace(plan.people, repetitions=5)))
-    with pytest.raises(SessionError, match="something else"):
+    with pytest.raises(SessionError, match="other files"):
         Journal(Path(__file__).parent, plan)
     (journal.folder / "people.json").write_text("[")
     with pytest.raises(SessionError, match="cannot be used"):

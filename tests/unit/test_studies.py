@@ -150,7 +150,7 @@ def test_a_store_of_another_study_is_refused(found: Found, tmp_path: Path) -> No
     with pytest.raises(tc.TeleopError, match="another study"):
         study(swept={"coarse_gain": (0.5,)}).explain(store)
     (tmp_path / "thesis.txt").write_text("important")
-    with pytest.raises(tc.TeleopError, match="something else"):
+    with pytest.raises(tc.TeleopError, match="other files"):
         study().explain(tmp_path)
     about = json.loads((store / "study.json").read_text())
     newer = tmp_path / "newer"

@@ -107,7 +107,7 @@ class Server(viser.ViserServer):
 
     def request_share_url(self, verbose: bool = True) -> str | None:
         """Refuse: a public address would bypass the guard."""
-        raise SessionError("the console is not led out of this machine by others")
+        raise SessionError("the console takes no public address; `ssh -L` reaches it from another machine")
 
     def _tell(self, answers: Answers) -> None:
         """Let the drivers hear of pages: in the order of events, hence on the server's loop."""

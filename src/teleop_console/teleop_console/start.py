@@ -182,7 +182,7 @@ class StartPage:
         self._insist_open()
         chosen = choices.checked(_words(query))
         if reason := choices.refusal(chosen):
-            raise ParameterError("choice", choices.command_line(chosen), f"another: {reason}")
+            raise ParameterError("choice", choices.command_line(chosen), f"another choice: {reason}")
         self._last, self.told = chosen, ""
         self._wishes.put(Wish(chosen))
         return ""
@@ -199,7 +199,7 @@ class StartPage:
         kind, names = _words(query).get("kind", ""), tuple(query.get("name", ()))
         words = self.recordings.words(kind, names)
         if not self._runs.acquire(blocking=False):
-            raise ParameterError("action", kind, "asked for when the one before has ended")
+            raise ParameterError("action", kind, "asked for after the action before it has ended")
         self.told = "$ teleop " + " ".join(words) + "\n…"
         threading.Thread(target=self._do, args=(kind, names), daemon=True).start()
         return ""

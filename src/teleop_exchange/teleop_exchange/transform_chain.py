@@ -30,7 +30,7 @@ def chain_to(top: str, frame: str, parents: Mapping[str, Collection[str]]) -> li
             raise UnknownNameError(f"--parent (poses of {name} stand in several)", "", sorted(own))
         for parent in sorted(own):
             if not top and parent in ways:
-                raise ParameterError("--frame", frame, f"none that carries itself, as {parent} does")
+                raise ParameterError("--frame", frame, f"a frame that is not its own ancestor; {parent} is one")
             if parent not in ways:
                 ways[parent] = [*ways[name], (parent, name)]
                 queue.append(parent)

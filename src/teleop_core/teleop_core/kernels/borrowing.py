@@ -35,7 +35,7 @@ class _Borrowing(AnalysisPass):
     def run_pass(self, state: Any) -> bool:
         """Look at the typed function, before code is made of it."""
         if _is_held(state, state.return_type) and _takes_room(state):
-            raise TypingError("its room ends with it: it must return no array")
+            raise TypingError("its scratch memory is free again when it returns: it must return no array")
         if state.targetctx.enable_nrt and _borrows(state):
             state.targetctx.enable_nrt = False  # of this function's own context
         return False

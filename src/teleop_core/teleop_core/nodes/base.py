@@ -273,7 +273,7 @@ class CoreNode(TunedNode):
             self._feed.close()
             self._feed = None
         if not (has_stopped and is_free):  # its outputs are silent: who sends them hangs
-            raise SessionError(f"{self.member_name} hangs and is left behind")
+            raise SessionError(f"{self.member_name} does not answer and is left running")
         self.stop()
 
     def _clear(self) -> None:

@@ -98,7 +98,7 @@ class Starter:
             self._is_ready, self.doing = word == "ready", word
             timeout = 0.0
         if not self._is_ready and time.monotonic() - self._last > self._patience:
-            raise SessionError(f"what the nodes share got no further for {self._patience:g} s: {self.doing}")
+            raise SessionError(f"the common start of the nodes made no progress for {self._patience:g} s: {self.doing}")
         return self._is_ready
 
     def start(

@@ -61,7 +61,7 @@ class Hardware:
         if coupling.shape != (n, n):
             raise ShapeError("hardware.coupling", (n, n), coupling.shape)
         if np.triu(coupling).any():
-            raise ParameterError("hardware.coupling", coupling.tolist(), "zero but of earlier joints")
+            raise ParameterError("hardware.coupling", coupling.tolist(), "zero except in the columns of earlier joints")
         coupling.setflags(write=False)
         object.__setattr__(self, "coupling", coupling)
         if self.links is not None and self.links.n != n:

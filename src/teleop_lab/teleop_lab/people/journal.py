@@ -50,7 +50,7 @@ class Journal:
             if (self.folder / _ABOUT).exists():
                 self._about |= json.loads((self.folder / _ABOUT).read_text("utf-8"))
             elif any(self.folder.iterdir()):
-                raise SessionError(f"{self.folder} holds something else; choose another place")
+                raise SessionError(f"{self.folder} contains other files; choose another folder")
             self._own = {code: self._read(code) for code in plan.codes}
         except (OSError, ValueError, TypeError) as error:
             raise SessionError(f"{self.folder} cannot be used for a study with people: {error}") from error

@@ -46,7 +46,7 @@ class Store:
             self.folder.mkdir(parents=True, exist_ok=True)
             if not file.exists():
                 if any(self.folder.iterdir()):
-                    raise SessionError(f"{self.folder} holds something else; choose another place")
+                    raise SessionError(f"{self.folder} contains other files; choose another folder")
                 write_whole(file, json.dumps(about))
             found = json.loads(file.read_text("utf-8"))
         except (OSError, ValueError) as error:

@@ -69,7 +69,7 @@ def _row(path: str, number: int, line: list[str], before: float) -> tuple[float,
         raise ParameterError(_NAME, path, needed)
     if time < 0.0 or time <= before:
         needed = f"times that are not negative and grow; line {number} says {time:g} s"
-        raise ParameterError(_NAME, path, f"{needed} after {before:g} s" if before >= 0 else needed)
+        raise ParameterError(_NAME, path, f"{needed}, the row before {before:g} s" if before >= 0 else needed)
     if not 0.0 <= delay <= LONGEST_DELAY and delay != LOST:
         needed = f"delays from 0 to {LONGEST_DELAY:g} s; line {number} says {delay:g} s"
         raise ParameterError(_NAME, path, needed + ": are they ms?" * (delay > 0.0))

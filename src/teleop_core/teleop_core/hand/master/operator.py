@@ -207,14 +207,14 @@ class RunningOperator(RunningStage):
         name = self._fixed.kind.kind
         moves = np.asarray(self._asked(self._motion, times))
         if moves.dtype.kind not in "fiub":
-            raise PartError("operator", name, f"one who answers numbers, not {moves.dtype}")
+            raise PartError("operator", name, f"one whose motion is numbers, not {moves.dtype}")
         moves = moves.astype(np.float64, copy=False)
         if moves.shape not in {(len(times), columns) for columns in (3, 6, 9, 12, 13)}:
             text = f"one who answers (N, 3), (N, 6) or (N, 9) for N times, not {moves.shape}"
             raise PartError("operator", name, text)
         if not np.isfinite(moves).all():
             bad = times[int(np.flatnonzero(~np.isfinite(moves).all(axis=1))[0])]
-            raise PartError("operator", name, f"one who answers finite numbers; at {bad:g} s not")
+            raise PartError("operator", name, f"one whose motion is finite; at {bad:g} s it is not")
         whole = np.zeros((len(times), 13))
         whole[:, : moves.shape[1]] = moves
         return whole

@@ -120,13 +120,13 @@ def sampled_motion(name: str, times: object, rows: object) -> Motion:
         text = f"given as times (N,) and rows (N, 3), (N, 6) or (N, 9), not {at.shape}, {wanted.shape}"
         raise PartError("operator", name, text)
     if wanted.shape[1] not in {3, 6, 9}:
-        raise PartError("operator", name, f"given in 3, 6 or 9 columns, not {wanted.shape[1]}")
+        raise PartError("operator", name, f"one whose motion has 3, 6 or 9 columns; it has {wanted.shape[1]}")
     if not (np.isfinite(at).all() and np.isfinite(wanted).all()):
         bad = int(np.flatnonzero(~(np.isfinite(wanted).all(axis=1) & np.isfinite(at)))[0])
-        raise PartError("operator", name, f"given in finite numbers; row {bad} is not")
+        raise PartError("operator", name, f"one whose motion is finite; row {bad} is not")
     if (np.diff(at) <= 0.0).any():
         bad = int(np.flatnonzero(np.diff(at) <= 0.0)[0]) + 1
-        raise PartError("operator", name, f"given at rising times; row {bad} is not later")
+        raise PartError("operator", name, f"one whose times rise; row {bad} is not later than the row before")
 
     def motion(times: Array) -> Array:
         smooth = [np.interp(times, at, column) for column in wanted[:, :6].T]

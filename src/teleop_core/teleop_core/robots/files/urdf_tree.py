@@ -165,7 +165,7 @@ def chain_to(tip: str, by_child: Mapping[str, UrdfJoint]) -> list[UrdfJoint]:
         found.append(by_child[link])
         link = found[-1].parent
         if len(found) > len(by_child):
-            raise ParameterError(f"joint {found[-1].name}", link, "a parent that it does not carry")
+            raise ParameterError(f"joint {found[-1].name}", link, "a parent that is not its own descendant")
     return found[::-1]
 
 
