@@ -189,7 +189,7 @@ BAD_SAMPLES = {
     "no samples": (np.zeros(0), np.zeros((0, 3)), "not (0,), (0, 3)"),
     "rows of another number": (np.arange(3), np.zeros((2, 3)), "not (3,), (2, 3)"),
     "a single row": (np.arange(3), np.zeros(3), "not (3,), (3,)"),
-    "four columns": (np.arange(3), np.zeros((3, 4)), "not 4"),
+    "four columns": (np.arange(3), np.zeros((3, 4)), "it has 4"),
     "a number that is none": (np.arange(2), np.array([[0, 0, 0], [0, np.nan, 0]]), "row 1"),
     "a time that is none": (np.array([0.0, np.nan]), np.zeros((2, 3)), "row 1"),
     "times that stand still": (np.array([0.0, 1.0, 1.0]), np.zeros((3, 3)), "row 2"),
