@@ -176,7 +176,7 @@ class HapticMaster(RunningStage):
         self.reset()
 
     def reset(self) -> None:
-        """Stylus in the inkwell, with the random numbers of the seed; a hand is about to come."""
+        """Put the stylus into the inkwell, restart the random numbers from the seed, and wait for a hand."""
         rng = np.random.default_rng(self._fixed.seed)
         rng.uniform(0.0, 2.0 * math.pi, PHASES)  # skip the random numbers of the operator, who uses the same seed
         self._noise.begin(rng)

@@ -29,7 +29,7 @@ class HandRoom:
         self._low, self._high, self._turn = corners[0] + _MARGIN, corners[1] - _MARGIN, largest_turn
 
     def share(self, hand: Array, step: Array, turn: Array) -> float:
-        """Share, at most 1, of a step (3,) [m] and a turn (3,) [rad] for which a hand at a pose (7,) has room."""
+        """Largest share, at most 1, of a step (3,) [m] and turn (3,) [rad] that a hand at a pose (7,) can make."""
         room = np.maximum(np.where(step > 0.0, self._high - hand[:3], hand[:3] - self._low), 0.0)
         shares = np.linspace(min(1.0, float((room / np.maximum(np.abs(step), 1e-12)).min())), 0.0, 21).tolist()
         return next((s for s in shares if length(turned(hand[3:], s * turn)[1]) <= self._turn), 0.0)

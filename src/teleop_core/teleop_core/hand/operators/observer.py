@@ -199,7 +199,7 @@ class Observer:
         return more >= min(0.5 * abs(expected), _FELT) - still and abs(later - felt) <= still
 
     def _gone(self, a: Glance, b: Glance) -> Array:
-        """Way and turn (6,) [m] from one glance to another, as they count in the present submovement."""
+        """Displacement and weighted rotation (6,) [m] between two glances, weighted as in the present submovement."""
         turn, lever = np.zeros(3), 0.0 if self._move is None else self._move.way.lever
         if lever > 0.0:
             turn_within(a.tip[3:], b.tip[3:], turn)

@@ -124,7 +124,7 @@ def _next_block(numbers: Array, memory: Array, scene: Array, state: Array) -> No
 
 @inner
 def _end_transfer(numbers: Array, memory: Array, scene: Array, state: Array, miss: int) -> None:
-    """Count a transfer. A dropped block is taken up again, a late one that is held goes on, as often as it may."""
+    """Count a transfer; up to ``tries`` times, pick a dropped block up again, or go on with a late held block."""
     attempts.end_attempt(memory, scene, state, miss)
     is_held = scene[_SECOND + 1] + scene[_SECOND + 2] > 0.0
     goes_on = miss == attempts.DROP or (miss == attempts.LATE and is_held)
@@ -140,7 +140,7 @@ def _end_transfer(numbers: Array, memory: Array, scene: Array, state: Array, mis
 
 @inner
 def lead(numbers: Array, memory: Array, scene: Array, state: Array) -> None:
-    """Lead an arm from step to step, and judge its block where it comes to rest, as a task's judge does."""
+    """Set the goals of an arm step by step, and judge its block when it comes to rest; see a task's judge."""
     if state[0] == 0.0:
         for i in range(3 * topics.JAW_OBJECTS):
             memory[_STARTS + i] = scene[_X0 + i]
