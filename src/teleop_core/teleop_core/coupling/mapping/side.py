@@ -50,7 +50,7 @@ _ROUNDING = 1e-13
 
 @inner
 def let_go(s: SideState) -> None:
-    """Set the hand's position to its proxy, and shift the fixture by the same vector. The slave does not move."""
+    """Shift the fixture so that its proxy coincides with the hand. The slave does not move."""
     for i in range(3):
         s.center[i] += s.beyond[i]
         s.beyond[i] = 0.0
@@ -105,7 +105,7 @@ def hold_slave(s: SideState, fixture: Held, step: Array) -> None:
     """Replace the hand's step (3,) [m] by that of its proxy, which is at most as long.
 
     If the hand reaches an allowed position that the proxy cannot reach, for example through a forbidden body, the
-    hand's position is set to the proxy: see :func:`let_go`.
+    hand's position becomes that of the proxy: see :func:`let_go`.
 
     Args:
         s: State; ``beyond`` and perhaps ``center`` are written.

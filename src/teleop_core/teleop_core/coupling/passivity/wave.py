@@ -37,9 +37,12 @@ HASTE = 0.01
 KEPT_WAY = 3e-4
 """Distance over which the hand's side reserves energy for the push, as in TDPA [m]."""
 RESERVE, TAKEN, OWED, SPEED = 1, 2, 5, 8
-"""Places in the memory of either side: energy that was heard and not yet given [J], integral of the
-wave that was given, integral of the own wave that is not yet told [√W s]; the hand's speed [m/s].
-The first place is the round at the hand, and what is left by the command at the slave."""
+"""Indices in the memory of either side.
+
+They are: received energy that is not yet given [J]; integral of the received wave that was given; integral of the own
+wave that is not yet sent [√W s]; the hand's speed [m/s]. Index 0 is the round at the hand, and the energy that the
+command left over at the slave.
+"""
 
 
 @kernel
