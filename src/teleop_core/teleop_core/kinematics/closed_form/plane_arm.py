@@ -147,7 +147,7 @@ def _attitude(H: Array, K: Array, turned: float, roll: float) -> tuple[float, fl
 
 @inner
 def _wrist(G: Array, K: Array, first: float, seed: Array, H: Array, q: Array) -> tuple[float, float, float]:
-    """Turn in the plane [rad] and place of the hand's axis [m]; write what else is known of q."""
+    """Return angle in the plane [rad] and position of the hand's axis [m]; write the other known joints into q."""
     M = room(3, 4)
     _seen(G, K, first, M, H)
     turned, roll = _attitude(H, K, _sum(K, seed), _get(K, ROLL, seed))
