@@ -38,7 +38,7 @@ class HoleParameters:
         return np.array(self.axis) / length(self.axis)
 
     def depth(self, ways: Array) -> float:
-        """Largest depth [m] in the hole of places (N, 3) [m] from the middle of its mouth; 0 where none is in it."""
+        """Largest depth [m] in the hole, of points (N, 3) [m] relative to its mouth; 0 if none is inside."""
         deep = -(ways * self.out).sum(axis=1)
         beside = length(ways + deep[:, None] * self.out)
         is_inside = (beside < self.radius + self.chamfer) & (deep <= self.thickness)
