@@ -252,14 +252,16 @@ MASTER_CONTACT = Topic(
     "master_base",
     columns=("number", "taken", "returned", "friction", "largest_force"),
 )
-"""Energy of the present contact, or the last one: how many there were, what the motors' force took
-from the hand and gave back, what dry friction took meanwhile [J], all of the true motion, which a
-simulator knows; and the largest force that the warmth of the motors allows [N]."""
+"""Energy of the present contact, or the last one: number of contacts so far; energy that the motors' force took from
+the hand, returned to it, and that dry friction took meanwhile [J]; and the largest force that the heat of the motors
+allows [N]. Energies use the true motion, which only a simulator knows.
+"""
 MASTER_SERVO_CF = Topic("master/servo_cf", Kind.WRENCH, passed_on("master/measured_cp"), "master_base")
 SLAVE_SERVO_CP = Topic("slave/servo_cp", Kind.POSE, passed_on("master/measured_cp"), "slave_base")
 SLAVE_SERVO_CF = Topic("slave/servo_cf", Kind.WRENCH, passed_on("master/measured_cp"), "slave_base", is_seldom=True)
-"""Force with which the hand leads the tip, of a session with a stage ``impedance``: what the hand
-bears of the push that answers the slave, times the gain of the architecture; no torque."""
+"""Force with which the hand moves the tip, in a session with a stage ``impedance``: the force with which the hand
+resists the slave's push, times the gain of the architecture; no torque.
+"""
 SLAVE_SERVO_JP = Topic("slave/servo_jp", Kind.JOINTS, passed_on("slave/servo_cp"), "slave_base")
 SLAVE_REACH = Topic(
     "slave/reach", Kind.NUMBERS, passed_on("slave/servo_cp"), "slave_base",
@@ -280,13 +282,15 @@ SLAVE_MEASURED_CP = Topic("slave/measured_cp", Kind.POSE, passed_on("slave/measu
 SLAVE_MEASURED_CF = Topic("slave/measured_cf", Kind.WRENCH, SAMPLED, "slave_base", is_seldom=True)
 """Measured force on the tip, in axes of slave_base, and torque about the tip."""
 SLAVE_ESTIMATED_CF = Topic("slave/estimated_cf", Kind.WRENCH, SAMPLED, "slave_base", is_seldom=True)
-"""What drive efforts and joint motion tell of the force on the tip, along slave_base, without a
-sensor; zero where ``slave_sim.force_sensor.estimate`` is off, and while brakes hold the arm."""
+"""Force on the tip estimated from drive efforts and joint motion without a sensor, in axes of slave_base; zero if
+``slave_sim.force_sensor.estimate`` is off, and while brakes hold the arm.
+"""
 SLAVE_TRUE_CP = Topic("slave/true_cp", Kind.POSE, SAMPLED, "slave_base")
 """True pose of the tip, which no encoder measures: only a simulator or a tracker knows it."""
 SLAVE_TRUE_CF = Topic("slave/true_cf", Kind.WRENCH, SAMPLED, "slave_base", is_seldom=True)
-"""The world's force on the tip, along slave_base, and no torque about the tip: what an ideal sensor
-would tell. Only a simulator knows."""
+"""Contact force on the tip, in axes of slave_base, without torque about the tip, as an ideal sensor would measure it.
+Only a simulator knows it.
+"""
 SLAVE_OPERATION = Topic("slave/operation", Kind.REPORT, SAMPLED, quality=Quality.LATCHED, columns=OPERATION)
 """Whether the slave may move, what stopped it, and what is needed to go on; sent at each change.
 See :mod:`teleop_core.slave.operation`."""
@@ -312,17 +316,19 @@ NETWORK_STATE = Topic(
     is_seldom=True,
     columns=("sent_there", "lost_there", "behind_there", "sent_back", "lost_back", "behind_back", "clock_ahead"),
 )
-"""Packets sent, lost, and by how many the newest that arrived is behind, of both directions; by how
-much the slave's clock is ahead of the master's [s]."""
+"""For both directions: packets sent, packets lost, and by how many packets the newest arrived one is behind; then the
+lead of the slave's clock over the master's [s].
+"""
 ENERGY = (
     "law", "round", "energy_in", "energy_out", "told", "heard", "margin", "withheld",
     "turn_in", "turn_out", "drift_x", "drift_y", "drift_z",
     "impedance", "wave_x", "wave_y", "wave_z",
 )  # fmt: skip
-"""Numbers of a port's energies since a round began, in the slave's scale [J]: the kind of passivity, by its place among
-them; when the round began [s]; what went in and out; how much the other side was told that it may give, and how much it
-told; what is left to be given; what was kept from going out; what torques took in and gave out; by how much a command
-is held back [m]; of waves, their impedance [N s/m], and the integral of what was told [√W s]."""
+"""Numbers of a port's energies since a round began, in the slave's scale [J]: index of the kind of passivity; start of
+the round [s]; energy in and out; energy credited to the other side, and credited by it; remaining energy; energy
+withheld; energy in and out by torques; drift, by which a command is held back [m]; for waves, their impedance [N s/m],
+and the integral of the sent wave [√W s].
+"""
 MASTER_ENERGY = Topic(
     "master/energy", Kind.NUMBERS, passed_on("master/measured_cp"), "master_base", columns=ENERGY, is_seldom=True
 )
@@ -361,9 +367,10 @@ SLAVE_JAW_GRIP = Topic(
     is_seldom=True,
     columns=("force", "is_gripped", "slid", "grips", "slips", "drops"),
 )
-"""What only a simulator knows: the push of each finger [N], whether the object is between them, and
-how far it slid in the present grip or the last one [m]. Then, how often it was gripped, slid by
-more than a millimetre, and was lost above the table."""
+"""Values that only a simulator knows: the push of each finger [N], whether the object is between the fingers, and how
+far the object slid in the present or last grip [m]. Then, how often an object was gripped, slid by more than a
+millimetre, and was lost above the table.
+"""
 SLAVE_JAW_OBJECT_CP = Topic("slave/jaw/object_cp", Kind.POSE, SAMPLED, "slave_base", is_seldom=True)
 """Pose of the object that the jaw can grip; only a simulator knows it."""
 JAW_OBJECTS = 6
@@ -376,8 +383,9 @@ SLAVE_JAW_BOARD = Topic(
     is_seldom=True,
     columns=("transferred", "dropped", "pull", *(f"{axis}{i}" for i in range(JAW_OBJECTS) for axis in "xyz")),
 )
-"""What only a simulator knows: how many objects came onto another peg, how many came to rest on none, and the pull of a
-peg on the gripped one, across [N]. Then the middle of each object [m], all zeros for one that is not there."""
+"""Values that only a simulator knows: how many objects came onto another peg, how many came to rest on no peg, and the
+force of a peg on the gripped object, across the peg [N]. Then the middle of each object [m], zeros for a missing one.
+"""
 FIRST_JAW_BOARD = replace(SLAVE_JAW_BOARD, name=f"first/{SLAVE_JAW_BOARD.name}")
 """Port of the second arm at which the first arm's topic arrives; see :meth:`Graph.links`."""
 FIRST_JAW_GRIP = replace(SLAVE_JAW_GRIP, name=f"first/{SLAVE_JAW_GRIP.name}")
@@ -411,15 +419,17 @@ TASK_STATE = Topic(
         "is_over",
     ),
 )  # fmt: skip
-"""What a task asks for now, and what came of it: how many goals there were, what to do at this one
-(:class:`~teleop_core.hand.tasks.Act`), where it is and how wide [m]; attempts, successes and errors so far; of the
-last attempt: the way to its goal [m], how far the tip was beyond the goal along it [m], the time it took [s], and what
-was wrong with it (:class:`~teleop_core.hand.tasks.Miss`); the step of the present one, where a task has several. Then
-how the tool shall be turned there, and how wide that is [rad]; with how much force to press [N]; and how far beside its
-way the tip would meet something [m]. Zero stands for what a task does not ask for. Last, whether no goal is left."""
+"""Present goal of a task, and its results. First the number of goals so far, the action at the present goal
+(:class:`~teleop_core.hand.tasks.Act`), its position and width [m]; attempts, successes and errors so far. Then, for
+the last attempt: the distance to its goal [m], the overshoot of the tip along it [m], its duration [s], and its error
+(:class:`~teleop_core.hand.tasks.Miss`); the step of the present attempt, if a task has several steps. Then the
+required attitude of the tool, and its tolerance [rad]; the force to press with [N]; and the clearance beside the path
+[m]. Zero means that the task does not require it. Last, whether no goal is left.
+"""
 OPERATOR_SERVO_CP = Topic("operator/servo_cp", Kind.POSE, SAMPLED, "master_base")
-"""Where a person who is elsewhere wants the stylus, at any rate: ``operator=remote`` leads the hand there. Silence lets
-go. As ``operator/buttons`` it comes from outside: no stage writes it, and it is not recorded."""
+"""Pose of the stylus that a remote person wants, at any rate: ``operator=remote`` moves the hand there. Without
+messages the hand lets go. Like ``operator/buttons`` it comes from outside: no stage writes it, and it is not recorded.
+"""
 OPERATOR_BUTTONS = Topic("operator/buttons", Kind.BUTTONS, SAMPLED, "master_base", quality=Quality.REPORT)
 """Buttons that the remote person presses and releases: each message counts, so it is sent reliably."""
 OPERATOR_JAW = Topic("operator/jaw", Kind.NUMBERS, SAMPLED, "master_base", quality=Quality.REPORT, columns=("closing",))

@@ -9,8 +9,9 @@ from teleop_core.kernels import Array, inner, kernel
 from teleop_core.kernels.room import room
 
 _COVARIANCE, _HAS_BEGUN = 4, 20
-"""Places in the memory, behind place and speed of the hand, then of its tremor: their covariance
-(4, 4), and whether there is any."""
+"""Indices in the memory, after position and speed of the hand and of its tremor: their covariance (4, 4), and whether
+there is a covariance.
+"""
 FASTEST = 1.0
 """Standard deviation of a hand's initial speed [m/s]."""
 

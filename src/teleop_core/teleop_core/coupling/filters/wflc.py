@@ -9,9 +9,9 @@ from teleop_core.kernels import Array, inner, kernel
 
 _SECOND, _THIRD = sections.WIDTH, 2 * sections.WIDTH
 _PHASE, RATE, _HEARD, _SUBTRACTED = range(3 * sections.WIDTH, 3 * sections.WIDTH + 8, 2)
-"""Places in the memory behind three sections: phase [rad]; by how much the rate is
-above the one at the beginning [rad/s]; weights of sine and cosine [m] of the first combiner, which
-finds the rate, and of the second, which is subtracted."""
+"""Indices in the memory, after three sections: phase [rad]; rate minus initial rate [rad/s]; weights of sine and
+cosine [m] of the first combiner, which finds the rate, and of the second, which is subtracted.
+"""
 _REACH = 2.0 * math.pi * 2.0
 """Largest difference of the learned rate from the initial rate [rad/s]: 8 to 12 Hz."""
 _FAINT = 5e-6

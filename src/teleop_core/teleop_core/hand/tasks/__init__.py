@@ -31,9 +31,10 @@ SCENE = (
     "grips", "other_grips", "transferred", "dropped",
     *(f"{axis}{i}" for i in range(topics.JAW_OBJECTS) for axis in "xyz"),
 )  # fmt: skip
-"""What a task sees: time since it began [s]; the tip's true pose in slave_base [m]; how far the hand closes, 0 to 1;
-the world's force on the tip [N]; whether the arm is the second one; whether its jaw grips, and that of the other arm;
-how many blocks came onto another peg, and onto none; the middle of each block [m], zero for one that is not there."""
+"""Inputs of a task: time since it began [s]; the tip's true pose in slave_base [m]; how far the hand closes, 0 to 1;
+the contact force on the tip [N]; whether the arm is the second one; whether its jaw grips, and the other arm's jaw;
+how many blocks came onto another peg, and onto none; the middle of each block [m], zero for a missing block.
+"""
 
 
 class Act(IntEnum):
