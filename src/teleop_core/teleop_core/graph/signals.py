@@ -38,8 +38,8 @@ def make_signals(topics: Iterable[Topic], joints: int, notes: Iterable[Field] = 
 
     Args:
         topics: Topics for which the record has ports.
-            joints: Number of joints of the arm; 0 if no topic has joints.
-            notes: Further fields, which are never recorded.
+        joints: Number of joints of the arm; 0 if no topic has joints.
+        notes: Further fields, which are never recorded.
 
     Returns:
         One record with ``now_ns``, the time of the tick [ns], the topics' fields, and the notes.

@@ -226,7 +226,7 @@ class RunningStage:
 
     Args:
         stage: The stage that it runs.
-            joints: Number of joints of its arm; 0 without joints.
+        joints: Number of joints of its arm; 0 without joints.
         dt: Length of a tick [s].
     """
 

@@ -139,8 +139,8 @@ class Stamp:
     Attributes:
         text: The rule in words.
         of: Name of the topic whose stamp is passed on; empty if the stamp is the time of sampling.
-            is_in_force: Whether the writer itself chooses the command whose stamp is passed on, because it may hold an
-                older command. Such a stamp may repeat, and is :data:`NO_COMMAND_NS` before the first command.
+        is_in_force: Whether the writer itself chooses the command whose stamp is passed on, because it may hold an
+            older command. Such a stamp may repeat, and is :data:`NO_COMMAND_NS` before the first command.
     """
 
     text: str
@@ -187,8 +187,8 @@ class Topic:
             another source of force; empty for a topic of its own.
         arm: Namespace; empty for the default arm.
         is_seldom: Whether it is sent only at a change and every :data:`SELDOM_NS`.
-            message: Name of the ROS message type of a topic without values, such as a robot's model; empty for that of
-                its kind.
+        message: Name of the ROS message type of a topic without values, such as a robot's model; empty for that of
+            its kind.
     """
 
     name: str

@@ -81,7 +81,7 @@ def register_robot(robot: Part, name: str | None = None, *, replace: bool = Fals
         robot: A :class:`Robot`, a :class:`~teleop_core.robots.arms.dh.DhTable`, or a function
             ``make(**geometry)`` that returns a robot and whose parameters all have defaults.
         name: Its name in configurations; None for its own name.
-            replace: Whether it may replace a robot that this program registered before.
+        replace: Whether it may replace a robot that this program registered before.
 
     Returns:
         The same robot, so that this function can be used as a decorator.

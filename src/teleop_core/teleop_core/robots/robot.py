@@ -76,15 +76,15 @@ class Robot:
         geometry: Symbols and their values [m, rad], in the order the kernels expect if there is no row.
         kernels: Compiled functions.
         row: Numbers that the kernels take (k,); None for the values of the geometry.
-            drives: Drive table, None for robots that are not used as slaves.
-            dynamics: Rigid-body model; None for independent axes.
-            hardware: How the real arm differs from its model; None if unknown.
+        drives: Drive table, None for robots that are not used as slaves.
+        dynamics: Rigid-body model; None for independent axes.
+        hardware: How the real arm differs from its model; None if unknown.
         task_mask: Directions that the robot controls: x, y, z, then rotations about x, y, z.
         solution: How inverse kinematics are solved, in words; empty if unknown.
-            visuals: Shapes of its links, if its file has them; nothing is read before it is drawn.
-            notes: What may have been read differently from what the author of its file meant, in words.
-            describe: Draws its bodies (:func:`teleop_core.robots.bodies.bodies_of`), for joints that are not a chain;
-                None for a chain, or if unknown.
+        visuals: Shapes of its links, if its file has them; nothing is read before it is drawn.
+        notes: What may have been read differently from what the author of its file meant, in words.
+        describe: Draws its bodies (:func:`teleop_core.robots.bodies.bodies_of`), for joints that are not a chain;
+            None for a chain, or if unknown.
 
     Raises:
         ShapeError: Limits, home, start or drives are not vectors (n,).
@@ -239,8 +239,8 @@ class Robot:
             q: Joint vector (n,) [rad, m]; limits are not applied. Several of them, (N, n), are
                 answered as by :meth:`solve_fk_batch`, which has the type for it.
             seed: ``T_base_tip`` (4, 4) whose assembly to stay in; None for home's.
-                search: Whether to search for another assembly if the one next to the seed does not close; a tick of a
-                    session never searches.
+            search: Whether to search for another assembly if the one next to the seed does not close; a tick of a
+                session never searches.
 
         Returns:
             :class:`FkResult`. Joints that do not assemble are not an error: the pose of least
@@ -332,8 +332,8 @@ class Robot:
             q: Joint vector (n,) [rad, m].
             dq: Joint speeds (n,) [rad/s or m/s].
             effort: Efforts of the drives, minus friction (n,) [N·m or N].
-                wrench: External wrench at the origin of the tip in base axes (6,): force [N], then torque [N·m]; None
-                    for no wrench.
+            wrench: External wrench at the origin of the tip in base axes (6,): force [N], then torque [N·m]; None
+                for no wrench.
 
         Raises:
             ShapeError: Another shape.

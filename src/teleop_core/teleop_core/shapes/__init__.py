@@ -33,7 +33,7 @@ class Shape:
     Attributes:
         name: Its name in ``--set fixture=`` and ``--set world=``.
         parameters: Its parameter group: real numbers and tuples of them. A text parameter ``file`` is the path of a
-        file that recordings keep.
+            file that recordings keep.
         distance: ``distance(offset, numbers, out)``, a kernel or a plain function. ``offset`` (3,)
             [m] runs from the middle of the shape to a point; ``numbers`` holds the parameters in
             their order; ``out`` (3,) gets a vector of any length except 0 that points out of the shape at its nearest

@@ -140,10 +140,10 @@ class MotionCommands:
 
         Args:
             twist: Linear and angular velocity (6,) of the tip in base axes [m/s, rad/s].
-                now_ns: Time of arrival, on the clock of the ticks [ns].
+            now_ns: Time of arrival, on the clock of the ticks [ns].
 
-            Raises:
-                ShapeError: ``twist`` does not have the shape (6,).
+        Raises:
+            ShapeError: ``twist`` does not have the shape (6,).
         """
         return self._drive(Motion.TIP, _row(twist, 6), "twist", now_ns)
 

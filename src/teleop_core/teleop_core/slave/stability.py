@@ -130,9 +130,9 @@ def check_stable(law: Controller, robot: Robot, loop: ClosedLoop, *, are_large_t
         loop: The arm in its present state.
         are_large_tried: Whether large errors are tried, too.
 
-        Raises:
-            ParameterError: An error grows, or does not decay.
-            Exception: Any exception of a control law in plain Python.
+    Raises:
+        ParameterError: An error grows, or does not decay.
+        Exception: Any exception of a control law in plain Python.
     """
     place = (robot.geometry_row.tobytes(), loop.arm.q.tobytes())
     key = loop_key(loop.p, loop.arm)

@@ -57,9 +57,9 @@ class Passivity:
             allowed push. ``scale`` is the hand's energy divided by that of the slave; ``period`` is the time since the
             last sample [s].
         slave: ``slave(numbers, memory, flow, force, tip, last, heard, port, command, period)``, called for every
-        command that arrives, only if there is a stage ``passivity``. ``numbers`` are those of that stage; ``force``
-        (6,) is the wrench on the tip [N, N m], whose pose is ``tip`` (7,); ``last`` (7,) is the last command given to
-        the slave; ``command`` (7,) is the command that came, and must be overwritten with the command to give.
+            command that arrives, only if there is a stage ``passivity``. ``numbers`` are those of that stage; ``force``
+            (6,) is the wrench on the tip [N, N m], whose pose is ``tip`` (7,); ``last`` (7,) is the last command given to
+            the slave; ``command`` (7,) is the command that came, and must be overwritten with the command to give.
         numbers: ``numbers(parameters)`` returns the ``numbers`` of ``hand``, if they are not simply the numbers of the
             parameters in their order.
         needs_slave: Whether it works only together with a stage ``passivity``.

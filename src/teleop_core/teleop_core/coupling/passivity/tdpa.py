@@ -149,8 +149,8 @@ def tdpa_slave(
         memory: Direction of the last force; written.
         flow: Heard, in, out [J].
         force: Wrench on the tip (6,).
-            tip: Pose of the tip (7,).
-            last: Last command given to the slave.
+        tip: Pose of the tip (7,).
+        last: Last command given to the slave.
         heard: Not used.
         port: Written.
         command: Written.

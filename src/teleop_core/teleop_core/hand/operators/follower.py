@@ -174,8 +174,8 @@ class Follower:
             tick: Length of a tick [s].
             count: Number of ticks, 1 to :data:`MOST`.
 
-            Returns:
-                Records (count,) of :class:`Wanted`; the next call overwrites them.
+        Returns:
+            Records (count,) of :class:`Wanted`; the next call overwrites them.
         """
         self._state["next"], self._state["tick"] = first, tick
         self._follow[count]()

@@ -353,8 +353,8 @@ def remote_operator(name: str, person: Person) -> Operator:
 
     Args:
         name: Name of the operator.
-            person: Called once every 4 ticks. It may call :meth:`RemoteHand.want`, :meth:`RemoteHand.let_go` and
-                :meth:`RemoteHand.press` any number of times.
+        person: Called once every 4 ticks. It may call :meth:`RemoteHand.want`, :meth:`RemoteHand.let_go` and
+            :meth:`RemoteHand.press` any number of times.
     """
 
     def make(_: object, setting: Setting) -> Motion:

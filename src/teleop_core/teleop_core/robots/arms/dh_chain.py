@@ -107,8 +107,8 @@ class DhTable:
         """The chain as a robot, which can be a slave; in closed form if its axes allow it.
 
         Args:
-            geometry: Symbols and values that the robot shows; none for those of its row. drives: Drive table in place
-                of the table's own.
+            geometry: Symbols and values that the robot shows; none for those of its row.
+            drives: Drive table in place of the table's own.
         """
         kinds, fixed, reach = self._frames()
         stated = self.drives or ({},) * len(self.joints)
@@ -161,11 +161,11 @@ def chain_robot(
         kinds: For each motion 1 for a turn, 2 for a slide; negative against its axis.
         fixed: Transforms (4, 4) before, between and after the motions, one more than motions.
         reach: Length [m] that weighs distances against angles; 0 means 1 m.
-            task: Directions that the arm controls, of :data:`DIRECTIONS`.
-            drives: Drive table.
-            solution: How its inverse kinematics are solved.
-            followers: How the motions follow the joints; None if each motion is a joint.
-            geometry: Symbols and values [m, rad] that the robot shows; none for those of its row.
+        task: Directions that the arm controls, of :data:`DIRECTIONS`.
+        drives: Drive table.
+        solution: How its inverse kinematics are solved.
+        followers: How the motions follow the joints; None if each motion is a joint.
+        geometry: Symbols and values [m, rad] that the robot shows; none for those of its row.
     """
     weights = {
         "reach": reach if reach > 0.0 else 1.0,

@@ -71,7 +71,7 @@ def least_inertia(kind: str, viscous: float, coulomb: float) -> float:
     Args:
         kind: "turn" or "slide".
         viscous: Viscous friction [N·m·s/rad or N·s/m]; 0 if it will be assumed.
-            coulomb: Dry friction [N·m or N], at the assumed ``friction_speed``; 0 if it will be assumed.
+        coulomb: Dry friction [N·m or N], at the assumed ``friction_speed``; 0 if it will be assumed.
     """
     slow, assumed = _SPEEDS[kind]["friction_speed"], _PER_INERTIA[kind]
     rate = (0.0 if viscous else assumed["viscous"]) + (0.0 if coulomb else assumed["coulomb"]) / slow

@@ -53,11 +53,11 @@ def root_of(path: Path, data: bytes) -> Xml.Element:
 
     Args:
         path: Path of the file, for messages.
-            data: XML of the file.
+        data: XML of the file.
 
-        Raises:
-            RecordingError: ``data`` is not XML.
-            ParameterError: The file is not a URDF, or declares a document type.
+    Raises:
+        RecordingError: ``data`` is not XML.
+        ParameterError: The file is not a URDF, or declares a document type.
     """
     with damage_told(path):
         root = tree_of(data)
@@ -101,7 +101,7 @@ def joint_of(name: str, element: Xml.Element, links: Links) -> UrdfJoint:
 
     Raises:
         UnknownNameError: Its type, or one of its links, does not exist.
-            ParameterError: Its axis has length zero, or a value is not a number.
+        ParameterError: Its axis has length zero, or a value is not a number.
     """
     kind, axis = element.get("type", ""), None
     if kind not in (*KINDS, "fixed"):
@@ -246,10 +246,10 @@ def numbers_of(where: str, element: Xml.Element | None, key: str, default: tuple
         element: The element.
         key: Name of the attribute.
         default: Default values; their number is the required number.
-            unit: Unit of the numbers, of :data:`~teleop_core.base.ranges.RANGES`, which gives their bounds.
+        unit: Unit of the numbers, of :data:`~teleop_core.base.ranges.RANGES`, which gives their bounds.
 
-        Raises:
-            ParameterError: The number of words is wrong, a word is not a number, or a value is not physical.
+    Raises:
+        ParameterError: The number of words is wrong, a word is not a number, or a value is not physical.
     """
     text = None if element is None else element.get(key)
     if text is None:

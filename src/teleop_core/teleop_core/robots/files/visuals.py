@@ -35,10 +35,10 @@ class Visual:
     Attributes:
         link: Name of the link.
         joints: Number of movable joints between the base and the link.
-            place: Pose of the shape (4, 4) in the base, with the arm at home [m].
-            kind: Kind of shape.
-            size: For a mesh, scales along x, y and z; for a box x, y, z; for a cylinder radius and length; for a
-                sphere its radius [m].
+        place: Pose of the shape (4, 4) in the base, with the arm at home [m].
+        kind: Kind of shape.
+        size: For a mesh, scales along x, y and z; for a box x, y, z; for a cylinder radius and length; for a
+            sphere its radius [m].
         file: Name of a mesh as the file gives it; empty for other kinds.
         urdf: The file.
     """
@@ -85,10 +85,10 @@ def meshes_of(text: str, urdf: Path) -> dict[str, Path]:
 
     Args:
         text: XML of the URDF; text that is not XML names no meshes.
-            urdf: Path of the URDF, for relative names.
+        urdf: Path of the URDF, for relative names.
 
-        Returns:
-            The files that :func:`mesh_file` finds.
+    Returns:
+        The files that :func:`mesh_file` finds.
     """
     found: dict[str, Path] = {}
     with suppress(Xml.ParseError, ParameterError):

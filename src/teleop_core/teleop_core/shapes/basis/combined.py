@@ -33,9 +33,9 @@ class Part(NamedTuple):
 
     Attributes:
         kind: Shape of the part.
-            parameters: Parameters of that shape.
-            side: 1 for the shape itself, -1 for everything outside it.
-            at: Middle of the part, relative to that of the whole (3,) [m].
+        parameters: Parameters of that shape.
+        side: 1 for the shape itself, -1 for everything outside it.
+        at: Middle of the part, relative to that of the whole (3,) [m].
     """
 
     kind: Shape
@@ -51,9 +51,9 @@ def parts_of(texts: tuple[str, ...], name: str) -> list[Part]:
         texts: Such as ``not cylinder radius=0.01 direction=[1.0, 0.0, 0.0] at=[0.0, 0.01, 0.0]``.
         name: Name of the parameter, for messages.
 
-        Raises:
-            ParameterError: There is no part or more than :data:`MOST`, or a text does not describe a part.
-        UnknownNameError: A part has no such parameter.
+    Raises:
+        ParameterError: There is no part or more than :data:`MOST`, or a text does not describe a part.
+    UnknownNameError: A part has no such parameter.
     """
     if not 1 <= len(texts) <= MOST:
         raise ParameterError(name, texts, f"1 to {MOST} parts, such as 'sphere radius=0.01'")

@@ -47,8 +47,8 @@ class GridRequest(NamedTuple):
     Attributes:
         file: Path of the mesh or the heights.
         scale: Length of a mesh's unit, or distance between heights of a field [m].
-            angles: Rotation angles of a mesh [rad]; empty for a field of heights.
-            step: Distance between nodes of the grid [m].
+        angles: Rotation angles of a mesh [rad]; empty for a field of heights.
+        step: Distance between nodes of the grid [m].
         kind: Name of the shape.
     """
 

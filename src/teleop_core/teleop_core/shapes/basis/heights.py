@@ -27,12 +27,12 @@ def read_heights(path: Path, data: bytes, spacing: float, step: float) -> triang
 
     Args:
         path: Path of the file, for messages and for the format: ``.npy``, or else CSV.
-            data: Content of the file: heights [m], a row for each x, a column for each y.
-            spacing: Distance between heights [m].
-            step: Step of the distance grid [m].
+        data: Content of the file: heights [m], a row for each x, a column for each y.
+        spacing: Distance between heights [m].
+        step: Step of the distance grid [m].
 
-        Raises:
-            ParameterError: The file is not a table of finite heights, or the table is too large for the step.
+    Raises:
+        ParameterError: The file is not a table of finite heights, or the table is too large for the step.
     """
     heights = _table(path, data)
     parts = math.ceil(2.0 * spacing / step)

@@ -141,8 +141,8 @@ class Tree(NamedTuple):
         boxes: Lower and upper corner of each node's box (2 L, 2, 3) [m]; the first is not used.
         begin: First triangle of each of the L leaves, and the number of triangles (L + 1,).
         corners: Corners of the triangles (F, 3, 3) [m].
-            normals: Normals from :func:`_pseudonormals` (F, 7, 3).
-            stack: Scratch memory for nodes.
+        normals: Normals from :func:`_pseudonormals` (F, 7, 3).
+        stack: Scratch memory for nodes.
     """
 
     boxes: Array

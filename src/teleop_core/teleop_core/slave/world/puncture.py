@@ -47,8 +47,8 @@ def puncture(p: PunctureNumbers, s: PunctureState, stiffness: float, push: float
         p: Parameters.
         s: State; written.
         stiffness: Stiffness of the object [N/m].
-            push: Push along the normal [N].
-            offset: Position of the tip relative to the middle of the object (3,) [m].
+        push: Push along the normal [N].
+        offset: Position of the tip relative to the middle of the object (3,) [m].
     """
     if not 0.0 < p.puncture_force <= push:
         return
