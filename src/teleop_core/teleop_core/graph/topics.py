@@ -187,8 +187,8 @@ class Topic:
             another source of force; empty for a topic of its own.
         arm: Namespace; empty for the default arm.
         is_seldom: Whether it is sent only at a change and every :data:`SELDOM_NS`.
-        message: Name of the ROS message type of a topic without values, such as a robot's model; empty for that of
-            its kind.
+        message: Name of the ROS message type of a topic without values, such as a robot's model; empty for that of its
+            kind.
     """
 
     name: str
@@ -271,9 +271,9 @@ SLAVE_REACH = Topic(
     ),
 )  # fmt: skip
 """How far inverse kinematics can follow: status as of
-:class:`~teleop_core.kinematics.IkStatus`, :class:`Limit`, the joint at its limit (-1: none),
-the residual of the answer [m, rad], and the correction in slave_base [m, rad] that would bring the command within the
-arm's reach, without a time limit.
+:class:`~teleop_core.kinematics.IkStatus`, :class:`Limit`, the joint at its limit (-1: none), the residual of the
+answer [m, rad], and the correction in slave_base [m, rad] that would bring the command within the arm's reach, without
+a time limit.
 """
 SLAVE_SETPOINT_JS = Topic("slave/setpoint_js", Kind.JOINTS, in_force("slave/servo_jp"), "slave_base")
 SLAVE_SETPOINT_CP = Topic("slave/setpoint_cp", Kind.POSE, in_force("slave/servo_jp"), "slave_base")

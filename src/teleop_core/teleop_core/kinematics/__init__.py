@@ -109,13 +109,13 @@ IkBatch: TypeAlias = IkResult[NDArray[np.int64]]
 class Kernels:
     """Functions of one robot, which take its ``geometry`` row: kernels, or plain Python, which is slower.
 
-    ``fk(q, geometry, T)`` and ``jacobian(q, geometry, J)`` write their last argument.
-    ``ik(T, seed, limits, geometry, q, residual)`` writes ``q`` and ``residual`` and returns an
-    :class:`IkStatus`; the rows of ``limits`` (3, n) are lower, upper and the largest step away
-    from the seed. With infinite steps it finds the branch inside the limits that is nearest to the seed. With finite
-    steps, in a path, it never changes the branch. For a T that is not rigid or a seed that is not finite, it writes
-    nothing and returns -1 (:func:`is_askable`). ``ik_all(T, geometry, solutions)`` fills rows of ``solutions``
-    (:data:`MAX_BRANCHES`, n), ignores limits, and returns the number of solutions.
+    ``fk(q, geometry, T)`` and ``jacobian(q, geometry, J)`` write their last argument. ``ik(T, seed, limits, geometry,
+    q, residual)`` writes ``q`` and ``residual`` and returns an :class:`IkStatus`; the rows of ``limits`` (3, n) are
+    lower, upper and the largest step away from the seed. With infinite steps it finds the branch inside the limits
+    that is nearest to the seed. With finite steps, in a path, it never changes the branch. For a T that is not rigid
+    or a seed that is not finite, it writes nothing and returns -1 (:func:`is_askable`). ``ik_all(T, geometry,
+    solutions)`` fills rows of ``solutions`` (:data:`MAX_BRANCHES`, n), ignores limits, and returns the number of
+    solutions.
 
     Robots with loops have two more. ``assemble(q, geometry, ask, T, out)`` writes the pose T, and ``out`` (2,):
     residual and mode of :class:`FkResult`; it returns an :class:`FkStatus`. ``ask[0]`` is the number of starts of a

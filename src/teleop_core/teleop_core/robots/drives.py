@@ -108,8 +108,8 @@ class Dynamics:
         parameters: Numbers that both read, in the model's own order.
         compensated: Axes (n,) whose gravity the published controller feeds forward.
         links: Inertias of the links from which these numbers were computed; () if the model has none.
-        frames: Frames of these links in the base with all joints at home, (k, 4, 4), the k-th moved by joint k; ()
-            if they are not known, or if there are no links.
+        frames: Frames of these links in the base with all joints at home, (k, 4, 4), the k-th moved by joint k; () if
+            they are not known, or if there are no links.
         unknown: Maps names of numbers that the source does not state to their indices in the row; the real arm may
             differ in them (:mod:`teleop_lab.fitting`).
 

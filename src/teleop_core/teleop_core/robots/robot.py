@@ -83,8 +83,8 @@ class Robot:
         solution: How inverse kinematics are solved, in words; empty if unknown.
         visuals: Shapes of its links, if its file has them; nothing is read before it is drawn.
         notes: What may have been read differently from what the author of its file meant, in words.
-        describe: Draws its bodies (:func:`teleop_core.robots.bodies.bodies_of`), for joints that are not a chain;
-            None for a chain, or if unknown.
+        describe: Draws its bodies (:func:`teleop_core.robots.bodies.bodies_of`), for joints that are not a chain; None
+            for a chain, or if unknown.
 
     Raises:
         ShapeError: Limits, home, start or drives are not vectors (n,).
@@ -332,8 +332,8 @@ class Robot:
             q: Joint vector (n,) [rad, m].
             dq: Joint speeds (n,) [rad/s or m/s].
             effort: Efforts of the drives, minus friction (n,) [N·m or N].
-            wrench: External wrench at the origin of the tip in base axes (6,): force [N], then torque [N·m]; None
-                for no wrench.
+            wrench: External wrench at the origin of the tip in base axes (6,): force [N], then torque [N·m]; None for
+                no wrench.
 
         Raises:
             ShapeError: Another shape.

@@ -34,10 +34,10 @@ class Shape:
         name: Its name in ``--set fixture=`` and ``--set world=``.
         parameters: Its parameter group: real numbers and tuples of them. A text parameter ``file`` is the path of a
             file that recordings keep.
-        distance: ``distance(offset, numbers, out)``, a kernel or a plain function. ``offset`` (3,)
-            [m] runs from the middle of the shape to a point; ``numbers`` holds the parameters in
-            their order; ``out`` (3,) gets a vector of any length except 0 that points out of the shape at its nearest
-            surface. Returns the distance of the point from the surface [m], negative inside.
+        distance: ``distance(offset, numbers, out)``, a kernel or a plain function. ``offset`` (3,) [m] runs from the
+            middle of the shape to a point; ``numbers`` holds the parameters in their order; ``out`` (3,) gets a vector
+            of any length except 0 that points out of the shape at its nearest surface. Returns the distance of the
+            point from the surface [m], negative inside.
         outline: ``outline(parameters)`` gives points (N, 3) [m] of one line along its edges around
             its middle; a row of NaN lifts the pen.
         numbers: ``numbers(parameters)`` returns ``numbers``, if they are not simply the parameters.

@@ -1,10 +1,10 @@
 """Friction: viscous, and dry friction that either grows smoothly with speed or sticks.
 
 Friction that sticks is the LuGre bristle in the elasto-plastic form of Dupont, Hayward, Armstrong and Altpeter (2002),
-with the deflection of break-away equal to that of steady sliding: the bristle bends with the joint until it carries the
-dry friction, and then slips. Of the known models it alone always holds a load below dry friction (plain LuGre creeps
-under vibration) without a switch between two sets of equations (as Karnopp's needs). LuGre is stiff because of the
-slip at high speed. Here the bristle is returned to its bound instead, which is exact at any step size.
+with the deflection of break-away equal to that of steady sliding: the bristle bends with the joint until it carries
+the dry friction, and then slips. Of the known models it alone always holds a load below dry friction (plain LuGre
+creeps under vibration) without a switch between two sets of equations (as Karnopp's needs). LuGre is stiff because of
+the slip at high speed. Here the bristle is returned to its bound instead, which is exact at any step size.
 """
 
 import math

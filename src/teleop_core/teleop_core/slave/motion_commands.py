@@ -1,8 +1,8 @@
 """Motion commands: commands to an arm other than a stream of joint references.
 
-They are those of CRTK (Collaborative Robotics Toolkit): moves to a goal, speeds of joints and tip,
-steps relative to the last command, hold. All of them pass the limits, states and faults of the slave's step. Only one
-command moves the arm at a time:
+They are those of CRTK (Collaborative Robotics Toolkit): moves to a goal, speeds of joints and tip, steps relative to
+the last command, hold. All of them pass the limits, states and faults of the slave's step. Only one command moves the
+arm at a time:
 
 - a move replaces any other motion, and only another move or a hold replaces a move; - of several streams the first one
 moves the arm, until it is silent for the command timeout; - hold ends a move, a speed command, and a single reference.
@@ -100,8 +100,7 @@ class MotionCommands:
         """Return the joints (n,) at which the tip has the pose T (4, 4), next to the setpoint; or a refusal.
 
         Of the branches inside the joint limits, the one nearest to the setpoint is taken. The computation is too long
-        for a
-        tick: a running session solves outside the ticks, and passes the joints to :meth:`move`.
+        for a tick: a running session solves outside the ticks, and passes the joints to :meth:`move`.
 
         Raises:
             ShapeError: ``T`` does not have the shape (4, 4).

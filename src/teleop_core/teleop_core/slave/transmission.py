@@ -33,8 +33,7 @@ def follow_encoders(p: DriveNumbers, s: DriveState, q: Array, coupling: Array, t
     """Write the true joint positions (n,) of motors at ``q`` (n,) [rad or m].
 
     A joint stays at its position until its motor has crossed the play; then the motor drags the joint. The lag of a
-    joint behind its
-    motor moves the later joints whose tendons pass it.
+    joint behind its motor moves the later joints whose tendons pass it.
 
     Args:
         p: Parameters.

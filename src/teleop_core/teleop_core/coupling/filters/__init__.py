@@ -36,10 +36,10 @@ class TremorFilter:
         name: Its name in ``--set tremor_filter.kind=``.
         parameters: Its parameter group.
         filter: ``filter(numbers, memory, value, period)``, a kernel or a plain function, called for every sample of
-            each coordinate except the first. ``numbers`` are those of the parameters; ``memory`` (32,) is kept from sample
-            to sample, and is zero at the start; ``value`` is the displacement from the first sample [m]; ``period`` is the
-            time since the last sample [s], 10 ms at most. Returns the filtered value [m]. It must return 0 as long as all
-            values are 0.
+            each coordinate except the first. ``numbers`` are those of the parameters; ``memory`` (32,) is kept from
+            sample to sample, and is zero at the start; ``value`` is the displacement from the first sample [m];
+            ``period`` is the time since the last sample [s], 10 ms at most. Returns the filtered value [m]. It must
+            return 0 as long as all values are 0.
         numbers: ``numbers(parameters)`` returns the ``numbers`` of ``filter``, if they are not simply the numbers of
             the parameters in their order.
     """

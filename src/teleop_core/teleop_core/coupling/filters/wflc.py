@@ -59,9 +59,9 @@ def wflc_filter(numbers: Array, memory: Array, value: float, period: float) -> f
     amplitude. At the learned rate both changes are known, so the sine before the high-pass is subtracted.
 
     Source:
-        Riviere, Rader and Thakor 1998 (IEEE Trans. Biomed. Eng. 45, 7): the weighted-frequency
-        combiner behind a band-pass, of one harmonic, and a second one with its rate. There the second combiner gets
-        the unfiltered value; the high-pass and its correction are ours.
+        Riviere, Rader and Thakor 1998 (IEEE Trans. Biomed. Eng. 45, 7): the weighted-frequency combiner behind a
+        band-pass, of one harmonic, and a second one with its rate. There the second combiner gets the unfiltered
+        value; the high-pass and its correction are ours.
     """
     corner = math.tan(math.pi * numbers[1] * period)
     sections.advance_section(memory, 0, value, corner, _DAMPING)

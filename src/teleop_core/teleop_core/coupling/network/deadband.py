@@ -5,8 +5,8 @@ sent. The receiver keeps the last packet. A packet is sent after ``longest_pause
 without packets knows that the other side is gone.
 
 Source:
-    Perception-based deadband coding, Hinterseer, Hirche, Chaudhuri, Steinbach and Buss 2008; the
-    idea of the codec of IEEE 1918.1.1. Here positions have an absolute deadband.
+    Perception-based deadband coding, Hinterseer, Hirche, Chaudhuri, Steinbach and Buss 2008; the idea of the codec of
+    IEEE 1918.1.1. Here positions have an absolute deadband.
 """
 
 import math

@@ -44,8 +44,8 @@ class Passivity:
     Both kernels may write to ``port``, their row of :data:`~teleop_core.graph.topics.ENERGY`. They get ``heard``, the
     other side's row as it arrived. Energies are in the slave's scale [J]. ``flow`` (3,) contains, since the last call,
     the energy that the other side credited, and the energy into and out of this port. ``memory`` (12,) is kept from
-    call to call, and zero at
-    the start; energies begin anew with every ``round``, and at the slave ``memory`` with them.
+    call to call, and zero at the start; energies begin anew with every ``round``, and at the slave ``memory`` with
+    them.
 
     Attributes:
         name: Its name in ``--set reflection.passivity=``.
@@ -57,9 +57,10 @@ class Passivity:
             allowed push. ``scale`` is the hand's energy divided by that of the slave; ``period`` is the time since the
             last sample [s].
         slave: ``slave(numbers, memory, flow, force, tip, last, heard, port, command, period)``, called for every
-            command that arrives, only if there is a stage ``passivity``. ``numbers`` are those of that stage; ``force``
-            (6,) is the wrench on the tip [N, N m], whose pose is ``tip`` (7,); ``last`` (7,) is the last command given to
-            the slave; ``command`` (7,) is the command that came, and must be overwritten with the command to give.
+            command that arrives, only if there is a stage ``passivity``. ``numbers`` are those of that stage;
+            ``force`` (6,) is the wrench on the tip [N, N m], whose pose is ``tip`` (7,); ``last`` (7,) is the last
+            command given to the slave; ``command`` (7,) is the command that came, and must be overwritten with the
+            command to give.
         numbers: ``numbers(parameters)`` returns the ``numbers`` of ``hand``, if they are not simply the numbers of the
             parameters in their order.
         needs_slave: Whether it works only together with a stage ``passivity``.

@@ -157,9 +157,9 @@ def tdpa_slave(
         period: Time since the last command [s].
 
     Source:
-        Ryu, Artigas and Preusche 2010, an admittance that takes from the command; Coelho, Ott,
-        Singh, Lizarralde and Kondak 2019 for drift that is made up for while energy is left. Our
-        addition: without contact, drift also decays by the distance by which the command moves back.
+        Ryu, Artigas and Preusche 2010, an admittance that takes from the command; Coelho, Ott, Singh, Lizarralde and
+        Kondak 2019 for drift that is made up for while energy is left. Our addition: without contact, drift also
+        decays by the distance by which the command moves back.
     """
     lead_slave(numbers, memory, flow, force, tip, last, port, command, 1e9, period)
 

@@ -98,8 +98,8 @@ class RemoteHand:
 
     Args:
         parameters: Delay, timeout and bounds.
-        start: Pose (7,) of the stylus at the beginning: place [m] in the master's base, quaternion
-            w, x, y, z; None for the rest pose of the haptic master's stylus.
+        start: Pose (7,) of the stylus at the beginning: place [m] in the master's base, quaternion w, x, y, z; None
+            for the rest pose of the haptic master's stylus.
         room: Corners low and high (3,) [m] of the box that the stylus stays in; None for no bound.
 
     Attributes:

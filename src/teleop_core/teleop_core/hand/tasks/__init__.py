@@ -64,12 +64,12 @@ class Task:
     Attributes:
         name: Its name in ``--set task=``.
         parameters: Its parameter group.
-        judge: ``judge(numbers, memory, scene, state)``, a kernel or a plain function, called every
-            tick once the slave follows. ``numbers`` are those of the parameters; ``memory`` (64,) is kept from tick to
-            tick, and zero at first; ``scene`` has the numbers that :data:`SCENE` names; ``state`` has the numbers of
-            ``task/state`` of the last tick, and is written.
-        numbers: ``numbers(parameters)`` returns the ``numbers`` of ``judge``, if they are not simply the numbers
-            of the parameters in their order.
+        judge: ``judge(numbers, memory, scene, state)``, a kernel or a plain function, called every tick once the slave
+            follows. ``numbers`` are those of the parameters; ``memory`` (64,) is kept from tick to tick, and zero at
+            first; ``scene`` has the numbers that :data:`SCENE` names; ``state`` has the numbers of ``task/state`` of
+            the last tick, and is written.
+        numbers: ``numbers(parameters)`` returns the ``numbers`` of ``judge``, if they are not simply the numbers of
+            the parameters in their order.
     """
 
     name: str

@@ -301,8 +301,8 @@ def settled(
 ) -> int:
     """Bring a branch into limits and steps, write its residual (2,) and return its status.
 
-    If the branch then misses the pose, damped least squares bring it as near as limits and steps allow.
-    ``reach`` is what :func:`choose` returned.
+    If the branch then misses the pose, damped least squares bring it as near as limits and steps allow. ``reach`` is
+    what :func:`choose` returned.
     """
     reached, J = room(4, 4), room(6, 7)
     if is_allowed(q, seed, limits):

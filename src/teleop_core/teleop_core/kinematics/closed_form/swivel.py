@@ -1,8 +1,8 @@
 """Arms of seven turning joints with a spherical shoulder and wrist: closed form over the swivel.
 
 The distance between shoulder centre and wrist centre determines joint 4. The arm can then swivel about the line
-between
-them: the shoulder's rotation is A(psi) = P cos psi + Q sin psi + N. The psi at which a joint of shoulder or wrist has
+between them: the shoulder's rotation is A(psi) = P cos psi + Q sin psi + N. The psi at which a joint of shoulder or
+wrist has
     a given angle follow from an equation linear in cos psi and sin psi. So the limits of all joints cut the circle of
     psi exactly into arcs. Each arc, however narrow, is either completely legal or completely illegal. psi = 0 is the
     seed's posture. The solution is the legal psi nearest to 0 that keeps a margin to the ends of its arc.

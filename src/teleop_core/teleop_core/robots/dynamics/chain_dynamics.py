@@ -2,9 +2,8 @@
 
 All motions and forces are written about the origin of the base and in its axes, so that the contributions of the links
 add up without a change of frame. The parameter row contains, for n joints: the geometry of
-:mod:`teleop_core.kinematics.dh_kernels`, gravity (3,) [m/s²], for each joint the thirteen
-numbers of the body that it moves (:func:`body_row`), and the inertias (n,) of the motors at the
-joints.
+:mod:`teleop_core.kinematics.dh_kernels`, gravity (3,) [m/s²], for each joint the thirteen numbers of the body that it
+moves (:func:`body_row`), and the inertias (n,) of the motors at the joints.
 
 Source:
     Luh, Walker and Paul 1980 (recursive Newton-Euler); Walker and Orin 1982 (composite bodies);

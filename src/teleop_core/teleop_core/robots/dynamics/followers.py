@@ -2,8 +2,7 @@
 
 This is the ``mimic`` of a URDF. With joints q (n,) and motions p (m,) of the chain, p = A q + b, where each row of A
 has one factor. Then the Jacobian of the joints is J A; by the principle of virtual work their efforts are Aᵀ times
-those of the
-motions, and their inertia is Aᵀ M A. A is constant, so that there is no term with its derivative.
+those of the motions, and their inertia is Aᵀ M A. A is constant, so that there is no term with its derivative.
 
 The parameter row of the dynamics contains m, then leader, factor and offset of each motion (m,), and the inertias (n,)
 of the motors at the joints. Then comes the row of :mod:`~teleop_core.robots.dynamics.chain_dynamics` of the m motions,

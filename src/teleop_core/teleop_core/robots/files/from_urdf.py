@@ -2,8 +2,7 @@
 
 The joints between root and tip move the tip. All other joints stay at zero, but their links have mass. A joint between
 root and tip that mimics another joint moves with it (:mod:`teleop_core.robots.dynamics.followers`). The kinematics are
-those of
-Denavit-Hartenberg chains (:mod:`teleop_core.kinematics.dh_kernels`), the dynamics those of rigid bodies
+those of Denavit-Hartenberg chains (:mod:`teleop_core.kinematics.dh_kernels`), the dynamics those of rigid bodies
 (:mod:`teleop_core.robots.dynamics.chain_dynamics`). Effort and velocity limits, damping and friction of the file are
 used for the drives if they are above zero. The inertia of a drive is that of the links at home; a URDF never contains
 the inertia of its motor. A file of drives may state it, and other missing values. Values that are missing there too

@@ -37,8 +37,8 @@ class Visual:
         joints: Number of movable joints between the base and the link.
         place: Pose of the shape (4, 4) in the base, with the arm at home [m].
         kind: Kind of shape.
-        size: For a mesh, scales along x, y and z; for a box x, y, z; for a cylinder radius and length; for a
-            sphere its radius [m].
+        size: For a mesh, scales along x, y and z; for a box x, y, z; for a cylinder radius and length; for a sphere
+            its radius [m].
         file: Name of a mesh as the file gives it; empty for other kinds.
         urdf: The file.
     """

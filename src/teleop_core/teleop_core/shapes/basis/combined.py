@@ -53,7 +53,7 @@ def parts_of(texts: tuple[str, ...], name: str) -> list[Part]:
 
     Raises:
         ParameterError: There is no part or more than :data:`MOST`, or a text does not describe a part.
-    UnknownNameError: A part has no such parameter.
+        UnknownNameError: A part has no such parameter.
     """
     if not 1 <= len(texts) <= MOST:
         raise ParameterError(name, texts, f"1 to {MOST} parts, such as 'sphere radius=0.01'")

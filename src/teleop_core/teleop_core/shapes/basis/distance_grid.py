@@ -82,8 +82,7 @@ def distance_grid(request: GridRequest) -> DistanceGrid:
 
     Raises:
         ParameterError: There is no such file, it is neither a closed mesh with a volume nor a field of heights, or it
-            does not fit the scale or the step; see :func:`read_triangles` and
-            :func:`read_heights`.
+            does not fit the scale or the step; see :func:`read_triangles` and :func:`read_heights`.
     """
     path = Path(request.file).expanduser()
     try:

@@ -43,9 +43,9 @@ class Bridge:
         message: ROS type of its commands, such as ``std_msgs/msg/Float64MultiArray``.
         command_topic: Default topic of the commands.
         state_topic: Default topic of the arm's measured joints, a JointState.
-        write: ``write(message, command, parameters, make)`` fills an empty message with a
-            :class:`Command`. ``make("trajectory_msgs/msg/JointTrajectoryPoint")`` makes an empty message of that type,
-            for messages that contain other messages.
+        write: ``write(message, command, parameters, make)`` fills an empty message with a :class:`Command`.
+            ``make("trajectory_msgs/msg/JointTrajectoryPoint")`` makes an empty message of that type, for messages that
+            contain other messages.
     """
 
     name: str

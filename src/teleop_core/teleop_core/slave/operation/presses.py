@@ -51,8 +51,8 @@ class Presses:
             count: Number of messages that the middleware has lost so far, of all buttons.
 
         Returns:
-            A press if ``count`` has grown since the last call. A loss that missing numbers have already shown may
-            give a second press: subtracting it could hide a loss of another button.
+            A press if ``count`` has grown since the last call. A loss that missing numbers have already shown may give
+            a second press: subtracting it could hide a loss of another button.
         """
         is_new = count > self._told
         self._told = count

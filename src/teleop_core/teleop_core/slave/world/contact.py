@@ -228,8 +228,8 @@ def touch(p: WorldNumbers, contacts: Any, arm: Arm, q: Array, dq: Array, felt: A
     Args:
         p: Parameters.
         contacts: :class:`ContactState` of each point (N,); written.
-        arm: With ``T`` of the true tip, its joints ``tip``, ``jacobian``, ``distance`` and
-            ``shape``; its scratch arrays ``offset``, ``normal`` and ``J`` are written.
+        arm: With ``T`` of the true tip, its joints ``tip``, ``jacobian``, ``distance`` and ``shape``; its scratch
+            arrays ``offset``, ``normal`` and ``J`` are written.
         q: Joints of the links (n,) [rad or m], which move the tip from here on.
         dq: Their speeds (n,).
         felt: Sum of the forces in axes of the slave's base, and of their torques about the tip; written.
