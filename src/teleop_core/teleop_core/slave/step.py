@@ -72,7 +72,7 @@ def _take_measured(p: commands.SlaveNumbers, s: commands.SlaveState, arm: ArmMod
     if before_ns == 0:
         _begin_where_it_is(p, s, arm, row)
         return
-    if is_lost:  # the arm may have been moved by hand, or may have received no setpoint
+    if is_lost:  # the arm may have been moved, or may have received no setpoint
         s.must_join = 1
     if watch.is_braked(p, s):
         for i in range(n):

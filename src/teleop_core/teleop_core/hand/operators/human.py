@@ -243,7 +243,7 @@ def _reach(
 
 
 def _blurred(p: HumanParameters, way: Array, duration: float, rng: np.random.Generator) -> Array:
-    """A wanted displacement and rotation (6,) with the noise of its execution; zero displacement has no noise."""
+    """A wanted displacement and rotation (6,) with the noise of execution; a zero displacement gets no noise."""
     out = way.copy()
     for part in (slice(0, 3), slice(3, 6)):
         size = float(length(way[part]))

@@ -260,7 +260,7 @@ class Observer:
             self._press(now + duration, Act.PRESS)
 
     def _careful(self, tip: Array, step: Array) -> float:
-        """Duration [s] for which the noise of a step (3,) [m] stays clear of walls and edges; 0 without walls.
+        """Duration [s] for which the noise of a step (3,) [m] stays clear of walls and edges; 0 without any.
 
         The fixture's walls are those of its box. The operator aims no more exactly than the goal requires.
         """

@@ -40,7 +40,7 @@ class PegTransferParameters:
 
 
 def numbers(p: PegTransferParameters) -> Array:
-    """Numbers that the judge takes: lift, width, longest, kind, six ways, clearance, tries."""
+    """Numbers of the judge: lift, width, longest, kind, x and y of six displacements, clearance, tries."""
     kind = transfer.KINDS.index(p.arms)
     return np.array([p.lift, p.width, p.longest, kind, *np.resize(p.ways, _WAYS), p.clearance, p.tries], np.float64)
 

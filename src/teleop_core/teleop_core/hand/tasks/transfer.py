@@ -2,7 +2,8 @@
 
 A task's memory contains the number of the block, -1 once all are done; the height to which to lift it, above its
 start; how many blocks were on another peg and on none when the attempt began; the initial positions of all blocks; and
-how often the block was picked up. Its numbers are lift, width, longest, kind, six paths, clearance, tries.
+how often the block was picked up. Its numbers are lift, width, longest, kind, x and y of six displacements, clearance,
+tries.
 """
 
 import math

@@ -328,7 +328,7 @@ def told(T: Array, geometry: Array, reach: int, q: Array, residual: Array) -> in
 
 @inner
 def forget(seed: Array, limits: Array) -> None:
-    """Write the seed and limits that :func:`kept` needs: a zero seed and infinite limits."""
+    """Write seed and limits for :func:`kept`: zero seed, infinite limits, zero steps, so that no branch is turned."""
     for i in range(seed.shape[0]):
         seed[i] = limits[2, i] = 0.0
         limits[0, i], limits[1, i] = -math.inf, math.inf

@@ -78,7 +78,7 @@ class Lead:
         """Go slowly to a setpoint that went on without the arm; arguments and result as in :meth:`step`.
 
         The setpoint must stand still. The arm must have been commanded before, and must still be at its last command:
-        an arm that was moved by hand meanwhile gets no command. Normal commands resume when the arm arrives.
+        an arm that was moved meanwhile gets no command. Normal commands resume when the arm arrives.
         """
         is_still = bool((setpoint == self._setpoint).all())
         self._setpoint[:] = setpoint

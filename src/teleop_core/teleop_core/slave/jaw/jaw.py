@@ -13,7 +13,7 @@ from teleop_core.slave.operation.states import State
 
 _STATE, _ENABLED = topics.OPERATION.index("state"), int(State.ENABLED)
 _NEAR = 1e-3  # a command this near to the held angle has reached it [rad]
-_MOVED = 0.05  # a jaw farther from its setpoint by more than this was moved by hand [rad]
+_MOVED = 0.05  # a jaw farther from its setpoint by more than this was moved by something else [rad]
 _CLOSING = 0.02  # a command that falls by this much closes the jaw; a resting hand varies less
 
 
@@ -63,7 +63,7 @@ def _see(p: JawNumbers, s: JawState, row: Row) -> None:
     """Take the jaw's measured angle.
 
     The setpoint is set to this angle until the first command is followed. It is also set to this angle if the jaw was
-    silent and is now farther from its setpoint than before, because then the jaw was moved by hand.
+    silent and is now farther from its setpoint than before, because then something else moved the jaw.
     """
     angle = row.slave_jaw_measured_js[0]
     if row.slave_jaw_measured_js_ns == s.sampled_ns or not math.isfinite(angle):
