@@ -14,8 +14,8 @@ class Presses:
 
     The state of a button that sends nothing is unknown, so such a button holds the stop (:meth:`doubt`).
 
-    Methods that take a message return the changes of the stop, oldest first: True for a press, and then False if no
-    button holds the stop any more.
+    Methods that take a message return the states of the stop after it, oldest first: True means pressed. A lost
+    message gives True first, followed by False if no button holds the stop.
     """
 
     def __init__(self) -> None:
@@ -72,7 +72,7 @@ class Presses:
             is_idle: Whether the arm is disabled. Then presses before the first message from this button are ignored.
 
         Returns:
-            The changes of the stop; empty for a message that was already taken.
+            States of the stop, oldest first; empty for a message that was already taken.
         """
         last = self._last.get(sender, number - 1 if is_idle else 0)
         if 0 < number <= last:
