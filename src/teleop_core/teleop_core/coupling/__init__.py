@@ -1,1 +1,1 @@
-"""Coupling: what lies between master and slave: mapping, fixtures, filters, network, passivity, architectures."""
+"""Coupling: the stages between master and slave: mapping, fixtures, filters, network, passivity, architectures."""

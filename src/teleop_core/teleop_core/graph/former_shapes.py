@@ -1,7 +1,7 @@
-"""Former shapes: fixtures and objects as recordings of version 0.6 and before tell them.
+"""Former shapes: fixtures and objects in recordings of version 0.6 and before.
 
-They had a diameter where a radius is now, and what is to stay out of was a kind of its own. Files
-of users are not read so: there an error names what is known.
+They had a diameter in place of the present radius, and each shape to stay out of was a separate kind. Only recordings
+are read in this way: for users' files an error lists the known names.
 """
 
 import re
@@ -23,7 +23,7 @@ def present_fixture(kind: str, values: Mapping[str, Any]) -> tuple[str, dict[str
 
     Args:
         kind: Such as ``keep_out_sphere``.
-        values: Of its own parameters, by name.
+        values: Values of its own parameters, by name.
     """
     shape, found = kind.removeprefix(_KEPT_OUT), dict(values)
     if shape in {"sphere", "cylinder"} and "diameter" in found:
@@ -44,13 +44,13 @@ def _part(text: str) -> str:
 
 
 def present_layer(layer: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[str, Any]]:
-    """Values of a recording's stages, by dotted names, as they are called today."""
+    """Values of a recording's stages, by their present dotted names."""
     return {stage: _present_stage(values) for stage, values in layer.items()}
 
 
 def _present_stage(values: Mapping[str, Any]) -> dict[str, Any]:
     kind, found = str(values.get(_KIND, "")), dict[str, Any]()
-    # Those of the fixture that is used come last, for keep_out_sphere is a sphere too.
+    # Values of the used fixture come last, because keep_out_sphere is a sphere too.
     for name in sorted(values, key=lambda name: name.startswith(f"{_FIXTURE}{kind}.")):
         head, dot, own = name.removeprefix(_FIXTURE).partition(".")
         if not (name.startswith(_FIXTURE) and dot):

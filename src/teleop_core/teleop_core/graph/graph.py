@@ -1,7 +1,7 @@
 """Graph: stages, the links between them and the arms: the one description of what runs.
 
-Virtual time, replay, nodes, recorder, evaluation and diagrams derive everything from it: the order
-of a tick, which topic feeds which port, what is delayed, what is summed.
+Virtual time, replay, nodes, recorder, evaluation and diagrams derive everything from the graph: the order of a tick,
+which topic feeds which port, which links are delayed, and which topics are summed.
 """
 
 from collections.abc import Iterable, Iterator
@@ -17,9 +17,9 @@ __all__ = ["BUILT_IN", "DEVICE", "HAND", "RECORDER_NAME", "Delay", "Graph", "Lin
 BUILT_IN = ("operator", "haptic_master", "motion_scaling", "inverse_kinematics", "slave", "slave_sim")
 """Names of the stages that every arm has."""
 HAND, DEVICE = BUILT_IN[:2]
-"""Stages with whose recorded output a replay may begin."""
+"""Stages at whose recorded output a replay can begin."""
 RECORDER_NAME = "recorder"
-_WAYS = {"first": 0, "second": 1}  # beginnings of ports between arms, to the arm that writes
+_WAYS = {"first": 0, "second": 1}  # maps prefixes of ports between arms to the arm that writes
 
 
 @dataclass(frozen=True)
@@ -36,22 +36,22 @@ class Member:
 
     @property
     def writes(self) -> tuple[Topic, ...]:
-        """Topics it writes, in its namespace."""
+        """Topics that it writes, in its namespace."""
         return tuple(topic.of_arm(self.arm) for topic in self.stage.writes)
 
 
 @dataclass(frozen=True)
 class Link:
-    """One topic on its way from writer to reader.
+    """Connection of one topic from its writer to one reader.
 
     Attributes:
         topic: The topic, in its namespace.
-        writer: Who writes it.
-        reader: Who reads it.
-        port: Where it arrives: the topic that the reading stage declares.
-        delay: Time on the way [s], beside that of a tick for late links.
-        is_late: Whether the reader gets it as it was at the end of the last tick.
-        adds: Whether it is added to what else arrives at the port.
+        writer: Stage that writes the topic.
+        reader: Stage that reads the topic.
+        port: Port of the reader: the topic that the reading stage declares.
+        delay: Delay [s], in addition to the one tick of late links.
+        is_late: Whether the reader gets the value from the end of the last tick.
+        adds: Whether the value is added to the other values at the port.
     """
 
     topic: Topic
@@ -65,7 +65,7 @@ class Link:
 
 @dataclass(frozen=True)
 class Delay:
-    """A delay on a link: of a topic, on its way to one reader or to all."""
+    """A delay of a topic, on its link to one reader or to all readers."""
 
     topic: str
     seconds: float
@@ -76,7 +76,7 @@ class Delay:
         """Delay from ``topic=seconds`` or ``topic@reader=seconds``.
 
         Raises:
-            ParameterError: It has another form, or the time is negative or no number.
+            ParameterError: The text has another form, or the time is negative or not a number.
         """
         link, equals, time = text.partition("=")
         topic, _, reader = link.strip().partition("@")
@@ -95,12 +95,12 @@ class Graph:
     """Stages, arms and delays, checked.
 
     Attributes:
-        stages: Stages of every arm; the order decides where the data does not.
+        stages: Stages of every arm; their order decides where the data flow does not determine the order.
         arms: Names of the arms; the first is the default one, whose topics have plain names.
         delays: Delays on links.
 
     Raises:
-        PartError: It cannot run; the text names the stage and what was expected.
+        PartError: The graph cannot run; the message names the stage and what was expected.
     """
 
     stages: tuple[Stage, ...]
@@ -108,7 +108,7 @@ class Graph:
     delays: tuple[Delay, ...] = field(default=())
 
     def __post_init__(self) -> None:
-        """Refuse what cannot run, before anything does."""
+        """Refuse a graph that cannot run, before anything runs."""
         for kind, names in (("arm", self.arms), ("stage", [s.name for s in self.stages])):
             for name in names:
                 if list(names).count(name) > 1:
@@ -162,7 +162,7 @@ class Graph:
                 owners[name] = stage.name
 
     def _adding(self, topic: Topic) -> list[tuple[Stage, Topic]]:
-        """Other topics that are added to this one, with who writes them."""
+        """Other topics that are added to this topic, with their writers."""
         return [(s, t) for s in self.stages for t in s.writes if t.adds_to == topic.name]
 
     def _check_delays(self) -> None:
@@ -186,15 +186,15 @@ class Graph:
 
     @property
     def streams(self) -> tuple[Topic, ...]:
-        """Those with one message per step."""
+        """Topics with one message per step."""
         return tuple(topic for topic in self.topics if topic.kind is not Kind.REPORT)
 
     @cached_property
     def links(self) -> tuple[Link, ...]:
-        """All links, reader by reader; at one port the link that others add to comes first.
+        """All links, reader by reader; at each port the link to which others are added comes first.
 
-        A port ``first/topic`` of the second arm is fed by the first one's ``topic``, and a port
-        ``second/topic`` of the first by the second's; of other arms nothing feeds them.
+        A port ``first/topic`` of the second arm is fed by the first arm's ``topic``, and a port ``second/topic`` of
+        the first arm by the second arm's. Such ports of other arms are not fed.
         """
         return tuple(
             link for member in self._all() for port in member.stage.reads for link in self._links_to(member, port)
@@ -251,10 +251,10 @@ class Graph:
 
     @cached_property
     def members(self) -> tuple[Member, ...]:
-        """Stages of all arms in the order of a tick: every stage after those it waits for.
+        """Stages of all arms in the order of a tick: every stage after the stages whose output it needs.
 
         Raises:
-            PartError: They wait for each other in a circle.
+            PartError: The stages need each other in a cycle.
         """
         waiting = list(self._all())
         needs = {member.name: set[str]() for member in waiting}
@@ -277,14 +277,14 @@ class Graph:
         """Stages whose topics a replay takes from a recording, arm by arm.
 
         Args:
-            begin: The last of them: :data:`HAND`, :data:`DEVICE`, or empty for none.
+            begin: The last of these stages: :data:`HAND`, :data:`DEVICE`, or empty for none.
         """
         names = BUILT_IN[: BUILT_IN.index(begin) + 1] if begin else ()
         return tuple(m for m in self.members if m.stage.name in names)
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What runs but may not be meant: outputs that look like an input and reach nobody."""
+        """Notes on probable mistakes: outputs with names like an input that no stage reads."""
         read = {link.topic.name for link in self.links}
         found = []
         for stage in self.stages:
@@ -304,10 +304,10 @@ class Graph:
         return tuple(link for link in self.links if link.reader == member)
 
     def chain(self, arm: str = "") -> tuple[tuple[str, Topic], ...]:
-        """Way of a master's sample to the slave: stages, each with the topic it answers with.
+        """Path of a master's sample to the slave: stages, each with its output topic.
 
-        It begins at the first stage of the order and follows the stamps: each next stage answers
-        the topic before it under its stamp.
+        The path begins at the first stage of the order and follows the stamps: each next stage answers the previous
+        topic and keeps its stamp.
         """
         first = Member(next(stage for stage in self.stages if stage.name == DEVICE), arm)
         found = [(first.stage.name, first.writes[0])]
@@ -335,7 +335,7 @@ def build_graph(arms: Iterable[str] = (), stages: Iterable[str] = (), delays: It
     """Graph of the built-in stages and some more.
 
     Args:
-        arms: Names of the arms, the first of which is the default one; one without a name if empty.
+        arms: Names of the arms, the default arm first; if empty, there is one arm without a name.
         stages: Names of further stages.
         delays: Delays as :meth:`Delay.parse` takes them.
 
@@ -353,7 +353,7 @@ def build_graph(arms: Iterable[str] = (), stages: Iterable[str] = (), delays: It
 
 
 def _demanded(stages: tuple[Stage, ...]) -> tuple[Stage, ...]:
-    """The stages, without those of their on-demand outputs that nobody reads."""
+    """The stages, without on-demand outputs that no stage reads."""
     needed = {topic.name for stage in stages for topic in stage.reads if topic not in stage.optional}
     written = {
         topic.name for stage in stages for topic in stage.writes if topic not in stage.on_demand or topic.name in needed

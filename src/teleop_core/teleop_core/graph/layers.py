@@ -1,4 +1,4 @@
-"""Layers: what files, scenarios and settings say, as values by stage and name, not yet checked."""
+"""Layers: contents of files, scenarios and settings, as values by stage and name, not yet checked."""
 
 import difflib
 import math
@@ -14,7 +14,7 @@ from teleop_core.graph.stage import STAGES
 
 @dataclass(frozen=True, kw_only=True)
 class RealTimeParameters:
-    """What a live node asks of the system; a refusal is reported and the node works on."""
+    """What a live node requests from the operating system; a refusal is reported, and the node works on."""
 
     priority: int = parameter(
         -1,
@@ -81,7 +81,7 @@ RENAMED = {
         )
     },
 }
-"""Former names, which recordings and files may still have, or their beginnings."""
+"""Former names, or their prefixes, which recordings and files may still contain, with the present names."""
 _READER = ("slave/servo_jp@slave_sim=", "slave/servo_jp@slave=")  # of commands, before and now
 _OF_ROBOT = ("robot", "geometry")
 
@@ -89,24 +89,24 @@ Layer = dict[str, dict[str, object]]
 
 
 def declared_groups() -> dict[str, type]:
-    """Name of each group of a parameter file to its type: the session, then all known stages."""
+    """Maps the name of each group of a parameter file to its type: the session, then all known stages."""
     return {SESSION: SessionParameters, **{name: STAGES.find(name).parameters for name in STAGES}}
 
 
 def config_folder() -> Path:
-    """Folder with the parameter files: of the source tree, or where the package is installed."""
+    """Folder with the parameter files: in the source tree, or in the installed package."""
     package = Path(__file__).resolve().parents[1]
     prefix = package.parents[3] / "share" / "teleop_core" / "config"
     return prefix if prefix.is_dir() else package.parent / "config"
 
 
 def _scenarios() -> dict[str, Path]:
-    """Names of the scenarios to their files."""
+    """Maps the names of the scenarios to their files."""
     return {path.stem: path for path in sorted(config_folder().glob("*.yaml")) if path.stem != "teleop"}
 
 
 def list_scenarios() -> dict[str, str]:
-    """Names of the scenarios to their descriptions."""
+    """Maps the names of the scenarios to their descriptions."""
     files = _scenarios().items()
     return {name: str(load_file(path).get("teleop", {}).get("description", "")) for name, path in files}
 
@@ -124,19 +124,19 @@ def scenario_file(name: str) -> Path:
 
 
 def load_file(path: Path) -> Layer:
-    """Values of a ROS 2 parameter file: stage to dotted names to values.
+    """Values of a ROS 2 parameter file: a mapping from stages to mappings from dotted names to values.
 
     Raises:
-        TeleopError: The file is missing, is not YAML, or has another shape.
+        TeleopError: The file is missing, is not YAML, or has the wrong structure.
     """
     return parse_layer(plain_yaml.load(path), str(path))
 
 
 def parse_text(text: str, where: str) -> Layer:
-    """Values of the text of a ROS 2 parameter file; an empty one says nothing.
+    """Values of the text of a ROS 2 parameter file; an empty text has no values.
 
     Raises:
-        TeleopError: It is not YAML, or has another shape.
+        TeleopError: The text is not YAML, or has the wrong structure.
     """
     try:
         content = plain_yaml.parse(text)
@@ -148,11 +148,11 @@ def parse_text(text: str, where: str) -> Layer:
 def parse_layer(content: object, where: str) -> Layer:
     """Values of a parsed ROS 2 parameter file.
 
-    What stands under ``/**`` holds for every stage that has it, unless the stage's own says more.
+    A value under ``/**`` applies to every stage that has the parameter, unless the stage's own group sets it.
 
     Raises:
-        TeleopError: It has another shape than stage / ros__parameters / name / value.
-        UnknownNameError: There is no such stage, or none has what stands under ``/**``.
+        TeleopError: The structure is not stage / ros__parameters / name / value.
+        UnknownNameError: There is no such stage, or no stage has a parameter under ``/**``.
     """
     layer: Layer = {}
     if not isinstance(content, Mapping):
@@ -184,7 +184,7 @@ def _owners(name: str, where: str) -> list[str]:
     """Stages that have a parameter of this name.
 
     Raises:
-        UnknownNameError: None has.
+        UnknownNameError: No stage has it.
     """
     names = {stage: {spec.name for spec in specs(group)} for stage, group in declared_groups().items()}
     if not (owners := [stage for stage, own in names.items() if name in own]):
@@ -194,7 +194,7 @@ def _owners(name: str, where: str) -> list[str]:
 
 
 def _current(full: str) -> str:
-    """Present name of a parameter that may be called by a former one."""
+    """Present name of a parameter; ``full`` may be a former name."""
     for old, new in RENAMED.items():
         if full == old or (old.endswith(".") and full.startswith(old)):
             return new + full[len(old) :]
@@ -202,7 +202,7 @@ def _current(full: str) -> str:
 
 
 def _share_robot(layer: Layer) -> None:
-    """Give ``slave`` the robot of ``slave_sim`` where a file of a former version has no ``slave``."""
+    """Give ``slave`` the robot of ``slave_sim`` if a file of a former version has no ``slave``."""
     for name in [name for name in layer if name.rpartition("/")[2] == "slave_sim"]:
         slave = layer.setdefault(name.removesuffix("_sim"), {})
         if not slave.keys() & set(_OF_ROBOT):
@@ -220,12 +220,12 @@ def _flat(values: Mapping[str, Any], prefix: str = "") -> Iterable[tuple[str, ob
 def parse_setting(text: str) -> Layer:
     """Values of one ``--set key=value``.
 
-    The key is ``stage.name``, or a bare name, which sets every stage that has it; ``arm/`` before
-    it means that arm alone. The name of a group with a ``kind`` chooses the kind:
-    ``fixture=sphere``. A list is written [1, 2]. Whole numbers serve for real ones.
+    The key is ``stage.name``, or a bare name, which sets every stage that has it; the prefix ``arm/`` restricts it to
+    that arm. The name of a group with a ``kind`` chooses the kind: ``fixture=sphere``. A list is written [1, 2]. Whole
+    numbers are accepted for real numbers.
 
     Raises:
-        TeleopError: No "=", or a value that is not YAML.
+        TeleopError: There is no "=", or the value is not YAML.
         UnknownNameError: No stage has the key; the nearest keys are listed.
     """
     key, equals, value_text = text.partition("=")
@@ -259,7 +259,7 @@ def _hits(key: str) -> list[tuple[str, Spec]]:
     """Stages and parameters that a key means.
 
     Raises:
-        UnknownNameError: None, or several of different names.
+        UnknownNameError: There is no such parameter, or there are several with different names.
     """
     declared = {
         f"{stage}.{spec.name}": (stage, spec) for stage, group in declared_groups().items() for spec in specs(group)
@@ -274,7 +274,7 @@ def _hits(key: str) -> list[tuple[str, Spec]]:
                 known.setdefault(old + full[len(new) :], entry)
     ends = {full: entry for full, entry in known.items() if f".{full}".endswith("." + key)}
     if len({spec.name for _, spec in ends.values()}) > 1:
-        raise UnknownNameError("key", key, ends)  # several parameters end so
+        raise UnknownNameError("key", key, ends)  # several parameters have this ending
     if not ends:
         near = difflib.get_close_matches(
             key[:LONGEST_VALUE], dict.fromkeys([*known, *(s.name for _, s in declared.values())])
@@ -284,9 +284,9 @@ def _hits(key: str) -> list[tuple[str, Spec]]:
 
 
 def _as_declared(spec: Spec, value: object) -> object:
-    """Value as the declared type: a whole number as a real one; what YAML took for a number as text.
+    """Value in the declared type: a whole number becomes a real one; a number read by YAML becomes text.
 
-    A single value stands for a list of one.
+    A single value stands for a list of one element.
     """
     if isinstance(value, list | tuple):
         return tuple(_as_element(spec, element) for element in value)

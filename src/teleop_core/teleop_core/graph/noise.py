@@ -1,15 +1,15 @@
-"""Noise: random numbers of the coming ticks, drawn a block ahead of them."""
+"""Noise: random numbers of the coming ticks, drawn a block of ticks in advance."""
 
 from typing import Any
 
 import numpy as np
 
 BLOCK = 1000
-"""Ticks for which noise, and what a hand wants, is drawn at once, at most."""
+"""Largest number of ticks for which noise, and the wanted motion of a hand, is computed at once."""
 
 
 class Noise:
-    """Noise of a stage, whose kernel counts the rows that it took in ``next_noise`` of its state.
+    """Noise of a stage; its kernel counts the used rows in ``next_noise`` of its state.
 
     Attributes:
         rows: Standard normal numbers, shape (:data:`BLOCK`, 6), a row for each tick.
@@ -23,7 +23,7 @@ class Noise:
         self._rng, self._end = rng, 0
 
     def prepare(self, state: Any, ticks: int) -> None:
-        """Draw what the next ticks take."""
+        """Draw the numbers that the next ticks need."""
         first = int(state["next_noise"])
         left = self._end - first
         if left >= ticks:

@@ -1,8 +1,8 @@
 """Signals: one record per stage with the newest value and stamp of every topic at its ports.
 
-A stage knows nothing of the others: it reads and writes the fields of its own record. In virtual
-time the composed tick copies values from record to record; as a node, subscriptions fill the
-record and publishers empty it. The arithmetic is the same.
+A stage is independent of the others: it reads and writes only the fields of its own record. In virtual time the
+composed tick copies values from record to record. In a node, subscriptions write into the record and publishers read
+from it. The computation is the same.
 
 Every topic has two fields, as :attr:`Topic.field <teleop_core.graph.topics.Topic.field>` names
 them: the columns of its kind, and ``<field>_ns``, its stamp [ns].
@@ -18,7 +18,7 @@ from teleop_core.kernels.fields import Field
 TICK_NS = 1_000_000
 """Control period of every stage unless a session says otherwise [ns]."""
 DT: float = TICK_NS / 1e9
-"""The same in seconds."""
+"""The control period in seconds."""
 
 STATE_FIELDS = TELEOP_STATE.columns
 STATE = {name: index for index, name in enumerate(STATE_FIELDS)}
@@ -37,9 +37,9 @@ def make_signals(topics: Iterable[Topic], joints: int, notes: Iterable[Field] = 
     """Zeroed signals (1,) with unit quaternions, so that every pose is valid from the start.
 
     Args:
-        topics: What the record has ports for.
+        topics: Topics for which the record has ports.
         joints: Number of joints of the arm; 0 if no topic has joints.
-        notes: Further fields, which are recorded by nobody.
+        notes: Further fields, which are never recorded.
 
     Returns:
         One record with ``now_ns``, the time of the tick [ns], the topics' fields, and the notes.
@@ -53,7 +53,7 @@ def make_signals(topics: Iterable[Topic], joints: int, notes: Iterable[Field] = 
 
 
 def assign(target: Any, source: Any) -> None:
-    """Give a record the values of another of its type, or 0 for all of its fields."""
+    """Write into a record the values of another record of its type, or 0 into all of its fields."""
     for name in target.dtype.names:
         target[name] = source if isinstance(source, int) else source[name]
 

@@ -1,4 +1,4 @@
-"""Stage: one step of the chain as a value, and what it is while a session runs.
+"""Stage: the description of one step of the chain, and its object in a running session.
 
 A stage names its parameters, the topics at its ports and the kernel that makes one step. From a
 tuple of stages everything else follows: the order of a tick, the nodes, the links, the recording.
@@ -23,23 +23,23 @@ __all__ = ["STAGES", "Runner", "RunningStage", "Stage", "joints_of", "register_s
 
 
 class Runner(Protocol):
-    """A stage at work: what virtual time and nodes need of it.
+    """A running stage: the interface for virtual time and nodes.
 
-    ``kernel(*arguments, signals, dt)`` makes one step from the inputs in ``signals`` to the outputs there; a kernel
-    that is compiled becomes part of the compiled tick, any other callable is called from Python.
+    ``kernel(*arguments, signals, dt)`` makes one step: it reads inputs from ``signals`` and writes outputs into it. A
+    compiled kernel becomes part of the compiled tick; any other callable is called from Python.
     """
 
     signals: Any
     kernel: Callable[..., None]
     arguments: tuple[Any, ...]
     ahead: int
-    """Ticks for which it can be prepared at once, 1000 at most."""
+    """Largest number of ticks for which it can be prepared at once, 1000 at most."""
     changes_itself: bool
     """Whether it changes parameters by itself, as a mode button does; see :meth:`present`."""
 
     @property
     def lead(self) -> int:
-        """Ticks before it can follow, as for a move to where it starts."""
+        """Ticks before it can follow commands, such as those of a move to its start."""
 
     def prepare(self, ticks: int) -> None:
         """Get ready for the next ``ticks`` steps, ``ahead`` at most."""
@@ -48,7 +48,7 @@ class Runner(Protocol):
         """Back to the state before the first step."""
 
     def retune(self, parameters: Any) -> None:
-        """Take new parameters from the next step on; nothing jumps."""
+        """Take new parameters from the next step on, without a jump of its outputs."""
 
     def step(self) -> None:
         """Make one step."""
@@ -57,10 +57,10 @@ class Runner(Protocol):
         """Compile or load the kernel, so that the first step takes no longer than others."""
 
     def examine(self, parameters: Any) -> None:
-        """Try parameters beside the running steps, where that takes long, before :meth:`retune`."""
+        """Try parameters before :meth:`retune`, outside the running steps, if the trial takes long."""
 
     def present(self) -> Any:
-        """Parameters as they are now; asked for only where it changes them by itself."""
+        """Present parameters; called only if the stage changes its parameters by itself."""
 
     def fall_silent(self) -> None:
         """Make outputs safe when the topic that it answers has fallen silent."""
@@ -69,7 +69,7 @@ class Runner(Protocol):
         """What is wrong now, in words, for people; asked once a second."""
 
     def described(self) -> dict[str, str]:
-        """Names and texts that its report tells beside its numbers."""
+        """Names and texts that its report contains in addition to its numbers."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -81,31 +81,30 @@ class Stage:
         parameters: Parameter group, a dataclass of :func:`~teleop_core.base.parameters.parameter`.
         reads: Topics it reads; its record has a field for each.
         writes: Topics it writes, streams and at most one report.
-        step: ``step(parameters, state, signals, dt)``, a kernel or a plain function: ``parameters``
-            and ``state`` are records with a field for each parameter and each entry of ``state``.
-        state: What it remembers from step to step, zero at the start: a class of
-            :class:`~teleop_core.kernels.fields.Fields`, or fields as :class:`numpy.dtype` takes
-            them.
-        make: In place of ``step`` and ``state``: makes the :class:`Runner` from parameters and the
-            length of a tick [s].
-        late: Those of ``reads`` that are taken as they were at the end of the last tick. A cycle of stages needs one.
-        optional: Those of ``reads`` that no stage has to write; zeros where none does.
-        trigger: The topic whose messages it answers, one step each; None for a stage with a clock
-            of its own, which makes one step per tick.
-        replaces: Topic whose other readers read ``writes[0]`` in its place, as for a limit or a
-            filter between two stages; or several, for ``writes`` in their order.
-        spares: Names of stages that read what is replaced all the same, such as an operator who
-            holds the stylus itself; of one topic alone: ``slave/measured_cf@passivity``.
-        serves: Names of the only stages that read what is replaced, whatever others replace for
+        step: ``step(parameters, state, signals, dt)``, a kernel or a plain function: ``parameters`` and ``state`` are
+            records with a field for each parameter and each entry of ``state``.
+        state: Its memory from step to step, zero at the start: a class of :class:`~teleop_core.kernels.fields.Fields`,
+            or fields as :class:`numpy.dtype` takes them.
+        make: In place of ``step`` and ``state``: makes the :class:`Runner` from parameters and the length of a tick
+            [s].
+        late: Topics of ``reads`` whose values from the end of the last tick are read. A cycle of stages needs one.
+        optional: Topics of ``reads`` that no stage has to write; their values are zero if no stage writes them.
+        trigger: The topic whose messages it answers, one step each; None for a stage with a clock of its own, which
+            makes one step per tick.
+        replaces: Topic whose other readers read ``writes[0]`` in its place, as for a limit or a filter between two
+            stages; or several topics, for ``writes`` in their order.
+        spares: Names of stages that still read the original topic, such as an operator who holds the stylus itself;
+            for one topic alone: ``slave/measured_cf@passivity``.
+        serves: Names of the only stages that read the replacement, even if other stages replace the same topic for
             them, such as an operator who sees the slave on a display; empty for all.
-        on_demand: Those of ``writes`` that are there only where another stage must read them, or
-            where what they replace is written.
-        notes: Further fields of its record, which nobody reads.
-        node: ``module:class`` of its node, if a general one does not do.
-        needs: Topics without which the node answers nothing.
+        on_demand: Topics of ``writes`` that exist only if another stage must read them, or if the topic that they
+            replace is written.
+        notes: Further fields of its record, which no stage reads.
+        node: ``module:class`` of its node, if a generic node is not enough.
+        needs: Topics without which the node answers no message.
 
     Raises:
-        PartError: It contradicts itself; the text says how.
+        PartError: The stage contradicts itself; the message tells how.
     """
 
     name: str
@@ -127,7 +126,7 @@ class Stage:
     needs: tuple[Topic, ...] = ()
 
     def __post_init__(self) -> None:
-        """Refuse what could never run."""
+        """Refuse a stage that could never run."""
         self._insist(self.name.isidentifier(), "a name of letters, digits and _")
         for word in ("reads", "writes", "late", "optional", "needs"):
             found = getattr(self, word)
@@ -164,7 +163,7 @@ class Stage:
         self._insist("robot" in names or not has_joints, text)
 
     def _check_parts(self) -> None:
-        """Refuse what has not the form that is asked for."""
+        """Refuse parts that do not have the required form."""
         is_group = isinstance(self.parameters, type) and is_dataclass(self.parameters)
         self._insist(is_group, "one whose parameters are a dataclass, not an instance of one")
         if self.step is not None:
@@ -206,10 +205,10 @@ class Stage:
         return tuple(dict.fromkeys((*self.reads, *self.writes)))
 
     def run(self, parameters: Any, dt: float = DT) -> Runner:
-        """The stage at work.
+        """Make the running stage.
 
         Args:
-            parameters: An instance of its group.
+            parameters: An instance of its parameter group.
             dt: Length of a tick [s].
         """
         if self.make is not None:
@@ -226,8 +225,8 @@ class RunningStage:
     """Base of :class:`Runner` classes: a record of signals and a kernel bound to its arguments.
 
     Args:
-        stage: What it runs.
-        joints: Number of joints of its arm; 0 without.
+        stage: The stage that it runs.
+        joints: Number of joints of its arm; 0 without joints.
         dt: Length of a tick [s].
     """
 
@@ -241,7 +240,7 @@ class RunningStage:
 
     @property
     def lead(self) -> int:
-        """Ticks before it can follow: none."""
+        """Ticks before it can follow commands: none."""
         return 0
 
     def prepare(self, ticks: int) -> None:
@@ -257,7 +256,7 @@ class RunningStage:
         """Try parameters before they are taken; nothing to do here."""
 
     def present(self) -> Any:
-        """Parameters as they are now, of a stage that changes them by itself."""
+        """Present parameters of a stage that changes them by itself."""
         raise NotImplementedError
 
     def fall_silent(self) -> None:
@@ -268,7 +267,7 @@ class RunningStage:
         return []
 
     def described(self) -> dict[str, str]:
-        """Names and texts that its report carries beside its numbers; none by default."""
+        """Names and texts that its report contains in addition to its numbers; none by default."""
         return {}
 
     def step(self) -> None:
@@ -285,7 +284,7 @@ class RunningStage:
 
 
 def _nothing() -> None:
-    """Stand in for the kernel of a stage that is being made."""
+    """Do nothing: placeholder for the kernel of a stage that is being made."""
 
 
 class _Plain(RunningStage):
@@ -305,10 +304,10 @@ class _Plain(RunningStage):
         self._try()
 
     def _try(self) -> None:
-        """Make one step of a compiled kernel in plain Python, on copies: that one checks indices.
+        """Make one step of a compiled kernel in plain Python, on copies, because plain Python checks indices.
 
         Raises:
-            PartError: It reaches beyond the end of an array.
+            PartError: The kernel reaches beyond the end of an array.
         """
         plain = getattr(self.kernel, "py_func", None)
         if plain is None:
@@ -317,29 +316,29 @@ class _Plain(RunningStage):
         for copy, record in zip(copies, (*self.arguments, self.signals), strict=True):
             copy[0] = record
         try:
-            with np.errstate(all="ignore"):  # as compiled code goes on with infinity
+            with np.errstate(all="ignore"):  # because compiled code continues with infinity
                 plain(*(copy[0] for copy in copies), self.dt)
         except IndexError as error:
             place = traceback.extract_tb(error.__traceback__)[-1]
             where = f"{Path(place.filename).name}:{place.lineno}"
             text = f"one that stays inside its arrays; {error} ({where})"
             raise PartError("stage", self.stage.name, text) from error
-        except Exception:  # what calls inner kernels runs compiled only
+        except Exception:  # kernels that call inner kernels run only compiled
             return
 
     def reset(self) -> None:
-        """State and signals as before the first step."""
+        """Reset state and signals to their values before the first step."""
         assign(self._state, 0)
         assign(self.signals, self._begin)
 
     def retune(self, parameters: Any) -> None:
-        """Take new parameters; those that are texts become the place of theirs in the choices."""
+        """Take new parameters; a text parameter becomes its index in the choices."""
         for name, value in _numbers(parameters):
             self._parameters[name] = value
 
 
 def _numbers(parameters: Any) -> list[tuple[str, Any]]:
-    """Fields of a parameter record: dots as underscores, texts as places among their choices."""
+    """Fields of a parameter record: dots become underscores, texts become indices in their choices."""
     found: list[tuple[str, Any]] = []
     values = values_of(parameters)
     for spec in specs(type(parameters)):
@@ -396,4 +395,4 @@ STAGES: Registry[Stage] = Registry(
 """All stages by name, in the order in which data goes through the built-in ones."""
 
 register_stage = STAGES.register
-"""Adds one of yours under its own name; see :meth:`Registry.register`."""
+"""Adds your stage under its own name; see :meth:`Registry.register`."""

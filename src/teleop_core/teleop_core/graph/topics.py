@@ -1,23 +1,23 @@
-"""Topics: the single list of what travels between the stages, with its message and its meaning.
+"""Topics: the single list of all topics between the stages, with their messages and meanings.
 
-A topic is described once, below the namespace of its arm: the default arm has the plain names, an
-arm called ``left`` has ``left/slave/servo_cp`` and so on.
+A topic is described once, without the namespace of its arm: the default arm has the plain names, an arm called
+``left`` has ``left/slave/servo_cp`` and so on.
 """
 
 from dataclasses import dataclass, replace
 from enum import Enum, IntEnum
 
 STATE_COMMANDS = ("enable", "disable", "pause", "resume", "home", "unhome", "reset", "stop")
-"""What an arm in operation is told, by name; see :mod:`teleop_core.slave.operation`."""
+"""Commands that change the state of an arm, by name; see :mod:`teleop_core.slave.operation`."""
 OPERATION = (
     "state", "is_homed", "is_busy", "is_stopped", "fault", "fault_joint", "fault_value",
     "fault_bound", "rest_time", "travel", "is_braked", "is_pressed",
 )  # fmt: skip
 """Numbers of ``slave/operation``: :class:`~teleop_core.slave.operation.State`, flags,
-:class:`~teleop_core.slave.operation.Fault`, the joint that it is about (-1: none), what was found
-and what it must not exceed; since it last had to stop: the time until it was at rest [s] and how
-far the tip got meanwhile [m], both 0 until then; whether its drives are to be off and brakes to
-hold it; whether a stop button is still pressed, or missed."""
+:class:`~teleop_core.slave.operation.Fault`, the joint of the fault (-1: none), the value found and its bound. Then,
+for the last stop, the time until the arm was at rest [s] and the distance that the tip moved meanwhile [m], both 0
+before the first stop; whether drives must be off and brakes on; whether a stop button is still pressed, or silent.
+"""
 
 
 class Quality(Enum):
@@ -29,12 +29,12 @@ class Quality(Enum):
 
 
 class Limit(IntEnum):
-    """What keeps the slave from doing all that the hand asks for."""
+    """Limit that keeps the slave from following the hand completely."""
 
     NONE = 0  # it follows
     JOINT = 1  # a joint is at the end of its range
-    WORKSPACE = 2  # no joint vector brings the tip there
-    SINGULARITY = 3  # joints would have to turn faster than they can, for the arm is near one
+    WORKSPACE = 2  # no joint vector brings the tip to the commanded pose
+    SINGULARITY = 3  # joints would have to turn faster than they can, because the arm is near a singularity
     SPEED = 4  # joints would have to move faster than they can
 
 
@@ -59,7 +59,7 @@ def limit_text(limit: int, joint: int, joint_names: tuple[str, ...] = ()) -> str
 
 
 class Kind(Enum):
-    """What the values of a topic are, and by which ROS message they go.
+    """Meaning of the values of a topic, and the ROS message that carries them.
 
     Columns of a value row, in the order used inside the package:
 
@@ -83,7 +83,7 @@ class Kind(Enum):
     JAW = "jaw", "sensor_msgs/msg/JointState"
     NUMBERS = "numbers", "sensor_msgs/msg/JointState"
     JOINTS = "joints", "sensor_msgs/msg/JointState"
-    STATE = "state", "sensor_msgs/msg/JointState"  # unknown topics of its type are read so
+    STATE = "state", "sensor_msgs/msg/JointState"  # unknown topics of its type are read with this kind
     REPORT = "report", "diagnostic_msgs/msg/DiagnosticArray"
 
     def __init__(self, _: str, ros_type: str) -> None:
@@ -97,7 +97,7 @@ class Kind(Enum):
 
     @property
     def has_names(self) -> bool:
-        """Whether its messages carry the names of their numbers."""
+        """Whether its messages contain the names of their numbers."""
         return self.has_joints or self in {Kind.NUMBERS, Kind.JAW}
 
     @property
@@ -115,7 +115,7 @@ class Kind(Enum):
         return _COLUMNS[self]
 
     def width(self, joints: int) -> int:
-        """Number of columns for a robot with this many joints, or a topic with so many names."""
+        """Number of columns for a robot with this many joints, or for a topic with this many names."""
         fixed = {Kind.POSE: 7, Kind.TWIST: 6, Kind.WRENCH: 6, Kind.BUTTONS: 3, Kind.REPORT: 0, Kind.JAW: 3}
         return {Kind.NUMBERS: joints, Kind.JOINTS: joints, Kind.STATE: 3 * joints, **fixed}[self]
 
@@ -138,9 +138,9 @@ class Stamp:
 
     Attributes:
         text: The rule in words.
-        of: Name of the topic whose stamp is passed on; empty where it is the time of sampling.
-        is_in_force: Whether the writer itself says which command's stamp it is, because it may hold an older one. Such
-            a stamp may come again, and is :data:`NO_COMMAND_NS` before the first command.
+        of: Name of the topic whose stamp is passed on; empty if the stamp is the time of sampling.
+        is_in_force: Whether the writer itself chooses the command whose stamp is passed on, because it may hold an
+            older command. Such a stamp may repeat, and is :data:`NO_COMMAND_NS` before the first command.
     """
 
     text: str
@@ -169,7 +169,7 @@ def arrived(topic: str) -> Stamp:
 
 
 SELDOM_NS = 20_000_000
-"""Time after which a value that has not changed is sent again all the same [ns]."""
+"""Time after which an unchanged value is sent again [ns]."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -178,7 +178,7 @@ class Topic:
 
     Attributes:
         name: Name below the arm's namespace, such as ``slave/servo_cp``.
-        kind: What its values are.
+        kind: Kind of its values.
         stamp: Which time its header carries.
         frame_id: Frame of the header, below the arm's namespace.
         quality: How it is transported.
@@ -186,9 +186,9 @@ class Topic:
         adds_to: Name of a topic whose readers get the sum of both, such as ``master/servo_cf`` for
             another source of force; empty for a topic of its own.
         arm: Namespace; empty for the default arm.
-        is_seldom: Whether it is sent where it changes and every :data:`SELDOM_NS` alone.
-        message: Name of the ROS message type where it carries no values, such as a robot's model;
-            empty for that of its kind.
+        is_seldom: Whether it is sent only at a change and every :data:`SELDOM_NS`.
+        message: Name of the ROS message type of a topic without values, such as a robot's model; empty for that of its
+            kind.
     """
 
     name: str
@@ -237,11 +237,11 @@ class Topic:
 
 MASTER_MEASURED_CP = Topic("master/measured_cp", Kind.POSE, SAMPLED, "master_base")
 MASTER_FILTERED_CP = Topic("master/filtered_cp", Kind.POSE, passed_on("master/measured_cp"), "master_base")
-"""The stylus without tremor, of a session with a tremor filter."""
+"""Pose of the stylus without tremor, in a session with a tremor filter."""
 MASTER_FILTERED_OUT = Topic(
     "master/filtered_out", Kind.NUMBERS, passed_on("master/measured_cp"), "master_base", columns=("x", "y", "z")
 )
-"""What a tremor filter took away [m]: the stylus is at filtered_cp and this much further."""
+"""What a tremor filter removed [m]: the position of the stylus minus that of filtered_cp."""
 MASTER_MEASURED_CV = Topic("master/measured_cv", Kind.TWIST, SAMPLED, "master_base")
 MASTER_MEASURED_CF = Topic("master/measured_cf", Kind.WRENCH, SAMPLED, "master_base")
 MASTER_BUTTONS = Topic("master/buttons", Kind.BUTTONS, SAMPLED, "master_base")
@@ -252,14 +252,16 @@ MASTER_CONTACT = Topic(
     "master_base",
     columns=("number", "taken", "returned", "friction", "largest_force"),
 )
-"""Energy of the present contact, or the last one: how many there were, what the motors' force took
-from the hand and gave back, what dry friction took meanwhile [J], all of the true motion, which a
-simulator knows; and the largest force that the warmth of the motors allows [N]."""
+"""Energy of the present contact, or the last one: number of contacts so far; energy that the motors' force took from
+the hand, returned to it, and that dry friction took meanwhile [J]; and the largest force that the heat of the motors
+allows [N]. Energies use the true motion, which only a simulator knows.
+"""
 MASTER_SERVO_CF = Topic("master/servo_cf", Kind.WRENCH, passed_on("master/measured_cp"), "master_base")
 SLAVE_SERVO_CP = Topic("slave/servo_cp", Kind.POSE, passed_on("master/measured_cp"), "slave_base")
 SLAVE_SERVO_CF = Topic("slave/servo_cf", Kind.WRENCH, passed_on("master/measured_cp"), "slave_base", is_seldom=True)
-"""Force with which the hand leads the tip, of a session with a stage ``impedance``: what the hand
-bears of the push that answers the slave, times the gain of the architecture; no torque."""
+"""Force with which the hand moves the tip, in a session with a stage ``impedance``: the force with which the hand
+resists the slave's push, times the gain of the architecture; no torque.
+"""
 SLAVE_SERVO_JP = Topic("slave/servo_jp", Kind.JOINTS, passed_on("slave/servo_cp"), "slave_base")
 SLAVE_REACH = Topic(
     "slave/reach", Kind.NUMBERS, passed_on("slave/servo_cp"), "slave_base",
@@ -269,25 +271,28 @@ SLAVE_REACH = Topic(
     ),
 )  # fmt: skip
 """How far inverse kinematics can follow: status as of
-:class:`~teleop_core.kinematics.IkStatus`, :class:`Limit`, the joint at its limit (-1: none),
-what the answer leaves [m, rad], and by what the command would have to be moved, in slave_base
-[m, rad], to be one that the arm can reach given time."""
+:class:`~teleop_core.kinematics.IkStatus`, :class:`Limit`, the joint at its limit (-1: none), the residual of the
+answer [m, rad], and the correction in slave_base [m, rad] that would bring the command within the arm's reach, without
+a time limit.
+"""
 SLAVE_SETPOINT_JS = Topic("slave/setpoint_js", Kind.JOINTS, in_force("slave/servo_jp"), "slave_base")
 SLAVE_SETPOINT_CP = Topic("slave/setpoint_cp", Kind.POSE, in_force("slave/servo_jp"), "slave_base")
 SLAVE_MEASURED_JS = Topic("slave/measured_js", Kind.STATE, SAMPLED, "slave_base")
 SLAVE_MEASURED_CP = Topic("slave/measured_cp", Kind.POSE, passed_on("slave/measured_js"), "slave_base")
 SLAVE_MEASURED_CF = Topic("slave/measured_cf", Kind.WRENCH, SAMPLED, "slave_base", is_seldom=True)
-"""What the sensor tells of the force on the tip, along slave_base, and of the torque about it."""
+"""Measured force on the tip, in axes of slave_base, and torque about the tip."""
 SLAVE_ESTIMATED_CF = Topic("slave/estimated_cf", Kind.WRENCH, SAMPLED, "slave_base", is_seldom=True)
-"""What drive efforts and joint motion tell of the force on the tip, along slave_base, without a
-sensor; zero where ``slave_sim.force_sensor.estimate`` is off, and while brakes hold the arm."""
+"""Force on the tip estimated from drive efforts and joint motion without a sensor, in axes of slave_base; zero if
+``slave_sim.force_sensor.estimate`` is off, and while brakes hold the arm.
+"""
 SLAVE_TRUE_CP = Topic("slave/true_cp", Kind.POSE, SAMPLED, "slave_base")
-"""Where the tip really is, which no encoder sees: only a simulator knows, or a tracker."""
+"""True pose of the tip, which no encoder measures: only a simulator or a tracker knows it."""
 SLAVE_TRUE_CF = Topic("slave/true_cf", Kind.WRENCH, SAMPLED, "slave_base", is_seldom=True)
-"""The world's force on the tip, along slave_base, and no torque about the tip: what an ideal sensor
-would tell. Only a simulator knows."""
+"""Contact force on the tip, in axes of slave_base, without torque about the tip, as an ideal sensor would measure it.
+Only a simulator knows it.
+"""
 SLAVE_OPERATION = Topic("slave/operation", Kind.REPORT, SAMPLED, quality=Quality.LATCHED, columns=OPERATION)
-"""Whether the slave may move, what stopped it, and what it takes to go on; sent where it changes.
+"""Whether the slave may move, what stopped it, and what is needed to go on; sent at each change.
 See :mod:`teleop_core.slave.operation`."""
 TELEOP_STATE = Topic(
     "teleop/state", Kind.REPORT, passed_on("master/measured_cp"), quality=Quality.LATCHED,
@@ -298,7 +303,7 @@ TELEOP_STATE = Topic(
     ),
 )  # fmt: skip
 NETWORK_SERVO_CP = Topic("network/servo_cp", Kind.POSE, arrived("slave/servo_cp"), "slave_base")
-"""What arrived of slave/servo_cp, as the four that follow of what the slave says of itself."""
+"""slave/servo_cp as it arrived through the network; the next four are the slave's values as they arrived."""
 NETWORK_SETPOINT_CP = Topic("network/setpoint_cp", Kind.POSE, arrived("slave/setpoint_cp"), "slave_base")
 NETWORK_MEASURED_CP = Topic("network/measured_cp", Kind.POSE, arrived("slave/measured_cp"), "slave_base")
 NETWORK_MEASURED_CF = Topic("network/measured_cf", Kind.WRENCH, arrived("slave/measured_cf"), "slave_base")
@@ -311,30 +316,32 @@ NETWORK_STATE = Topic(
     is_seldom=True,
     columns=("sent_there", "lost_there", "behind_there", "sent_back", "lost_back", "behind_back", "clock_ahead"),
 )
-"""Packets sent, lost, and by how many the newest that arrived is behind, of both directions; by how
-much the slave's clock is ahead of the master's [s]."""
+"""For both directions: packets sent, packets lost, and by how many packets the newest arrived one is behind; then the
+lead of the slave's clock over the master's [s].
+"""
 ENERGY = (
     "law", "round", "energy_in", "energy_out", "told", "heard", "margin", "withheld",
     "turn_in", "turn_out", "drift_x", "drift_y", "drift_z",
     "impedance", "wave_x", "wave_y", "wave_z",
 )  # fmt: skip
-"""Numbers of a port's energies since a round began, in the slave's scale [J]: the kind of passivity, by its place among
-them; when the round began [s]; what went in and out; how much the other side was told that it may give, and how much it
-told; what is left to be given; what was kept from going out; what torques took in and gave out; by how much a command
-is held back [m]; of waves, their impedance [N s/m], and the integral of what was told [√W s]."""
+"""Numbers of a port's energies since a round began, in the slave's scale [J]: index of the kind of passivity; start of
+the round [s]; energy in and out; energy credited to the other side, and credited by it; remaining energy; energy
+withheld; energy in and out by torques; drift, by which a command is held back [m]; for waves, their impedance [N s/m],
+and the integral of the sent wave [√W s].
+"""
 MASTER_ENERGY = Topic(
     "master/energy", Kind.NUMBERS, passed_on("master/measured_cp"), "master_base", columns=ENERGY, is_seldom=True
 )
-"""Energies at the hand, of a session with a stage ``passivity``: push times way of the hand."""
+"""Energies at the hand, in a session with a stage ``passivity``: push times displacement of the hand."""
 SLAVE_ENERGY = Topic("slave/energy", Kind.NUMBERS, SAMPLED, "slave_base", columns=ENERGY, is_seldom=True)
-"""The same at the slave: force on the tip times way of the tip."""
+"""Energies at the slave: force on the tip times displacement of the tip."""
 PASSIVITY_SERVO_CP = Topic("passivity/servo_cp", Kind.POSE, passed_on("slave/servo_cp"), "slave_base")
-"""The slave's command as passivity lets it through."""
+"""The slave's command after the passivity stage."""
 NETWORK_SERVO_CF = Topic("network/servo_cf", Kind.WRENCH, arrived("slave/servo_cf"), "slave_base")
 IMPEDANCE_SERVO_CP = Topic("impedance/servo_cp", Kind.POSE, passed_on("slave/servo_cp"), "slave_base")
-"""The slave's command, yielding to the force on its tip."""
+"""The slave's command after the impedance stage, which yields to the force on the tip."""
 REMOTE_CENTRE_SERVO_CP = Topic("remote_centre/servo_cp", Kind.POSE, passed_on("slave/servo_cp"), "slave_base")
-"""The slave's command, turned so that the tool passes through its remote centre."""
+"""The slave's command, rotated so that the tool passes through its remote centre."""
 REMOTE_CENTRE = Topic(
     "remote_centre/place",
     Kind.NUMBERS,
@@ -347,7 +354,7 @@ REMOTE_CENTRE = Topic(
 SLAVE_JAW_SERVO_JP = Topic(
     "slave/jaw/servo_jp", Kind.NUMBERS, passed_on("master/measured_cp"), "slave_base", columns=JAW
 )
-"""Angle between the two fingers of the jaw that the master's side asks for [rad]."""
+"""Commanded angle between the two fingers of the jaw, from the master's side [rad]."""
 SLAVE_JAW_SETPOINT_JS = Topic(
     "slave/jaw/setpoint_js", Kind.NUMBERS, in_force("slave/jaw/servo_jp"), "slave_base", columns=JAW
 )
@@ -360,13 +367,14 @@ SLAVE_JAW_GRIP = Topic(
     is_seldom=True,
     columns=("force", "is_gripped", "slid", "grips", "slips", "drops"),
 )
-"""What only a simulator knows: the push of each finger [N], whether the object is between them, and
-how far it slid in the present grip or the last one [m]. Then, how often it was gripped, slid by
-more than a millimetre, and was lost above the table."""
+"""Values that only a simulator knows: the push of each finger [N], whether the object is between the fingers, and how
+far the object slid in the present or last grip [m]. Then, how often an object was gripped, slid by more than a
+millimetre, and was lost above the table.
+"""
 SLAVE_JAW_OBJECT_CP = Topic("slave/jaw/object_cp", Kind.POSE, SAMPLED, "slave_base", is_seldom=True)
-"""Where the object is that the jaw can grip, which only a simulator knows."""
+"""Pose of the object that the jaw can grip; only a simulator knows it."""
 JAW_OBJECTS = 6
-"""Most objects that stand on a board at once."""
+"""Largest number of objects on a board."""
 SLAVE_JAW_BOARD = Topic(
     "slave/jaw/board",
     Kind.NUMBERS,
@@ -375,13 +383,14 @@ SLAVE_JAW_BOARD = Topic(
     is_seldom=True,
     columns=("transferred", "dropped", "pull", *(f"{axis}{i}" for i in range(JAW_OBJECTS) for axis in "xyz")),
 )
-"""What only a simulator knows: how many objects came onto another peg, how many came to rest on none, and the pull of a
-peg on the gripped one, across [N]. Then the middle of each object [m], all zeros for one that is not there."""
+"""Values that only a simulator knows: how many objects came onto another peg, how many came to rest on no peg, and the
+force of a peg on the gripped object, across the peg [N]. Then the middle of each object [m], zeros for a missing one.
+"""
 FIRST_JAW_BOARD = replace(SLAVE_JAW_BOARD, name=f"first/{SLAVE_JAW_BOARD.name}")
-"""Port of the second arm at which the first one's topic arrives; see :meth:`Graph.links`."""
+"""Port of the second arm at which the first arm's topic arrives; see :meth:`Graph.links`."""
 FIRST_JAW_GRIP = replace(SLAVE_JAW_GRIP, name=f"first/{SLAVE_JAW_GRIP.name}")
 SECOND_TRUE_CP = replace(SLAVE_TRUE_CP, name=f"second/{SLAVE_TRUE_CP.name}")
-"""Port of the first arm at which the second one's topic arrives; so is the next one."""
+"""Port of the first arm at which the second arm's topic arrives; the next one is such a port, too."""
 SECOND_JAW_GRIP = replace(SLAVE_JAW_GRIP, name=f"second/{SLAVE_JAW_GRIP.name}")
 NETWORK_JAW_SERVO_JP = Topic(
     "network/jaw_servo_jp", Kind.NUMBERS, arrived("slave/jaw/servo_jp"), "slave_base", columns=JAW
@@ -393,15 +402,15 @@ NETWORK_SLAVE_ENERGY = Topic(
     "network/slave_energy", Kind.NUMBERS, arrived("slave/energy"), "slave_base", columns=ENERGY
 )
 HAND_SERVO_CP = Topic("hand/servo_cp", Kind.POSE, SAMPLED, "master_base")
-"""Where the operator wants the stylus; silence lets go of it."""
+"""Pose of the stylus that the operator wants; without messages the stylus is released."""
 HAND_BUTTONS = Topic("hand/buttons", Kind.BUTTONS, SAMPLED, "master_base", is_seldom=True)
-"""Which buttons of the stylus the operator presses."""
+"""Buttons of the stylus that the operator presses."""
 HAND_TREMOR = Topic("hand/tremor", Kind.NUMBERS, SAMPLED, "master_base", columns=("x", "y", "z"), is_seldom=True)
-"""By how much the tip is off [m], whatever the device's friction swallows of the hand's motion."""
+"""Offset of the tip by tremor [m], which the device's friction does not reduce."""
 HAND_JAW = Topic("hand/jaw", Kind.NUMBERS, SAMPLED, "master_base", columns=("closing",), is_seldom=True)
 """How far the operator closes the jaw: 0 open, 1 closed."""
 DISPLAY_MEASURED_CP = Topic("display/measured_cp", Kind.POSE, arrived("slave/measured_cp"), "slave_base")
-"""Where the operator sees the slave, of a session with a display: the newest frame."""
+"""Pose of the slave that the operator sees, in a session with a display: the newest frame."""
 TASK_STATE = Topic(
     "task/state", Kind.NUMBERS, SAMPLED, "slave_base", is_seldom=True,
     columns=(
@@ -410,19 +419,21 @@ TASK_STATE = Topic(
         "is_over",
     ),
 )  # fmt: skip
-"""What a task asks for now, and what came of it: how many goals there were, what to do at this one
-(:class:`~teleop_core.hand.tasks.Act`), where it is and how wide [m]; attempts, successes and errors so far; of the
-last attempt: the way to its goal [m], how far the tip was beyond the goal along it [m], the time it took [s], and what
-was wrong with it (:class:`~teleop_core.hand.tasks.Miss`); the step of the present one, where a task has several. Then
-how the tool shall be turned there, and how wide that is [rad]; with how much force to press [N]; and how far beside its
-way the tip would meet something [m]. Zero stands for what a task does not ask for. Last, whether no goal is left."""
+"""Present goal of a task, and its results. First the number of goals so far, the action at the present goal
+(:class:`~teleop_core.hand.tasks.Act`), its position and width [m]; attempts, successes and errors so far. Then, for
+the last attempt: the distance to its goal [m], the overshoot of the tip along it [m], its duration [s], and its error
+(:class:`~teleop_core.hand.tasks.Miss`); the step of the present attempt, if a task has several steps. Then the
+required attitude of the tool, and its tolerance [rad]; the force to press with [N]; and the clearance beside the path
+[m]. Zero means that the task does not require it. Last, whether no goal is left.
+"""
 OPERATOR_SERVO_CP = Topic("operator/servo_cp", Kind.POSE, SAMPLED, "master_base")
-"""Where a person who is elsewhere wants the stylus, at any rate: ``operator=remote`` leads the hand there. Silence lets
-go. As ``operator/buttons`` it comes from outside: no stage writes it, and it is not recorded."""
+"""Pose of the stylus that a remote person wants, at any rate: ``operator=remote`` moves the hand there. Without
+messages the hand lets go. Like ``operator/buttons`` it comes from outside: no stage writes it, and it is not recorded.
+"""
 OPERATOR_BUTTONS = Topic("operator/buttons", Kind.BUTTONS, SAMPLED, "master_base", quality=Quality.REPORT)
-"""Buttons that this person presses and releases: each message counts, so it is sent reliably."""
+"""Buttons that the remote person presses and releases: each message counts, so it is sent reliably."""
 OPERATOR_JAW = Topic("operator/jaw", Kind.NUMBERS, SAMPLED, "master_base", quality=Quality.REPORT, columns=("closing",))
-"""How far this person closes the jaw, 0 open to 1 closed; silence leaves it as it is."""
+"""How far the remote person closes the jaw, 0 open to 1 closed; without messages it does not change."""
 DIAGNOSTICS = Topic("diagnostics", Kind.REPORT, Stamp("time of the report"), quality=Quality.REPORT)
 
 STREAMS = (
@@ -432,9 +443,9 @@ STREAMS = (
     SLAVE_SERVO_CP, SLAVE_SERVO_JP, SLAVE_REACH, SLAVE_SETPOINT_JS, SLAVE_SETPOINT_CP,
     SLAVE_MEASURED_JS, SLAVE_MEASURED_CP, SLAVE_TRUE_CP,
 )  # fmt: skip
-"""Topics of the built-in stages that carry one message per tick."""
+"""Topics of the built-in stages with one message per tick."""
 REPORTS = (SLAVE_OPERATION, TELEOP_STATE)
-"""Topics of the built-in stages that are sent where they change."""
+"""Topics of the built-in stages that are sent only at a change."""
 NETWORK_TOPICS = (
     NETWORK_SERVO_CP,
     NETWORK_SETPOINT_CP,

@@ -1,4 +1,4 @@
-"""Warming: the first step of a stage, made and taken back before its ticks begin."""
+"""Warming: the first step of a stage, made and undone before its ticks begin."""
 
 from teleop_core.graph.signals import assign
 from teleop_core.graph.stage import Runner
@@ -6,10 +6,10 @@ from teleop_core.kernels import is_kernel
 
 
 def warm_up(runner: Runner) -> None:
-    """Load a stage, and leave it as it was made: its first step takes no longer than others.
+    """Load a stage and leave it in its initial state, so that its first step takes no longer than others.
 
-    A compiled step is made and taken back, which touches its code and memory. What is drawn ahead
-    is drawn. Other steps are not made, for they may do what cannot be taken back.
+    A compiled step is made and undone, which loads its code and memory. Random numbers and motion are prepared in
+    advance. Steps that are not compiled are not made, because their effects may be impossible to undo.
 
     Args:
         runner: The stage, before its first step.
@@ -21,6 +21,6 @@ def warm_up(runner: Runner) -> None:
     runner.step()
     runner.reset()
     assign(runner.signals, before)
-    runner.load()  # what was reset may have other arguments
-    if runner.ahead > 1:  # who answers to each tick is to draw with what that one brings
+    runner.load()  # a reset stage may have other arguments
+    if runner.ahead > 1:  # an operator that reacts to each tick must draw with the values of that tick
         runner.prepare(1)

@@ -1,1 +1,1 @@
-"""Hand: who moves the slave: operators and their tasks, devices, and the master in their hand."""
+"""Hand: the master side: operators and their tasks, input devices, and the master device in the hand."""

@@ -1,4 +1,4 @@
-"""Kinematics of a robot as compiled functions, what they answer, and batches of them."""
+"""Kinematics of a robot as compiled functions, their results, and batches of them."""
 
 import math
 from collections.abc import Callable
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from teleop_core.kernels import inner, kernel
 from teleop_core.kernels.geometry import Array, is_rigid, rotation_angle_between
 
-_FLOAT64 = np.dtype(np.float64)  # one object; another of its kind is copied
+_FLOAT64 = np.dtype(np.float64)  # one shared object; other objects of its kind are copied
 _ROW, _TABLE = types.float64[::1], types.float64[:, ::1]
 # Signatures that let one compiled graph run any robot: see Kernels for the arguments.
 FK = types.void(_ROW, _ROW, _TABLE)
@@ -29,19 +29,19 @@ AssembliesKernel: TypeAlias = Callable[[Array, Array, Array], int]
 DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")
 # A pose counts as reached within this distance [m] and angle [rad].
 REACHED = 1e-9
-# Joints that say more than the pose may contradict each other by so much [m]: encoders, play.
+# If there are more joint readings than the pose needs, they may disagree by this much [m]: encoders, play.
 AGREED = 1e-4
-# Most joint vectors that one pose can have: the three-fingered hand, four for each finger.
+# Largest number of joint vectors of one pose: the three-fingered hand, with four for each finger.
 MAX_BRANCHES = 64
-# Most poses that one joint vector can have: a platform on six legs has 40 (Dietmaier 1998).
+# Largest number of poses of one joint vector: a platform on six legs has 40 (Dietmaier 1998).
 MAX_ASSEMBLIES = 64
-# Starts of the search for an assembly where the one next to the seed does not close, and of the search for all of them.
-# Of the leg sets that have an assembly, a quarter of the starts and more end in one.
+# Number of starts: to search an assembly if the one next to the seed does not close, and to search all assemblies.
+# For leg sets that have an assembly, at least a quarter of the starts end in one.
 SEARCH, SEARCH_ALL = 64, 384
 
 
 class IkStatus(IntEnum):
-    """How well inverse kinematics could do what was asked."""
+    """How well inverse kinematics reached the wanted pose."""
 
     FOLLOWED = 0  # the joint vector reaches the pose
     LIMITED = 1  # a joint or speed limit keeps the tip off the pose
@@ -52,9 +52,9 @@ class IkStatus(IntEnum):
 class FkStatus(IntEnum):
     """Whether forward kinematics found a pose with which the loops of a robot close."""
 
-    CLOSED = 0  # the loops close, in the seed's assembly: they do on the straight way from there
-    NEAR_SINGULAR = 1  # they do, but the joints hardly fix the tip here, and assemblies meet
-    OTHER_MODE = 2  # they close, but in another assembly: the nearest to the seed that was found
+    CLOSED = 0  # the loops close, in the seed's assembly: they also close along the straight path from the seed
+    NEAR_SINGULAR = 1  # the same, but near a singularity: the joints hardly fix the tip, and assemblies meet
+    OTHER_MODE = 2  # the loops close, but in another assembly: the nearest to the seed that was found
     NOT_CLOSED = 3  # no assembly was found; the pose of least error next to the seed is returned
     UNDETERMINED = 4  # joints of this layout never fix a pose; the seed is returned
 
@@ -67,10 +67,10 @@ Sign = TypeVar("Sign")
 
 
 class FkResult(NamedTuple, Generic[Status, Number, Sign]):
-    """Answer of forward kinematics: for one q, or for N with a leading axis in each entry."""
+    """Result of forward kinematics: for one q, or for N of them with a leading axis in each entry."""
 
     T: Array
-    """``T_base_tip`` (4, 4) or (N, 4, 4), always finite; closed loops only where status says so."""
+    """``T_base_tip`` (4, 4) or (N, 4, 4), always finite; ``status`` tells whether the loops are closed."""
     status: Status
     """:class:`FkStatus` of one q; for N an integer array (N,) of its values."""
     residual: Number
@@ -78,8 +78,8 @@ class FkResult(NamedTuple, Generic[Status, Number, Sign]):
     mode: Sign
     """Side of the singular poses: 1 as at home, -1 the other, 0 without loops; for N (N,).
 
-    Between two poses of different sign every path meets a singular pose. Assemblies of one sign
-    are told apart by their place in :meth:`~teleop_core.robots.robot.Robot.fk_all`.
+    Every path between two poses of different sign passes a singular pose. Assemblies of the same sign are
+    distinguished by their index in :meth:`~teleop_core.robots.robot.Robot.fk_all`.
     """
 
 
@@ -88,16 +88,16 @@ FkBatch: TypeAlias = FkResult[NDArray[np.int64], Array, NDArray[np.int64]]
 
 
 class IkResult(NamedTuple, Generic[Status]):
-    """Answer of inverse kinematics: for one pose, or for N with a leading axis in each entry."""
+    """Result of inverse kinematics: for one pose, or for N of them with a leading axis in each entry."""
 
     q: Array
     """Joint vector (n,) or (N, n) [rad, m], always finite and inside the limits."""
     status: Status
     """:class:`IkStatus` of one pose; for N an integer array (N,) of its values."""
     residual: Array
-    """Distance [m] and angle [rad], (2,) or (N, 2), between the pose of ``q`` and the wanted.
+    """Distance [m] and angle [rad], (2,) or (N, 2), between the pose of ``q`` and the wanted pose.
 
-    Of robots with loops it is the pose next to home, as in a tick: ``Kernels.fk``.
+    For robots with loops, the pose of ``q`` is the one next to home, as in a tick: ``Kernels.fk``.
     """
 
 
@@ -107,27 +107,26 @@ IkBatch: TypeAlias = IkResult[NDArray[np.int64]]
 
 @dataclass(frozen=True, kw_only=True)
 class Kernels:
-    """Functions of one robot over its ``geometry`` row: kernels, or plain Python, which is slower.
+    """Functions of one robot, which take its ``geometry`` row: kernels, or plain Python, which is slower.
 
-    ``fk(q, geometry, T)`` and ``jacobian(q, geometry, J)`` write their last argument.
-    ``ik(T, seed, limits, geometry, q, residual)`` writes ``q`` and ``residual`` and returns an
-    :class:`IkStatus`; the rows of ``limits`` (3, n) are lower, upper and the largest step away
-    from the seed. With infinite steps the branch inside the limits that is nearest to the seed
-    is wanted; with finite ones, in a path, the branch never changes. It returns -1, nothing
-    written, for a T that is not rigid or a seed that is not finite (:func:`is_askable`).
-    ``ik_all(T, geometry, solutions)`` fills rows of ``solutions`` (:data:`MAX_BRANCHES`, n) and
-    returns how many, without regard to limits.
+    ``fk(q, geometry, T)`` and ``jacobian(q, geometry, J)`` write their last argument. ``ik(T, seed, limits, geometry,
+    q, residual)`` writes ``q`` and ``residual`` and returns an :class:`IkStatus`; the rows of ``limits`` (3, n) are
+    lower, upper and the largest step away from the seed. With infinite steps it finds the branch inside the limits
+    that is nearest to the seed. With finite steps, in a path, it never changes the branch. For a T that is not rigid
+    or a seed that is not finite, it writes nothing and returns -1 (:func:`is_askable`). ``ik_all(T, geometry,
+    solutions)`` fills rows of ``solutions`` (:data:`MAX_BRANCHES`, n), ignores limits, and returns the number of
+    solutions.
 
     Robots with loops have two more. ``assemble(q, geometry, ask, T, out)`` writes the pose T, and ``out`` (2,):
-    residual and mode of :class:`FkResult`; it returns an :class:`FkStatus`. ``ask`` (2,) is how many starts a search
-    may take where the assembly next to the seed does not close, 0 for none, and 1 if T holds the seed, 0 if home is
-    meant: then T is what ``fk`` writes, unless that does not close and the search finds another. ``assemblies(q,
-    geometry, found)`` fills ``found`` (:data:`MAX_ASSEMBLIES`, 4, 4) with all poses it finds and returns how many.
-    ``fk`` itself never searches, so that it takes microseconds in a tick, and never fails: where nothing closes next to
-    home it writes the pose of least error.
+    residual and mode of :class:`FkResult`; it returns an :class:`FkStatus`. ``ask[0]`` is the number of starts of a
+    search if the assembly next to the seed does not close; 0 means no search. ``ask[1]`` is 1 if T contains the seed,
+    and 0 if home is the seed. With home as the seed, T is what ``fk`` writes, unless that does not close and the
+    search finds another pose. ``assemblies(q, geometry, found)`` fills ``found`` (:data:`MAX_ASSEMBLIES`, 4, 4) with
+    all poses that it finds, and returns their number. ``fk`` itself never searches, so that it takes microseconds in a
+    tick. It never fails: if nothing closes next to home, it writes the pose of least error.
 
-    Shapes: ``q`` and ``seed`` (n,), ``T`` (4, 4), ``J`` (6, n), ``residual`` (2,), all float64 in
-    C order and writable: for read-only arrays numba would compile a second time.
+    Shapes: ``q`` and ``seed`` (n,), ``T`` (4, 4), ``J`` (6, n), ``residual`` (2,), all float64 in C order and
+    writable, because numba would compile a second version for read-only arrays.
     """
 
     fk: WriteKernel
@@ -140,7 +139,7 @@ class Kernels:
 
 @inner
 def is_askable(T: Array, seed: Array) -> bool:
-    """Whether T is a rigid transform and the seed finite; every ik kernel checks that first."""
+    """Whether T is a rigid transform and the seed is finite; every ik kernel checks this first."""
     for i in range(seed.shape[0]):
         if not math.isfinite(seed[i]):
             return False
@@ -149,7 +148,7 @@ def is_askable(T: Array, seed: Array) -> bool:
 
 @inner
 def pose_residual(reached: Array, wanted: Array, residual: Array) -> bool:
-    """Write distance [m] and angle [rad] between two transforms; whether both are negligible."""
+    """Write distance [m] and angle [rad] between two transforms; return whether both are negligible."""
     square = 0.0
     for i in range(3):
         square += (reached[i, 3] - wanted[i, 3]) ** 2
@@ -159,7 +158,7 @@ def pose_residual(reached: Array, wanted: Array, residual: Array) -> bool:
 
 
 def is_ready(value: object, shape: tuple[int, ...]) -> TypeGuard[Array]:
-    """Whether a kernel can take the value as it is; the kernels check that it is finite."""
+    """Whether a kernel can take the value without conversion; kernels themselves check that it is finite."""
     return type(value) is np.ndarray and value.shape == shape and value.dtype is _FLOAT64 and value.flags.carray
 
 
@@ -183,8 +182,8 @@ def assemble_batch(
 ) -> None:
     """Write transforms (N, 4, 4), residuals and modes (N, 2), statuses (N,) of joints (N, n).
 
-    Each from the seed that stands in its place, or from home, as ``ask`` says; in a path all but
-    the first from the last before it in the assembly of the path.
+    The seed of each pose is the content of ``transforms`` at its index, or home; ``ask`` tells which. In a path, the
+    seed of every pose after the first is the last earlier pose in the assembly of the path.
     """
     seed = np.empty((4, 4))
     for i in range(q.shape[0]):

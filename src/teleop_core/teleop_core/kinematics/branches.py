@@ -5,12 +5,12 @@ import math
 from teleop_core.kernels import Array, inner
 
 SLACK = 1e-12
-"""Rounding that a joint on its limit may show [rad or m]."""
-# Up to this joint 5 of a spherical wrist its two branches are neighbours [rad]. There limits count
-# in a path too: a wrist that would run into one goes over to the other branch, which costs little.
-# Farther away the branch stays, whatever it costs.
+"""Rounding by which a joint on its limit may exceed the limit [rad or m]."""
+# Up to this angle of joint 5 of a spherical wrist [rad] its two branches are neighbours. There limits count in a path
+# too: a wrist that would reach a limit changes to the other branch, which needs only a small move. At larger angles
+# the branch never changes in a path.
 BESIDE = 0.1
-# Added to the cost of a branch outside the limits: more than any move of one inside.
+# Added to the cost of a branch outside the limits: larger than any move inside them.
 OUTSIDE = 100.0
 
 
@@ -37,10 +37,10 @@ def hold(q: Array, i: int, seed: Array, limits: Array) -> None:
 
 @inner
 def slowed(wanted: Array, seed: Array, limits: Array, q: Array) -> bool:
-    """Write ``q`` on the straight way from the seed to ``wanted``; whether it got there.
+    """Write ``q`` on the straight path from the seed to ``wanted``; return whether ``q`` reaches ``wanted``.
 
-    All actuators are slowed by one common factor, so that those that hold one body together keep
-    their proportion; only then is each kept inside its own limits.
+    All actuators are slowed by one common factor, so that actuators that move the same body keep their proportion.
+    After that each actuator is kept inside its own limits.
 
     Args:
         wanted: Joint positions (n,) [rad or m].
@@ -66,7 +66,8 @@ def slowed(wanted: Array, seed: Array, limits: Array, q: Array) -> bool:
 def turned(angle: float, seed: float, lower: float, upper: float, is_path: bool) -> float:
     """The angle plus whole turns [rad]: nearest to the seed, and inside the limits if possible.
 
-    In a path only the neighbour of the seed counts: a joint at its end stop stays there instead of unwinding by a turn.
+    In a path only the angle nearest to the seed is allowed: a joint at its end stop stays there and does not unwind by
+    a turn.
     """
     near = seed if is_path else min(max(seed, lower), upper)
     angle -= 2.0 * math.pi * math.floor((angle - near) / (2.0 * math.pi) + 0.5)
@@ -81,7 +82,7 @@ def turned(angle: float, seed: float, lower: float, upper: float, is_path: bool)
 
 @inner
 def turn(q: Array, seed: Array, limits: Array, first: int, last: int) -> None:
-    """Bring joints first..last-1 by whole turns next to the seed, or into their limits."""
+    """Move joints first..last-1 by whole turns next to the seed, or into their limits."""
     is_path = math.isfinite(limits[2, 0])
     for i in range(first, last):
         q[i] = turned(q[i], seed[i], limits[0, i], limits[1, i], is_path)

@@ -1,8 +1,8 @@
 """Damped least squares: the joint vector within a box whose pose is nearest to a wanted one, for any arm.
 
-The box is the joint limits, or one speed-limited step around the last joint vector; inside it the error is driven to
-zero where that is possible and to its least where it is not, through singularities too. Damping that shrinks with the
-error keeps the steps bounded far away and the convergence quadratic close by.
+The box contains the joint limits, or one speed-limited step around the last joint vector. Inside the box the error is
+reduced to zero if possible, and otherwise to its minimum, through singularities too. The damping shrinks with the
+error. So steps are bounded far from the solution, and convergence is quadratic near it.
 
 Source:
     Nakamura and Hanafusa 1986 (damping); Yamashita and Fukushima 2001 (damping by the error).
@@ -49,7 +49,7 @@ def pose_error(reached: Array, wanted: Array, length: float, error: Array) -> fl
             trace += reached[i, j] * wanted[i, j]
     sine = 0.5 * math.sqrt(x * x + y * y + z * z)
     angle = math.atan2(sine, 0.5 * (trace - 1.0))
-    # Without a sine the angle is 0, or pi, where a turn about z starts the way back.
+    # If the sine is zero the angle is 0 or pi; at pi a rotation about z starts the return.
     scale = 0.5 * angle / sine if sine > 1e-12 else 0.5
     error[3], error[4], error[5] = scale * x, scale * y, scale * z
     if sine <= 1e-12 and angle > 1.0:
@@ -66,7 +66,7 @@ def pose_error(reached: Array, wanted: Array, length: float, error: Array) -> fl
 def eliminate(A: Array, b: Array) -> None:
     """Replace b (6,) by the solution of A x = b for a positive definite A (6, 6).
 
-    The upper triangle of A counts, and is overwritten.
+    Only the upper triangle of A is used, and it is overwritten.
     """
     for k in range(6):
         pivot = 1.0 / max(A[k, k], 1e-300)
@@ -86,7 +86,7 @@ def eliminate(A: Array, b: Array) -> None:
 def gram(J: Array, is_free: Array, damping: float, A: Array) -> None:
     """Write the upper triangle of J Jᵀ + damping I, (6, 6).
 
-    Of the columns of J (6, n) those that are free count (1.0, else 0.0).
+    Only the free columns of J (6, n) count: those with 1.0 in ``is_free``.
     """
     for r in range(6):
         for s in range(r, 6):
@@ -130,10 +130,10 @@ def damped_move(J: Array, error: Array, damping: float, is_free: Array, box: Arr
 
 @kernel
 def is_near_singular(J: Array, length: float, bound: float) -> bool:
-    """Whether the smallest singular value of J (6, n), n >= 6, lies under a bound > 0.
+    """Whether the smallest singular value of J (6, n), n >= 6, is below ``bound`` > 0.
 
-    The linear rows count after division by ``length``. It does where J Jᵀ - bound² I has a
-    negative eigenvalue, and then elimination meets a negative pivot (Sylvester's law of inertia).
+    The linear rows are divided by ``length`` first. The value is below the bound if J Jᵀ - bound² I has a negative
+    eigenvalue. Elimination then meets a negative pivot (Sylvester's law of inertia).
     """
     A = room(6, 6)
     for r in range(6):

@@ -1,13 +1,14 @@
 """Kinematics of a Denavit-Hartenberg chain: kernels over constant transforms between its joints.
 
-Every convention comes down to T = F0 J1(q1) F1 J2(q2) F2 ... with Ji a turn about or a slide along
-the local z axis and Fi constant. The geometry row holds, for n joints: n kinds (+1 or -1 a turn, +2
-or -2 a slide, negative against its axis); the reach [m]; six weights of the controlled directions
-(1 or 0); and n + 1 transforms of twelve numbers, row by row.
+Every convention can be written as T = F0 J1(q1) F1 J2(q2) F2 ..., where Ji is a rotation about or a slide along the
+local z axis and Fi is constant. The geometry row contains, for n joints: n kinds (+1 or -1 for a rotation, +2 or -2
+for a slide, negative if against the axis); the reach [m]; six weights of the controlled directions (1 or 0); and n + 1
+transforms of twelve numbers, row by row.
 
-In a chain of m motions of which some follow others (:mod:`teleop_core.robots.dynamics.followers`) there stand, in place
-of the transforms: m + 1, which is no entry of a rotation, as the first one is; for all motions their joints, then their
-factors, then their offsets; and the row of the m motions.
+In a chain of m motions some motions may follow others (:mod:`teleop_core.robots.dynamics.followers`). The row then
+contains other numbers in place of the transforms: m + 1; the joints of all motions, then their factors, then their
+offsets; and the row of the m motions. The number m + 1 marks such a chain, because the first number of a transform is
+an entry of a rotation and cannot have this value.
 """
 
 import math
@@ -21,11 +22,11 @@ from teleop_core.kinematics.damped import ZERO, damped_move, free_joints, pose_e
 
 _ROUNDS, _PATH_ROUNDS = 60, 12  # of one search
 _DAMPING, _HOPELESS = 1e-2, 1e10  # per squared error: at the start, and where no step helps
-_STARTS, _MOST_STARTS = 24, 120  # further searches when that from the seed fails, and all fail
-_CLOSE, _LONG_ROUNDS = 1e-8, 1000  # squared error in a flat valley, which takes longer to walk
+_STARTS, _MOST_STARTS = 24, 120  # further searches if the search from the seed fails; and if all fail
+_CLOSE, _LONG_ROUNDS = 1e-8, 1000  # squared error in a flat valley, where the descent needs more rounds
 _ALL_STARTS = 200  # searches for all branches
-_SAME = 1e-6  # joint vectors this close are one [rad, m]
-_NEAR = 0.02  # pivot under which small moves need large joint moves
+_SAME = 1e-6  # joint vectors this close count as equal [rad, m]
+_NEAR = 0.02  # pivot below which small moves need large joint moves
 _FOLLOWED, _LIMITED = int(IkStatus.FOLLOWED), int(IkStatus.LIMITED)
 _NEAR_SINGULAR, _UNREACHABLE = int(IkStatus.NEAR_SINGULAR), int(IkStatus.UNREACHABLE)
 
@@ -60,7 +61,7 @@ def move_joint(kind: float, q: float, T: Array) -> None:
 
 @inner
 def spread(q: Array, followers: Array, motions: Array) -> None:
-    """Write the motions (m,) of joints (n,); ``followers`` begin with joints, factors, offsets."""
+    """Write the motions (m,) of joints (n,); ``followers`` begins with joints, factors, offsets."""
     m = motions.shape[0]
     for i in range(m):
         motions[i] = followers[m + i] * q[int(followers[i])] + followers[2 * m + i]
@@ -131,7 +132,7 @@ def _chain_jacobian(q: Array, geometry: Array, T: Array, J: Array) -> None:
             T[i, j] = 1.0 if i == j else 0.0
     append_fixed(geometry, n, 0, T)
     for j in range(n):
-        # The axis for now, the point it goes through in the linear rows.
+        # For now, the angular rows contain the axis, and the linear rows a point on it.
         sign = 1.0 if geometry[j] > 0.0 else -1.0
         for i in range(3):
             J[i, j], J[3 + i, j] = T[i, 3], sign * T[i, 2]
@@ -149,7 +150,7 @@ def _chain_jacobian(q: Array, geometry: Array, T: Array, J: Array) -> None:
 
 @inner
 def _masked_error(reached: Array, T: Array, geometry: Array, n: int, error: Array) -> float:
-    """Write the weighted error (6,) in the controlled directions; its squared norm."""
+    """Write the weighted error (6,) in the controlled directions; return its squared norm."""
     pose_error(reached, T, geometry[n], error)
     square = 0.0
     for r in range(6):
@@ -160,14 +161,14 @@ def _masked_error(reached: Array, T: Array, geometry: Array, n: int, error: Arra
 
 @inner
 def _weighted_jacobian(q: Array, geometry: Array, J: Array) -> None:
-    """Write the Jacobian (6, n) with linear rows over the reach and uncontrolled rows zero."""
+    """Write the Jacobian (6, n) with linear rows divided by the reach and uncontrolled rows zero."""
     jacobian(q, geometry, J)
     _weigh(q.shape[0], geometry, J)
 
 
 @inner
 def _weigh(n: int, geometry: Array, J: Array) -> None:
-    """Weigh a Jacobian (6, n): linear rows over the reach, uncontrolled rows zero."""
+    """Weigh a Jacobian (6, n): divide linear rows by the reach, set uncontrolled rows to zero."""
     for r in range(6):
         weight = geometry[n + 1 + r] / (geometry[n] if r < 3 else 1.0)
         for j in range(n):
@@ -176,10 +177,10 @@ def _weigh(n: int, geometry: Array, J: Array) -> None:
 
 @inner
 def descend(T: Array, box: Array, geometry: Array, rounds: int, q: Array) -> float:
-    """Lower the error from ``q`` (n,), inside a box (2, n), until it is zero or least.
+    """Reduce the error from ``q`` (n,), inside a box (2, n), until it is zero or minimal.
 
     Returns:
-        Squared weighted error that is left.
+        Remaining squared weighted error.
     """
     n = q.shape[0]
     J, reached, error, left = np.empty((6, n)), room(4, 4), room(6), room(6)
@@ -209,9 +210,9 @@ def descend(T: Array, box: Array, geometry: Array, rounds: int, q: Array) -> flo
 
 @kernel
 def descend_long(T: Array, box: Array, geometry: Array, q: Array) -> float:
-    """:func:`descend`, with more rounds where it ends close to the pose.
+    """:func:`descend`, with more rounds if it ends close to the pose.
 
-    That happens beside singular postures, where the error falls into a flat and curved valley.
+    That happens near singular postures, where the error has a flat and curved valley.
     """
     square = descend(T, box, geometry, _ROUNDS, q)
     if ZERO < square < _CLOSE:
@@ -221,7 +222,7 @@ def descend_long(T: Array, box: Array, geometry: Array, q: Array) -> float:
 
 @kernel
 def _start(number: int, box: Array, q: Array) -> None:
-    """Write the joint vector (n,) of one in an even sequence over a box (2, n).
+    """Write joint vector ``number`` (n,) of a sequence that fills a box (2, n) evenly.
 
     Source:
         Roberts 2018, the R sequence: multiples of powers of the root of x^(n+1) = x + 1.
@@ -244,9 +245,9 @@ def _distance(a: Array, b: Array) -> float:
 
 @inner
 def _search(T: Array, seed: Array, box: Array, geometry: Array, q: Array) -> None:
-    """Look from all over the box; replace ``q`` by the reached pose nearest to the seed.
+    """Search from starts all over the box; replace ``q`` by the solution nearest to the seed.
 
-    Poses that few starts reach, beside singular postures and limits, are looked for longer.
+    Poses near singular postures and limits, which few starts reach, are searched for longer.
     """
     trial, nearest = np.empty(q.shape[0]), math.inf
     for number in range(_MOST_STARTS):
@@ -272,9 +273,9 @@ def is_hardly_moving(q: Array, geometry: Array) -> bool:
 
 @inner
 def pose_of_chain(q: Array, geometry: Array, J: Array, T: Array) -> bool:
-    """Write the pose (4, 4) of a chain without followers, and say :func:`is_hardly_moving`.
+    """Write the pose (4, 4) of a chain without followers, and return :func:`is_hardly_moving`.
 
-    It takes one walk along the chain in place of two. ``J`` is memory of six rows.
+    It needs one pass along the chain in place of two. ``J`` is scratch memory of six rows.
     """
     _chain_jacobian(q, geometry, T, J)
     _weigh(q.shape[0], geometry, J)
@@ -308,7 +309,7 @@ def _is_flat(n: int, geometry: Array, J: Array) -> bool:
 
 @inner
 def _status(q: Array, T: Array, box: Array, geometry: Array, residual: Array) -> int:
-    """Write the residual (2,) and say how well ``q`` does what T asks."""
+    """Write the residual (2,) and return the status of ``q`` for the wanted pose T."""
     n, reached, error = q.shape[0], np.empty((4, 4)), np.empty(6)
     fk(q, geometry, reached)
     pose_residual(reached, T, residual)
@@ -327,10 +328,10 @@ def _status(q: Array, T: Array, box: Array, geometry: Array, residual: Array) ->
 def ik(T: Array, seed: Array, limits: Array, geometry: Array, q: Array, residual: Array) -> int:
     """Write joints (n,) next to ``T_base_tip``; see :class:`teleop_core.robots.robot.Kernels`.
 
-    Damped least squares from the seed inside the limits; if that fails and steps are free, from a fixed set of starts.
-    In a path one search inside the step around the seed, so that the branch stays. A numeric search cannot prove that
-    nothing reaches: with a joint on its bound the status is LIMITED, else UNREACHABLE. Likewise the branch is next to
-    the seed as a rule, not by proof.
+    With free steps it runs damped least squares from the seed inside the limits and, if that fails, from a fixed set
+    of starts. In a path it makes one search inside the step around the seed, so that the branch does not change. A
+    numeric search cannot prove that no solution exists. If it finds none, the status is LIMITED with a joint on its
+    bound, else UNREACHABLE. Likewise the branch is usually, but not provably, the nearest to the seed.
     """
     if not is_askable(T, seed):
         return -1
@@ -350,9 +351,9 @@ def ik(T: Array, seed: Array, limits: Array, geometry: Array, q: Array, residual
 
 @kernel
 def ik_all(T: Array, geometry: Array, solutions: Array) -> int:
-    """Write the joint vectors (k, n) that many searches find, without regard to limits; k.
+    """Write the joint vectors (k, n) that many searches find, ignoring limits; return k.
 
-    Turns are looked for in a full circle, slides in the reach; what no search finds is missed.
+    Rotations are searched in a full circle, slides in the reach. Solutions that no search finds are missed.
     """
     n, count = solutions.shape[1], 0
     box, trial = np.empty((2, n)), np.empty(n)

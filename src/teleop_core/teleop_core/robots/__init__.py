@@ -80,14 +80,14 @@ def register_robot(robot: Part, name: str | None = None, *, replace: bool = Fals
     Args:
         robot: A :class:`Robot`, a :class:`~teleop_core.robots.arms.dh.DhTable`, or a function
             ``make(**geometry)`` that returns a robot and whose parameters all have defaults.
-        name: What configurations call it; None for its own name.
-        replace: Whether it may take the place of one that this program registered before.
+        name: Its name in configurations; None for its own name.
+        replace: Whether it may replace a robot that this program registered before.
 
     Returns:
-        The same robot, so that this decorates functions too.
+        The same robot, so that this function can be used as a decorator.
 
     Raises:
-        PartError: The name is taken, this is no robot, or its kernels do not run.
+        PartError: The name is taken, the object is not a robot, or its kernels do not run.
     """
     ROBOTS.add(part_name(robot) if name is None else name, robot, replace=replace)
     return robot
@@ -132,7 +132,7 @@ def _loaded(name: str, geometry: Mapping[str, float | str]) -> Robot:
 
 
 def load_robot_set(name: str, settings: Iterable[str]) -> Robot:
-    """Robot by name, with its geometry as texts ``symbol=value``, without a warning.
+    """Robot by name, with its geometry as texts ``symbol=value``; gives no warnings.
 
     Args:
         name: As for :func:`load_robot`.

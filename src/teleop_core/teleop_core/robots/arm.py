@@ -10,7 +10,7 @@ from teleop_core.robots.drives import Drives
 
 
 class Arm(Protocol):
-    """What a :class:`teleop_core.robots.robot.Robot` offers its helpers; meanings are documented there."""
+    """Part of :class:`teleop_core.robots.robot.Robot` that helper modules use; it is documented there."""
 
     # ruff: noqa: D102
     @property

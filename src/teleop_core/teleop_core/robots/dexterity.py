@@ -1,4 +1,4 @@
-"""Dexterity: singular values and manipulability of a pose, and the workspace they fill."""
+"""Dexterity: singular values and manipulability of a posture, and samples of the workspace."""
 
 import math
 from pathlib import Path
@@ -71,7 +71,7 @@ def singular_values(robot: Robot, q: object, length: float = 1.0) -> Array:
 
 
 def manipulability(robot: Robot, q: object, length: float = 1.0) -> float:
-    """Volume of the manipulability ellipsoid but for a constant: the product of singular values.
+    """Volume of the manipulability ellipsoid up to a constant factor: the product of singular values.
 
     It is sqrt(det(J Jᵀ)) for arms with as many joints as controlled directions or more, and 0 at a
     singularity. Arguments and errors as :func:`singular_values`.
@@ -85,9 +85,10 @@ def manipulability(robot: Robot, q: object, length: float = 1.0) -> float:
 def sample_workspace(robot: Robot, count: int, rng: np.random.Generator, length: float = 1.0) -> tuple[Array, Array]:
     """Tip positions and manipulability of joint vectors drawn evenly inside the limits.
 
-    Even in the joints is not even in space: the density of points says how many postures reach a place. Joints with
-    which a robot's loops do not close in home's assembly are left out; where no draw closes, as with the joints of a
-    hand, which hold an object by no chance, all count with their pose of least error.
+    Samples that are uniform in the joints are not uniform in space: the density of points shows how many postures
+    reach a position. Joint vectors at which a robot's loops do not close in home's assembly are left out. If none
+    closes, all count with their pose of least error. This happens for a hand, whose random joints never hold an
+    object.
 
     Args:
         robot: The arm.

@@ -1,4 +1,4 @@
-"""Drives and dynamics of slaves: what its motors can do, and how its links move."""
+"""Drives and dynamics of slaves: what their motors can do, and how their links move."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -33,7 +33,7 @@ MAY_BE_ZERO = ("viscous", "coulomb")
 
 
 def read_only(name: str, values: object, shape: tuple[int, ...] | None = None) -> Array:
-    """Copy of finite numbers that nobody can write.
+    """Read-only copy of finite numbers.
 
     Raises:
         ShapeError: Not a vector, or another shape than the wanted one.
@@ -56,17 +56,17 @@ class Drives:
         inertia: Reflected motor inertia plus, at home, that of the links [kg·m² or kg], > 0.
         viscous: Viscous friction [N·m·s/rad or N·s/m], >= 0.
         coulomb: Dry friction [N·m or N], >= 0.
-        friction_speed: Where dry friction reaches 70 % of its value [rad/s or m/s], > 0.
+        friction_speed: Speed at which dry friction reaches 70 % of its value [rad/s or m/s], > 0.
         effort_limit: Largest torque or force of the motor at the joint [N·m or N], > 0.
         speed_limit: Largest speed [rad/s or m/s], > 0.
-        encoder_step: Smallest difference that is measured [rad or m], > 0.
+        encoder_step: Resolution of the encoder [rad or m], > 0.
         bandwidth: Triple closed-loop pole of the default PID gains [rad/s], > 0.
-        assumed: Names of the entries above that no source states, for one joint at least.
+        assumed: Names of the entries above that no source states for at least one joint.
 
     Raises:
         ShapeError: Entries are not vectors of one length.
         ParameterError: A value is not possible.
-        UnknownNameError: ``assumed`` names what is no entry.
+        UnknownNameError: A name in ``assumed`` is not an entry.
     """
 
     inertia: Array
@@ -107,15 +107,15 @@ class Dynamics:
         gravity: Effort [N·m or N] that holds the arm at rest.
         parameters: Numbers that both read, in the model's own order.
         compensated: Axes (n,) whose gravity the published controller feeds forward.
-        links: Inertias of the links behind those numbers, for models that have such; () for none.
-        frames: Where the frames of these links stand in the base with all joints at home,
-            (k, 4, 4), the k-th moved by joint k; () where nobody says, as without links.
-        unknown: Names of numbers that the source does not state, to their places in the row; the
-            real arm may differ in them (:mod:`teleop_lab.fitting`).
+        links: Inertias of the links from which these numbers were computed; () if the model has none.
+        frames: Frames of these links in the base with all joints at home, (k, 4, 4), the k-th moved by joint k; () if
+            they are not known, or if there are no links.
+        unknown: Maps names of numbers that the source does not state to their indices in the row; the real arm may
+            differ in them (:mod:`teleop_lab.fitting`).
 
     Raises:
-        ShapeError: ``parameters`` are not a vector, or there is not one frame for each link.
-        ParameterError: ``parameters`` that are not finite, or a link whose inertia no body can have.
+        ShapeError: ``parameters`` is not a vector, or the number of frames differs from the number of links.
+        ParameterError: ``parameters`` are not finite, or no body can have the inertia of a link.
     """
 
     acceleration: AccelerationKernel

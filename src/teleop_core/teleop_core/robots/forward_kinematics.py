@@ -1,4 +1,4 @@
-"""Forward kinematics of a robot with its status: the questions behind :meth:`Robot.solve_fk`."""
+"""Forward kinematics of a robot with its status: the implementation of :meth:`Robot.solve_fk`."""
 
 import numpy as np
 
@@ -62,10 +62,10 @@ def solved(robot: arm.Arm, joints: Array, seed: object, *, search: bool = True, 
 
 
 def closed_poses(robot: arm.Arm, joints: Array) -> Array:
-    """Poses of joint vectors (n,) or (N, n) whose loops close.
+    """Poses of joint vectors (n,) or (N, n) at which the loops close.
 
     Raises:
-        ClosureError: With some joints they do not.
+        ClosureError: The loops do not close for some joint vector.
     """
     if joints.ndim == 1:
         one = solved_one(robot, joints, None)

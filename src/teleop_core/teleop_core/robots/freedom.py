@@ -1,8 +1,8 @@
 """Freedom: how far the tip can go in every direction, and the posture a slave starts from.
 
-The tip is walked away from a posture along 26 directions, and turned about as many axes, in small steps, as the hand
-will move it. A direction ends where a joint limit ends it, and where the arm comes beside a singularity: there a joint
-has to move :data:`SWIFT` times as far as the tool. What is left in the worst direction is the room there.
+The tip is moved away from a posture along 26 directions, and rotated about as many axes, in small steps, as a hand
+would move it. A direction ends at a joint limit or near a singularity, where a joint has to move :data:`SWIFT` times
+as far as the tool. The room of the posture is the distance in the worst direction.
 """
 
 import itertools
@@ -17,30 +17,30 @@ from teleop_core.kernels import Array, length, product, raise_pending, rotations
 from teleop_core.kinematics import IkStatus
 from teleop_core.robots import arm
 
-# One step of the walk turns the tool so far [rad], or takes it as far as a lever of reach/pi would.
+# One step rotates the tool by this angle [rad], or moves it as far as a lever of reach/pi with this angle.
 STEP = math.radians(2.0)
 STEPS = 45
-# Beside a singularity a joint moves more than so many times as far as the tool.
+# Near a singularity a joint moves more than this many times as far as the tool.
 SWIFT = 3.0
-# Home has room enough if the tip can turn so far [rad] in the worst direction, and move as far as
-# the lever would take it by the second angle: reach/15.
+# Home has enough room if, in the worst direction, the tip can rotate by the first angle [rad] and move as far as the
+# lever does with the second angle: reach/15.
 ENOUGH = math.radians(30.0)
 ENOUGH_MOVE = math.radians(12.0)
-# Postures count as equal from this share of the most room on.
+# Postures with at least this share of the largest room count as equal.
 EQUAL = 0.9
-# Postures that are looked at.
+# Number of postures that are examined.
 SAMPLES = 512
 _FOLLOWED = int(IkStatus.FOLLOWED)
 _KNOWN: dict[tuple[object, ...], Array] = {}
 
 
 class Freedom(NamedTuple):
-    """How far the tip can go from a posture in its worst direction, of those it controls."""
+    """How far the tip can move from a posture in the worst of the directions that it controls."""
 
     metres: float
-    """Way of the tip with its attitude kept; inf if no position is controlled."""
+    """Distance of the tip at constant attitude; inf if no position is controlled."""
     radians: float
-    """Turn about the tip in place; inf if no rotation is controlled."""
+    """Rotation about the fixed tip; inf if no rotation is controlled."""
 
 
 def freedom(robot: arm.Arm, q: object) -> Freedom:
@@ -65,7 +65,7 @@ def freedom(robot: arm.Arm, q: object) -> Freedom:
 def lever(robot: arm.Arm) -> float:
     """Distance [m] that counts as much as a radian: reach/pi.
 
-    The reach is the largest distance of the tip from the base's origin over the postures that are looked at.
+    The reach is the largest distance of the tip from the base's origin over the examined postures.
     """
     return float(length(_poses(robot, samples(robot))[:, :3, 3]).max()) / math.pi
 
@@ -85,7 +85,7 @@ def samples(robot: arm.Arm) -> Array:
 
 
 def start_of(robot: arm.Arm) -> Array:
-    """:func:`start_posture`, looked for once per program for robots that are alike."""
+    """:func:`start_posture`, computed once per program for equal robots."""
     arrays = (robot.lower, robot.upper, robot.home, robot.geometry_row, np.array(robot.task_mask))
     key = (robot.kernels, *(array.tobytes() for array in arrays))
     if key not in _KNOWN:
@@ -94,11 +94,12 @@ def start_of(robot: arm.Arm) -> Array:
 
 
 def start_posture(robot: arm.Arm) -> Array:
-    """Posture from which the tip has room in all directions, by a rule without chance.
+    """Posture from which the tip has room in all directions, by a deterministic rule.
 
-    Home, if it has room enough: a turn by 30 degrees and a move by reach/15. Else of the postures looked at that hold
-    the tool as home does, where some can turn and move by 30 degrees, or else of all, those within :data:`EQUAL` of the
-    most room; of these the one nearest to home, by the largest share of a joint's range.
+    Home is taken if it has enough room: a rotation by 30 degrees and a move by reach/15. Otherwise the candidates are
+    the examined postures with the tool attitude of home, if some of them can rotate and move by 30 degrees, or else
+    all examined postures. Of the candidates within :data:`EQUAL` of the largest room, the nearest to home is taken,
+    measured by the largest share of a joint's range.
 
     Args:
         robot: The arm.
@@ -124,14 +125,14 @@ def start_posture(robot: arm.Arm) -> Array:
 
 
 def free_postures(robot: arm.Arm, count: int) -> Array:
-    """Postures with room all around, the start first, then those looked at with the most room.
+    """Postures with room in all directions: the start first, then the examined postures with the most room.
 
     Args:
         robot: The arm.
-        count: How many are wanted, at most.
+        count: Largest number of postures.
 
     Returns:
-        (k, n) [rad, m], k at least 1: those from which the tip can go nowhere are left out.
+        (k, n) [rad, m], k at least 1: postures without room are left out.
     """
     spread = samples(robot)
     steps = np.minimum(*_steps(robot, spread))
@@ -141,7 +142,7 @@ def free_postures(robot: arm.Arm, count: int) -> Array:
 
 
 def _poses(robot: arm.Arm, postures: Array) -> Array:
-    """Poses (N, 4, 4) next to home, of least error where joints spread evenly do not assemble."""
+    """Poses (N, 4, 4) next to home; those of least error for joints at which the loops do not close."""
     return robot.solve_fk_batch(postures, search=False).T
 
 

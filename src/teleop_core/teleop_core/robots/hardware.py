@@ -1,4 +1,4 @@
-"""Hardware: what a real arm does beside its ideal model, as measured or fitted."""
+"""Hardware: how a real arm differs from its ideal model, as measured or fitted."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -22,22 +22,22 @@ class Hardware:
 
     Args:
         coulomb: Dry friction that holds a joint at rest [N·m or N], >= 0.
-        bias: Effort that the amplifier gives when none is asked for [N·m or N].
-        wander: Standard deviation of dry friction over its mean, >= 0.
-        play: Half width of the play between encoder and joint [rad or m], >= 0: backlash, and
-            friction behind an elastic tendon, which moves the joint alike.
-        coupling: (n, n), zero on and above the diagonal: what a joint moves per lag of an earlier
-            one behind its encoder.
-        links: How the links, and the zeros of the joints, differ from the drawing; None: not.
-        dynamics: Parameter row of the true dynamics; empty when they are as the control law knows.
+        bias: Effort that the amplifier gives at a command of zero [N·m or N].
+        wander: Standard deviation of dry friction, divided by its mean, >= 0.
+        play: Half width of the play between encoder and joint [rad or m], >= 0: backlash, and friction behind an
+            elastic tendon, which has the same effect.
+        coupling: Motion of a joint per lag of an earlier joint behind its encoder, (n, n), zero on and above the
+            diagonal.
+        links: How the links, and the zeros of the joints, differ from the drawing; None for no difference.
+        dynamics: Parameter row of the true dynamics; empty if they equal those of the control law.
         motors: Inertias of the motors through their gears (n,) [kg·m² or kg]; empty: not known.
-        sources: Each name above to how its numbers are known, as of
+        sources: Maps each name above to the source of its numbers, as in
             :func:`teleop_core.base.parameters.parameter`.
 
     Raises:
-        ShapeError: An array has another shape than ``coulomb`` asks for.
-        ParameterError: A number is not possible, or a source names no mark.
-        UnknownNameError: A source of what is no number.
+        ShapeError: The shape of an array does not fit that of ``coulomb``.
+        ParameterError: A number is not possible, or a source has no valid mark.
+        UnknownNameError: A name in ``sources`` is not one of the numbers.
     """
 
     coulomb: Array

@@ -1,9 +1,9 @@
 """Inertias of links: mass, centre and moments as a value, and whether a body can have them.
 
-A rigid body of positive density everywhere has a positive mass and three principal moments about its centre of mass
-that are positive and of which none exceeds the sum of the other two. All of it is said by one matrix, the
-pseudo-inertia (4, 4) ∫ (x, 1)(x, 1)ᵀ dm: it is positive definite. A flat plate, whose largest moment is that sum, is
-let through; a point or a line, which no engine can turn about itself, is not.
+A rigid body of positive density has a positive mass and three positive principal moments about its centre of mass, of
+which none exceeds the sum of the other two. All this is equivalent to one condition: the pseudo-inertia (4, 4) ∫ (x,
+1)(x, 1)ᵀ dm is positive definite. A flat plate, whose largest moment equals that sum, is accepted. A point or a line
+is refused, because no physics engine can rotate it.
 
 Source:
     Wensing, Kim and Slotine 2018, Linear matrix inequalities for physically consistent inertial
@@ -18,8 +18,8 @@ import numpy as np
 from teleop_core.base import ParameterError, ShapeError
 from teleop_core.kernels import Array, dot
 
-# Share of the largest moment by which rounding may break the triangle inequality: of a plate, or
-# of numbers that a source gives to some digits.
+# Share of the largest moment by which rounding may violate the triangle inequality: for a plate, or for numbers that a
+# source prints with few digits.
 _ROUNDING = 1e-9
 
 

@@ -8,10 +8,10 @@ of theta and so on; joint offsets are errors of theta on turning and of d on sli
     errors = LinkErrors.of(robot, {"d3": 5.5e-3})
     dh_kernels.fk(q, true_chain(robot, errors), T_base_tip)
 
-Arms described in other conventions are brought to this one: every pair of successive axes has a common normal, along
-which a is measured, pointing to the later axis. Where axes are parallel it is any of them; the small turn of the later
-axis out of the plane of both is then no error of the four numbers (Hayati and Mirmirani 1985). A pair of nearly
-parallel axes can be built in a way that they do not describe.
+Arms described in other conventions are converted to this one: every pair of successive axes has a common normal, along
+which a is measured, pointing to the later axis. For parallel axes any common normal is taken. A small rotation of the
+later axis out of the plane of both is then not described by the four numbers (Hayati and Mirmirani 1985). So these
+numbers do not cover all errors of a pair of nearly parallel axes.
 
 Source:
     Denavit and Hartenberg 1955; Mooring, Roth and Driels 1991, Fundamentals of manipulator calibration.
@@ -37,7 +37,7 @@ _PARALLEL, _ONE_LINE = 1e-9, 1e-12
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class LinkErrors:
-    """Deltas of each link's Denavit-Hartenberg numbers, built less drawn; read-only copies.
+    """Deltas of each link's Denavit-Hartenberg numbers: built minus drawn; read-only copies.
 
     Args:
         a: Along the common normal, (n,) [m].
@@ -151,8 +151,8 @@ def _errors_of_link(errors: LinkErrors, i: int) -> tuple[Array, Array]:
 def next_axis_motion(F: Array) -> Array:
     """Motion S = Rz Tz (4, 4) that ends F = Rz(theta) Tz(d) Tx(a) Rx(alpha) S.
 
-    Parallel axes, whose common normal may lie anywhere, get d = 0 in S; of the two directions of
-    the normal of intersecting axes that with the smaller turn in S is taken.
+    Parallel axes, whose common normal may lie anywhere, get d = 0 in S. For intersecting axes, the direction of the
+    normal with the smaller rotation in S is taken.
 
     Source:
         Derived; the third row of a rotation is sin(alpha) sin(turn), sin(alpha) cos(turn), cos.

@@ -1,4 +1,4 @@
-"""Robots as parts: what counts as one, and how it becomes a :class:`Robot`."""
+"""Robots as parts: which objects count as a robot, and how they become a :class:`Robot`."""
 
 import inspect
 from collections.abc import Callable, Mapping
@@ -19,16 +19,16 @@ _OF_MACHINES = ("four_bar", "mma", "parallelogram", "rps3", "scara_stewart", "st
 _TABLE_ENDINGS = (".yaml", ".yml")
 _URDF_ENDINGS = (".urdf", ".xacro")
 DESCRIPTION = "_description"
-"""How names of the package ``robot_descriptions`` end."""
+"""Suffix of names of the package ``robot_descriptions``."""
 ARGUMENT = "xacro."
-"""What stands before the name of an argument of a xacro in a robot's geometry."""
-# Of a failure of somebody else's kernel, which may be pages long.
+"""Prefix of xacro arguments in a robot's geometry."""
+# Characters kept of an error message of a user's kernel, which may be pages long.
 _MOST_CHARACTERS = 200
 
 
 @runtime_checkable
 class RobotSource(Protocol):
-    """What describes a robot, such as :class:`teleop_core.robots.arms.dh.DhTable`."""
+    """An object that describes a robot, such as :class:`teleop_core.robots.arms.dh.DhTable`."""
 
     def robot(self) -> Robot:
         """The robot."""
@@ -36,7 +36,7 @@ class RobotSource(Protocol):
 
 
 RobotPart: TypeAlias = Robot | RobotSource | Callable[..., Robot]
-"""A robot, what describes one, or ``make(**geometry)`` that returns one, all with defaults."""
+"""A robot, an object that describes one, or ``make(**geometry)`` that returns one; all arguments have defaults."""
 Part = TypeVar("Part", bound=RobotPart)
 
 
@@ -46,7 +46,7 @@ def built(name: str, part: RobotPart, geometry: Mapping[str, float | str]) -> Ro
     Raises:
         UnknownNameError: The part's function does not take such a symbol.
         ParameterError: A ready robot is given a geometry, or a length is not possible.
-        PartError: The part makes something else than a robot.
+        PartError: The part does not make a robot.
     """
     for symbol, value in geometry.items():
         if isinstance(value, float):
@@ -131,9 +131,9 @@ def _checked(name: str, part: object) -> RobotPart:
 
 
 def _try(part: RobotPart) -> None:
-    """Run every kernel once at home, so that a wrong one is told before anything else runs.
+    """Run every kernel once at home, so that errors are reported before anything else runs.
 
-    Chains of a table are not tried: their kernels are ours.
+    Chains of a table are not tried, because their kernels are our own.
     """
     name = part_name(part)
     robot = built(name, part, {})
@@ -147,7 +147,7 @@ def _try(part: RobotPart) -> None:
         _try_dynamics(robot)
     except TeleopError:
         raise
-    except Exception as error:  # whatever a foreign kernel raises, one line names it
+    except Exception as error:  # whatever a user's kernel raises, one line names the kernel
         reason = " ".join(str(error).split())[:_MOST_CHARACTERS]
         raise PartError("robot", name, f"one whose kernels run at home; {type(error).__name__}: {reason}") from error
 
@@ -160,7 +160,7 @@ def _try_dynamics(robot: Robot) -> None:
 
 
 def part_name(part: RobotPart) -> str:
-    """Name that a part brings along: its own, or that of its function."""
+    """Name of a part: its own name, or that of its function."""
     return str(getattr(part, "name", None) or getattr(part, "__name__", type(part).__name__))
 
 

@@ -1,8 +1,8 @@
 """Rank: in how many directions a tip can move at once, and which of them to control.
 
-An arm of five joints cannot hold every pose: asked for all six directions it follows none of them well. Of the sets of
-directions that it can move in at once, those count that hold most of the position. Of these the one is taken in which
-the worst direction needs the least motion of the joints, in the median of postures spread evenly over the limits.
+An arm of five joints cannot hold every pose. If it has to control all six directions, it follows none of them well. Of
+the sets of directions in which it can move at once, those with the most position directions are candidates. The chosen
+set needs the least joint motion in its worst direction, in the median over postures spread evenly within the limits.
 """
 
 from itertools import combinations
@@ -15,8 +15,8 @@ from teleop_core.kinematics import DIRECTIONS
 from teleop_core.robots import arm, freedom
 
 _POSTURES, _FEW = 128, 4
-_NONE = 1e-6  # singular value, over the lever, of a direction in which the tip cannot move
-_POOR = 1e-3  # median of the least one below which a set of directions is of no use
+_NONE = 1e-6  # singular value, divided by the lever, of a direction in which the tip cannot move
+_POOR = 1e-3  # a set of directions is useless if the median of its least singular value is below this
 
 
 class Directions(NamedTuple):
@@ -27,7 +27,7 @@ class Directions(NamedTuple):
 
 
 def directions_of(robot: arm.Arm, lever: float) -> Directions:
-    """Directions that a robot can control, of all six: it may control fewer.
+    """Directions that a robot can control, of all six; ``robot`` itself may be set to control fewer.
 
     Args:
         robot: The arm.

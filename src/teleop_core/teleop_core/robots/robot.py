@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 
 
 class _Start:
-    """Start posture of a robot: as given, else by the rule, when it is first asked for."""
+    """Start posture of a robot: the given one, or the one of the rule, computed at its first use."""
 
     @overload
     def __get__(self, robot: None, owner: type) -> None: ...
@@ -69,22 +69,22 @@ class Robot:
         lower: Smallest joint positions (n,) [rad, m].
         upper: Largest joint positions (n,) [rad, m].
         home: Joint vector (n,) of the published or natural zero, inside the limits.
-        home_is_assumed: Whether nobody says that home is a posture to work from: the zero of a
-            URDF, at which many arms are stretched out. No session starts there.
+        home_is_assumed: Whether home is not known to be a working posture, such as the zero of a URDF, at which many
+            arms are stretched out. No session starts there.
         start: Joint vector (n,) at which a session starts, inside the limits; None for one with room in all directions
             (:func:`teleop_core.robots.freedom.start_posture`), looked for when it is first asked for.
         geometry: Symbols and their values [m, rad], in the order the kernels expect if there is no row.
         kernels: Compiled functions.
         row: Numbers that the kernels take (k,); None for the values of the geometry.
         drives: Drive table, None for robots that are not used as slaves.
-        dynamics: Rigid-body model; None for axes that do not act on each other.
-        hardware: What the real arm does beside its model; None where nobody knows.
+        dynamics: Rigid-body model; None for independent axes.
+        hardware: How the real arm differs from its model; None if unknown.
         task_mask: Directions that the robot controls: x, y, z, then rotations about x, y, z.
-        solution: How inverse kinematics are solved, in words; empty for robots that do not say.
-        visuals: What its links look like, if a file says so; nothing is read before it is drawn.
-        notes: What was read of its file otherwise than it may be meant, in words.
-        describe: Draws its bodies (:func:`teleop_core.robots.bodies.bodies_of`), for joints that
-            are no chain; None for a chain, or where nobody knows.
+        solution: How inverse kinematics are solved, in words; empty if unknown.
+        visuals: Shapes of its links, if its file has them; nothing is read before it is drawn.
+        notes: What may have been read differently from what the author of its file meant, in words.
+        describe: Draws its bodies (:func:`teleop_core.robots.bodies.bodies_of`), for joints that are not a chain; None
+            for a chain, or if unknown.
 
     Raises:
         ShapeError: Limits, home, start or drives are not vectors (n,).
@@ -109,7 +109,7 @@ class Robot:
     describe: "Callable[[Robot], Bodies] | None" = None
     home_is_assumed: bool = False
     start: _Start = _Start()
-    # Writable copies for the kernels, which are compiled for such arrays alone.
+    # Writable copies for the kernels, which are compiled only for writable arrays.
     _row: Array = field(init=False)
     _free: Array = field(init=False)
     _home: Array = field(init=False)
@@ -165,7 +165,7 @@ class Robot:
 
     @property
     def geometry_row(self) -> Array:
-        """Numbers that the kernels take: a new array each time, the caller's."""
+        """Numbers that the kernels take: a new array each time, which the caller may change."""
         return self._row.copy()
 
     @cached_property
@@ -197,16 +197,17 @@ class Robot:
     def limits(self, dt: float = math.inf) -> Array:
         """Rows lower, upper, largest step within ``dt`` [s]: (3, n), as the ik kernel takes it.
 
-        Without drives, or without ``dt``, steps are infinite. A new array each time, the caller's.
+        Without drives, or without ``dt``, steps are infinite. Each call returns a new array, which the caller may
+        change.
         """
         return np.stack((self.lower, self.upper, self.speed_limit * dt))
 
     def fk(self, q: object) -> Array:
         """Pose of the tip in the base, in which all loops close.
 
-        Where a robot with loops has several, it is the one next to home if that closes, else the
-        nearest to home of those that a search finds. Redundant joints, as those of a hand on an object, may contradict
-        each other by 0.1 mm.
+        A robot with loops may have several poses. The result is the one next to home if its loops close, else the
+        nearest to home of those that a search finds. Redundant joints, such as those of a hand on an object, may
+        disagree by 0.1 mm.
 
         Args:
             q: Joint vector (n,) or batch (N, n) [rad, m]; limits are not applied.
@@ -217,7 +218,7 @@ class Robot:
         Raises:
             ShapeError: Another shape.
             ParameterError: NaN or infinity.
-            ClosureError: No assembly has these joints; :meth:`solve_fk` answers all the same.
+            ClosureError: No assembly has these joints; :meth:`solve_fk` returns a result even then.
         """
         joints = checked_array("q", q, (self.n,))
         if self.kernels.assemble is not None:
@@ -238,8 +239,8 @@ class Robot:
             q: Joint vector (n,) [rad, m]; limits are not applied. Several of them, (N, n), are
                 answered as by :meth:`solve_fk_batch`, which has the type for it.
             seed: ``T_base_tip`` (4, 4) whose assembly to stay in; None for home's.
-            search: Whether to look for another assembly where that next to the seed does not
-                close; a tick of a session does not.
+            search: Whether to search for another assembly if the one next to the seed does not close; a tick of a
+                session never searches.
 
         Returns:
             :class:`FkResult`. Joints that do not assemble are not an error: the pose of least
@@ -266,16 +267,15 @@ class Robot:
         return forward_kinematics.solved(self, joints, seed, search=search)
 
     def follow_fk(self, q: object, seed: object = None) -> FkBatch:
-        """Poses along a path of joint vectors, which stays in its assembly as long as that closes.
+        """Poses along a path of joint vectors; the path stays in its assembly as long as the loops close there.
 
         Args:
             q: Joint vectors (N, n) [rad, m], near one another.
             seed: ``T_base_tip`` (4, 4) before the first; None for home's assembly.
 
         Returns:
-            :class:`FkResult` with a leading axis. Where the path leaves the assembly, beyond a
-            singular pose, the status is NOT_CLOSED, and no other assembly is looked for; what
-            comes after starts from the last pose that closed.
+            :class:`FkResult` with a leading axis. If the path leaves the assembly, beyond a singular pose, the status
+            is NOT_CLOSED, and no other assembly is searched. Later poses start from the last pose that closed.
 
         Raises:
             ShapeError: Another shape.
@@ -331,9 +331,9 @@ class Robot:
         Args:
             q: Joint vector (n,) [rad, m].
             dq: Joint speeds (n,) [rad/s or m/s].
-            effort: Of the drives, less friction (n,) [N·m or N].
-            wrench: From outside, at the origin of the tip in base axes (6,): force [N], then
-                torque [N·m]; None for none.
+            effort: Efforts of the drives, minus friction (n,) [N·m or N].
+            wrench: External wrench at the origin of the tip in base axes (6,): force [N], then torque [N·m]; None for
+                no wrench.
 
         Raises:
             ShapeError: Another shape.

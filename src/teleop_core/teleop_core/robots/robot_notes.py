@@ -1,4 +1,4 @@
-"""Notes on a robot of a URDF: what of it may not be meant, each in a line."""
+"""Notes on a robot of a URDF: what its author may not have meant, one line each."""
 
 from teleop_core.kinematics import DIRECTIONS
 from teleop_core.robots.freedom import lever
@@ -7,7 +7,7 @@ from teleop_core.robots.robot import Robot
 
 
 def notes_on_robot(robot: Robot, file: str, has_task: bool) -> list[str]:
-    """What the file may mean otherwise, and which directions the tip cannot move in.
+    """Notes on ambiguous content of the file, and on directions in which the tip cannot move.
 
     Args:
         robot: As it was loaded from the file.
@@ -19,7 +19,7 @@ def notes_on_robot(robot: Robot, file: str, has_task: bool) -> list[str]:
 
 
 def rank_note(robot: Robot, file: str, has_task: bool) -> str:
-    """Which directions an arm does not hold that cannot move in all of them at once; else empty.
+    """Note on the directions that an arm does not control because it cannot move in all at once; else empty.
 
     Args:
         robot: As it was loaded from the file.
@@ -42,7 +42,7 @@ def rank_note(robot: Robot, file: str, has_task: bool) -> str:
 
 
 def assumed_note(robot: Robot, file: str) -> str:
-    """Which limits of drives a URDF leaves out, for one joint at least; empty where none is.
+    """Note on the drive limits that a URDF does not state for at least one joint; empty if it states all.
 
     Args:
         robot: As it was loaded from the file.

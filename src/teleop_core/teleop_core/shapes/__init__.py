@@ -1,7 +1,8 @@
-"""Shapes: how far a point is from a body, whether it is inside, and how the body is drawn.
+"""Shapes: bodies with a signed distance to a point, and with lines to draw them.
 
-One file per shape, in this folder. A virtual fixture holds the hand inside or outside of a shape
-(:mod:`teleop_core.coupling.fixtures`); the slave's tool touches one (:mod:`teleop_core.slave.world`).
+Each shape is one file of this folder. A virtual fixture keeps the hand inside or outside a shape
+(:mod:`teleop_core.coupling.fixtures`); an object that the slave's tool touches has a shape
+(:mod:`teleop_core.slave.world`).
 """
 
 import re
@@ -30,16 +31,16 @@ class Shape:
     """A body in space.
 
     Attributes:
-        name: What ``--set fixture=`` and ``--set world=`` call it.
-        parameters: Its parameter group: real numbers and tuples of them. What a text ``file`` among
-            them names is kept with recordings.
-        distance: ``distance(offset, numbers, out)``, a kernel or a plain function. ``offset`` (3,)
-            [m] runs from the middle of the shape to a point; ``numbers`` holds the parameters in
-            their order; ``out`` (3,) gets a vector of any length but 0 that points out of the shape
-            where its surface is nearest. Returns how far the point is outside [m], negative inside.
+        name: Its name in ``--set fixture=`` and ``--set world=``.
+        parameters: Its parameter group: real numbers and tuples of them. A text parameter ``file`` is the path of a
+            file that recordings keep.
+        distance: ``distance(offset, numbers, out)``, a kernel or a plain function. ``offset`` (3,) [m] runs from the
+            middle of the shape to a point; ``numbers`` holds the parameters in their order; ``out`` (3,) gets a vector
+            of any length except 0 that points out of the shape at its nearest surface. Returns the distance of the
+            point from the surface [m], negative inside.
         outline: ``outline(parameters)`` gives points (N, 3) [m] of one line along its edges around
             its middle; a row of NaN lifts the pen.
-        numbers: ``numbers(parameters)`` gives ``numbers``, if that is something else.
+        numbers: ``numbers(parameters)`` returns ``numbers``, if they are not simply the parameters.
     """
 
     name: str
@@ -56,7 +57,7 @@ _FILE = re.compile(r"""\bfile\s*=\s*['"]([^'"]*)['"]""")  # in the text of a par
 
 
 def files_of(parameters: object) -> list[str]:
-    """Names of the files that a shape's parameters tell of, its parts included."""
+    """Names of the files in a shape's parameters, including those of its parts."""
     found: list[str] = []
     for name, value in values_of(parameters).items():
         if name == "file":
@@ -67,7 +68,7 @@ def files_of(parameters: object) -> list[str]:
 
 
 def moved(value: Any, files: Mapping[str, str]) -> Any:
-    """Value of a parameter with files where they are now, by the path that it tells."""
+    """Value of a parameter with its file paths replaced by the present paths in ``files``."""
     if isinstance(value, list | tuple):
         return type(value)(moved(element, files) for element in value)
     if not isinstance(value, str):
@@ -75,13 +76,13 @@ def moved(value: Any, files: Mapping[str, str]) -> Any:
     return files.get(value) or _FILE.sub(lambda said: said[0].replace(said[1], files.get(said[1], said[1])), value)
 
 
-_STEP = 1e-6  # along the way out, over which the distance must grow by as much [m]
+_STEP = 1e-6  # step outwards [m], over which the distance must grow by the same amount
 _TRIED = np.array([(0.31, 0.02, 0.05), (0.01, 0.43, -0.03), (-0.02, 0.04, 0.37), (-0.29, 0.23, -0.41)])
 """Offsets at which a shape is tried [m]."""
 
 
 def _try(part: Shape) -> None:
-    """Try it at some places, so that what cannot work is told before anything runs."""
+    """Try a shape at some points, so that errors are reported before anything runs."""
     needs = (
         "one with distance(offset, numbers, out) -> float, outline(parameters) -> (N, 3) and "
         "parameters that all have defaults"
@@ -99,7 +100,7 @@ def _try(part: Shape) -> None:
 
 
 def _fault_at(part: Shape, numbers: Array, offset: Array) -> str:
-    """What a shape must have that it has not at one place; empty if it has all."""
+    """Requirement that a shape does not meet at one point; empty if it meets all."""
     (given, _), (out, fence) = fenced(numbers), fenced(np.zeros(3))
     distance = float(part.distance(offset, given, out))
     size, place = float(np.linalg.norm(out)), f"at {offset.tolist()} m from its middle"
@@ -121,7 +122,7 @@ SHAPES: Registry[Shape] = Registry(
     part_check("shape", Shape, "distance", "outline"),
     _try,
 )
-"""All shapes by name: every file of this folder holds one."""
+"""All shapes by name: every file of this folder contains one."""
 
 register_shape = SHAPES.register
-"""Adds one of yours under its own name; see :meth:`Registry.register`."""
+"""Adds your shape under its own name; see :meth:`Registry.register`."""

@@ -24,10 +24,10 @@ class BoxParameters:
 
 @kernel
 def box_distance(offset: Array, size: Array, out: Array) -> float:
-    """Write the way out of a box (3,); returns how far a point (3,) [m] is outside.
+    """Write the outward direction of a box (3,); return the distance [m] of a point (3,) outside it.
 
-    Outside it runs from the nearest point, so around an edge it turns. Inside it is that of the
-    nearest face; x comes before y before z where faces are equally near.
+    For a point outside, the direction is that from the nearest point of the box, so it rotates around edges. For a
+    point inside, it is the normal of the nearest face; of equally near faces x comes before y, and y before z.
     """
     square, face, depth = 0.0, 0, -math.inf
     for i in range(3):

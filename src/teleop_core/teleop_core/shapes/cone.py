@@ -40,9 +40,9 @@ class ConeParameters:
 
 @kernel
 def cone_distance(offset: Array, numbers: Array, out: Array) -> float:
-    """Write the way out of a cone (3,); returns how far a point (3,) [m] is outside.
+    """Write the outward direction of a cone (3,); return the distance [m] of a point (3,) outside it.
 
-    The nearest point is on the wall, or the tip for points beyond it.
+    The nearest point is on the wall, or is the cone's tip for points beyond the tip.
     """
     axis = directions.unit(numbers[3], numbers[4], numbers[5])
     cosine, sine = math.cos(numbers[6]), math.sin(numbers[6])
@@ -64,7 +64,7 @@ def cone_distance(offset: Array, numbers: Array, out: Array) -> float:
 
 
 def cone_outline(parameters: ConeParameters) -> Array:
-    """A rim as far behind the middle as the tip is before it, and four lines from it to the tip."""
+    """A rim as far from the middle as the tip, on the opposite side, and four lines from the rim to the tip."""
     axis, tip = drawing.unit_vector(parameters.axis), np.array(parameters.apex)
     height = 2.0 * max(-float(dot(axis, tip)), _LEAST)
     rim = drawing.ring(tip + height * axis, axis, height * math.tan(parameters.half_angle))

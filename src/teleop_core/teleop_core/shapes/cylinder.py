@@ -29,7 +29,7 @@ class CylinderParameters:
 
 @kernel
 def cylinder_distance(offset: Array, numbers: Array, out: Array) -> float:
-    """Write the way out of a tube (3,); returns how far a point (3,) [m] is outside."""
+    """Write the outward direction of a tube (3,); return the distance [m] of a point (3,) outside it."""
     axis = directions.unit(numbers[2], numbers[3], numbers[4])
     along = directions.part_along(offset, axis)
     for i in range(3):

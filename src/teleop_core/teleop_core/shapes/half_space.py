@@ -12,7 +12,7 @@ from teleop_core.shapes.basis import directions, drawing
 
 @dataclass(frozen=True, kw_only=True)
 class HalfSpaceParameters:
-    """What is in front of a plane."""
+    """Everything in front of a plane."""
 
     normal: tuple[float, ...] = parameter(
         (0.0, 1.0, 0.0), Within(-1.0, 1.0), "from the plane into the half-space, of any length", length=3
@@ -29,7 +29,7 @@ class HalfSpaceParameters:
 
 
 def half_space_numbers(parameters: HalfSpaceParameters) -> Array:
-    """Numbers of its plane, whose normal looks out of it."""
+    """Numbers of the plane of a half-space; the plane's normal points out of the half-space."""
     return np.array((*(-x for x in parameters.normal), parameters.room))
 
 

@@ -38,7 +38,7 @@ class HoleParameters:
         return np.array(self.axis) / length(self.axis)
 
     def depth(self, ways: Array) -> float:
-        """Largest depth [m] in the hole of places (N, 3) [m] from the middle of its mouth; 0 where none is in it."""
+        """Largest depth [m] in the hole, of points (N, 3) [m] relative to its mouth; 0 if none is inside."""
         deep = -(ways * self.out).sum(axis=1)
         beside = length(ways + deep[:, None] * self.out)
         is_inside = (beside < self.radius + self.chamfer) & (deep <= self.thickness)
@@ -47,9 +47,9 @@ class HoleParameters:
 
 @inner
 def _section_depth(out: float, up: float, shape: Array) -> tuple[float, float, float]:
-    """How far the plane of the nearest face is from a place; above 0 where that is outside.
+    """Distance of a point from the plane of the nearest face; above 0 for a point outside.
 
-    Arguments and results as of :func:`_section_distance`.
+    Arguments and results as in :func:`_section_distance`.
     """
     radius, thickness, rim, chamfer = shape[0], shape[1], shape[2], shape[3]
     diagonal = math.sqrt(0.5)
@@ -68,18 +68,18 @@ def _section_depth(out: float, up: float, shape: Array) -> tuple[float, float, f
 
 @inner
 def _section_distance(out: float, up: float, shape: Array) -> tuple[float, float, float]:
-    """How far a place in the section through the axis is outside of the plate.
+    """Distance outside the plate, of a point in the section through the axis.
 
-    The section is convex: its faces are top, chamfer, wall of the hole, bottom and rim. Inside the
-    nearest face counts, outside the nearest of the nearest points of all faces.
+    The section is convex: its faces are top, chamfer, wall of the hole, bottom and rim. For a point inside, the
+    nearest face counts; for a point outside, the nearest point of all faces.
 
     Args:
-        out: From the axis [m].
-        up: Above the mouth [m].
+        out: Distance from the axis [m].
+        up: Height above the mouth [m].
         shape: Radius of the hole, thickness and radius of the plate, width of the chamfer [m].
 
     Returns:
-        The distance [m], negative inside; and the way out, along ``out`` and along ``up``.
+        The distance [m], negative inside; and the outward direction, along ``out`` and along ``up``.
     """
     distance, way_out, way_up = _section_depth(out, up, shape)
     if distance <= 0.0:
@@ -99,7 +99,7 @@ def _section_distance(out: float, up: float, shape: Array) -> tuple[float, float
         else:
             x, z = out - rim, up - min(max(up, -thickness), 0.0)
         beyond = math.sqrt(x * x + z * z)
-        if beyond <= directions.MIDDLE:  # on a face, but for rounding
+        if beyond <= directions.MIDDLE:  # on a face, up to rounding
             return _section_depth(out, up, shape)
         if beyond < distance:
             distance, way_out, way_up = beyond, x / beyond, z / beyond
@@ -108,9 +108,9 @@ def _section_distance(out: float, up: float, shape: Array) -> tuple[float, float
 
 @kernel
 def hole_distance(offset: Array, numbers: Array, out: Array) -> float:
-    """Write the way out of the plate (3,); returns how far a point (3,) [m] is outside.
+    """Write the outward direction of the plate (3,); return the distance [m] of a point (3,) outside it.
 
-    On the axis, where all ways to the wall are as long, one of them is taken.
+    On the axis all directions to the wall are equally long; one of them is taken.
     """
     axis = directions.unit(numbers[4], numbers[5], numbers[6])
     up = directions.part_along(offset, axis)

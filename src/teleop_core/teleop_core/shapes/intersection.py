@@ -1,4 +1,4 @@
-"""Intersection: what is in all of several shapes, such as a box without a ball."""
+"""Intersection: the points inside all of several shapes, such as a box without a ball."""
 
 from dataclasses import dataclass
 
@@ -10,12 +10,12 @@ from teleop_core.shapes.basis import combined, directions
 
 _ROUNDS = 200  # at most
 _STILL = 1e-12  # moves that count [m]
-_INSIDE = 1e-8  # distance that is none [m]
+_INSIDE = 1e-8  # distance that counts as zero [m]
 
 
 @dataclass(frozen=True, kw_only=True)
 class IntersectionParameters:
-    """Shapes that share it."""
+    """Shapes whose common part it is."""
 
     parts: tuple[str, ...] = combined.parts_parameter(
         ("box size=[0.03, 0.03, 0.03]", "not sphere radius=0.01 at=[0.0, 0.02, 0.0]"), "shapes whose common part it is"
@@ -27,9 +27,10 @@ class IntersectionParameters:
 
 @inner
 def _project(numbers: Array, place: Array) -> None:
-    """Move a place (3,) [m] to the nearest one in all parts, if they are convex.
+    """Move a point (3,) [m] to the nearest point inside all parts, if the parts are convex.
 
-    Goes to the parts in turn and takes back at each what that part moved in the round before.
+    The point is projected onto the parts in turn; before each projection the move by that part in the last round is
+    undone.
 
     Source:
         Boyle and Dykstra 1986.
@@ -52,11 +53,11 @@ def _project(numbers: Array, place: Array) -> None:
 
 @kernel
 def intersection_distance(offset: Array, numbers: Array, out: Array) -> float:
-    """Write the way out (3,); returns how far a point (3,) [m] is outside.
+    """Write the outward direction (3,); return the distance [m] of a point (3,) outside the intersection.
 
-    Outside the way comes from the nearest place inside, where all parts are convex. Beside parts
-    that are not (paths, the outside of a shape) it comes from some place inside near by. Where none
-    is found, and inside, it is the way out of the part that the point is farthest outside of.
+    For a point outside, the direction comes from the nearest point inside if all parts are convex. Next to parts that
+    are not convex (paths, the outside of a shape) it comes from some near point inside. If no such point is found, and
+    for points inside, it is the outward direction of the part with the largest distance.
     """
     farthest = combined.extreme_part(offset, numbers, 1.0, out)
     if farthest <= 0.0:

@@ -1,4 +1,4 @@
-"""Line: what is within a radius of a straight line, such as guidance along it, or a wire."""
+"""Line: all points within a radius of a straight line, such as guidance along it, or a wire."""
 
 import math
 from dataclasses import dataclass
@@ -30,7 +30,7 @@ class LineParameters:
 
 @kernel
 def rod_distance(offset: Array, numbers: Array, out: Array) -> float:
-    """Write the way from a line's nearest point (3,); returns how far a point (3,) [m] is outside.
+    """Write the vector from a line's nearest point (3,); return the distance [m] of a point (3,) outside.
 
     ``numbers``: radius, length of the line, its direction.
     """
@@ -45,7 +45,7 @@ def rod_distance(offset: Array, numbers: Array, out: Array) -> float:
 
 
 def endless_if_zero(parameters: object) -> Array:
-    """Numbers of a shape whose second is a length, infinite in place of 0."""
+    """Numbers of a shape whose second number is a length; a length of 0 becomes infinite."""
     numbers = numbers_of(parameters)
     numbers[1] = numbers[1] or math.inf
     return numbers

@@ -1,7 +1,7 @@
 """Mesh: a closed surface of triangles from a file, read from a grid of distances.
 
-The distances are made once, see :mod:`teleop_core.shapes.basis.distance_grid`. Between the nodes
-they are a cubic spline, so that the normal, which is its gradient, turns without a kink.
+The distances are computed once, see :mod:`teleop_core.shapes.basis.distance_grid`. Between the nodes they are a cubic
+spline, so that the normal, which is the spline's gradient, is continuous.
 """
 
 import math
@@ -36,10 +36,10 @@ class MeshParameters:
 
 @inner
 def _cell(offset: float, shape: Array, axis: int) -> tuple[int, float, float]:
-    """Where a place is in the grid along an axis, or where the grid ends before it.
+    """Position of a point in the grid along an axis, or the end of the grid for a point beyond.
 
     Returns:
-        Second of the four nodes around it; share of a step behind that; how far it is beyond [m].
+        Second of the four nodes around the point; share of a step after that node; distance beyond the grid [m].
     """
     wanted = (offset - shape[4 + axis]) / shape[3]
     last = shape[axis] - 1.0 - distance_grid.EDGE
@@ -50,7 +50,7 @@ def _cell(offset: float, shape: Array, axis: int) -> tuple[int, float, float]:
 
 @inner
 def _gradient(shape: Array, at: tuple[int, int, int], share: tuple[float, float, float], gradient: Array) -> float:
-    """Write the gradient (3,) of the spline behind a node; returns its value [m]."""
+    """Write the gradient (3,) of the spline after a node; return the spline's value [m]."""
     wx, wy, wz = spline.weights(share[0]), spline.weights(share[1]), spline.weights(share[2])
     sx, sy, sz = spline.slopes(share[0]), spline.slopes(share[1]), spline.slopes(share[2])
     rows, columns = int(shape[1]), int(shape[2])
@@ -75,12 +75,12 @@ def _gradient(shape: Array, at: tuple[int, int, int], share: tuple[float, float,
 
 @kernel
 def mesh_distance(offset: Array, numbers: Array, out: Array) -> float:
-    """Write the way out of a mesh (3,), of length 1; returns how far a point (3,) [m] is outside.
+    """Write the outward unit vector of a mesh (3,); return the distance [m] of a point (3,) outside it.
 
-    Where the distance ``f`` has a ridge (behind an edge, in the middle of the mesh) its spline has
-    a slope below 1. What is returned is ``f |∇f|``, for then a spring along the way out pushes with
-    the gradient of ``f²``, and no way around the ridge gains energy. Beyond the grid it is the
-    distance from the place of the surface that is nearest to where the grid ends.
+    Where the distance ``f`` has a ridge (behind an edge, in the middle of the mesh) its spline has a slope below 1.
+    The returned value is ``f |∇f|``. Then a spring along the outward direction pushes with the gradient of ``f²``, and
+    no path around the ridge gains energy. Beyond the grid, the distance is measured from the surface point nearest to
+    the end of the grid.
     """
     i, u, x = _cell(offset[0], numbers, 0)
     j, v, y = _cell(offset[1], numbers, 1)

@@ -24,7 +24,7 @@ class PlaneParameters:
 
 @kernel
 def plane_distance(offset: Array, numbers: Array, out: Array) -> float:
-    """Write a plane's normal (3,); returns how far a point (3,) [m] is above it.
+    """Write a plane's normal (3,); return the height [m] of a point (3,) above the plane.
 
     ``numbers``: the normal, of any length, and the plane's height above the middle [m].
     """

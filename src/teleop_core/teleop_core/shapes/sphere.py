@@ -20,9 +20,9 @@ class SphereParameters:
 
 @kernel
 def sphere_distance(offset: Array, numbers: Array, out: Array) -> float:
-    """Write the way from the middle (3,), z at the middle; returns how far a point is outside."""
+    """Write the vector from the middle (3,), or z at the middle; return the distance of a point outside."""
     x, y, z = offset[0], offset[1], offset[2]
-    distance = math.sqrt(x * x + y * y + z * z)  # products, for powers round otherwise in Python
+    distance = math.sqrt(x * x + y * y + z * z)  # products, because powers are rounded differently in Python
     out[0], out[1], out[2] = x, y, z
     if distance <= directions.MIDDLE:
         out[2] = 1.0

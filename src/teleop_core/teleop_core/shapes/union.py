@@ -1,4 +1,4 @@
-"""Union: what is in any of several shapes, such as a ball with a channel that leads out of it."""
+"""Union: the points inside any of several shapes, such as a ball with a channel that leads out of it."""
 
 from dataclasses import dataclass
 
@@ -9,7 +9,7 @@ from teleop_core.shapes.basis import combined
 
 @dataclass(frozen=True, kw_only=True)
 class UnionParameters:
-    """Shapes, each of which belongs to it."""
+    """Shapes of which it consists."""
 
     parts: tuple[str, ...] = combined.parts_parameter(
         ("sphere radius=0.015", "cylinder radius=0.005 length=0.05 direction=[1.0, 0.0, 0.0]"),
@@ -22,7 +22,7 @@ class UnionParameters:
 
 @kernel
 def union_distance(offset: Array, numbers: Array, out: Array) -> float:
-    """Write the way out of the nearest part (3,); returns how far a point (3,) [m] is outside."""
+    """Write the outward direction of the nearest part (3,); return the distance [m] of a point (3,) outside."""
     return combined.extreme_part(offset, numbers, -1.0, out)
 
 

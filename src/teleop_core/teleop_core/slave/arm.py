@@ -1,4 +1,4 @@
-"""Arm: what the kernels of server and simulator know of an arm, with scratch arrays."""
+"""Arm: the arm data that the kernels of server and simulator use, with scratch arrays."""
 
 from typing import Any, NamedTuple
 
@@ -6,7 +6,7 @@ from teleop_core.kernels.geometry import Array
 
 
 class ArmModel(NamedTuple):
-    """What the server knows of its arm: pointers, plain arrays, and scratch arrays for kernels."""
+    """The server's model of its arm: pointers, plain arrays, and scratch arrays for kernels."""
 
     fk: Any
     jacobian: Any
@@ -15,7 +15,7 @@ class ArmModel(NamedTuple):
     joints: Array
     effort: Array
     T: Array
-    is_free: Array  # rooms for what follows a twist: (n,) and (6, n)
+    is_free: Array  # scratch arrays for following a twist: (n,) and (6, n)
     J: Array
 
 
@@ -39,14 +39,14 @@ class Arm(NamedTuple):
     effort: Array
     setpoint: Array
     measured: Array
-    feedforward: Array  # (n,); (2 n + n²,) for laws that take the model
+    feedforward: Array  # (n,); (2 n + n²,) for control laws that use the model
     limit: Array
     joints: Array  # room for joints
     tip: Array  # true joint positions (n,), behind the transmission
     T: Array
     shape: Array  # numbers of the object
     contacts: Any  # ContactState of each point of the tool (N,)
-    offset: Array  # rooms for what the tool feels: (3,), (3,) and (6, n)
+    offset: Array  # scratch arrays for the force on the tool: (3,), (3,) and (6, n)
     normal: Array
     J: Array
     noises: Array  # of the force sensor in the coming ticks (N, 6)

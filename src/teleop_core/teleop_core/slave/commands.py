@@ -1,4 +1,4 @@
-"""Commands: how the slave takes references, moves its setpoint, to a goal too, and stops it."""
+"""Commands: how the slave takes references, moves its setpoint to them or to a goal, and stops it."""
 
 import math
 from enum import IntEnum
@@ -17,15 +17,15 @@ class CommandStatus(IntEnum):
     """How the slave took the command of this tick."""
 
     FRESH = 0  # followed
-    STALE = 1  # none came for longer than the command timeout: the last one is held
-    REFUSED = 2  # too far from the one in force to be the same motion: the last one is held
-    MOVING = 3  # to a goal, as to where the slave starts, or at a speed: nothing is followed
-    CLOSED = 4  # not enabled, or not homed: nothing is followed
-    BLIND = 5  # the arm has not said lately where it is: it holds
+    STALE = 1  # no command came for longer than the command timeout: the last command is held
+    REFUSED = 2  # too far from the command in force to be the same motion: the last command is held
+    MOVING = 3  # moves to a goal, such as the start position, or at a wanted speed: no servo_jp is followed
+    CLOSED = 4  # not enabled, or not homed: no command is followed
+    BLIND = 5  # no recent measured position of the arm: it holds
 
 
 class SlaveRow(Row):
-    """Ports of the slave, and how it took the command of this tick."""
+    """Ports of the slave, and the status of this tick's command."""
 
     command_status: int
 
@@ -33,8 +33,8 @@ class SlaveRow(Row):
 class SlaveNumbers(ServerParameters, WayParameters):
     """Parameter record of an arm's server."""
 
-    start: PerJoint  # where it starts to follow [rad or m]
-    braking: PerJoint  # what its drives can brake [rad/s² or m/s²]
+    start: PerJoint  # position from which it starts to follow commands [rad or m]
+    braking: PerJoint  # deceleration of which its drives are capable [rad/s² or m/s²]
     acceleration: PerJoint
     rest_speed: PerJoint
     near: PerJoint
@@ -57,7 +57,7 @@ class SlaveState(ServerState, WayState):
     drive: PerJoint  # wanted speeds of the joints [rad/s or m/s]
     asked: PerJoint
     tool_step: float
-    twist: Wrench  # wanted of the tip [m/s, rad/s]
+    twist: Wrench  # wanted twist of the tip [m/s, rad/s]
     command_stamp_ns: int
     arrival_ns: int
     seen_ns: int
@@ -76,13 +76,13 @@ class SlaveState(ServerState, WayState):
 _FRESH, _STALE, _REFUSED, _MOVING, _CLOSED = (
     int(CommandStatus[name]) for name in ("FRESH", "STALE", "REFUSED", "MOVING", "CLOSED")
 )
-# Stamps this far ahead of the slave's clock are an error, not a clock that is a little ahead.
+# Stamps this far ahead of the slave's clock are an error; smaller leads are a normal clock difference.
 _FUTURE_NS = 1_000_000_000
-# Commands that are further apart than this are no stream [ns].
+# Commands farther apart than this do not count as a stream [ns].
 _SLOWEST_NS = 500_000_000
 AT_LIMITS, AT_ONCE, WITH_ARM = 0, 1, 2
-"""Ways in which a setpoint comes to rest."""
-# Parts of a way in which the tip's speed is looked at.
+"""How a setpoint comes to rest; see :func:`come_to_rest`."""
+# Number of parts of a path in which the tip's speed is checked.
 _PARTS = 32
 _ENABLED, _SILENCE, _JUMP = int(State.ENABLED), int(Fault.SILENCE), int(Fault.JUMP)
 
@@ -91,8 +91,8 @@ _ENABLED, _SILENCE, _JUMP = int(State.ENABLED), int(Fault.SILENCE), int(Fault.JU
 def plan_move(p: SlaveNumbers, s: SlaveState, arm: ArmModel, dt: float) -> None:
     """Begin the cubic move from the setpoint to ``move_to``, as fast as all limits allow.
 
-    Joints keep their share of the speed limits and the acceleration of their drives, the tip its
-    speed, as far as a straight way through joint space of 32 parts tells.
+    Joints stay within their share of the speed limits and within the acceleration of their drives. The tip stays
+    within its speed limit, which is checked in 32 parts of the straight path through joint space.
     """
     longest = 0.0
     for i in range(s.setpoint.shape[0]):
@@ -116,7 +116,7 @@ def plan_move(p: SlaveNumbers, s: SlaveState, arm: ArmModel, dt: float) -> None:
 
 @inner
 def advance_move(s: SlaveState) -> None:
-    """Make a tick of the cubic move."""
+    """Advance the cubic move by one tick."""
     if s.moved_ticks >= s.move_ticks:
         return
     s.moved_ticks += 1
@@ -134,7 +134,7 @@ def advance_move(s: SlaveState) -> None:
 
 @inner
 def move_joint(p: SlaveNumbers, s: SlaveState, i: int, step: float, dt: float) -> None:
-    """Move a joint's setpoint by a step, no faster than its drive and no farther than its range."""
+    """Move a joint's setpoint by a step, within the speed limit of its drive and the joint limits."""
     reach, before = p.speed_limit[i] * dt, s.setpoint[i]
     step = min(max(step, -reach), reach)
     s.setpoint[i] = min(max(before + step, p.lower[i]), p.upper[i])
@@ -143,7 +143,7 @@ def move_joint(p: SlaveNumbers, s: SlaveState, i: int, step: float, dt: float) -
 
 @inner
 def forget_way(s: SlaveState) -> None:
-    """Make the setpoint the wanted value, and drop the command that was on its way."""
+    """Make the setpoint the wanted value, and drop the command that is still being interpolated."""
     for i in range(s.setpoint.shape[0]):
         s.command[i] = s.target[i] = s.filtered[i] = s.setpoint[i]
     s.span, s.ticks = 0, 1
@@ -151,13 +151,13 @@ def forget_way(s: SlaveState) -> None:
 
 @inner
 def come_to_rest(p: SlaveNumbers, s: SlaveState, how: int, dt: float) -> None:
-    """Stop the setpoint: at once, as fast as the drives can brake, or where the brakes hold the arm.
+    """Stop the setpoint: as fast as the drives can brake, at once, or where the brakes hold the arm.
 
     Args:
         p: Parameters.
         s: State; written.
-        how: :data:`AT_LIMITS`, as the drives can brake; :data:`AT_ONCE`, it stands still from this
-            tick on; or :data:`WITH_ARM`, the drives are off and it goes to where the arm is.
+        how: :data:`AT_LIMITS`: brake as fast as the drives can. :data:`AT_ONCE`: stand still from this tick on.
+            :data:`WITH_ARM`: the drives are off, and the setpoint goes to the measured position.
         dt: Tick [s].
     """
     for i in range(s.setpoint.shape[0]):
@@ -175,7 +175,7 @@ def come_to_rest(p: SlaveNumbers, s: SlaveState, how: int, dt: float) -> None:
 
 @inner
 def _not_followed(s: SlaveState, row: SlaveRow) -> int:
-    """Status of an arm that follows nothing. Commands that come meanwhile count as old later."""
+    """Status of an arm that follows no command. Commands that arrive now are ignored later as old."""
     s.seen_ns = max(s.seen_ns, row.slave_servo_jp_ns)
     s.arrival_ns, s.in_row, s.is_stream = 0, 0, 0
     return _MOVING if s.is_busy or s.motion != 0 else _CLOSED
@@ -183,7 +183,7 @@ def _not_followed(s: SlaveState, row: SlaveRow) -> int:
 
 @inner
 def _age_of_command(p: SlaveNumbers, s: SlaveState, now_ns: int) -> int:
-    """FRESH or STALE; a stream of commands that was silent for too long pauses the arm."""
+    """FRESH or STALE; the arm pauses if the stream of commands was silent for too long."""
     silence_ns = now_ns - s.arrival_ns
     if silence_ns <= p.timeout_ns:
         return _FRESH
@@ -195,16 +195,17 @@ def _age_of_command(p: SlaveNumbers, s: SlaveState, now_ns: int) -> int:
 
 @inner
 def take_command(p: SlaveNumbers, s: SlaveState, row: SlaveRow, dt: float) -> int:
-    """Accept a new servo_jp unless it is a jump; returns the :class:`CommandStatus`.
+    """Accept a new servo_jp unless it is a jump; return the :class:`CommandStatus`.
 
-    A jump is farther from the command in force than full speed reaches in the command timeout, or in the time since the
-    message before. That time is half a second at most, which is what the first one has: no stream can be that far.
+    A jump is farther from the command in force than the joint moves at full speed in the longer of two times. They are
+    the command timeout and the time since the previous message. The latter counts as half a second at most, and as
+    half a second for the first message.
     """
     stamp, now_ns = row.slave_servo_jp_ns, row.now_ns
-    if stamp > now_ns + _FUTURE_NS:  # taken, it would make every later command an old one
+    if stamp > now_ns + _FUTURE_NS:  # if it were taken, every later command would count as old
         s.refused += 1
         return _REFUSED
-    if stamp < s.seen_ns - _FUTURE_NS:  # of another clock, after a silence: a new stream
+    if stamp < s.seen_ns - _FUTURE_NS:  # stamps of another clock after a silence: a new stream
         s.seen_ns = 0
     if s.state != _ENABLED or s.is_busy or s.motion != 0 or not s.is_homed:
         return _not_followed(s, row)
@@ -218,20 +219,20 @@ def take_command(p: SlaveNumbers, s: SlaveState, row: SlaveRow, dt: float) -> in
                 s.refused += 1
                 _age_of_command(p, s, now_ns)
                 return _REFUSED
-        # Commands whose stamps run ahead of the clock that they come by are as near as they come.
+        # If stamps advance faster than our clock, the time between arrivals counts as the period.
         period_ns = 0 if is_first else min(period_ns, now_ns - s.arrival_ns)
         begin_way(p, s, row.slave_servo_jp, period_ns, dt)
         is_next = s.arrival_ns > 0 and now_ns - s.arrival_ns <= _longest_gap(p, s)
         s.gap_ns = period_ns
         s.in_row = s.in_row + 1 if is_next else 0
-        s.is_stream = max(s.is_stream, s.in_row)  # a gap does not make single commands of it
+        s.is_stream = max(s.is_stream, s.in_row)  # a gap does not turn a stream into single commands
         s.command_stamp_ns, s.arrival_ns, s.refused_before = stamp, now_ns, s.refused
     return _age_of_command(p, s, now_ns)
 
 
 @inner
 def _longest_gap(p: SlaveNumbers, s: SlaveState) -> int:
-    """Time [ns] of silence after which a stream is broken; for a slow stream twice its period."""
+    """Silence [ns] after which a stream counts as broken; for a slow stream twice its period."""
     return max(p.timeout_ns, 2 * s.gap_ns)
 
 
@@ -248,7 +249,7 @@ def follows(p: SlaveNumbers, s: SlaveState, now_ns: int) -> bool:
 
 @inner
 def advance_setpoint(p: SlaveNumbers, s: SlaveState, before: Array, dt: float) -> None:
-    """Filter the command and move the setpoint there, within the limits of speed and acceleration.
+    """Filter the command and move the setpoint to it, within the limits of speed and acceleration.
 
     Args:
         p: Parameters.
@@ -274,18 +275,19 @@ def advance_setpoint(p: SlaveNumbers, s: SlaveState, before: Array, dt: float) -
 
 @inner
 def stoppable(room: float, most: float) -> float:
-    """Largest step from which a setpoint stops within ``room``, each step less by ``most``.
+    """Largest step from which a setpoint can stop within ``room`` if each step is smaller by ``most``.
 
-    From r, in steps of ``most``, the way to rest is r (r + most) / (2 most).
+    A step r that shrinks by ``most`` each tick needs the distance r (r + most) / (2 most) to come to rest.
     """
     return 0.5 * (math.sqrt(most * (most + 8.0 * max(room, 0.0))) - most)
 
 
 @inner
 def _eased(ahead: float, flow: float, step: float, most: float) -> float:
-    """Step of a setpoint that may change its step by ``most``, towards a place that moves on.
+    """Next step of a setpoint towards a moving target; the step may change by ``most`` a tick.
 
-    Relative to that place, which is ``ahead`` and moves by ``flow`` a tick, it goes no faster than it can brake.
+    The target is ``ahead`` of the setpoint and moves by ``flow`` a tick. Relative to the target, the setpoint is never
+    faster than it can brake.
     """
     relative = min(stoppable(abs(ahead), most), abs(ahead))
     wanted = flow + (relative if ahead > 0.0 else -relative)
@@ -294,12 +296,12 @@ def _eased(ahead: float, flow: float, step: float, most: float) -> float:
 
 @inner
 def limit_tool(p: SlaveNumbers, s: SlaveState, arm: ArmModel, last: Array, dt: float) -> None:
-    """Shorten the step of all joints where the tip would be too fast; write the setpoint's pose.
+    """Shorten the step of all joints if the tip would be too fast; write the setpoint's pose.
 
     Args:
         p: Parameters with ``tool_speed`` [m/s] and ``tool_acceleration`` [m/s²].
         s: State with ``setpoint`` and its last ``step`` (n,); written.
-        arm: Its ``setpoint`` and ``T``, the pose of it, are written.
+        arm: Its ``setpoint`` and ``T``, the pose of the setpoint, are written.
         last: Pose (7,) of the setpoint a tick ago.
         dt: Tick [s].
     """

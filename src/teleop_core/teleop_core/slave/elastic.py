@@ -1,7 +1,7 @@
 """Elastic joints: motors that move links through gears that bend.
 
-Encoders sit on the motors, so that control acts on one side of a spring, and what it carries is on
-the other. Friction acts on the motor. Joints whose gear does not bend move as before, beside them.
+Encoders sit on the motors. So control acts on one side of a spring, and the load is on the other side. Friction acts
+on the motor. Joints with a rigid gear move by the rigid model, in the same arm.
 """
 
 from typing import Any
@@ -14,7 +14,7 @@ from teleop_core.slave.friction import FrictionState, bend, friction
 from teleop_core.slave.joints import JointNumbers
 from teleop_core.slave.world.contact import add_push
 
-_DAMPING = 0.02  # assumed: of a gear on its spring, share of critical with the motor alone
+_DAMPING = 0.02  # assumed: damping of a gear on its spring, as a share of critical damping with the motor alone
 
 
 class ElasticNumbers(JointNumbers):
@@ -26,7 +26,7 @@ class ElasticNumbers(JointNumbers):
 
 
 class ElasticState(FrictionState):
-    """Fields of a state record with the links behind them."""
+    """Fields of a state record with the links behind the gears that bend."""
 
     link: PerJoint  # [rad or m]
     link_speed: PerJoint
@@ -66,7 +66,7 @@ def _derivative(
     net: Array,
     found: Array,
 ) -> None:
-    """Write accelerations (2, n) of motors and links at places (2, n) and speeds (2, n)."""
+    """Write accelerations (2, n) of motors and links at positions (2, n) and speeds (2, n)."""
     n = start.shape[0]
     for i in range(n):
         own = effort[i] - friction(p, s, i, place[0, i] - start[i], speed[0, i])
@@ -95,7 +95,7 @@ def integrate_elastic(
     dq: Array,
     dt: float,
 ) -> None:
-    """Move motors ``q``, ``dq`` and links ``s.link``, ``s.link_speed`` on by one tick.
+    """Advance motors ``q``, ``dq`` and links ``s.link``, ``s.link_speed`` by one tick.
 
     Args:
         acceleration: Pointer to the robot's rigid-body model, motors included.

@@ -1,7 +1,7 @@
 """Force observer: the force on the tip without a sensor, from drive efforts and joint motion.
 
-The generalised momentum of the arm changes by drives, weight and friction, which are known, and by outside forces.
-These are the remainder, as accurate as the model of friction.
+The generalised momentum of the arm changes by drives, weight and friction, which are known, and by external forces.
+The external forces are the remainder, as accurate as the friction model.
 """
 
 import math
@@ -17,12 +17,14 @@ from teleop_core.slave.arm import Arm
 from teleop_core.slave.friction import FrictionNumbers
 
 _DAMPING = 1e-4
-"""Of the way from efforts to force, over its mean square gain: a direction in which the arm feels
-a hundredth of what it feels in others is told at half."""
+"""Damping of the map from efforts to force, divided by its mean square gain.
+
+In a direction with a hundredth of the sensitivity of others, the estimate is half of the true force.
+"""
 
 
 class ObserverNumbers(FrictionNumbers):
-    """Fields of a parameter record with what the observer knows."""
+    """Fields of a parameter record with the observer's model of the arm."""
 
     effort_limit: PerJoint
     is_estimated: int
@@ -30,7 +32,7 @@ class ObserverNumbers(FrictionNumbers):
 
 
 class ObserverState(Fields):
-    """Fields of a state record with what the observer has seen."""
+    """Fields of a state record with the observer's memory."""
 
     measured: PerJoint
     speed: PerJoint
@@ -45,10 +47,10 @@ class ObserverState(Fields):
 
 @inner
 def _lag(s: ObserverState, effort: Array, model: Array, share: float) -> None:
-    """Low-pass the efforts, less the arm's own, so that they lag as much as the measured speeds.
+    """Low-pass the drive efforts, less those of the arm's own model, so that they lag as much as the measured speeds.
 
-    Speeds are those of differences: from the middle of one tick to that of the next an arm moves
-    under the mean of both efforts, and weighs what it weighs in between.
+    Speeds are differences of positions. From the middle of one tick to the middle of the next, the arm therefore moves
+    under the mean of both efforts, and its weight is that at the time in between.
     """
     for i in range(effort.shape[0]):
         mean = 0.5 * (s.last_effort[i] + effort[i]) - model[i]
@@ -66,17 +68,17 @@ def _known_effort(p: ObserverNumbers, s: ObserverState, i: int) -> float:
 
 @inner
 def _observe(p: ObserverNumbers, s: ObserverState, model: Array, dt: float) -> None:
-    """Bring the residual (n,) [N·m or N] to the present tick, and keep what the next one needs.
+    """Bring the residual (n,) [N·m or N] to the present tick, and keep what the next tick needs.
 
     Args:
         p: Parameter record.
         s: State record; written.
-        model: Bias and inertia (n + n²,) of the arm as it is known.
+        model: Bias and inertia (n + n²,) of the known model of the arm.
         dt: Tick [s].
 
     Source:
         De Luca and Mattone 2003; De Luca, Albu-Schäffer, Haddadin and Hirzinger 2006: r = K (p - ∫(τ + Cᵀ dq - g + r)
-        dt), with Cᵀ dq = dM/dt dq - C dq. Steps take the new r, so that every gain is stable.
+        dt), with Cᵀ dq = dM/dt dq - C dq. Steps use the new r (implicit), so that every gain is stable.
     """
     n = s.speed.shape[0]
     for i in range(n):
@@ -98,13 +100,13 @@ def _observe(p: ObserverNumbers, s: ObserverState, model: Array, dt: float) -> N
 def force_of_efforts(J: Array, efforts: Array, scale: Array, force: Array) -> None:
     """Write the force (3,) [N] on a tip that explains efforts (n,) of the joints best.
 
-    Minimises Σ ((Jᵀ f - efforts)ᵢ / scaleᵢ)² + damping |f|². The direction in which a singular arm feels nothing gets
-    no force; where the Jacobian is not finite there is none at all.
+    Minimises Σ ((Jᵀ f - efforts)ᵢ / scaleᵢ)² + damping |f|². In the direction in which a singular arm feels nothing,
+    the force is zero. If the Jacobian is not finite, the whole force is zero.
 
     Args:
         J: Jacobian (6, n) of the tip; its linear rows count, for a push makes no torque there.
-        efforts: Of the push [N·m or N].
-        scale: By what each joint's effort is measured, > 0: its largest.
+        efforts: Joint efforts caused by the force [N·m or N].
+        scale: Scale of each joint's effort, > 0: its largest effort.
         force: Written.
     """
     A, b = np.zeros((3, 3)), np.zeros(3)
@@ -128,7 +130,7 @@ def force_of_efforts(J: Array, efforts: Array, scale: Array, force: Array) -> No
 
 @inner
 def forget(s: ObserverState, wrench: Array) -> None:
-    """Begin anew with the next estimate; until then there is none, and the wrench (6,) is zero."""
+    """Begin anew with the next estimate; until then there is no estimate, and the wrench (6,) is zero."""
     s.is_observed = 0
     for i in range(s.residual.shape[0]):
         s.residual[i] = s.lagged[i] = 0.0
@@ -138,15 +140,15 @@ def forget(s: ObserverState, wrench: Array) -> None:
 
 @inner
 def estimate(p: ObserverNumbers, s: ObserverState, arm: Arm, lag: float, dt: float, wrench: Array) -> None:
-    """Write the force on the tip along the slave's base, without torque, as the joints tell it.
+    """Write the force on the tip in axes of the slave's base, without torque, estimated from the joints.
 
-    It knows what an encoder, an amplifier and the control law's model know, and the plant's mean
-    friction. The residual is that of the tick that ended.
+    The estimate uses encoder positions, amplifier efforts, the control law's model and the plant's mean friction. The
+    residual is that of the last tick.
 
     Args:
         p: Parameters.
         s: State; written.
-        arm: Its rooms ``measured``, ``joints`` and ``J`` are written.
+        arm: Its scratch arrays ``measured``, ``joints`` and ``J`` are written.
         lag: Time constant of the measured speeds [s].
         dt: Tick [s].
         wrench: Written (6,) [N, N·m].
@@ -156,7 +158,7 @@ def estimate(p: ObserverNumbers, s: ObserverState, arm: Arm, lag: float, dt: flo
     copy(s.measured, arm.measured)
     copy(s.speed, arm.joints)
     write_model(arm.acceleration, arm.model, arm.measured, arm.joints, model)
-    if not s.is_observed:  # it was held until now, in balance or by its brakes
+    if not s.is_observed:  # until now the arm was held, in balance or by its brakes
         copy(model[:n], s.last_effort)
         copy(s.speed, s.last_speed)
     _observe(p, s, model, dt)

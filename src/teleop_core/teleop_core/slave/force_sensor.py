@@ -1,7 +1,7 @@
-"""Force sensor: what a real one makes of the force on the tip.
+"""Force sensor: simulates what a real sensor measures of the force on the tip.
 
-The world's force goes through a low-pass, as wide as the sensor's electronics; the weight of what
-hangs behind the sensor and its bias are added, and noise that is drawn anew for each sample.
+The contact force passes a low-pass with the bandwidth of the sensor's electronics. Then the weight of the tool behind
+the sensor, the sensor's bias, and noise are added. The noise is drawn anew for each sample.
 """
 
 import math
@@ -16,11 +16,11 @@ from teleop_core.slave.arm import Arm
 
 STANDARD_GRAVITY = 9.80665
 """Weight of a mass [m/s²]; it pulls along -z of the slave's base."""
-_STREAM = 3  # of random numbers beside the seed; those of a human operator are 1 and 2
+_STREAM = 3  # number of the random stream, used with the seed; streams 1 and 2 are the human operator's
 
 
 class SensorNumbers(Fields):
-    """Fields of a parameter record with what the sensor does."""
+    """Fields of a parameter record with the properties of the sensor."""
 
     is_ideal: int
     has_noise: int
@@ -39,7 +39,7 @@ class SensorState(Fields):
 
 @dataclass(frozen=True, kw_only=True)
 class ForceSensorParameters:
-    """The force sensor behind the tip, an ideal one by default, and the estimate without one."""
+    """The force sensor behind the tip, ideal by default, and the force estimate without a sensor."""
 
     force_noise: float = parameter(
         0.0,
@@ -90,7 +90,7 @@ class ForceSensorParameters:
     )
 
     def write(self, p: SensorNumbers, dt: float) -> None:
-        """Write the record of a simulated arm that makes ticks of ``dt`` [s]."""
+        """Write these values into the record of a simulated arm whose tick is ``dt`` [s]."""
         p["sensor_share"] = -math.expm1(-2.0 * math.pi * self.force_bandwidth * dt)
         p["sensor_noise"] = [self.force_noise] * 3 + [self.torque_noise] * 3
         p["sensor_offset"] = self.force_bias + self.torque_bias
@@ -102,7 +102,7 @@ class ForceSensorParameters:
 
 
 class SensorNoise(Noise):
-    """Noise of a sensor, which the same seed draws again."""
+    """Noise of a sensor, reproducible with the same seed."""
 
     def __init__(self, seed: int) -> None:
         super().__init__()
@@ -116,9 +116,9 @@ class SensorNoise(Noise):
 
 @inner
 def sense(p: SensorNumbers, s: SensorState, arm: Arm, row: Row) -> None:
-    """Write ``slave_measured_cf``: what the sensor makes of ``slave_true_cf``.
+    """Write ``slave_measured_cf``: the sensor's measurement of ``slave_true_cf``.
 
-    The low-pass is exact for a force that stays what it is for a tick.
+    The low-pass is exact for a force that is constant during a tick.
 
     Args:
         p: Parameters.

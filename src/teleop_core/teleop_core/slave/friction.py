@@ -1,10 +1,10 @@
 """Friction: viscous, and dry friction that either grows smoothly with speed or sticks.
 
 Friction that sticks is the LuGre bristle in the elasto-plastic form of Dupont, Hayward, Armstrong and Altpeter (2002),
-with the deflection of break-away equal to that of steady sliding: the bristle bends with the joint until it carries the
-dry friction, and then slips. Of the known models it is the one that holds a load below dry friction always (plain LuGre
-creeps under vibration) and needs no switch between two sets of equations (Karnopp's does). What makes LuGre stiff, the
-slip at high speed, is the return of the bristle to its bound here, which is exact at any step.
+with the deflection of break-away equal to that of steady sliding: the bristle bends with the joint until it carries
+the dry friction, and then slips. Of the known models it alone always holds a load below dry friction (plain LuGre
+creeps under vibration) without a switch between two sets of equations (as Karnopp's needs). LuGre is stiff because of
+the slip at high speed. Here the bristle is returned to its bound instead, which is exact at any step size.
 """
 
 import math
@@ -15,7 +15,7 @@ from teleop_core.kernels import Fields, IntegerPerJoint, PerJoint, inner
 # Noise: the multiplicative generator of Lewis, Goodman and Miller (1969), multiplier of Park,
 # Miller and Stockmeyer (1993).
 _MULTIPLIER, _MODULUS = 48271, 2147483647
-_DAMPING = 1.0  # of a stuck joint on its bristle, share of critical
+_DAMPING = 1.0  # damping of a stuck joint on its bristle, as a share of critical damping
 
 
 class FrictionNumbers(Fields):
@@ -24,7 +24,7 @@ class FrictionNumbers(Fields):
     viscous: PerJoint  # [N·m·s/rad or N·s/m]
     coulomb: PerJoint  # dry friction [N·m or N]
     friction_speed: PerJoint  # [rad/s or m/s]
-    bristle: PerJoint  # [N·m/rad or N/m]; 0 where it does not stick
+    bristle: PerJoint  # [N·m/rad or N/m]; 0 for friction that does not stick
     bristle_damping: PerJoint
     wander: PerJoint
     wander_travel: PerJoint
@@ -48,8 +48,8 @@ def friction(p: FrictionNumbers, s: FrictionState, i: int, moved: float, speed: 
         p: Parameters.
         s: State.
         i: Joint.
-        moved: How far it has come since the start of the step [rad or m].
-        speed: Its speed [rad/s or m/s].
+        moved: Motion of the joint since the start of the step [rad or m].
+        speed: Speed of the joint [rad/s or m/s].
     """
     dry = p.coulomb[i] * s.grip[i]
     if p.bristle[i] > 0.0:
@@ -61,9 +61,9 @@ def friction(p: FrictionNumbers, s: FrictionState, i: int, moved: float, speed: 
 
 @inner
 def bend(p: FrictionNumbers, s: FrictionState, i: int, moved: float) -> None:
-    """Bend the bristle of joint ``i`` by a whole step, as far as dry friction carries it.
+    """Bend the bristle of joint ``i`` by a whole step, up to the bend at which it carries the dry friction.
 
-    The rest of the way slips, and is added to ``s.slipped``.
+    The rest of the motion is slip, and is added to ``s.slipped``.
     """
     slip = moved
     if p.bristle[i] > 0.0:
@@ -76,11 +76,11 @@ def bend(p: FrictionNumbers, s: FrictionState, i: int, moved: float) -> None:
 
 @inner
 def wander(p: FrictionNumbers, s: FrictionState) -> None:
-    """Let the dry friction of joints that slipped change: first-order noise of mean 1 over the way.
+    """Vary the dry friction of joints that slipped: first-order noise of mean 1 over the slipped distance.
 
-    Teeth and balls meet other places of their paths as a joint moves on; at rest they stay, and so
-    does what they hold. The share never falls below a tenth, and its noise is uniform within a
-    tick, hence normal over the way on which it changes.
+    As a joint moves, teeth and balls meet other parts of their tracks; at rest they stay, so the friction does not
+    change. The share never falls below a tenth. Its noise is uniform within a tick, and so approximately normal over
+    the distance on which the friction changes.
     """
     for i in range(s.grip.shape[0]):
         if p.wander[i] > 0.0 and s.slipped[i] > 0.0:
@@ -93,5 +93,5 @@ def wander(p: FrictionNumbers, s: FrictionState) -> None:
 
 
 def bristle_damping(bristle: Any, inertia: Any) -> Any:
-    """Damping of bristles that keeps stuck joints from swinging [N·m·s/rad or N·s/m]."""
+    """Damping of bristles that keeps stuck joints from oscillating [N·m·s/rad or N·s/m]."""
     return 2.0 * _DAMPING * (bristle * inertia) ** 0.5

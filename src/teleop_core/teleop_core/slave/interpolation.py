@@ -1,4 +1,4 @@
-"""Interpolation: the way from command to command where they come slower than the ticks."""
+"""Interpolation: the path from command to command if commands come more slowly than ticks."""
 
 from teleop_core.kernels import Array, Fields, PerJoint, inner
 
@@ -10,13 +10,13 @@ class WayParameters(Fields):
 
     lower: PerJoint
     upper: PerJoint
-    interpolation: int  # place of its name in :data:`~teleop_core.slave.slave.INTERPOLATIONS`
+    interpolation: int  # index of its name in :data:`~teleop_core.slave.slave.INTERPOLATIONS`
 
 
 class WayState(Fields):
-    """Fields of a state record with the way to the newest command; slopes are per way."""
+    """Fields of a state record with the path to the newest command; slopes are per whole path."""
 
-    command: PerJoint  # where the way is now [rad or m]
+    command: PerJoint  # present position on the path [rad or m]
     target: PerJoint  # the newest command
     begin: PerJoint
     slope: PerJoint  # first slope at the beginning
@@ -28,12 +28,12 @@ class WayState(Fields):
 
 @inner
 def begin_way(p: WayParameters, s: WayState, command: Array, period_ns: int, dt: float) -> None:
-    """Go to a new command, over the period of commands if that is longer than a tick.
+    """Begin a path to a new command; it lasts one period of commands if that is longer than a tick.
 
     Args:
         p: Parameters.
         s: State; written.
-        command: New joints (n,) [rad or m], held inside their limits.
+        command: New joints (n,) [rad or m]; they are clipped to the joint limits.
         period_ns: Time since the last command [ns]; 0 for the first.
         dt: Tick [s].
     """
@@ -47,7 +47,7 @@ def begin_way(p: WayParameters, s: WayState, command: Array, period_ns: int, dt:
             longer = span / s.span
             s.slope[i], s.bend[i] = slope * longer, bend * longer * longer
             s.end_slope[i] = goal - s.target[i]
-        else:  # a straight way, or a jump, for a way of least jerk that may go on from it
+        else:  # a straight path or a jump, stored so that a minimum-jerk path may continue from it
             s.bend[i] = 0.0
             s.slope[i] = s.end_slope[i] = goal - s.command[i] if p.interpolation == _LINEAR else 0.0
         s.begin[i], s.target[i] = s.command[i], goal
@@ -56,7 +56,7 @@ def begin_way(p: WayParameters, s: WayState, command: Array, period_ns: int, dt:
 
 @inner
 def _coefficients(s: WayState, i: int) -> tuple[float, float, float, float, float]:
-    """Of the quintic in the share of the way, first to fifth power."""
+    """Coefficients of the quintic in the share of the path, first to fifth power."""
     rise, a, b, e = s.target[i] - s.begin[i], s.slope[i], s.bend[i], s.end_slope[i]
     return (
         a,
@@ -69,7 +69,7 @@ def _coefficients(s: WayState, i: int) -> tuple[float, float, float, float, floa
 
 @inner
 def _slopes(s: WayState, i: int) -> tuple[float, float]:
-    """First and second slope of joint i where it is on its way; 0 if it waits at the end."""
+    """First and second derivative of joint i at its present point of the path; 0 if it waits at the end."""
     if s.ticks > s.span:
         return 0.0, 0.0
     x = s.ticks / s.span
@@ -80,9 +80,9 @@ def _slopes(s: WayState, i: int) -> tuple[float, float]:
 
 @inner
 def advance_on_way(p: WayParameters, s: WayState) -> None:
-    """Move the command on by one tick; at the end of the way it is the newest command, exactly.
+    """Move the command on by one tick; at the end of the path it is exactly the newest command.
 
-    The polynomial of fifth degree with given position, speed and acceleration at its ends is the way with least jerk.
+    The polynomial of fifth degree with given position, speed and acceleration at its ends is the minimum-jerk path.
 
     Source:
         Flash and Hogan 1985, eq. 3.

@@ -10,7 +10,7 @@ from teleop_core.slave.world.contact import WorldNumbers, add_push
 
 
 class JointNumbers(FrictionNumbers, WorldNumbers):
-    """Fields of a parameter record with what acts on moving joints."""
+    """Fields of a parameter record with what acts on joints in motion."""
 
 
 @inner
@@ -27,7 +27,7 @@ def _derivative(
     net: Array,
     ddq: Array,
 ) -> None:
-    """Write accelerations (n,) under the drive effort less friction, at ``q`` come from start."""
+    """Write accelerations (n,) under drive effort minus friction, at ``q``, for a tick that began at ``start``."""
     for i in range(q.shape[0]):
         net[i] = effort[i] - friction(p, s, i, q[i] - start[i], dq[i])
     add_push(p, contacts, q, dq, net)

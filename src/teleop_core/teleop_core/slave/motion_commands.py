@@ -1,12 +1,11 @@
-"""Motion commands: what an arm is told to do beside following a stream of joint references.
+"""Motion commands: commands to an arm other than a stream of joint references.
 
-They are those of CRTK (Collaborative Robotics Toolkit): moves to a goal, speeds of joints and tip,
-steps relative to the last command, hold. Whatever they ask for goes through the limits, states and
-faults of the slave's step. One of them moves the arm at a time:
+They are those of CRTK (Collaborative Robotics Toolkit): moves to a goal, speeds of joints and tip, steps relative to
+the last command, hold. All of them pass the limits, states and faults of the slave's step. Only one command moves the
+arm at a time:
 
-- a move takes the arm from whatever moves it, and gives it to another move or to hold alone;
-- of streams the one that came first keeps it, until it falls silent for the command timeout;
-- hold ends a move, a speed, and a command that came alone.
+- a move replaces any other motion, and only another move or a hold replaces a move; - of several streams the first one
+moves the arm, until it is silent for the command timeout; - hold ends a move, a speed command, and a single reference.
 """
 
 from typing import Any, Protocol
@@ -22,14 +21,14 @@ from teleop_core.slave.operation.states import Answer, Event, State
 from teleop_core.slave.velocity import Motion
 
 _REACHED = (IkStatus.FOLLOWED, IkStatus.NEAR_SINGULAR)
-# Goals beyond a limit by rounding, as of a setpoint that is there [rad or m].
+# A goal may exceed a limit by this rounding, such as that of a setpoint at the limit [rad or m].
 _SLACK = 1e-6
 Told = tuple[Answer, str]
-"""What became of a command, and the same in words."""
+"""Answer to a command, and the same in words."""
 
 
 class Commanded(Protocol):
-    """What is commanded: the slave, as far as it matters here."""
+    """What motion commands need of a slave."""
 
     robot: Robot
     parameters: Any
@@ -42,8 +41,8 @@ class Commanded(Protocol):
 class MotionCommands:
     """Takes motion commands for a slave, between two ticks.
 
-    Every command returns an :class:`~teleop_core.slave.operation.Answer` and the same in words:
-    what the arm cannot do, or may not do in its state, is refused and changes nothing.
+    Every command returns an :class:`~teleop_core.slave.operation.Answer` and the same in words. A command that the arm
+    cannot do, or may not do in its state, is refused and changes nothing.
 
     Args:
         slave: The slave; its state is written.
@@ -56,7 +55,7 @@ class MotionCommands:
 
     @property
     def goal(self) -> Array:
-        """Joints (n,) where it goes, or holds [rad or m]: of a move, or of the last reference."""
+        """Joints (n,) where the arm goes or holds [rad or m]: the goal of a move, or the last reference."""
         s = self._slave.state
         return np.array(s["move_to"] if s["is_busy"] else s["target"], dtype=np.float64)
 
@@ -73,7 +72,7 @@ class MotionCommands:
     # -- moves -----------------------------------------------------------------------------------
 
     def move(self, goal: object) -> Told:
-        """Move smoothly to joints, from rest to rest; from another motion it brakes to rest first.
+        """Move smoothly to joints, from rest to rest; an arm in motion brakes to rest first.
 
         Args:
             goal: Joints (n,) [rad or m].
@@ -98,13 +97,13 @@ class MotionCommands:
         return self.move(self._slave.state["setpoint"] + self._joints(step))
 
     def solve(self, T: object) -> Array | Told:
-        """Joints (n,) at which the tip has a pose (4, 4), next to the setpoint; or a refusal.
+        """Return the joints (n,) at which the tip has the pose T (4, 4), next to the setpoint; or a refusal.
 
-        The branch inside the limits next to the setpoint is taken. This takes long for a tick: a
-        running session solves beside the ticks, and hands the joints to :meth:`move`.
+        Of the branches inside the joint limits, the one nearest to the setpoint is taken. The computation is too long
+        for a tick: a running session solves outside the ticks, and passes the joints to :meth:`move`.
 
         Raises:
-            ShapeError: Another shape.
+            ShapeError: ``T`` does not have the shape (4, 4).
         """
         seed = np.array(self._slave.state["setpoint"], dtype=np.float64)
         found = self._slave.robot.ik(T, seed)
@@ -115,17 +114,17 @@ class MotionCommands:
         return Answer.REFUSED, f"refused: out of reach, {short}"
 
     def load(self) -> None:
-        """Compile what :meth:`solve` calls, since compiling beside running ticks would make them late."""
+        """Compile what :meth:`solve` calls, since compiling during a session would make the ticks late."""
         robot = self._slave.robot
         self.solve(robot.fk(robot.home))
 
     # -- streams ---------------------------------------------------------------------------------
 
     def drive_joints(self, speed: object, now_ns: int) -> Told:
-        """Drive joints at speeds until the command timeout is over; then brake to rest.
+        """Drive joints at the given speeds until the command timeout is over; then brake to rest.
 
         Args:
-            speed: Joint speeds (n,) [rad/s or m/s]; faster ones than the drives' are cut in proportion.
+            speed: Joint speeds (n,) [rad/s or m/s]; speeds above the drives' limits are all reduced in proportion.
             now_ns: Time of arrival, on the clock of the ticks [ns].
 
         Raises:
@@ -134,21 +133,21 @@ class MotionCommands:
         return self._drive(Motion.JOINTS, self._joints(speed), "drive", now_ns)
 
     def drive_tip(self, twist: object, now_ns: int) -> Told:
-        """Drive the tip at a twist until the command timeout is over; then brake to rest.
+        """Drive the tip at the given twist until the command timeout is over; then brake to rest.
 
-        Near singularities and where joints come to their limits, the tip lags.
+        The tip lags near singularities and when joints reach their limits.
 
         Args:
             twist: Linear and angular velocity (6,) of the tip in base axes [m/s, rad/s].
             now_ns: Time of arrival, on the clock of the ticks [ns].
 
         Raises:
-            ShapeError: Another shape.
+            ShapeError: ``twist`` does not have the shape (6,).
         """
         return self._drive(Motion.TIP, _row(twist, 6), "twist", now_ns)
 
     def servo(self, joints: object, now_ns: int) -> Told:
-        """Follow joint references (n,) [rad or m], as those of ``slave/servo_jp``.
+        """Follow a joint reference (n,) [rad or m], like one of ``slave/servo_jp``.
 
         Raises:
             ShapeError: Another number of joints.
@@ -161,15 +160,15 @@ class MotionCommands:
         return Answer.DONE, "servo: taken"
 
     def servo_by(self, step: object, now_ns: int) -> Told:
-        """Follow steps of joints (n,) [rad or m], each from the last command."""
+        """Follow a step of joints (n,) [rad or m], relative to the last command."""
         s = self._slave.state
         last = s["asked"] if s["asked_ns"] else s["target"]
         return self.servo(last + self._joints(step), now_ns)
 
     def hold(self) -> Told:
-        """Brake to rest, and stay there until the next command; a stream in force goes on.
+        """Brake to rest and stay there until the next command; an active stream goes on moving the arm.
 
-        To keep a stream away, pause the arm.
+        To stop a stream, pause the arm.
         """
         s = self._slave.state
         if s["state"] != State.ENABLED:
@@ -195,7 +194,7 @@ class MotionCommands:
         return Answer.DONE, "velocity: taken"
 
     def _refusal(self) -> Told | None:
-        """Why nothing streamed is followed now; None if it is."""
+        """Why the arm does not follow streams now; None if it follows them."""
         s = self._slave.state
         state = State(int(s["state"]))
         if state is not State.ENABLED:

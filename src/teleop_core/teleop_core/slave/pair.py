@@ -1,4 +1,4 @@
-"""Pair: a server and its simulated arm as one, for moves of a slave alone."""
+"""Pair: a server and its simulated arm as one object, to move a slave without other stages."""
 
 from dataclasses import dataclass, fields
 from typing import Any
@@ -27,7 +27,7 @@ def arm_step(steps: Any, server: Any, simulated: Any, row: commands.SlaveRow, dt
         steps: The kernels of both, as :func:`~teleop_core.kernels.apart` gives them.
         server: Arguments of :func:`~teleop_core.slave.step.slave_step`.
         simulated: Arguments of :func:`~teleop_core.slave.simulation.simulation_step`.
-        row: Signals of both; what is measured is of the last tick for the server.
+        row: Signals of both; the server reads measured values of the last tick.
         dt: Tick [s].
     """
     steps[0](server[0], server[1], server[2], row, dt)
@@ -39,12 +39,12 @@ class SimulatedArm(RunningStage):
     """A server and its simulated arm, stepped together without a graph.
 
     Args:
-        parameters: Of both.
+        parameters: Parameters of both.
         dt: Tick [s].
 
     Attributes:
         server: The server; its signals are those of the pair.
-        simulated: The simulated arm, likewise.
+        simulated: The simulated arm; its signals are those of the pair.
 
     Raises:
         ParameterError: As of :class:`~teleop_core.slave.slave.Slave` and
@@ -67,7 +67,7 @@ class SimulatedArm(RunningStage):
         self.reset()
 
     def reset(self) -> None:
-        """Back to home, at rest, with no command in force."""
+        """Go back to home, at rest, with no command in force."""
         assign(self.signals, self._begin)
         for stage in (self.server, self.simulated):
             stage.reset()
@@ -83,7 +83,7 @@ class SimulatedArm(RunningStage):
 
     @property
     def lead(self) -> int:
-        """Ticks of the move from home to where the slave starts; nothing is followed before."""
+        """Ticks of the move from home to the slave's start; the slave follows no command before its end."""
         return self.server.lead
 
 

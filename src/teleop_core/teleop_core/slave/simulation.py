@@ -46,7 +46,7 @@ def _measure(p: SimulationNumbers, s: SimulationState, q: Array, dt: float) -> N
 
 @inner
 def _control(p: SimulationNumbers, s: SimulationState, arm: Arm, dt: float) -> None:
-    """Write the effort that the control law asks for."""
+    """Write the effort that the control law demands."""
     n = arm.q.shape[0]
     copy(s.measured, arm.measured)
     arm.gravity(arm.measured, arm.model, arm.feedforward[:n])
@@ -60,7 +60,7 @@ def _control(p: SimulationNumbers, s: SimulationState, arm: Arm, dt: float) -> N
 
 @inner
 def _brake(p: SimulationNumbers, s: SimulationState, arm: Arm, dt: float) -> None:
-    """Let brakes as strong as the drives stop the arm, whatever its dynamics have become."""
+    """Let brakes as strong as the drives stop the arm; this works even if its dynamics have diverged."""
     for i in range(arm.q.shape[0]):
         fastest, less = p.speed_limit[i] * 1.5, p.braking[i] * dt
         speed = min(max(arm.dq[i], -fastest), fastest)
@@ -74,7 +74,7 @@ def _brake(p: SimulationNumbers, s: SimulationState, arm: Arm, dt: float) -> Non
 
 @inner
 def _see_joints(p: SimulationNumbers, s: SimulationState, arm: Arm) -> None:
-    """Write where the joints truly are, behind gears that bend and tendons with play."""
+    """Write the true joint positions, behind gears that bend and tendons with play."""
     if p.has_gears:
         copy(s.link, arm.joints)
         follow_encoders(p, s, arm.joints, arm.coupling, arm.tip)
@@ -84,7 +84,7 @@ def _see_joints(p: SimulationNumbers, s: SimulationState, arm: Arm) -> None:
 
 @inner
 def _touch(p: SimulationNumbers, s: SimulationState, arm: Arm, row: Row) -> None:
-    """Let the tool feel the object, at the links that move it."""
+    """Compute the contact between tool and object, at the true positions of the links."""
     if p.has_gears:
         touch(p, arm.contacts, arm, s.link, s.link_speed, row.slave_true_cf)
     else:
@@ -93,7 +93,7 @@ def _touch(p: SimulationNumbers, s: SimulationState, arm: Arm, row: Row) -> None
 
 @inner
 def _estimate(p: SimulationNumbers, s: SimulationState, arm: Arm, row: Row, dt: float) -> None:
-    """Write what joints and drives tell of the force on the tip; brakes tell nothing."""
+    """Write the tip force estimated from joints and drives; with brakes on there is no estimate."""
     if p.is_estimated and not row.slave_operation[_BRAKED] > 0.0:
         estimate(p, s, arm, SPEED_LAG, dt, row.slave_estimated_cf)
     else:
@@ -116,10 +116,10 @@ def _move_on(p: SimulationNumbers, s: SimulationState, arm: Arm, braked: bool, d
 
 @kernel
 def simulation_step(p: SimulationNumbers, s: SimulationState, arm: Arm, row: Row, dt: float) -> None:
-    """One control tick of a simulated arm: write what its encoders say, and where its tip is.
+    """One control tick of a simulated arm: write its encoder positions and the pose of its tip.
 
-    What is measured is sampled at the start of the tick, together with the setpoint it is held
-    against; then the arm moves on under constant effort. With brakes on, its drives are off.
+    Measured values are sampled at the start of the tick, together with the setpoint with which they are compared. Then
+    the arm moves on under constant effort. With brakes on, its drives are off.
 
     Args:
         p: Parameter record.

@@ -1,7 +1,7 @@
-"""Slave: the arm's server, which says where the arm may go; drives, or their simulator, obey.
+"""Slave: the arm's server. It writes the setpoints that drives, or their simulator, follow.
 
-It holds states, emergency stop, limits, faults, motion commands and the reference filter of any
-arm. Where the arm is, it is told.
+It contains states, emergency stop, limits, faults, motion commands and the reference filter of any arm. It receives
+the arm's measured joints.
 """
 
 import math
@@ -30,7 +30,7 @@ _TIMES = {
 }
 _STOP, _PRESSED = int(Event.STOP), int(Fault.STOP)
 _FILTER_SOURCE = "published: Vongbunyong 2008, eq. 6.2.8"
-_NEAR = 1e-3  # rad or m, beside an encoder step: who is farther from home is elsewhere
+_NEAR = 1e-3  # rad or m, in addition to an encoder step: an arm farther from home is not at home
 INTERPOLATIONS = ("none", "linear", "minimum_jerk")
 
 
@@ -75,7 +75,7 @@ class SlaveParameters(RobotParameters):
     operation: OperationParameters = field(default_factory=OperationParameters)
 
     def start_of(self, robot: Robot) -> Array:
-        """Joints (n,) from which a robot follows [rad or m]."""
+        """Start joints (n,), from which a robot follows commands [rad or m]."""
         if self.start:
             return np.array(self.start, dtype=np.float64)
         is_home = self.starts_at_home and not robot.home_is_assumed
@@ -83,13 +83,13 @@ class SlaveParameters(RobotParameters):
 
 
 class Slave(RunningStage):
-    """Stage that leads an arm: from references and commands to setpoints, within states and limits.
+    """Stage of an arm's server: from references and commands to setpoints, within states and limits.
 
-    It assumes that the arm is at home, until the arm says where it is. Once
-    enabled it moves the arm smoothly to where it starts, and follows then.
+    It assumes that the arm is at home until the first measured position comes. Once enabled it moves the arm smoothly
+    to the start position, and then follows commands.
 
     Raises:
-        ParameterError: The robot has no drives, or its start is not one.
+        ParameterError: The robot has no drives, or its start position is not valid.
     """
 
     def __init__(self, parameters: SlaveParameters, dt: float = DT) -> None:
@@ -116,7 +116,7 @@ class Slave(RunningStage):
         self._load_commands()
 
     def reset(self) -> None:
-        """Back to home, with no command in force."""
+        """Go back to home, with no command in force."""
         s, home = self.state, self.robot.home
         assign(s, 0)
         for name in ("command", "filtered", "setpoint", "target", "move_from", "measured"):
@@ -144,10 +144,10 @@ class Slave(RunningStage):
         self._take_operation(parameters.operation)
 
     def _take_start(self, parameters: SlaveParameters) -> None:
-        """Plan the move from home to where the slave starts.
+        """Plan the move from home to the slave's start.
 
         Raises:
-            ParameterError: The start is not of the robot's joints, or outside their limits.
+            ParameterError: The start does not fit the robot's joints, or is outside their limits.
         """
         robot, p = self.robot, self.parameters
         assert robot.drives is not None
@@ -164,19 +164,19 @@ class Slave(RunningStage):
 
     @property
     def lead(self) -> int:
-        """Ticks of the move from home to where the slave starts; nothing is followed before."""
+        """Ticks of the move from home to the slave's start; the slave follows no command before its end."""
         return self._start_ticks
 
     # -- operation -------------------------------------------------------------------------------
 
     def _load_commands(self) -> None:
-        """Compile what commands and faults call, so that no stop waits for the compiler."""
+        """Compile the functions of commands and faults, so that no stop waits for the compiler."""
         spare = records(self.state.dtype)[0]
         _request(self.parameters, spare, int(Event.STOP))
         _fail(self.parameters, spare, int(Fault.STALL), 0.0, 0.0)
 
     def _begin_operation(self) -> None:
-        """Enabled and on the way to where it starts, or disabled and not homed."""
+        """Begin enabled and moving to the start, or disabled and not homed."""
         s = self.state
         s["command_stamp_ns"], s["fault_joint"] = topics.NO_COMMAND_NS, -1
         s["move_to"], s["move_ticks"] = self.parameters["start"], self._start_ticks
@@ -186,7 +186,7 @@ class Slave(RunningStage):
             s["is_busy"] = s["is_homing"] = self._start_ticks > 0
 
     def _take_script(self, given: OperationParameters) -> None:
-        """Write the commands that come by themselves."""
+        """Write the scripted commands into the record."""
         self._starts_enabled, script = given.starts_enabled, given.script()
         self.parameters["event_count"] = len(script)
         for index, (seconds, event) in enumerate(script):
@@ -194,7 +194,7 @@ class Slave(RunningStage):
             self.parameters["event_ns"][index] = round(seconds * 1e9)
 
     def _take_operation(self, given: OperationParameters) -> None:
-        """Write bounds of motion and of faults; those that nobody gave follow from the drives."""
+        """Write bounds of motion and of faults; bounds without a given value follow from the drives."""
         robot, p, drives = self.robot, self.parameters, self.robot.drives
         assert drives is not None
         p["braking"] = drives.effort_limit / drives.inertia
@@ -218,7 +218,7 @@ class Slave(RunningStage):
             event: The command, one of :data:`~teleop_core.slave.operation.states.COMMANDS`.
 
         Returns:
-            What became of it, and the same in words.
+            The answer to the command, and the same in words.
 
         Raises:
             UnknownNameError: There is no such command.
@@ -232,10 +232,10 @@ class Slave(RunningStage):
         return answer, text
 
     def press(self, *, is_pressed: bool, heard_ns: int) -> None:
-        """Take what stop buttons said: whether any of them holds the stop pressed.
+        """Take the state of the stop buttons.
 
         Args:
-            is_pressed: Whether one does.
+            is_pressed: Whether any button holds the stop pressed.
             heard_ns: Time of the last message of the button that has been silent longest [ns]; the
                 heartbeat counts from then.
         """
@@ -244,17 +244,17 @@ class Slave(RunningStage):
             self.request(Event.STOP)
 
     def fail(self, fault: Fault, value: float = 0.0, bound: float = 0.0) -> None:
-        """Take note of a fault that was found outside, as two publishers of commands.
+        """Record a fault that was found outside this stage, such as two publishers of commands.
 
         Args:
-            fault: What was found; it does what :data:`~teleop_core.slave.operation.FAULTS` says.
-            value: What was found, in the fault's unit.
-            bound: What it must not exceed.
+            fault: The fault; :data:`~teleop_core.slave.operation.FAULTS` gives its reaction.
+            value: The value that was found, in the fault's unit.
+            bound: The bound of that value.
         """
         _fail(self.parameters, self.state, int(fault), value, bound)
 
     def answer_measured(self) -> None:
-        """Write the measured pose of the joints in the signals, where no step takes them."""
+        """Write the pose of the measured joints into the signals, for a session without a running step."""
         row, transform = self.signals, np.empty((4, 4))
         joints = row["slave_measured_js"][: self.robot.n].copy()
         self.robot.kernels.fk(joints, self.arm.geometry, transform)
@@ -262,11 +262,11 @@ class Slave(RunningStage):
 
     @property
     def operation(self) -> dict[str, float]:
-        """Numbers of ``slave/operation`` by name, of the last tick."""
+        """Numbers of ``slave/operation`` of the last tick, by name."""
         return dict(zip(topics.OPERATION, self.signals["slave_operation"].tolist(), strict=True))
 
     def described(self) -> dict[str, str]:
-        """Names of the joints, by which the report of the operation calls them."""
+        """Joint names that the report of the operation uses."""
         return {"joints": " ".join(self.robot.joint_names)}
 
     @property
@@ -277,7 +277,7 @@ class Slave(RunningStage):
 
 @kernel
 def _request(p: commands.SlaveNumbers, s: commands.SlaveState, event: int) -> int:
-    """Take a command; of a stop the fault is told."""
+    """Take a command; a stop also records the stop fault."""
     if event == _STOP:
         was = s.is_stopped
         fail(p, s, _PRESSED, -1, 0.0, 0.0)

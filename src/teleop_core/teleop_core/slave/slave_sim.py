@@ -32,7 +32,7 @@ class ControllerParameters:
 
 @dataclass(frozen=True, kw_only=True)
 class PlantParameters:
-    """What the simulator moves."""
+    """The plant, which the simulator moves."""
 
     kind: Choice = choice(PLANTS, "ideal", fixed=True, doc="what the simulator moves")
 
@@ -68,14 +68,14 @@ class SlaveSimParameters(RobotParameters):
 
 
 class SlaveSim(RunningStage):
-    """Stage that simulates an arm: control ticks of continuous drives and links.
+    """Stage that simulates an arm: a discrete control law on continuous drives and links.
 
-    It is at home first, at rest and in balance: the control law holds the gravity that is not
-    compensated, if it can. Its tip touches the world, whose push the drives feel.
+    The arm begins at home, at rest and in balance: the control law holds the gravity that is not compensated, if it
+    can. Its tip can touch the world, and the contact force acts on the drives.
 
     Raises:
-        ParameterError: The robot has no drives, a list is not of its number of joints, the loop
-            does not let errors die, or the tip begins inside an object.
+        ParameterError: The robot has no drives, the length of a list is not its number of joints, errors do not decay
+            in the control loop, or the tip begins inside an object.
     """
 
     def __init__(self, parameters: SlaveSimParameters, dt: float = DT) -> None:
@@ -131,7 +131,7 @@ class SlaveSim(RunningStage):
         handover.missing_effort(self.arm, np.zeros(n), self.arm.gains, dt, ticks=0)  # compiles it
 
     def reset(self) -> None:
-        """Back to home, at rest."""
+        """Go back to home, at rest."""
         self._rest_at(self.robot.home)
 
     def _rest_at(self, home: Array) -> None:
@@ -155,7 +155,7 @@ class SlaveSim(RunningStage):
         row["slave_setpoint_js"], row["slave_measured_js"] = home, 0.0
         row["slave_true_cf"] = row["slave_measured_cf"] = row["slave_estimated_cf"] = 0.0
         row["slave_measured_js"][: self.robot.n] = s["measured"]
-        row["slave_measured_js_ns"] = topics.NO_COMMAND_NS  # where it stands before the first tick
+        row["slave_measured_js_ns"] = topics.NO_COMMAND_NS  # position before the first tick
 
     @property
     def punctures(self) -> int:
@@ -169,7 +169,7 @@ class SlaveSim(RunningStage):
 
     @property
     def depth(self) -> float:
-        """How deep the tip was in the channel of its last puncture a tick ago [m]; 0 outside."""
+        """Depth of the tip in the channel of its last puncture, a tick ago [m]; 0 outside."""
         tip = self.arm.contacts[0]
         return max(-float(tip["gap"]), 0.0) if tip["is_open"] else 0.0
 
@@ -179,14 +179,14 @@ class SlaveSim(RunningStage):
             self._noise.prepare(self.state, ticks)
 
     def examine(self, parameters: SlaveSimParameters) -> None:
-        """Try parameters on an arm of their own, at home and where this one is.
+        """Try parameters on a separate copy of the arm, at home and at the present position.
 
-        This takes tenths of a second where the loop changes: in a running session it is done beside
-        the ticks, before :meth:`retune`.
+        This takes tenths of a second if the control loop changes. A running session therefore does it outside the
+        ticks, before :meth:`retune`.
 
         Raises:
-            ParameterError: A list has another length than the robot has joints; friction is more
-                than drives or integrator can take; or an error would grow, or not come back.
+            ParameterError: The length of a list is not the number of joints; friction is too large for the drives or
+                the integrator; or an error would grow, or not decay.
         """
         trial = SlaveSim(parameters, self.dt)
         if stability.loop_key(trial.parameters, trial.arm) != stability.loop_key(self.parameters, self.arm):
@@ -195,10 +195,10 @@ class SlaveSim(RunningStage):
         self._examined = parameters
 
     def retune(self, parameters: SlaveSimParameters) -> None:
-        """Take new parameters from the next tick on; a law that can shift takes over what it gave.
+        """Take new parameters from the next tick on; a law with ``shift`` keeps the effort continuous.
 
         Raises:
-            ParameterError: What :meth:`examine` refuses, unless these were examined; nothing has changed then.
+            ParameterError: As :meth:`examine`, unless these parameters were examined before; nothing has changed then.
         """
         if parameters is not self._examined:
             self.examine(parameters)
@@ -206,7 +206,7 @@ class SlaveSim(RunningStage):
         self._hand_over()
 
     def _take(self, parameters: SlaveSimParameters) -> None:
-        """Write parameters where the step reads them."""
+        """Write parameters into the records that the step reads."""
         robot, p, drives = self.robot, self.parameters, self.robot.drives
         assert drives is not None
         assert robot.dynamics is not None
@@ -231,7 +231,7 @@ class SlaveSim(RunningStage):
         p["steps"], p["braking"] = (parameters.integration_steps, drives.effort_limit / drives.inertia)
 
     def _take_world(self, world: WorldParameters) -> None:
-        """Write where the object is, and what it is made of."""
+        """Write the object's position and material."""
         p, made_of = self.parameters, world.made_of
         p["has_world"] = world.kind.kind != "empty"
         if p["has_world"]:
@@ -249,7 +249,7 @@ class SlaveSim(RunningStage):
         """Pose (4, 4) of the tip at the robot's start.
 
         Raises:
-            ParameterError: Its direct kinematics finds no way to close the loops there.
+            ParameterError: The forward kinematics cannot close the robot's loops there.
         """
         try:
             return self.robot.fk(self.robot.start)
@@ -258,10 +258,10 @@ class SlaveSim(RunningStage):
             raise ParameterError("world.place", (), text) from error
 
     def _check_world(self, world: WorldParameters) -> None:
-        """Make sure that the tool begins outside.
+        """Make sure that the tool begins outside the object.
 
         Raises:
-            ParameterError: It begins inside the object.
+            ParameterError: The tool begins inside the object.
         """
         center, tool = self.parameters["world_center"], world.tool(self.robot.fk(self.robot.home))
         inside = -world.distance(tool, center) if self.parameters["has_world"] else 0.0
@@ -270,17 +270,17 @@ class SlaveSim(RunningStage):
             raise ParameterError("world.place", tuple(center.tolist()), text)
 
     def _check_loop(self, parameters: SlaveSimParameters) -> None:
-        """Try the loop as it is set, where the arm is; see :mod:`teleop_core.slave.stability`."""
+        """Try the present control loop at the arm's position; see :mod:`teleop_core.slave.stability`."""
         assert self.robot.drives is not None
         stability.check_friction(self.parameters, self.robot.drives.inertia, self.dt)
         loop = stability.ClosedLoop(self.parameters, self.state, self.arm, self.signals, self.dt)
         stability.check_stable(self._law, self.robot, loop, are_large_tried=parameters.trials == "all")
 
     def _hand_over(self) -> None:
-        """Move the effort that new gains no longer give into the integrators, once the gains are in force."""
+        """Move the effort that the new gains no longer give into the integrators, once these gains are in force."""
         if np.array_equal(self.arm.gains, self._gains_in_force):
             return
-        if self.signals["now_ns"] > 0:  # before the first tick nothing moves, or is compensated
+        if self.signals["now_ns"] > 0:  # before the first tick nothing moves, and nothing must be handed over
             speed = np.array(self.state["speed"])
             missing = handover.missing_effort(self.arm, speed, self._gains_in_force, self.dt)
             self._law.shift(self.arm.memory, missing)
@@ -305,7 +305,7 @@ class SlaveSim(RunningStage):
         return np.array(table, dtype=np.float64, order="C")
 
     def _gravity(self, dynamics: Array) -> Array:
-        """Effort (n,) that holds an arm of these dynamics where it is [N·m or N]."""
+        """Effort (n,) that holds an arm with these dynamics at its present position [N·m or N]."""
         assert self.robot.dynamics is not None
         effort = np.zeros(self.robot.n)
         self.robot.dynamics.gravity(self.arm.q, dynamics, effort)

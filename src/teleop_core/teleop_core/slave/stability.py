@@ -1,7 +1,7 @@
-"""Stability: whether a slave's loop, as it is set, follows, comes to rest, and lets errors die.
+"""Stability: whether a slave's control loop follows, comes to rest, and lets errors decay.
 
-A loop is tried before it is used: copies of the arm run under it. The result of a trial depends on nothing else, so a
-loop that has passed is not tried again in this process.
+A loop is tried on copies of the arm before it is used. The result depends on nothing else, so a loop that has passed
+is not tried again in this process.
 """
 
 from collections.abc import Callable
@@ -20,19 +20,19 @@ from teleop_core.slave.plants import PER_JOINT
 from teleop_core.slave.simulation import SimulationNumbers, SimulationState, simulation_step
 
 _TICKS, _LAST = 400, 100
-# After _TICKS no error may be so many times what it was. Laws that learn may let errors grow for a
-# while, within bounds; loops that run away pass this by orders of magnitude.
+# After _TICKS no error may exceed its initial value by this factor. Laws that learn may let errors grow for a while,
+# within bounds; unstable loops exceed this factor by orders of magnitude.
 _GROWTH = 100.0
-# Error at the start, in encoder steps, and what is left of those steps meanwhile.
+# Initial error in encoder steps, and the factor on the encoder steps during the trial.
 _ERROR, _FINE = 1e-2, 1e-6
 # Ticks of a dash: bursts of full speed with rests between, then a run at full speed.
 _BURSTS, _BURST, _RUN = 2, 50, 150
-# Within the longest of these rests [ticks], not before the shortest, the error must have come down
-# to this share of the largest one of the dash.
+# Within the longest of these rests [ticks], but after the shortest, the error must have fallen to this share of the
+# dash's largest error.
 _SHORTEST, _LONGEST, _LEFT = 300, 2000, 0.5
-# Share of the room that a joint has, which a dash may take.
+# Share of a joint's free range that a dash may use.
 _ROOM = 0.8
-# Where classical Runge-Kutta ends to be stable: -h times a real pole.
+# Stability limit of classical Runge-Kutta: -h times a real pole.
 _STABLE = 2.785
 _LOOP = (*PER_JOINT, "bristle_damping", "gear_damping", "effort_limit", "speed_limit",
          "compensated", "steps", "delay_ticks")  # fmt: skip
@@ -41,7 +41,7 @@ _passed: set[tuple[object, ...]] = set()
 
 
 def check_friction(p: SimulationNumbers, inertia: Array, dt: float) -> None:
-    """Refuse friction that the drives cannot move, or that the integrator cannot follow.
+    """Refuse friction that the drives cannot overcome, or that the integration steps cannot follow.
 
     Args:
         p: Parameter record of the slave.
@@ -72,7 +72,7 @@ def check_friction(p: SimulationNumbers, inertia: Array, dt: float) -> None:
 
 
 class ClosedLoop(NamedTuple):
-    """A simulated arm with its control law: what one tick of it takes."""
+    """A simulated arm with its control law: the arguments of one tick."""
 
     p: SimulationNumbers
     s: SimulationState
@@ -81,7 +81,7 @@ class ClosedLoop(NamedTuple):
     dt: float
 
     def copied(self) -> "ClosedLoop":
-        """The same arm apart, in free air, for a loop is judged there."""
+        """Return a separate copy of the arm without objects to touch, because the loop is judged without contact."""
         p, s, row = (_copy(record) for record in (self.p, self.s, self.row))
         p["has_world"] = 0
         p["is_ideal"], p["has_noise"], p["is_estimated"] = 1, 0, 0
@@ -91,7 +91,7 @@ class ClosedLoop(NamedTuple):
         return ClosedLoop(p, s, arm, row, self.dt)
 
     def step(self) -> Callable[[], None]:
-        """What makes a tick of it."""
+        """Return the function that advances the arm by one tick."""
         tick = bound(simulation_step, *self)
 
         def made() -> None:
@@ -103,36 +103,36 @@ class ClosedLoop(NamedTuple):
 
 
 def loop_key(p: SimulationNumbers, arm: Arm) -> tuple[bytes, ...]:
-    """Numbers that make the loop of an arm what it is, wherever the arm is.
+    """Numbers that define the control loop of an arm, independent of its position.
 
     Args:
         p: Parameter record of the slave.
-        arm: Its arrays.
+        arm: Arrays of the arm.
     """
     fields = (*(p[name] for name in _LOOP), *(getattr(arm, name) for name in _ARM))
     return tuple(field.tobytes() for field in fields)
 
 
 def check_stable(law: Controller, robot: Robot, loop: ClosedLoop, *, are_large_tried: bool = True) -> None:
-    """Refuse a loop in which small errors grow, or that does not come back from large ones.
+    """Refuse a loop in which small errors grow, or that does not recover from large errors.
 
-    Small errors: two copies of the arm are held at the present setpoint, one of them with a small
-    error of all joints; encoders are fine and dry friction is left out, so that the difference of
-    the two is that of a linear loop. After 0.4 s it must not be a hundred times what it was.
+    Small errors: two copies of the arm are held at the present setpoint, one of them with a small error of all joints.
+    Encoders have fine steps and there is no dry friction, so the difference of the two copies is that of a linear
+    loop. After 0.4 s the difference must be less than a hundred times its initial value.
 
-    Large errors: the setpoint of one joint after the other dashes at the full speed of its drive,
-    in bursts and in one run, and stands still at once, which saturates the drive. Within 2 s the
-    error must come below half of the largest one on the way.
+    Large errors: one joint after the other is tested. Its setpoint moves at the full speed of the drive, in bursts and
+    in one run, and then stops suddenly, which saturates the drive. Within 2 s the error must fall below half of its
+    largest value during the motion.
 
     Args:
         law: The control law.
-        robot: What it moves.
-        loop: The arm as it is now.
-        are_large_tried: Whether large errors must come back, too.
+        robot: The robot that it moves.
+        loop: The arm in its present state.
+        are_large_tried: Whether large errors are tried, too.
 
     Raises:
-        ParameterError: An error grows, or does not come back.
-        Exception: What a law in plain Python raises.
+        ParameterError: An error grows, or does not decay.
+        Exception: Any exception of a control law in plain Python.
     """
     place = (robot.geometry_row.tobytes(), loop.arm.q.tobytes())
     key = loop_key(loop.p, loop.arm)
@@ -140,7 +140,7 @@ def check_stable(law: Controller, robot: Robot, loop: ClosedLoop, *, are_large_t
     if tried in _passed:
         return
     _check_small(law.name, loop)
-    if IS_COMPILED and are_large_tried:  # in plain Python dashes take seconds
+    if IS_COMPILED and are_large_tried:  # dashes take seconds if the law is plain Python
         _check_large(law.name, robot, loop)
     _passed.add(tried)
 
@@ -161,7 +161,7 @@ def _check_small(name: str, loop: ClosedLoop) -> None:
 
 
 def _held(loop: ClosedLoop, by: Array) -> Array:
-    """Positions (N, n) in the last ticks of an arm that is held ``by`` (n,) off its setpoint."""
+    """Positions (N, n) in the last ticks of a trial that begins ``by`` (n,) off the setpoint."""
     loop = loop.copied()
     for field in ("encoder_step", "effort_step"):
         loop.p[field] *= _FINE
@@ -189,13 +189,13 @@ def _check_large(name: str, robot: Robot, loop: ClosedLoop) -> None:
 def dash(lower: float, upper: float, start: float, speed: float, dt: float) -> Array:
     """Setpoints (N,) of a joint that dashes from ``start`` towards the farther of its limits.
 
-    Ticks of full speed and of standstill take turns; the last of them is one of full speed.
+    Periods of full speed and of standstill alternate; the last period is at full speed.
 
     Args:
         lower: Lower limit [rad or m].
         upper: Upper limit [rad or m].
-        start: Where it begins.
-        speed: Full speed of its drive [rad/s or m/s]; less of it where there is no room.
+        start: Initial position [rad or m].
+        speed: Full speed of its drive [rad/s or m/s]; reduced if the joint's free range is too short.
         dt: Tick [s].
     """
     burst = np.repeat([1.0, 0.0], _BURST)
@@ -207,7 +207,7 @@ def dash(lower: float, upper: float, start: float, speed: float, dt: float) -> A
 
 
 def _left(robot: Robot, loop: ClosedLoop, joint: int) -> float:
-    """Share of a joint's largest error that is left in rest after its setpoint has dashed."""
+    """Share of a joint's largest error that remains at rest after its setpoint has dashed."""
     loop = loop.copied()
     setpoint, arm, step = loop.row.slave_setpoint_js, loop.arm, loop.step()
 

@@ -13,7 +13,7 @@ _ARRIVED, _HOME, _BLIND = int(Event.ARRIVED), int(Event.HOME), int(commands.Comm
 
 @inner
 def _moves(p: commands.SlaveNumbers, s: commands.SlaveState) -> bool:
-    """Whether setpoint or arm move in this tick."""
+    """Whether the setpoint or the arm moves in this tick."""
     moving = 0
     for i in range(s.setpoint.shape[0]):
         moving += s.step[i] != 0.0 or not abs(s.speed[i]) <= p.rest_speed[i]
@@ -30,7 +30,7 @@ def _is_still(s: commands.SlaveState) -> bool:
 
 @inner
 def _is_near(p: commands.SlaveNumbers, s: commands.SlaveState) -> bool:
-    """Whether the arm stands at its setpoint."""
+    """Whether the arm is at its setpoint."""
     off = 0
     for i in range(s.setpoint.shape[0]):
         off += not abs(s.measured[i] - s.setpoint[i]) <= p.near[i]
@@ -39,7 +39,7 @@ def _is_near(p: commands.SlaveNumbers, s: commands.SlaveState) -> bool:
 
 @inner
 def _begin_where_it_is(p: commands.SlaveNumbers, s: commands.SlaveState, arm: ArmModel, row: commands.SlaveRow) -> None:
-    """Let the setpoint of an arm that is not at home begin where it is; it homes from there."""
+    """Begin the setpoint of an arm that is not at home at its measured position; the arm homes from there."""
     if _is_near(p, s):
         return
     for i in range(s.setpoint.shape[0]):
@@ -56,7 +56,7 @@ def _begin_where_it_is(p: commands.SlaveNumbers, s: commands.SlaveState, arm: Ar
 def _take_measured(p: commands.SlaveNumbers, s: commands.SlaveState, arm: ArmModel, row: commands.SlaveRow) -> None:
     """Take a new sample of the arm, and look for faults in it.
 
-    It was sampled together with the setpoint that is still in force.
+    The sample was taken together with the setpoint that is still in force.
     """
     stamp_ns, n = row.slave_measured_js_ns, s.setpoint.shape[0]
     if stamp_ns == s.sampled_ns:
@@ -72,13 +72,13 @@ def _take_measured(p: commands.SlaveNumbers, s: commands.SlaveState, arm: ArmMod
     if before_ns == 0:
         _begin_where_it_is(p, s, arm, row)
         return
-    if is_lost:  # it may have been moved, or have heard of no setpoint
+    if is_lost:  # the arm may have been moved, or may have received no setpoint
         s.must_join = 1
     if watch.is_braked(p, s):
         for i in range(n):
             s.full_ns[i] = 0
     else:
-        # What was in a longer gap nobody has seen.
+        # What happened in a longer gap is unknown.
         watch.watch_joints(p, s, arm.effort, min(stamp_ns - before_ns, p.timeout_ns))
         watch.watch_tip(p, s, row.slave_setpoint_cp, row.slave_measured_cp)
     watch.find_rest(s, _moves(p, s), stamp_ns)
@@ -94,7 +94,7 @@ def _go_on(
         s.must_join = 0
     if s.state == _ENABLED and s.is_busy and not s.must_plan:
         commands.advance_move(s)
-    elif s.state == _ENABLED and s.is_busy:  # a way to a goal begins at rest
+    elif s.state == _ENABLED and s.is_busy:  # a move to a goal begins at rest
         commands.come_to_rest(p, s, commands.AT_LIMITS, dt)
     elif s.state == _ENABLED and s.motion != 0:
         velocity.advance_velocity(p, s, arm, row.now_ns, dt)
@@ -114,12 +114,12 @@ def slave_step(
 ) -> None:
     """One tick of the arm's server: write the slave's setpoint, measured pose and operation.
 
-    What is measured is of the last tick, and judged against the setpoint of that one.
+    Measured values are those of the last tick, and are compared with the setpoint of that tick.
 
     Args:
         p: Parameter record.
         s: State record; written.
-        arm: :class:`ArmModel`; its rooms are written.
+        arm: :class:`ArmModel`; its scratch arrays are written.
         row: Signals.
         dt: Tick [s].
     """
@@ -132,7 +132,7 @@ def slave_step(
     row.command_status = commands.take_command(p, s, row, dt)
     if s.state != _ENABLED:
         s.motion = 0
-    elif watch.is_blind(p, s, row.now_ns):  # a move goes on from wherever the arm is then
+    elif watch.is_blind(p, s, row.now_ns):  # a later move begins from the arm's position at that time
         row.command_status, s.motion, s.must_plan = _BLIND, 0, s.is_busy
     if s.must_plan and row.command_status != _BLIND and _is_still(s):
         if s.is_homing:

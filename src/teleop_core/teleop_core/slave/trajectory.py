@@ -11,8 +11,8 @@ from teleop_core.kernels.geometry import Array
 def cubic_move(start: Array, end: Array, move_time: float, times: Array) -> tuple[Array, Array]:
     """Joint positions and speeds of a move whose joints start, run and stop together.
 
-    ``q = a0 + a2 t² + a3 t³`` with ``a2 = 3 (end - start) / T²``, ``a3 = -2 (end - start) / T³``. Before time 0 the arm
-    rests at the start, after ``move_time`` at the end. The joints draw a straight line in joint space.
+    ``q = a0 + a2 t² + a3 t³`` with ``a2 = 3 (end - start) / T²``, ``a3 = -2 (end - start) / T³``. Before time 0 the
+    arm rests at the start; after ``move_time`` it rests at the end. The path is a straight line in joint space.
 
     Args:
         start: Joint vector (n,) [rad or m].
@@ -44,7 +44,7 @@ def cubic_move(start: Array, end: Array, move_time: float, times: Array) -> tupl
 def shortest_move_time(start: Array, end: Array, speed_limit: Array) -> float:
     """Shortest time of :func:`cubic_move` [s] in which no joint exceeds its speed limit.
 
-    The peak, in the middle of the move, is 1.5 times the mean speed; 0 for a move to itself.
+    The peak speed, in the middle of the move, is 1.5 times the mean speed. The time is 0 if start and end are equal.
 
     Args:
         start: Joint vector (n,) [rad or m].

@@ -1,4 +1,4 @@
-"""Transmission: drives between efforts asked and given, play and tendons behind the encoders."""
+"""Transmission: drives from commanded to given effort; play and tendons behind the encoders."""
 
 from typing import Annotated
 
@@ -21,10 +21,10 @@ class DriveNumbers(Fields):
 
 
 class DriveState(Fields):
-    """Fields of a state record with the same."""
+    """Fields of a state record with drives and transmission."""
 
-    carried: PerJoint  # the joints as the motors left them [rad or m]
-    late: Annotated[Array, LONGEST_DELAY + 1, "joints"]  # the efforts asked for lately
+    carried: PerJoint  # joints behind the play, as the motors last moved them [rad or m]
+    late: Annotated[Array, LONGEST_DELAY + 1, "joints"]  # the latest commanded efforts
     driven: int
 
 
@@ -32,13 +32,13 @@ class DriveState(Fields):
 def follow_encoders(p: DriveNumbers, s: DriveState, q: Array, coupling: Array, tip: Array) -> None:
     """Write the true joint positions (n,) of motors at ``q`` (n,) [rad or m].
 
-    A joint stays where it is until its motor has crossed the play, and is dragged then. The lag of a joint behind its
-    motor moves the later joints whose tendons pass it.
+    A joint stays at its position until its motor has crossed the play; then the motor drags the joint. The lag of a
+    joint behind its motor moves the later joints whose tendons pass it.
 
     Args:
         p: Parameters.
         s: State; written.
-        q: Where the motors are, seen through their gears.
+        q: Motor positions, seen through their gears.
         coupling: (n, n), below its diagonal.
         tip: Written.
     """
@@ -53,14 +53,14 @@ def follow_encoders(p: DriveNumbers, s: DriveState, q: Array, coupling: Array, t
 
 @inner
 def drive(p: DriveNumbers, s: DriveState, arm: Arm) -> None:
-    """Turn the effort asked for into the one that the motors give.
+    """Turn the commanded effort into the effort that the motors give.
 
     Args:
         p: Parameters.
         s: State; written.
         arm: Its ``effort`` is written.
     """
-    if p.delay_ticks > 0:  # in the first ticks the first effort, which holds the arm
+    if p.delay_ticks > 0:  # in the first ticks it is the first effort, which holds the arm
         count = s.late.shape[0]
         late = s.driven - min(p.delay_ticks, s.driven)
         for i in range(arm.q.shape[0]):
@@ -72,7 +72,7 @@ def drive(p: DriveNumbers, s: DriveState, arm: Arm) -> None:
         if step > 0.0:
             asked = round(asked / step) * step
         arm.effort[i] = min(max(p.drive_gain[i] * asked + p.bias[i], -limit), limit)
-        # The motor gives no drive beyond its rated speed, fading out over the next tenth.
+        # Beyond its rated speed the motor's driving effort fades to zero over the next tenth of that speed.
         over = abs(arm.dq[i]) / p.speed_limit[i] - 1.0
         if over > 0.0 and arm.effort[i] * arm.dq[i] > 0.0:
             arm.effort[i] *= max(0.0, 1.0 - 10.0 * over)

@@ -22,22 +22,22 @@ class Motion(IntEnum):
 _FOLLOWING, _TIP = int(Motion.FOLLOWING), int(Motion.TIP)
 # Radians per second at the tip that count as much as metres per second: its inverse [m].
 _LENGTH = 0.1
-# Added to the squares of the weighted singular values. Assumed: where they are 1, speeds lose a
-# ten-thousandth; next to a singularity joints go 50 times as fast as the tip asks for, at most.
+# Damping added to the squares of the weighted singular values. Assumed: where these are 1, speeds lose a
+# ten-thousandth; next to a singularity joints are at most 50 times as fast as the weighted tip speed.
 _DAMPING = 1e-4
 
 
 @inner
 def joint_speeds(arm: ArmModel, q: Array, twist: Array, speed: Array) -> None:
-    """Write the joint speeds (n,) that follow a twist at damped best.
+    """Write the joint speeds (n,) that follow a twist best in the damped least-squares sense.
 
-    ``dq = Jᵀ (J Jᵀ + damping I)⁻¹ v``, with the linear rows of J and v over a length. Near a
-    singularity the tip lags instead of the joints racing; what a robot cannot do is left out.
+    ``dq = Jᵀ (J Jᵀ + damping I)⁻¹ v``, with the linear rows of J and v divided by a length. Near a singularity the tip
+    lags, and the joints stay slow. Components that the robot cannot do are left out.
 
     Args:
-        arm: Its ``jacobian`` and ``geometry``; its rooms ``J`` and ``is_free`` are written.
+        arm: Its ``jacobian`` and ``geometry``; its scratch arrays ``J`` and ``is_free`` are written.
         q: Joints (n,) [rad or m].
-        twist: Of the tip (6,) in base axes [m/s, rad/s].
+        twist: Twist of the tip (6,) in base axes [m/s, rad/s].
         speed: Joint speeds (n,) [rad/s or m/s]; written.
 
     Source:
@@ -60,7 +60,7 @@ def joint_speeds(arm: ArmModel, q: Array, twist: Array, speed: Array) -> None:
 
 @inner
 def _share_of_limits(p: SlaveNumbers, s: SlaveState, dt: float) -> float:
-    """Share, at most 1, of the wanted speeds that keeps all speed limits and, of a driven tip, all ranges."""
+    """Largest share, at most 1, of the wanted speeds within all speed limits and, for a tip twist, all joint limits."""
     share = 1.0
     for i in range(s.drive.shape[0]):
         fast = abs(s.drive[i])
@@ -78,13 +78,14 @@ def _share_of_limits(p: SlaveNumbers, s: SlaveState, dt: float) -> float:
 def advance_velocity(p: SlaveNumbers, s: SlaveState, arm: ArmModel, now_ns: int, dt: float) -> None:
     """Move the setpoint at the wanted speed; without a fresh command it brakes to rest, and stays.
 
-    All joints keep their speed limits, change their speed no faster than their drives can brake,
-    and stop at the end of their ranges. A tip whose joints cannot keep up goes slower on its line.
+    All joints stay within their speed limits, change their speed no faster than their drives can brake, and stop at
+    their joint limits. If the joints are too slow for the wanted twist, the tip moves more slowly in the same
+    direction.
 
     Args:
         p: Parameters.
         s: State; its setpoint is written.
-        arm: As of :func:`joint_speeds`.
+        arm: As in :func:`joint_speeds`.
         now_ns: Time of the tick [ns].
         dt: Tick [s].
     """

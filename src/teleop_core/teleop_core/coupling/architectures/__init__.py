@@ -1,7 +1,8 @@
 """Architectures: what the hand feels of the slave, one file per kind.
 
-A kind turns the force on the slave's tip, and how far the tip is from where the hand leads it, into a push. Axes,
-silence, the largest push and passivity are the same for all (:mod:`teleop_core.coupling.mapping.reflection`).
+Each kind computes a push on the hand from the force on the slave's tip and from the distance between the tip and its
+command. All kinds share the handling of axes, silence, the largest push and passivity
+(:mod:`teleop_core.coupling.mapping.reflection`).
 """
 
 from collections.abc import Callable
@@ -26,12 +27,12 @@ MEMORY = 12
 
 
 def unscaled(parameters: object) -> float:
-    """One: forces at the hand are of the size of those on the tip."""
+    """Return one: forces at the hand are as large as those on the tip."""
     return 1.0
 
 
 def unled(parameters: object) -> float:
-    """Zero: the hand's force does not move the slave."""
+    """Return zero: the hand's force does not move the slave."""
     return 0.0
 
 
@@ -40,21 +41,21 @@ class Architecture:
     """A kind of architecture: what comes back to the hand.
 
     Attributes:
-        name: What ``--set reflection.architecture=`` calls it.
+        name: Its name in ``--set reflection.architecture=``.
         parameters: Its parameter group.
         push: ``push(numbers, memory, felt, away, period, out)``, a kernel or a plain function, called for every sample
             of the master. ``numbers`` are those of the parameters; ``memory`` (12,) is kept from sample to sample, and
-            zero at the start; ``felt`` (3,) is the force on the tip [N]; ``away`` (3,) the way from where the hand
-            leads the tip to where the tip was measured [m]; both along the slave's base, as late as they come, and zero
-            where nothing comes; ``period`` is the time since the sample before [s]. Writes the push (3,) along the
-            slave's base [N].
-        numbers: ``numbers(parameters)`` gives what ``push`` takes, if that is
-            something else than the numbers of the parameters in their order.
-        force_scale: ``force_scale(parameters)`` gives the force at the hand over the one on the
-            tip that it answers, above 0, by which energies of hand and slave are compared.
-        lead_gain: ``lead_gain(parameters)`` gives the force that leads the slave's tip over what
-            the hand bears of the push [N/N], for the stage ``impedance``.
-        needs_impedance: Whether it works with a stage ``impedance`` alone.
+            zero at the start; ``felt`` (3,) is the force on the tip [N]; ``away`` (3,) is the vector from the
+            commanded to the measured tip position [m]. Both are in axes of the slave's base, have the delay of the
+            network, and are zero while nothing arrives. ``period`` is the time since the last sample [s]. Writes the
+            push (3,) in axes of the slave's base into ``out`` [N].
+        numbers: ``numbers(parameters)`` returns the ``numbers`` of ``push``, if they are not simply the numbers of the
+            parameters in their order.
+        force_scale: ``force_scale(parameters)`` returns the force at the hand, divided by the tip force that causes
+            it, > 0. Energies of hand and slave are compared by this factor.
+        lead_gain: ``lead_gain(parameters)`` returns the force on the slave's tip per force with which the hand resists
+            the push [N/N], for the stage ``impedance``.
+        needs_impedance: Whether it works only together with a stage ``impedance``.
     """
 
     name: str
@@ -70,7 +71,7 @@ class Architecture:
 
 
 def _try(part: Architecture) -> None:
-    """Push for some samples, so that what cannot work is told before anything runs."""
+    """Push for some samples, so that errors are reported before anything runs."""
     needs = "one with push(numbers, memory, felt, away, period, out) and parameters that all have defaults"
     with tried("architecture", part.name, needs):
         numbers, _ = fenced(part.numbers(part.parameters()))  # one too far is NaN
@@ -92,7 +93,7 @@ ARCHITECTURES: Registry[Architecture] = Registry(
     part_check("architecture", Architecture, "push"),
     _try,
 )
-"""All kinds by name."""
+"""All architectures by name."""
 
 register_architecture = ARCHITECTURES.register
-"""Adds one of yours under its own name; see :meth:`Registry.register`."""
+"""Adds your architecture under its own name; see :meth:`Registry.register`."""

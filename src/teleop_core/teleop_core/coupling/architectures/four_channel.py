@@ -1,4 +1,4 @@
-"""Four channels: places and forces go both ways, and the slave yields to what forces differ by."""
+"""Four channels: positions and forces go both ways, and the slave yields to the difference of the forces."""
 
 from dataclasses import dataclass
 
@@ -10,7 +10,7 @@ from teleop_core.coupling.architectures.three_channel import ThreeChannelParamet
 
 @dataclass(frozen=True, kw_only=True)
 class FourChannelParameters(ThreeChannelParameters):
-    """What comes back, and what the slave gets of the hand's force."""
+    """What the hand gets of the slave, and what the slave gets of the hand's force."""
 
     hand_gain: float = parameter(
         1.0,

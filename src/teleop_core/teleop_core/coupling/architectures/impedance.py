@@ -1,8 +1,8 @@
-"""Impedance as a stage: the slave's tip yields to its force, as on a mass with spring and damper.
+"""Impedance as a stage: the slave's tip yields to the force on it, as a mass with spring and damper does.
 
-What leads an arm is a place, so the force on its tip moves the place that it is led to. The hand's
-force, of an architecture that sends it, does the same with the other sign. Everything behind this
-stage holds as before: passivity, reach, limits and faults see the one command that is left.
+An arm is commanded by positions, so the force on its tip shifts the commanded position. If the architecture sends the
+hand's force, this force shifts it in the opposite sense. The stages after this one work as before: passivity, reach,
+limits and faults see only the resulting command.
 """
 
 import math
@@ -13,12 +13,12 @@ from teleop_core.graph import Row, Stage, copy, topics
 from teleop_core.kernels import Fields, Vector3, inner, kernel
 
 _LONGEST = 0.1
-"""Time for which it yields at once [s], after a pause of the commands."""
+"""Longest time of one step [s], after a pause of the commands."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class ImpedanceParameters:
-    """The mass, spring and damper between where the hand leads the tip and where it goes."""
+    """The mass, spring and damper between the hand's command and the command that the slave gets."""
 
     mass: float = parameter(
         1.0,
@@ -47,14 +47,14 @@ class ImpedanceParameters:
 class ImpedanceState(Fields):
     """State record of the impedance."""
 
-    way: Vector3  # from the command to where the tip goes [m]
+    way: Vector3  # shift of the command [m]
     speed: Vector3  # [m/s]
     last_ns: int  # stamp of the command before
 
 
 @inner
 def _yield(p: ImpedanceParameters, s: ImpedanceState, row: Row, time: float) -> None:
-    """Step way and speed by a time [s] under both forces."""
+    """Advance shift and speed by ``time`` [s] under both forces."""
     lead = 1.0 if row.slave_setpoint_cp_ns > topics.NO_COMMAND_NS else 0.0
     inertia, square = p.mass + time * (p.damping + time * p.stiffness), 0.0
     for i in range(3):
@@ -71,11 +71,11 @@ def _yield(p: ImpedanceParameters, s: ImpedanceState, row: Row, time: float) -> 
 
 @kernel
 def impedance_step(p: ImpedanceParameters, s: ImpedanceState, row: Row, dt: float) -> None:
-    """One command: yield for the time since the one before, and write impedance_servo_cp.
+    """One command: yield for the time since the last command, and write impedance_servo_cp.
 
-    A step backwards in time, which is calm whatever mass and time:
-    ``speed = (M speed + t (f - K way)) / (M + t B + t² K)``. While the slave goes its own way no
-    force counts, so that it is taken up without a way; what is left of one fades by itself.
+    The step is backward Euler, stable for any mass and time: ``speed = (M speed + t (f - K way)) / (M + t B + t² K)``.
+    While the slave does not follow the hand, forces are ignored, so that following begins without a shift; a remaining
+    shift decays by itself.
 
     Args:
         p: Parameters.
@@ -84,7 +84,7 @@ def impedance_step(p: ImpedanceParameters, s: ImpedanceState, row: Row, dt: floa
         dt: Tick [s].
 
     Source:
-        Hogan 1985, impedance control, in the form of an admittance for an arm led by places.
+        Hogan 1985, impedance control, in the form of an admittance for a position-controlled arm.
     """
     time = min(1e-9 * (row.slave_servo_cp_ns - s.last_ns), _LONGEST)
     if time > 0.0:

@@ -1,4 +1,4 @@
-"""Position-force: the slave gets the hand's place, the hand gets the force on the slave's tip."""
+"""Position-force: the slave gets the hand's position, the hand gets the force on the slave's tip."""
 
 from dataclasses import dataclass
 
@@ -26,7 +26,7 @@ def position_force_push(numbers: Array, memory: Array, felt: Array, away: Array,
 
 
 def force_scale(parameters: PositionForceParameters) -> float:
-    """Force at the hand over the one on the tip, above 0."""
+    """Force at the hand, divided by the force on the tip; > 0."""
     return max(parameters.force_gain, 1e-3)
 
 

@@ -1,4 +1,4 @@
-"""Position-position: a spring between where the hand leads the slave's tip and where it is."""
+"""Position-position: a spring between the commanded and the measured position of the slave's tip."""
 
 from dataclasses import dataclass
 
@@ -21,7 +21,7 @@ class PositionPositionParameters:
 
 @kernel
 def position_position_push(numbers: Array, memory: Array, felt: Array, away: Array, period: float, out: Array) -> None:
-    """Write the push (3,) [N]: a spring towards where the tip is.
+    """Write the push (3,) [N]: a spring towards the measured tip position.
 
     Source:
         Lawrence 1993, position-position, without its damper.

@@ -1,6 +1,6 @@
-"""Three channels: the hand gets force and place of the slave, which yields to its own force.
+"""Three channels: the hand gets force and position of the slave, which yields to its own force.
 
-The slave gets the hand's place, and its stage ``impedance`` the force on its own tip.
+The slave gets the hand's position, and its stage ``impedance`` gets the force on the slave's tip.
 """
 
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ from teleop_core.kernels import Array, kernel
 
 @dataclass(frozen=True, kw_only=True)
 class ThreeChannelParameters(PositionPositionParameters, PositionForceParameters):
-    """What comes back of the slave's force, first, and of its place."""
+    """Gains of the slave's force and position to the hand."""
 
 
 @kernel
@@ -21,7 +21,7 @@ def channels_push(numbers: Array, memory: Array, felt: Array, away: Array, perio
     """Write the push (3,) [N]: the force on the tip times its gain, and a spring towards the tip.
 
     Source:
-        Lawrence 1993, channels of force and place back to the hand, without a damper.
+        Lawrence 1993, channels of force and position back to the hand, without a damper.
     """
     for i in range(3):
         out[i] = numbers[0] * felt[i] + numbers[1] * away[i]

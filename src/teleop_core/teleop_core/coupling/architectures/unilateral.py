@@ -1,4 +1,4 @@
-"""Unilateral: the slave gets the hand's place, the hand gets nothing back."""
+"""Unilateral: the slave gets the hand's position, the hand gets nothing back."""
 
 from teleop_core.base import NoParameters
 from teleop_core.coupling.architectures import Architecture
@@ -7,7 +7,7 @@ from teleop_core.kernels import Array, kernel
 
 @kernel
 def unilateral_push(numbers: Array, memory: Array, felt: Array, away: Array, period: float, out: Array) -> None:
-    """Write no push (3,) [N]."""
+    """Write a zero push (3,) [N]."""
     for i in range(3):
         out[i] = 0.0
 

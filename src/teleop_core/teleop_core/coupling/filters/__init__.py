@@ -1,7 +1,7 @@
-"""Tremor filters: what takes the tremor out of the hand's position, one file per kind.
+"""Tremor filters: they remove tremor from the hand's position, one file per kind.
 
-A kind filters one coordinate. When it begins, what happens after a pause or a jump, and which
-samples it gets are the same for all (:mod:`teleop_core.coupling.filters.tremor_filter`).
+Each kind filters one coordinate. The start, the behaviour after a pause or a jump, and the choice of samples are the
+same for all (:mod:`teleop_core.coupling.filters.tremor_filter`).
 """
 
 import math
@@ -23,9 +23,9 @@ _ROW = types.float64[::1]
 FILTER = types.float64(_ROW, _ROW, types.float64, types.float64)
 """Signature of a filter kernel, so that one compiled stage serves every kind."""
 MEMORY = 32
-"""Numbers that a filter remembers of each coordinate."""
+"""How many numbers a filter remembers for each coordinate."""
 LONGEST_NS = 10_000_000
-"""Longest period that a filter is given; a longer one is split [ns]."""
+"""Longest period that a filter gets [ns]; a longer period is split."""
 
 
 @dataclass(frozen=True)
@@ -33,15 +33,15 @@ class TremorFilter:
     """A kind of tremor filter.
 
     Attributes:
-        name: What ``--set tremor_filter.kind=`` calls it.
+        name: Its name in ``--set tremor_filter.kind=``.
         parameters: Its parameter group.
         filter: ``filter(numbers, memory, value, period)``, a kernel or a plain function, called for every sample of
-            each coordinate but the one with which it begins. ``numbers`` are those of the parameters; ``memory`` (32,)
-            is kept from sample to sample, and zero where the filter begins; ``value`` is the way from the place where
-            it began [m]; ``period`` is the time since the sample before [s], 10 ms at most. Returns the filtered value
-            [m]; as long as all values are 0 it returns 0.
-        numbers: ``numbers(parameters)`` gives what ``filter`` takes, if that is
-            something else than the numbers of the parameters in their order.
+            each coordinate except the first. ``numbers`` are those of the parameters; ``memory`` (32,) is kept from
+            sample to sample, and is zero at the start; ``value`` is the displacement from the first sample [m];
+            ``period`` is the time since the last sample [s], 10 ms at most. Returns the filtered value [m]. It must
+            return 0 as long as all values are 0.
+        numbers: ``numbers(parameters)`` returns the ``numbers`` of ``filter``, if they are not simply the numbers of
+            the parameters in their order.
     """
 
     name: str
@@ -54,7 +54,7 @@ class TremorFilter:
 
 
 def _try(part: TremorFilter) -> None:
-    """Filter some values, so that what cannot work is told before anything runs."""
+    """Filter some values, so that errors are reported before anything runs."""
     needs = "one with filter(numbers, memory, value, period) -> float and parameters that all have defaults"
     with tried("tremor filter", part.name, needs):
         numbers, _ = fenced(part.numbers(part.parameters()))  # one too far is NaN
@@ -77,7 +77,7 @@ TREMOR_FILTERS: Registry[TremorFilter] = Registry(
     part_check("tremor filter", TremorFilter, "filter"),
     _try,
 )
-"""All kinds by name."""
+"""All tremor filters by name."""
 
 register_tremor_filter = TREMOR_FILTERS.register
-"""Adds one of yours under its own name; see :meth:`Registry.register`."""
+"""Adds your filter under its own name; see :meth:`Registry.register`."""

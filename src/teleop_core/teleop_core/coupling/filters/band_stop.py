@@ -1,4 +1,4 @@
-"""Band stop: takes out all frequencies between two edges, as flat as possible outside of them."""
+"""Band stop: removes all frequencies between two edges, with a response as flat as possible outside."""
 
 import math
 from dataclasses import dataclass
@@ -23,7 +23,7 @@ class BandStopParameters:
 
 @inner
 def _section(memory: Array, at: int, value: float, real: float, imaginary: float, center: float) -> float:
-    """Section with a pair of poles (real ± imaginary j) and zeros at ``± j sqrt(center)``."""
+    """Set up a section with a pair of poles (real ± imaginary j) and zeros at ``± j sqrt(center)``."""
     square = real * real + imaginary * imaginary
     slope = math.sqrt(square)
     damping = -2.0 * real / slope
@@ -33,9 +33,9 @@ def _section(memory: Array, at: int, value: float, real: float, imaginary: float
 
 @kernel
 def band_stop_filter(numbers: Array, memory: Array, value: float, period: float) -> float:
-    """Value without what is in the band: Butterworth of order 4, two sections.
+    """Value without the frequencies in the band: Butterworth of order 4, two sections.
 
-    The poles ``p = exp(±3πj/4)`` of the low-pass of order 2 go to the roots of
+    The poles ``p = exp(±3πj/4)`` of the low-pass of order 2 are mapped to the roots of
     ``s² - (width / p) s + low high = 0``, with edges warped by the bilinear transform.
 
     Source:

@@ -1,4 +1,4 @@
-"""Kalman: a hand that keeps its speed until it is pushed, and a tremor that swings beside it."""
+"""Kalman: a model of a hand with constant speed and random accelerations, plus a tremor that oscillates."""
 
 import math
 from dataclasses import dataclass
@@ -9,15 +9,16 @@ from teleop_core.kernels import Array, inner, kernel
 from teleop_core.kernels.room import room
 
 _COVARIANCE, _HAS_BEGUN = 4, 20
-"""Places in the memory, behind place and speed of the hand, then of its tremor: their covariance
-(4, 4), and whether there is any."""
+"""Indices in the memory, after position and speed of the hand and of its tremor: their covariance (4, 4), and whether
+there is a covariance.
+"""
 FASTEST = 1.0
-"""Standard deviation of the speed with which a hand may begin [m/s]."""
+"""Standard deviation of a hand's initial speed [m/s]."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class KalmanParameters:
-    """How much the hand accelerates and trembles, and how exact readings are, at any rate."""
+    """How much the hand accelerates and trembles, and how exact readings are; independent of the sample rate."""
 
     acceleration_noise: float = parameter(
         0.02,
@@ -48,9 +49,9 @@ class KalmanParameters:
 
 @inner
 def _model(numbers: Array, period: float, F: Array, W: Array) -> None:
-    """Write the transition (4, 4) of a period, and the covariance (4, 4) of what it adds.
+    """Write the transition matrix (4, 4) of a period into ``F``, and the covariance (4, 4) of its noise into ``W``.
 
-    The tremor is a swing that noise drives and damping stops: its variance stays.
+    The tremor is a damped oscillator driven by noise, with constant variance.
     """
     damping, rate = 2.0 * math.pi * numbers[3], 2.0 * math.pi * numbers[2]
     square, push = rate * rate + damping * damping, numbers[0] * numbers[0] * period
@@ -73,7 +74,7 @@ def _model(numbers: Array, period: float, F: Array, W: Array) -> None:
 
 @inner
 def _begin(numbers: Array, spread: float, memory: Array) -> None:
-    """Know of the first reading what it says: place and tremor together are 0."""
+    """Begin with what the first reading shows: position plus tremor is 0."""
     damping, rate = 2.0 * math.pi * numbers[3], 2.0 * math.pi * numbers[2]
     tremor, P = numbers[4] * numbers[4], memory[_COVARIANCE:]
     memory[_HAS_BEGUN] = 1.0
@@ -83,10 +84,10 @@ def _begin(numbers: Array, spread: float, memory: Array) -> None:
 
 @kernel
 def kalman_filter(numbers: Array, memory: Array, value: float, period: float) -> float:
-    """Place of the meant motion, of which the reading shows the sum with a tremor.
+    """Position of the intended motion; the reading is the sum of intended motion and tremor.
 
-    Both are predicted, the hand at constant speed and the tremor as it swings, and then moved
-    towards the reading, each as far as it is uncertain.
+    Both are predicted: the hand at constant speed, and the tremor by its oscillation. Then both are corrected towards
+    the reading, each in proportion to its uncertainty.
 
     Source:
         Kalman 1960, theorem 3; Bar-Shalom, Li and Kirubarajan 2001, section 6.2.2 (white noise

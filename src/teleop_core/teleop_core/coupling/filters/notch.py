@@ -1,4 +1,4 @@
-"""Notch: takes out one frequency and, the lower its quality, what is beside it."""
+"""Notch: removes one frequency and its neighbours; a lower quality removes a wider band."""
 
 import math
 from dataclasses import dataclass
@@ -8,7 +8,7 @@ from teleop_core.coupling.filters import LONGEST_NS, TremorFilter, sections
 from teleop_core.kernels import Array, kernel
 
 _WIDEST = 0.45
-"""Width of a notch times the period of samples, below the pole of its tangent at a half."""
+"""Largest width of a notch times the sample period; below 0.5, where its tangent becomes infinite."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -24,7 +24,7 @@ class NotchParameters:
     )
 
     def __post_init__(self) -> None:
-        """Refuse a notch so wide that slow samples cannot show it."""
+        """Refuse a notch that is too wide for slow samples."""
         least = self.frequency * 1e-9 * LONGEST_NS / _WIDEST
         if self.quality < least:
             text = f">= {least:.3g} at {self.frequency:g} Hz, or samples of 100 Hz cannot show it"
@@ -33,9 +33,9 @@ class NotchParameters:
 
 @kernel
 def notch_filter(numbers: Array, memory: Array, value: float, period: float) -> float:
-    """Value without what is near the notch's frequency.
+    """Value without frequencies near the notch's frequency.
 
-    The width is as wanted after the bilinear transform too: its tangent is taken, not its value.
+    The width is prewarped by its tangent, so it is also right after the bilinear transform.
 
     Source:
         Orfanidis 1996 (Introduction to Signal Processing), section 11.3.

@@ -11,12 +11,12 @@ def advance_section(memory: Array, at: int, value: float, slope: float, damping:
     """Bring the band-pass and the low-pass of a section to the next sample.
 
     With the input u, band-pass b and low-pass l obey ``db/dt = w (u - l - damping b)`` and ``dl/dt = w b``. They are
-    integrated by the trapezoidal rule, which is the bilinear transform where the period stays the same and never
-    diverges where it changes. The high-pass of the section is ``u - damping b - l``, its notch ``u - damping b``.
+    integrated by the trapezoidal rule. For a constant period this is the bilinear transform; for a changing period it
+    never diverges. The high-pass of the section is ``u - damping b - l``, its notch ``u - damping b``.
 
     Args:
-        memory: What is remembered; written.
-        at: Where the section's :data:`WIDTH` numbers begin in it.
+        memory: Memory of the filter; written.
+        at: Index in ``memory`` at which the section's :data:`WIDTH` numbers begin.
         value: Input.
         slope: ``tan(w period / 2)`` of the section's frequency w.
         damping: 2 for critical damping, the inverse of the quality.

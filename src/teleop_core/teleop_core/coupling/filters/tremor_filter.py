@@ -1,8 +1,8 @@
-"""Tremor filter: a stage between the master and the mapping, which takes tremor out of the hand.
+"""Tremor filter: a stage between the master and the mapping, which removes tremor from the hand's motion.
 
-The slave is led by the filtered stylus. An operator sees and feels the stylus itself, and so does
-everyone who reads ``master/measured_cp`` from outside. What pushes the hand goes by the stylus
-itself too: a push that is late gives back more energy than it took.
+The slave follows the filtered stylus. The unfiltered stylus is what the operator sees and feels, and what
+``master/measured_cp`` contains. Forces on the hand use the unfiltered stylus too, because a delayed force returns more
+energy than it took.
 """
 
 import math
@@ -18,7 +18,7 @@ from teleop_core.graph import DT, Row, RunningStage, Stage, assign, topics
 from teleop_core.kernels import Array, Vector3, inner, kernel, record
 
 _FADE = 0.2
-"""Time constant with which the difference between old and new parameters goes away [s]."""
+"""Time constant with which the step at a change of parameters decays [s]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,17 +35,17 @@ class TremorFilterParameters:
 class FilterState(plausibility.PlausibilityState):
     """State record of the tremor filter."""
 
-    origin: Vector3  # reading at which it began [m]
+    origin: Vector3  # reading at which the filter began [m]
     value: Vector3  # last reading, from there
     told: Vector3  # last answer
-    shift: Vector3  # what is left of the difference between old and new parameters
+    shift: Vector3  # remaining step of the output at a change of parameters
     begun: int
     is_retuned: int
     is_other: int
 
 
 class Part(NamedTuple):
-    """The kind's filter, its numbers, and what it remembers of each coordinate (3, 32)."""
+    """The kind's filter, its numbers, and its memory of each coordinate (3, 32)."""
 
     filter: Any
     numbers: Array
@@ -54,7 +54,7 @@ class Part(NamedTuple):
 
 @inner
 def _begin(s: FilterState, memory: Array, pose: Array, filtered: Array) -> None:
-    """Begin anew at a reading: it passes, and nothing of before is remembered."""
+    """Restart at a reading: the reading passes unchanged, and earlier readings are forgotten."""
     s.begun += 1
     s.is_retuned = s.is_other = 0
     for i in range(3):
@@ -65,7 +65,7 @@ def _begin(s: FilterState, memory: Array, pose: Array, filtered: Array) -> None:
 
 @inner
 def _filter(s: FilterState, part: Part, i: int, value: float, elapsed_ns: int) -> float:
-    """Filtered value of a coordinate; a long period is split, on a straight line between values."""
+    """Filtered value of a coordinate; a long period is split, with linear interpolation of the values."""
     pieces = 1 + (elapsed_ns - 1) // LONGEST_NS
     period = 1e-9 * elapsed_ns / pieces
     memory, before = part.memory[i], s.value[i]
@@ -96,7 +96,7 @@ def _fade(s: FilterState, period: float, filtered: Array) -> None:
 
 @inner
 def _follow(s: FilterState, part: Part, pose: Array, elapsed_ns: int, filtered: Array) -> None:
-    """Write the filtered position of a sample that follows another one."""
+    """Write the filtered position of a sample that is not the first."""
     if s.is_other > 0:
         _begin(s, part.memory, pose, filtered)
         s.is_retuned = 1
@@ -110,10 +110,10 @@ def _follow(s: FilterState, part: Part, pose: Array, elapsed_ns: int, filtered: 
 def tremor_filter_step(p: plausibility.PlausibilityNumbers, s: FilterState, part: Part, row: Row, dt: float) -> None:
     """One master sample: write master_filtered_cp and master_filtered_out.
 
-    The position is filtered coordinate by coordinate, over the time between stamps; the orientation passes. A reading
-    that is not finite, or of the same stamp as the last one, changes nothing: what was written stays. The filter begins
-    anew at the first reading, after a pause, where stamps go back, and at a reading that no hand can have made. That
-    passes as it is, so that ``motion_scaling`` judges the same jump. Nothing rings after it.
+    The position is filtered coordinate by coordinate, over the time between stamps; the orientation passes unchanged.
+    A reading that is not finite, or has the stamp of the last one, changes nothing. The filter restarts at the first
+    reading, after a pause, when stamps go back, and at an implausible reading. An implausible reading passes
+    unchanged, so that ``motion_scaling`` judges the same jump. The filter does not ring after it.
 
     Args:
         p: Parameter record.
@@ -132,7 +132,7 @@ def tremor_filter_step(p: plausibility.PlausibilityNumbers, s: FilterState, part
         filtered[i] = pose[i]
     if goes_on:
         _follow(s, part, pose, elapsed_ns, filtered)
-    if not (goes_on and _is_finite(filtered)):  # a filter of one's own may run away
+    if not (goes_on and _is_finite(filtered)):  # a user's filter may diverge
         _begin(s, part.memory, pose, filtered)
     for i in range(3):
         s.told[i] = filtered[i]
@@ -140,7 +140,7 @@ def tremor_filter_step(p: plausibility.PlausibilityNumbers, s: FilterState, part
 
 
 class RunningTremorFilter(RunningStage):
-    """Stage that takes tremor out of the master's pose."""
+    """Stage that removes tremor from the master's position."""
 
     def __init__(self, parameters: TremorFilterParameters, dt: float = DT) -> None:
         super().__init__(TREMOR_FILTER, 0, dt)
@@ -159,7 +159,7 @@ class RunningTremorFilter(RunningStage):
         self._told = 0
 
     def retune(self, parameters: TremorFilterParameters) -> None:
-        """Take new parameters from the next sample on; what differs fades, and nothing jumps."""
+        """Take new parameters from the next sample on; the output does not jump, because the difference fades."""
         plausibility.take_hand(self.parameters, parameters.plausible)
         self.parameters["pause_ns"] = math.floor(parameters.longest_pause * 1e9 + 0.5)
         kind = TREMOR_FILTERS.find(parameters.kind.kind)
@@ -174,7 +174,7 @@ class RunningTremorFilter(RunningStage):
         self.state["is_retuned"] = self.state["is_other"] = 1
 
     def concerns(self) -> list[str]:
-        """Readings that no hand can have made, in words."""
+        """Implausible readings, in words."""
         count, told = int(self.state["implausible"]), self._told
         self._told = count
         if count <= told:

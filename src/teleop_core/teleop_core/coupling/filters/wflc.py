@@ -9,20 +9,20 @@ from teleop_core.kernels import Array, inner, kernel
 
 _SECOND, _THIRD = sections.WIDTH, 2 * sections.WIDTH
 _PHASE, RATE, _HEARD, _SUBTRACTED = range(3 * sections.WIDTH, 3 * sections.WIDTH + 8, 2)
-"""Places in the memory behind three sections: phase [rad]; by how much the rate is
-above the one at the beginning [rad/s]; weights of sine and cosine [m] of the first combiner, which
-finds the rate, and of the second, which is subtracted."""
+"""Indices in the memory, after three sections: phase [rad]; rate minus initial rate [rad/s]; weights of sine and
+cosine [m] of the first combiner, which finds the rate, and of the second, which is subtracted.
+"""
 _REACH = 2.0 * math.pi * 2.0
-"""By how much the learned rate may differ from the one at the beginning [rad/s]: 8 to 12 Hz."""
+"""Largest difference of the learned rate from the initial rate [rad/s]: 8 to 12 Hz."""
 _FAINT = 5e-6
-"""Amplitude below which a tremor says little of its frequency [m]."""
+"""Amplitude below which the frequency of a tremor can hardly be estimated [m]."""
 _DAMPING, _WIDE = math.sqrt(2.0), 0.6
-"""Of the high-pass, Butterworth, and of the band-passes: their width over their frequency."""
+"""Damping of the high-pass (Butterworth); width of the band-passes, divided by their frequency."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class WflcParameters:
-    """How the tremor is told from what is meant, and how fast it is learned."""
+    """How the tremor is separated from the intended motion, and how fast it is learned."""
 
     frequency: float = parameter(10.0, Within(6.0, 14.0, "Hz"), "of the tremor, at the beginning")
     high_pass: float = parameter(
@@ -52,16 +52,16 @@ def _band_pass(memory: Array, at: int, value: float, slope: float) -> float:
 def wflc_filter(numbers: Array, memory: Array, value: float, period: float) -> float:
     """Value without the sine that has been learned.
 
-    Two combiners learn the weights of the same sine by least mean squares. The second one hears the value behind a
-    high-pass and is subtracted. The first one hears it behind two band-passes more, so that hardly any meant motion is
-    left, and finds the rate: by its error times the sine's derivative, here over the squared amplitude, so that large
-    and small tremors are learned alike. The high-pass turns the tremor's phase and takes from its amplitude; at the
-    learned rate both are known, and what is subtracted is the sine before the pass.
+    Two combiners learn the weights of the same sine by least mean squares. The second combiner gets the value after a
+    high-pass; its sine is subtracted. The first combiner gets the value after two more band-passes, which leave hardly
+    any intended motion, and finds the rate. It uses its error times the sine's derivative, here divided by the squared
+    amplitude, so that large and small tremors are learned equally fast. The high-pass changes the tremor's phase and
+    amplitude. At the learned rate both changes are known, so the sine before the high-pass is subtracted.
 
     Source:
-        Riviere, Rader and Thakor 1998 (IEEE Trans. Biomed. Eng. 45, 7): the weighted-frequency
-        combiner behind a band-pass, of one harmonic, and a second one with its rate. There the
-        second one hears everything; the high-pass and what makes up for it are ours.
+        Riviere, Rader and Thakor 1998 (IEEE Trans. Biomed. Eng. 45, 7): the weighted-frequency combiner behind a
+        band-pass, of one harmonic, and a second one with its rate. There the second combiner gets the unfiltered
+        value; the high-pass and its correction are ours.
     """
     corner = math.tan(math.pi * numbers[1] * period)
     sections.advance_section(memory, 0, value, corner, _DAMPING)

@@ -1,8 +1,8 @@
-"""Following: whether the slave follows the hand, and what is sent where it does not.
+"""Following: whether the slave follows the hand, and what is sent while it does not.
 
-What is heard of the slave may be old, as by way of a network: a slave follows as long as the stamps of what it has in
-force rise. Where they do no longer, the last command is held for as long as an answer takes, for it may be followed
-still; then the slave goes its own way, and the command is where it is.
+Values from the slave may be old because of a network. The slave counts as following while the stamps of its commands
+in force increase. When they stop, the last command is held for the time of an answer, because it may still be
+followed. After that the slave counts as moving by itself, and the command is set to the slave's position.
 """
 
 from teleop_core.graph import Row, topics
@@ -10,30 +10,30 @@ from teleop_core.kernels import Fields, inner
 
 
 class FollowingNumbers(Fields):
-    """Fields of a parameter record with how long is waited."""
+    """Fields of a parameter record with waiting times."""
 
     timeout_ns: int
     pause_ns: int
 
 
 class FollowingState(Fields):
-    """Fields of a state record with what was heard of the slave."""
+    """Fields of a state record with the last values from the slave."""
 
     last_ns: int  # stamp of the last command
     is_engaged: int
     in_force_ns: int  # stamp in force
     rose_ns: int  # when it rose last
-    lag_ns: int  # how far behind the last command it was then
+    lag_ns: int  # how far the setpoint was behind the last command at that time
     lost_ns: int  # since when the slave does not follow
     felt_ns: int  # stamp of its force
     felt_at_ns: int  # when that rose last
-    seen_ns: int  # stamp of where it was measured
+    seen_ns: int  # stamp of the measured pose
     seen_at_ns: int  # when that rose last
 
 
 @inner
 def hear(s: FollowingState, row: Row) -> None:
-    """Note when the slave was heard last, of a sample that has come.
+    """Record when values from the slave last came.
 
     Args:
         s: State; written.
@@ -41,7 +41,7 @@ def hear(s: FollowingState, row: Row) -> None:
     """
     now_ns, stamp_ns = row.master_measured_cp_ns, row.slave_setpoint_cp_ns
     if stamp_ns > s.in_force_ns > topics.NO_COMMAND_NS:
-        # Against the last command: a pause of the master is no lag of the slave.
+        # Compared with the last command, so that a pause of the master does not count as a lag of the slave.
         s.rose_ns, s.lag_ns = now_ns, s.last_ns - stamp_ns
     if row.slave_measured_cf_ns > s.felt_ns:
         s.felt_at_ns = now_ns
@@ -52,13 +52,13 @@ def hear(s: FollowingState, row: Row) -> None:
 
 @inner
 def is_felt(p: FollowingNumbers, s: FollowingState, row: Row) -> bool:
-    """Whether the slave's force was heard of lately; one that does not change is sent seldom."""
+    """Whether a force of the slave came recently; a constant force is sent rarely."""
     return bool(row.master_measured_cp_ns - s.felt_at_ns <= p.timeout_ns + topics.SELDOM_NS)
 
 
 @inner
 def is_seen(p: FollowingNumbers, s: FollowingState, row: Row) -> bool:
-    """Whether it was heard lately where the slave is."""
+    """Whether a measured pose of the slave came recently."""
     return bool(row.master_measured_cp_ns - s.seen_at_ns <= p.timeout_ns)
 
 
@@ -66,7 +66,7 @@ def is_seen(p: FollowingNumbers, s: FollowingState, row: Row) -> bool:
 def follows(p: FollowingNumbers, s: FollowingState, row: Row) -> bool:
     """Whether the slave had the last command in force, or newer ones keep coming into force.
 
-    It does not after a pause of the master.
+    After a pause of the master the slave does not follow.
     """
     pause_ns = row.master_measured_cp_ns - s.last_ns
     is_known = row.slave_setpoint_cp_ns > topics.NO_COMMAND_NS and s.last_ns != 0
@@ -76,7 +76,7 @@ def follows(p: FollowingNumbers, s: FollowingState, row: Row) -> bool:
 
 @inner
 def is_in_doubt(p: FollowingNumbers, s: FollowingState, is_following: bool, row: Row) -> bool:
-    """Whether the place of a slave that does not follow is unknown: it is far away, or silent."""
+    """Whether the position of a slave that does not follow is unknown, because its values are delayed or missing."""
     now_ns = row.master_measured_cp_ns
     if is_following:
         s.lost_ns = 0

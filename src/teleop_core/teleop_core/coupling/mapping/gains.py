@@ -22,7 +22,7 @@ MODES = ("coarse", "fine")
 
 @dataclass(frozen=True, kw_only=True)
 class FixtureParameters:
-    """What the fixture button puts around the hand."""
+    """The fixture that the fixture button puts around the hand."""
 
     kind: Choice = choice(SHAPES, "box", doc="shape of the fixture")
     place: tuple[float, ...] = parameter(
@@ -67,12 +67,12 @@ class FixtureParameters:
 
     @property
     def pushes(self) -> bool:
-        """Whether the hand can feel it."""
+        """Whether the hand can feel the fixture."""
         return self.side != "slave" and self.max_force > 0.0
 
     @cached_property
     def made(self) -> Fixture:
-        """The fixture; that of a shape from a file is checked when it is used first."""
+        """The fixture; a shape from a file is checked at its first use."""
         shape = SHAPES.find(self.kind.kind)
         return Fixture(shape, self.kind.parameters, self.place, self.keep_out)
 
@@ -83,7 +83,7 @@ class FixtureParameters:
 
 @dataclass(frozen=True, kw_only=True)
 class ReachForceParameters:
-    """The push that the hand feels where the slave cannot follow."""
+    """The push on the hand when the slave cannot follow because of a limit."""
 
     is_on: bool = parameter(True, doc="whether the hand feels the slave's limits as a wall")
     stiffness: float = parameter(

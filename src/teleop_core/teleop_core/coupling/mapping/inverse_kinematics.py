@@ -44,7 +44,7 @@ class SolverNumbers(Fields):
     speed: PerJoint  # rated [rad/s or m/s]
     longest_ns: int
     timeout_ns: int
-    tolerance: Annotated[Array, 2]  # of place and turn [m, rad]
+    tolerance: Annotated[Array, 2]  # of position and rotation [m, rad]
 
 
 class SolverState(Fields):
@@ -58,7 +58,7 @@ class SolverState(Fields):
 
 
 class Solver(NamedTuple):
-    """Solver of one robot with room to work in: plain arrays, which robot kernels take."""
+    """Solver of one robot with scratch arrays: plain arrays for robot kernels."""
 
     fk: Any
     ik: Any
@@ -68,8 +68,8 @@ class Solver(NamedTuple):
     reached: Array
     seed: Array  # the last answer (n,)
     q: Array
-    free: Array  # the answer if there were time enough
-    before: Array  # the slave's setpoint at the last command, as long as none is in force
+    free: Array  # the answer without a time limit
+    before: Array  # the slave's setpoint at the last command, while no command is in force
     residual: Array
 
 
@@ -77,14 +77,15 @@ _STATUS, _LIMIT, _JOINT, _RESIDUAL, _CUT = 0, 1, 2, 3, 5
 _NONE, _AT_JOINT, _BEYOND = int(topics.Limit.NONE), int(topics.Limit.JOINT), int(topics.Limit.WORKSPACE)
 _SINGULAR, _SLOW = int(topics.Limit.SINGULARITY), int(topics.Limit.SPEED)
 _FOLLOWED, _NEAR_SINGULAR = int(IkStatus.FOLLOWED), int(IkStatus.NEAR_SINGULAR)
-# A step [rad or m] that no speed limit is: a path still, but one that has all the time it needs.
+# A step [rad or m] so large that it never limits the speed; the path is followed without a time limit.
 _ANY_STEP = 1e6
-# Full speed for this long [s] is what a command may ask for that comes alone, or first: the slave
-# takes half a second of it for one motion, and goes all the way.
+# A single or first command may be as far away as full speed reaches in this time [s]. The slave accepts half a second
+# of it as one motion, and goes the whole distance.
 _ALONE = 0.45
-# A way of joints is long for a tremor [s at full speed]: a prismatic joint goes a millimetre in it.
+# A joint motion longer than this is too long for a tremor [s at full speed]; a prismatic joint moves a millimetre in
+# it.
 _FAR = 0.02
-# A joint this close to its limit [rad or m] is at it.
+# A joint this close to its limit [rad or m] counts as at the limit.
 _AT = 1e-9
 
 
@@ -95,7 +96,7 @@ def _is_reached(status: int) -> bool:
 
 @inner
 def _joint_at_limit(q: Array, limits: Array) -> int:
-    """First joint at an end of its range; -1 if none is."""
+    """First joint at a joint limit; -1 if there is none."""
     for i in range(q.shape[0]):
         if q[i] <= limits[0, i] + _AT or q[i] >= limits[1, i] - _AT:
             return i
@@ -104,10 +105,10 @@ def _joint_at_limit(q: Array, limits: Array) -> int:
 
 @inner
 def _explain(p: SolverNumbers, solver: Solver, reach: Array) -> None:
-    """Write why the arm falls short, and by what the command lies beyond its reach.
+    """Write why the arm does not reach the command, and by how much the command is out of reach.
 
-    The pose is solved again as if there were time enough. If that reaches it, the arm only lags,
-    which is told where it does by more than the tolerance.
+    The pose is solved again without a time limit. If this solution reaches the command, the arm only lags. A lag is
+    reported if it exceeds the tolerance.
     """
     T, q, free, limits = solver.T, solver.q, solver.free, solver.limits
     copy(q, free)
@@ -135,7 +136,7 @@ def _explain(p: SolverNumbers, solver: Solver, reach: Array) -> None:
 
 @inner
 def _has_own_way(s: SolverState, solver: Solver, row: Row, timeout_ns: int) -> bool:
-    """Whether the slave does not follow: its setpoint is an old one, or moves by itself."""
+    """Whether the slave does not follow: its setpoint is old, or moves by itself."""
     if row.slave_setpoint_js_ns > topics.NO_COMMAND_NS:
         return bool(s.last_ns - row.slave_setpoint_js_ns > timeout_ns)
     moves = False
@@ -156,10 +157,10 @@ def _goes_far(p: SolverNumbers, solver: Solver) -> bool:
 
 @inner
 def _solve(p: SolverNumbers, solver: Solver, time: float, is_alone: bool) -> int:
-    """Write the answer within ``time`` [s] of full speed, or all the way to a command alone.
+    """Write the answer within ``time`` [s] of full speed; for a single command, write the whole motion.
 
-    Next to a singularity a tremor of the first command would turn joints far for nothing, so joints move far only if
-    the pose is otherwise outside the tolerances.
+    Next to a singularity a tremor of the first command would cause large useless joint motions. So joints move far
+    only if the pose would otherwise be outside the tolerances.
     """
     longest = _ALONE if is_alone else time
     status = -1
@@ -181,10 +182,10 @@ def _solve(p: SolverNumbers, solver: Solver, time: float, is_alone: bool) -> int
 def inverse_kinematics_step(p: SolverNumbers, s: SolverState, solver: Solver, row: Row, dt: float) -> None:
     """One slave pose: write slave_servo_jp and slave_reach.
 
-    The answer is the neighbour of the last one; while the slave does not follow, of the slave's
-    own setpoint, so that a restart never asks for another branch. Joints move as far as their
-    speed allows in the time since the last command, whatever the rate of commands; a command that
-    comes alone is answered with all of its way, which the slave goes at its own limits.
+    The answer is the solution nearest to the last answer. While the slave does not follow, it is the solution nearest
+    to the slave's own setpoint, so that a restart never changes the branch. Joints move as far as their speed allows
+    in the time since the last command, at any rate of commands. The answer to a single command is the whole motion,
+    which the slave makes within its own limits.
     """
     T, seed, q = solver.T, solver.seed, solver.q
     elapsed_ns = row.slave_servo_cp_ns - s.last_ns
@@ -214,7 +215,7 @@ def inverse_kinematics_step(p: SolverNumbers, s: SolverState, solver: Solver, ro
 
 
 class InverseKinematics(RunningStage):
-    """Stage that turns slave poses into joint references; ``slave_reach`` tells how it went."""
+    """Stage that turns slave poses into joint references; ``slave_reach`` contains the result."""
 
     def __init__(self, parameters: InverseKinematicsParameters, dt: float = DT) -> None:
         self.robot = load_robot_set(parameters.robot, parameters.geometry)
@@ -232,13 +233,13 @@ class InverseKinematics(RunningStage):
         self.reset()
 
     def reset(self) -> None:
-        """Start from where the slave is, as the first pose finds it."""
+        """Start at the next pose from the slave's position at that time."""
         self._solver.seed[:] = self.robot.home
         assign(self.state, 0)
         self._told = 0, 0
 
     def concerns(self) -> list[str]:
-        """What kept the slave from following since this was last asked, in words."""
+        """What kept the slave from following since the last call, in words."""
         asked, limited = int(self.state["asked"]), int(self.state["limited"])
         share = (limited - self._told[1]) / max(asked - self._told[0], 1)
         self._told = asked, limited

@@ -1,6 +1,6 @@
-"""Jaw command: the angle between the fingers of the jaw that the master's side asks for.
+"""Jaw command: the jaw angle that the master's side commands.
 
-It comes from the hand itself, as far as that closes its handle, or from a button of the stylus.
+It is set by how far the hand closes its handle, or by a button of the stylus.
 """
 
 from dataclasses import dataclass

@@ -1,8 +1,8 @@
-"""Limits: how a command that the arm cannot follow is drawn back, without wind-up.
+"""Limits: a command that the arm cannot follow is drawn back, without wind-up.
 
-The command is drawn back to where the arm can be, so that it moves at once when the hand turns
-back. How far the hand stands against the limit is measured from where it met it, up to a bound
-beyond which the limit is dragged along; that is what the hand feels and what the state tells.
+The command is drawn back to a pose that the arm can reach, so that it moves immediately when the hand turns back. The
+depth of the hand beyond the limit is measured from the point where it met the limit. Beyond a bound the limit is
+dragged along with the hand. The hand feels this depth, and the state reports it.
 """
 
 import math
@@ -13,11 +13,11 @@ from teleop_core.kernels import Fields, PoseRow, Quaternion, Vector3, geometry, 
 from teleop_core.kernels.room import room
 
 SENT = 8192
-"""Commands that are remembered until the answer comes how far they could be followed."""
+"""Number of commands that are stored until the answer comes that tells how far they could be followed."""
 
 
 class Sent(Fields):
-    """What was cut off all commands before one that was sent."""
+    """Sum of what was cut off all commands before a sent command."""
 
     stamp_ns: int
     moved: Vector3
@@ -27,8 +27,8 @@ class Sent(Fields):
 class LimitState(Fields):
     """Fields of a state record with the limit that hand and slave meet.
 
-    Places [m] are in the slave's axes, turns [rad] in those of the tool. The hand stands against
-    the limit while a depth is positive.
+    Positions [m] are in the slave's axes, rotations [rad] in those of the tool. The hand is beyond the limit while a
+    depth is positive.
     """
 
     command: PoseRow
@@ -37,7 +37,7 @@ class LimitState(Fields):
     alignment: Quaternion
     moved: Vector3  # what was cut off all commands so far
     turned: Quaternion
-    answered_ns: int  # which of them was answered last
+    answered_ns: int  # index of the command that was answered last
     sent: int  # how many there were
     limit: int
     joint: int
@@ -48,32 +48,32 @@ class LimitState(Fields):
     turn_anchor: Quaternion
     turn_out: Vector3
     turn_depth: float
-    met: float  # depths when something was cut off last: who gets farther out has left the limit
+    met: float  # depths at the last cut; a hand farther out than that has left the limit
     turn_met: float
 
 
 _LIMIT, _JOINT, _CUT = (topics.SLAVE_REACH.columns.index(name) for name in ("limit", "joint", "cut_x"))
 _NONE, _AT_JOINT, _BEYOND = int(topics.Limit.NONE), int(topics.Limit.JOINT), int(topics.Limit.WORKSPACE)
-# A limit is told for this long after the last command that met it [ns].
+# A limit is reported for this long after the last command that met it [ns].
 _TOLD_NS = 100_000_000
-# A turn beyond a limit counts up to this [rad].
+# A rotation beyond a limit counts up to this value [rad].
 _MOST_TURN = 0.05
-# So much farther out than where something was cut off last, the limit is left [m, rad].
+# The limit is left at this distance beyond the point of the last cut [m, rad].
 _PAST, _TURN_PAST = 2e-4, 5e-3
-# What is cut off by less is rounding [m or rad].
+# A cut smaller than this is rounding [m or rad].
 _ROUNDING = 1e-9
 
 
 @inner
 def forget_limits(s: LimitState) -> None:
-    """Stand against no limit, as when the hand lets go of the slave."""
+    """Forget all limits, as when the hand lets go of the slave."""
     s.limit, s.joint, s.until_ns = _NONE, -1, 0
     s.depth = s.turn_depth = 0.0
 
 
 @inner
 def remember(s: LimitState, sent: Sequence[Sent], stamp_ns: int) -> None:
-    """Note how far a command that is sent now is drawn back already."""
+    """Store how far the command that is sent now is already drawn back."""
     entry = sent[s.sent % len(sent)]
     entry.stamp_ns = stamp_ns
     for i in range(3):
@@ -85,7 +85,7 @@ def remember(s: LimitState, sent: Sequence[Sent], stamp_ns: int) -> None:
 
 @inner
 def _found(s: LimitState, sent: Sequence[Sent], stamp_ns: int) -> int:
-    """Place of the command with a stamp; -1 if it is too old to be known."""
+    """Index of the command with a stamp; -1 if the command is too old to be stored."""
     count = len(sent)
     for back in range(1, min(count, s.sent) + 1):
         at = (s.sent - back) % count
@@ -96,9 +96,9 @@ def _found(s: LimitState, sent: Sequence[Sent], stamp_ns: int) -> int:
 
 @inner
 def draw_back(s: LimitState, sent: Sequence[Sent], gain: float, row: Row) -> None:
-    """Take the answer to an earlier command: draw the present command back as far as that one was cut.
+    """Take the answer to an earlier command: draw the present command back by the cut of the earlier one.
 
-    What was cut off since that command was sent is not cut twice.
+    What was already cut off since the earlier command was sent is not cut again.
 
     Args:
         s: State record with ``command`` (7,), ``hand`` (3,) [m] in the slave's axes and ``tool``
@@ -169,7 +169,7 @@ def _turn_back(s: LimitState, entry: Sent, reach: geometry.Array) -> None:
 
 @inner
 def align(s: LimitState) -> None:
-    """Let the hand's present orientation mean that of the command."""
+    """Align: the hand's present orientation now corresponds to that of the command."""
     inverse = room(4)
     geometry.invert_quaternion(s.tool, inverse)
     geometry.multiply_quaternions(s.command[3:7], inverse, s.alignment)
@@ -177,7 +177,7 @@ def align(s: LimitState) -> None:
 
 @inner
 def _anchor_turn(s: LimitState) -> None:
-    """Put the anchor where the hand's orientation is, less the depth."""
+    """Put the anchor at the hand's orientation, minus the depth."""
     x, y, z = s.turn_out[0], s.turn_out[1], s.turn_out[2]
     back = -s.turn_depth
     geometry.rotate_by_vector(s.tool, back * x, back * y, back * z, s.turn_anchor)
@@ -185,7 +185,7 @@ def _anchor_turn(s: LimitState) -> None:
 
 @inner
 def measure_depth(s: LimitState, most: float, now_ns: int) -> None:
-    """Measure how far the hand stands against the limit now; beyond it no limit is told.
+    """Measure how far the hand is now beyond the limit; a hand that has left the limit reports none.
 
     Args:
         s: State record.

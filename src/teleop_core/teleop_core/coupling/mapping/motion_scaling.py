@@ -57,23 +57,23 @@ class ScalingState(
     must_latch: int
     is_fixture_on: int
     stylus: Vector3
-    has_led: int  # the last sample led the slave
-    aligned: int  # how often it was led and then aligned anew
+    has_led: int  # whether the last sample moved the slave
+    aligned: int  # how often following and alignment began anew
 
 
 _FOLLOWING, _CLUTCHED = STATE["is_following"], STATE["is_clutched"]
 _FINE, _GAIN, _FIXTURE = STATE["is_fine"], STATE["gain"], STATE["is_fixture_on"]
 _CENTER, _SIZE = STATE["fixture_center_x"], STATE["fixture_size_x"]
 _LIMIT, _JOINT = STATE["limit"], STATE["limited_joint"]
-# Depth [m] up to which the hand's stand against a limit is measured, where no force is felt.
+# Depth [m] up to which the hand's depth beyond a limit is measured if no force is felt.
 _SHALLOW = 2e-3
-# Period [s] that the first sample is taken to have.
+# Assumed period of the first sample [s].
 _LONG = 1e-3
 
 
 @kernel
 def to_slave_axes(p: ScalingNumbers, master: Array, slave: Array) -> None:
-    """Write a vector (3,) of the master's base in the slave's axes."""
+    """Rotate a vector (3,) from the master's base to the slave's axes, and write it into ``slave``."""
     x, y, z = (p.sign[0] * master[p.axis[0]], p.sign[1] * master[p.axis[1]], p.sign[2] * master[p.axis[2]])
     slave[0], slave[1], slave[2] = x, y, z
 
@@ -87,7 +87,7 @@ def mapped_orientation(p: ScalingNumbers, stylus: Array, tool: Array) -> None:
 
 @inner
 def _take_tool(p: ScalingNumbers, s: ScalingState, pose: Array, turn: Array) -> None:
-    """Take the orientation that the hand asks for, and, if only a share of it counts, its turn."""
+    """Store the orientation that the hand commands and, if only a share of it counts, its rotation."""
     if p.rotation_gain == 1.0:
         mapped_orientation(p, pose[3:7], s.tool)
         return
@@ -107,7 +107,7 @@ def _toggle_mode(s: ScalingState, buttons: Array) -> None:
 
 @inner
 def _toggle_fixture(s: ScalingState, buttons: Array, position: Array) -> None:
-    """Put the fixture around the present position, or take it away, at the rising edge."""
+    """Put the fixture around the present position, or remove it, at the rising edge of its button."""
     if buttons[1] > s.buttons[1]:
         s.is_fixture_on = 1 - s.is_fixture_on
         for i in range(3):
@@ -116,9 +116,9 @@ def _toggle_fixture(s: ScalingState, buttons: Array, position: Array) -> None:
 
 @inner
 def _latch(s: ScalingState, stylus: Array) -> None:
-    """Hold the command and measure further motion from here: no step, whatever happened before.
+    """Hold the command and measure further motion from the present pose; this never causes a step.
 
-    The fixture goes with the hand, so that it stays where it is around the slave.
+    The fixture moves with the hand, so that it does not move relative to the slave.
     """
     if s.is_engaged:
         for i in range(3):
@@ -129,7 +129,7 @@ def _latch(s: ScalingState, stylus: Array) -> None:
 
 @inner
 def _move(p: ScalingNumbers, s: ScalingState, fixture: Held, gain: float, position: Array, turn: Array) -> None:
-    """Add the scaled step of the hand to the command; turn the tool as the stylus."""
+    """Add the scaled step of the hand to the command; rotate the tool like the stylus."""
     step = room(3)
     for i in range(3):
         step[i] = position[i] - s.master[i]
@@ -182,7 +182,7 @@ def _push_back(p: ScalingNumbers, s: ScalingState, force: Array) -> None:
 
 @inner
 def _report(p: ScalingNumbers, s: ScalingState, gain: float, is_following: bool, row: Row) -> None:
-    """Write teleop_state; the fixture in the slave's base, where it holds the slave in."""
+    """Write teleop_state; the fixture is given in the slave's base, where it confines the slave."""
     state = row.teleop_state
     state[_FOLLOWING] = 1.0 if is_following else 0.0
     state[_CLUTCHED], state[_FINE] = s.buttons[0], s.is_fine
@@ -211,7 +211,7 @@ def _refuse(
     stylus: Array,
     row: Row,
 ) -> None:
-    """Answer a sample that no hand can have made: hold, push with nothing, begin anew after it."""
+    """Answer an implausible sample: hold the command, write no force, and begin anew after it."""
     s.must_latch = 1
     limits.remember(s, sent, row.master_measured_cp_ns)
     walls.forget_wall(s, stylus)
@@ -242,12 +242,12 @@ def motion_scaling_step(
         row: Signals.
         dt: Tick [s].
 
-    Position is incremental (X_S += gain X_P), so a change of gain alone moves nothing; orientation follows the stylus
-    absolutely, up to an alignment that is latched whenever the slave is engaged anew. While clutched the command is
-    held; while the slave does not follow it is the slave's own setpoint. What the arm cannot reach is cut off, and
-    motion goes on from there: see :mod:`teleop_core.coupling.mapping.limits`. The slave is led by the pose, which a
-    tremor filter may have made late; what pushes the hand goes by the stylus, tremor and all. A fixture that holds the
-    slave cuts the steps of the command: see :mod:`teleop_core.coupling.mapping.side`.
+    Position is incremental (X_S += gain X_P), so a change of gain alone causes no motion. Orientation follows the
+    stylus absolutely, up to an alignment that is latched whenever the slave is engaged anew. While clutched the
+    command is held. While the slave does not follow, the command is the slave's own setpoint. A command out of reach
+    is cut, and motion continues from there: see :mod:`teleop_core.coupling.mapping.limits`. The slave follows the
+    pose, which a tremor filter may have delayed. Forces on the hand use the unfiltered stylus. A fixture that confines
+    the slave shortens the steps of the command: see :mod:`teleop_core.coupling.mapping.side`.
 
     Source:
         Vongbunyong 2008, sections 6.2-6.3.
@@ -322,7 +322,7 @@ class MotionScaling(RunningStage):
         s["command"][3] = s["alignment"][0] = s["tool"][0] = s["turned"][0] = 1.0
 
     def retune(self, parameters: gains.MotionScalingParameters) -> None:
-        """Take new parameters from the next sample on; nothing moves. A new mode is switched to."""
+        """Take new parameters from the next sample on, without any motion. A new mode takes effect."""
         p, fixture = self.parameters, parameters.fixture
         p["gain"] = parameters.coarse_gain, parameters.fine_gain
         axes = axis_map("axes", parameters.axes)
@@ -348,7 +348,7 @@ class MotionScaling(RunningStage):
         self._values = parameters
 
     def present(self) -> gains.MotionScalingParameters:
-        """Parameters as they are now: the mode button changes the mode."""
+        """Present parameters; the mode button may have changed the mode."""
         mode = gains.MODES[int(self.state["is_fine"])]
         if mode != self._values.mode:
             self._values = replace(self._values, mode=mode)
@@ -393,7 +393,7 @@ class MotionScaling(RunningStage):
             law.numbers[:], law.kept[:] = numbers, kept  # the tick that is composed already goes on
             return
         if part.push_pointer is not law.push:
-            # what is new sets in from nothing
+            # a new force starts from zero
             self.state["heard"] = self.state["seen"] = self.state["push"] = 0.0
         self._law = make_law(part, numbers, passivity, kept)
         self._compose_anew()
@@ -403,11 +403,11 @@ class MotionScaling(RunningStage):
         self._bound = None
 
     def fall_silent(self) -> None:
-        """Report that nothing is followed, because no sample came for long."""
+        """Report that the slave follows no hand, because no sample came for a long time."""
         self.signals["teleop_state"][_FOLLOWING] = 0.0
 
     def concerns(self) -> list[str]:
-        """Samples that no hand can have made, and buttons that fell silent, in words."""
+        """Implausible samples, and buttons that fell silent, in words."""
         found, told = [], self._told
         count, aligned = self._told = int(self.state["implausible"]), int(self.state["aligned"])
         if count > told[0]:
@@ -423,7 +423,7 @@ class MotionScaling(RunningStage):
         return found
 
     def described(self) -> dict[str, str]:
-        """Kind and numbers of the fixture, as teleop/state reports them beside its columns."""
+        """Kind and numbers of the fixture, which teleop/state reports in addition to its columns."""
         return self._values.fixture.made.described()
 
 

@@ -1,9 +1,8 @@
-"""Plausibility: samples that no hand can have made move nothing.
+"""Plausibility: samples that no hand can have made do not move the slave.
 
-A sample is measured against the one before. What is too fast, too sudden or too far away holds the
-command, as a pressed clutch does, and so does a way in a gap of the samples that is long for their
-stream; from the next plausible sample on the hand is followed again,
-from where it is then. So a teleport moves nothing, and neither do random poses.
+Each sample is compared with the previous one. A sample that is too fast, too sudden or too far away holds the command,
+as a pressed clutch does. So does motion during an unusually long gap in the stream. From the next plausible sample on
+the slave follows again, relative to the hand's pose at that time. So neither jumps nor random poses move the slave.
 """
 
 import math
@@ -58,7 +57,7 @@ class PlausibilityNumbers(Fields):
     hand_turn: float  # [rad/s]
     hand_reach: float  # [m]
     silence_ns: int  # of buttons
-    pause_ns: int  # after which anything is plausible
+    pause_ns: int  # pause after which any sample is plausible
 
 
 class PlausibilityState(Fields):
@@ -75,10 +74,10 @@ class PlausibilityState(Fields):
     buttons_ns: int
 
 
-# Samples that come faster than this [s] are taken to be so far apart: stamps may be uneven.
+# Samples closer together than this [s] count as this far apart, because stamps may be uneven.
 _SHORTEST = 1e-3
-# In a gap of the samples nobody sees whether a hand moves or jumps: it is given no more way than
-# its limit allows in this time [s], or in two periods of a slower stream.
+# In a gap of the samples, a motion cannot be told from a jump. So the hand may move no farther than its speed limit
+# allows in this time [s], or in two periods of a slower stream.
 _GAP = 20e-3
 # So many messages no farther apart than this are a stream [ns]. A pause takes so many away from at
 # most twice as many: the one in which the poses were silent too leaves a stream one, two do not.
@@ -93,7 +92,7 @@ def take_hand(p: PlausibilityNumbers, hand: HandLimits) -> None:
 
 @inner
 def is_plausible(p: PlausibilityNumbers, s: PlausibilityState, pose: Array, stamp_ns: int) -> bool:
-    """Whether a hand can have come from the last sample to this one; counts those that cannot.
+    """Whether a hand can have moved from the last sample to this one; counts implausible samples.
 
     Args:
         p: Parameters.
@@ -142,7 +141,7 @@ def _turn(before: Array, after: Array) -> float:
 def has_lost_buttons(p: PlausibilityNumbers, s: PlausibilityState, row: Row) -> bool:
     """Whether the buttons came as a stream and are silent now, so that the state of the clutch is unknown.
 
-    Masters that send them where they change only have no stream of them.
+    Masters that send buttons only at a change have no stream of them.
     """
     stamp_ns = row.master_buttons_ns
     if stamp_ns != s.buttons_ns:

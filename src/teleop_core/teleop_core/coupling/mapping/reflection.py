@@ -1,4 +1,4 @@
-"""Reflection: what the hand feels of the slave, and what its passivity leaves of that."""
+"""Reflection: the force that the hand feels from the slave, as limited by passivity."""
 
 import math
 from typing import Annotated, Any, NamedTuple
@@ -28,38 +28,38 @@ from teleop_core.kernels import Array, Integers, PoseRow, Vector3, inner
 
 
 class ReflectionNumbers(FollowingNumbers):
-    """Fields of a parameter record with what comes back."""
+    """Fields of a parameter record with the force reflection."""
 
     is_reflected: int
     reflected_most: float  # [N]
     law: float  # kind of passivity
-    force_scale: float  # force at the hand over that on the tip
-    lead_gain: float  # force that leads the slave over that of the hand
-    gain: Annotated[Array, 2]  # motion of the slave over the hand's: coarse, fine
+    force_scale: float  # force at the hand, divided by that on the tip
+    lead_gain: float  # force that moves the slave, divided by that of the hand
+    gain: Annotated[Array, 2]  # motion of the slave, divided by the hand's: coarse, fine
     axis: Annotated[Integers, 3]  # axes of master and slave
     sign: Vector3
 
 
 class ReflectionState(FollowingState):
-    """Fields of a state record with what the hand feels."""
+    """Fields of a state record with the forces on the hand."""
 
     heard: float  # share of the force that counts
     seen: float  # share of the slave's place that counts
     push: Vector3  # the last one [N]
     pushed_at: Vector3  # where it began [m]
-    scale: float  # the hand's energy over the slave's
-    command: PoseRow  # where the hand leads the slave
+    scale: float  # the hand's energy, divided by the slave's
+    command: PoseRow  # position to which the hand moves the slave
     led_from: PoseRow  # the same before
     is_fine: int
 
 
-# Time [s] over which what comes from afar sets in, or fades where nothing comes any more.
+# Time [s] over which the slave's force fades in, or fades out when no values arrive.
 _FADE = 0.1
 _ROUNDING = 1.0 + 1e-12
 
 
 class Law(NamedTuple):
-    """Architecture and passivity: kernels, numbers, memory, what they get and what they write."""
+    """Architecture and passivity: kernels, numbers, memory, inputs and outputs."""
 
     push: Any
     numbers: Array
@@ -77,7 +77,7 @@ class Law(NamedTuple):
     flow: Array
     heard: Array  # energies of the slave, its wave along the master's base
     port: Array
-    wall: Array  # force of fixture and limits since the sample before [N]
+    wall: Array  # force of fixture and limits since the last sample [N]
     walls: Array  # its energies
 
     def clear(self) -> None:
@@ -103,15 +103,15 @@ def make_law(part: Architecture, numbers: Array, passivity: Passivity, kept: Arr
 def reflect(
     p: ReflectionNumbers, s: ReflectionState, law: Law, is_following: bool, period: float, stylus: Array, row: Row
 ) -> None:
-    """Add to the hand's force (3,) [N] what it feels of the slave. The force of a silent slave fades.
+    """Add the reflected force of the slave (3,) [N] to the hand's force. The force of a silent slave fades.
 
     Args:
         p: Parameters.
         s: State; written.
-        law: What comes back, and how; written.
-        is_following: Whether the slave is led by the hand; where it goes its own way is not felt.
-        period: Since the sample before [s].
-        stylus: Where the tip of the stylus is (3,) [m].
+        law: Architecture and passivity; written.
+        is_following: Whether the slave follows the hand; motions that the slave makes by itself are not felt.
+        period: Time since the last sample [s].
+        stylus: Position of the tip of the stylus (3,) [m].
         row: Signals.
     """
     if p.is_reflected == 0:
@@ -139,10 +139,10 @@ def reflect(
 
 @inner
 def _hold_wall(law: Law, force: Array) -> None:
-    """Limit the force (3,) of fixture and limits to what the energy that they absorbed pays for.
+    """Limit the force (3,) of fixture and limits so that they return no more energy than they absorbed.
 
-    With passivity a wall gives back no more energy than it took, however stiff it is. Its energy is counted apart, so
-    that reflection cannot spend it.
+    With passivity this holds for a wall of any stiffness. The energy of the wall is counted separately, so that
+    reflection cannot use it.
     """
     square = way = 0.0
     for i in range(3):
@@ -158,9 +158,9 @@ def _hold_wall(law: Law, force: Array) -> None:
 
 @inner
 def lead_by_force(p: ReflectionNumbers, s: ReflectionState, row: Row) -> None:
-    """Write slave_servo_cf: what the hand bears of the push that answers the slave.
+    """Write slave_servo_cf: the force with which the hand resists the slave's push.
 
-    A device that can be moved freely gives the hand's force on so; it has no sensor of it.
+    This is how a freely movable device passes on the hand's force, because it has no force sensor.
     """
     for i in range(3):
         row.slave_servo_cf[i] = -p.lead_gain * p.sign[i] * s.push[p.axis[i]]
@@ -168,7 +168,7 @@ def lead_by_force(p: ReflectionNumbers, s: ReflectionState, row: Row) -> None:
 
 @inner
 def _bound(push: Array, most: float, rounding: float) -> None:
-    """Shorten a push (3,) to ``most`` [N]; one that is longer by rounding alone stays."""
+    """Shorten a push (3,) to ``most`` [N]; a push that is longer only by rounding stays unchanged."""
     square = 0.0
     for i in range(3):
         square += push[i] * push[i]
@@ -180,9 +180,9 @@ def _bound(push: Array, most: float, rounding: float) -> None:
 
 @inner
 def _count(p: ReflectionNumbers, s: ReflectionState, law: Law, is_following: bool, stylus: Array, row: Row) -> None:
-    """Add the work of the last push on the hand; a law that begins anew has no energy.
+    """Add the work of the last push on the hand; a law that begins anew has zero energy.
 
-    Energies begin anew with another law or scale, and while the hand does not lead the slave.
+    Energies begin anew when law or scale changes, and while the slave does not follow the hand.
     """
     scale = p.force_scale / p.gain[s.is_fine]
     is_other = law.port[LAW] != p.law or s.scale != scale or law.port[ROUND] == 0.0
@@ -190,7 +190,7 @@ def _count(p: ReflectionNumbers, s: ReflectionState, law: Law, is_following: boo
         s.scale = scale
         begin_round(law.port, p.law, 1e-9 * row.master_measured_cp_ns)
         copy(s.command, s.led_from)
-        copy(stylus, s.pushed_at)  # where it was before may be another grip, or nowhere yet
+        copy(stylus, s.pushed_at)  # the last position may belong to another grip, or may not exist
     for i in range(3):
         law.moved[i] = stylus[i] - s.pushed_at[i]
         s.pushed_at[i] = stylus[i]

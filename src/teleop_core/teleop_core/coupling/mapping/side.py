@@ -1,11 +1,11 @@
-"""Side: whether a virtual fixture holds the hand, the slave, or both.
+"""Side: whether a virtual fixture confines the hand, the slave, or both.
 
-A slave that is held is led by a proxy of the hand: a place that stays in the fixture, as near to
-the hand as it may come. What is commanded moves as the proxy does. So a hand that comes back from
-3 mm beyond the wall moves the slave only where it passes the wall again.
+A confined slave follows a proxy of the hand: a point that stays in the fixture, as near to the hand as possible. The
+command moves like the proxy. So a hand that returns from 3 mm beyond the wall moves the slave only after it has passed
+the wall again.
 
-The proxy never moves farther than the hand does at the same sample, so the slave jumps nowhere: not
-where a shape has two ways back that are equally short, and not where the shape was changed.
+At each sample the proxy moves no farther than the hand. So the slave never jumps, even if a shape has two equally
+short ways back, or if the shape was changed.
 
 Source:
     Zilles and Salisbury 1995, a constraint-based god-object method; bounded by the hand's steps here.
@@ -19,11 +19,11 @@ from teleop_core.kernels import Array, Fields, Vector3, inner
 from teleop_core.kernels.room import room
 
 SIDES = ("hand", "slave", "both")
-"""Whom a fixture holds."""
+"""Which side a fixture confines."""
 
 
 class SideNumbers(Fields):
-    """Fields of a parameter record with whom the fixture holds."""
+    """Fields of a parameter record with the side that the fixture confines."""
 
     holds_hand: int
     holds_slave: int
@@ -33,24 +33,24 @@ class SideState(Fields):
     """Fields of a state record with hand and proxy [m], in the master's base."""
 
     center: Vector3  # middle of the fixture
-    master: Vector3  # where the hand leads the slave from
-    beyond: Vector3  # from the proxy to there; zero where nothing is held
+    master: Vector3  # position of the hand at the last sample
+    beyond: Vector3  # vector from the proxy to it; zero if the slave is not confined
 
 
-# Depth up to which a place is allowed [m]: a tenth of the nanometre that reports are rounded to,
-# for the slave's gain is 10 at most.
+# Depth up to which a position is allowed [m]: a tenth of the nanometre to which reports are rounded, because the
+# slave's gain is 10 at most.
 _ALLOWED = 1e-10
-# Rounds in which a place is drawn in. Shapes of ours need one.
+# Most iterations to move a point into the shape. Our own shapes need one.
 _ROUNDS = 8
-# Shares of a step that are tried: beside a curved wall a whole one may lead too far.
+# Shares of a step that are tried: near a curved wall the whole step may be too long.
 _SHARES = 4
-# Rounding of differences of places [m].
+# Rounding of differences of positions [m].
 _ROUNDING = 1e-13
 
 
 @inner
 def let_go(s: SideState) -> None:
-    """Move the hand's place to its proxy, and the fixture with it. The slave does not move."""
+    """Shift the fixture so that its proxy coincides with the hand. The slave does not move."""
     for i in range(3):
         s.center[i] += s.beyond[i]
         s.beyond[i] = 0.0
@@ -66,7 +66,7 @@ def _distance(a: Array, b: Array) -> float:
 
 @inner
 def _draw_in(fixture: Held, place: Array) -> bool:
-    """Move a place (3,) to the nearest one that is allowed; whether it is allowed then."""
+    """Move a point (3,) to the nearest allowed position; return whether it is allowed then."""
     out = room(3)
     depth = fixture_depth(fixture, place, out)
     for _ in range(_ROUNDS):
@@ -80,9 +80,10 @@ def _draw_in(fixture: Held, place: Array) -> bool:
 
 @inner
 def _approach(fixture: Held, last: Array, aim: Array, most: float) -> None:
-    """Move an aim (3,) to where the proxy may be next on its way there, ``most`` [m] away.
+    """Replace an aim (3,) by the next position of the proxy on its way there, at most ``most`` [m] away.
 
-    A proxy that is outside, as after a change of the shape, goes the shortest way in. One that has no way stays.
+    A proxy outside the fixture, for example after a change of the shape, moves inwards on the shortest path. A proxy
+    without a path stays.
     """
     target, share = room(3), most / max(_distance(aim, last), most)
     copy(aim, target)
@@ -101,15 +102,15 @@ def _approach(fixture: Held, last: Array, aim: Array, most: float) -> None:
 
 @inner
 def hold_slave(s: SideState, fixture: Held, step: Array) -> None:
-    """Turn the hand's step (3,) [m] into that of its proxy, which is no longer.
+    """Replace the hand's step (3,) [m] by that of its proxy, which is at most as long.
 
-    Where the hand gets to a place that is allowed, but the proxy cannot follow, as through a
-    forbidden body, the proxy is the hand's new place: see :func:`let_go`.
+    If the hand reaches an allowed position that the proxy cannot reach, for example through a forbidden body, the
+    hand's position becomes that of the proxy: see :func:`let_go`.
 
     Args:
         s: State; ``beyond`` and perhaps ``center`` are written.
         fixture: The fixture.
-        step: From the hand's last place to its present one; written.
+        step: Vector from the hand's last position to its present one; written.
     """
     last, aim, hand, most = room(3), room(3), room(3), 0.0
     for i in range(3):

@@ -1,14 +1,13 @@
-"""Walls: how a fixture pushes back on the hand that is beyond it.
+"""Walls: how a fixture pushes back a hand that is beyond it.
 
-The source's wall is a spring that ends in a constant force (:func:`wall_force`). Sampled, it gives
-back more energy than it took: its force is that of the place at the beginning of a period and is
-held for all of it. So it is too small on the way in and too large on the way out, by half a
-period's way. A damped wall (:func:`damped_wall`) makes up for it, as far as
-:func:`passive_stiffness`.
+The source's wall is a spring up to a constant force (:func:`wall_force`). A sampled spring returns more energy than it
+took: its force belongs to the position at the beginning of a period, and is held for the whole period. So the force is
+    too small on the way in and too large on the way out, by the motion of half a period. A damped wall
+    (:func:`damped_wall`) compensates this, up to :func:`passive_stiffness`.
 
-A passivity controller (Hannaford and Ryu 2002), which cuts the force where the energy that a
-contact took is used up, was tried on top and left out: with a reading in steps and a device that
-bends it switches on and off, and contacts that the damper alone makes passive gave energy.
+A passivity controller (Hannaford and Ryu 2002) was tried in addition, and left out. It cuts the force when the energy
+that a contact took is used up. With an encoder in steps and a compliant device it switches on and off. Contacts that
+the damper alone makes passive then gave energy.
 """
 
 import math
@@ -33,14 +32,15 @@ class WallState(Fields):
     rate: Vector3  # its smoothed rate [m/s]
 
 
-# The rate is that of the readings through a first-order lag that takes the time in which the hand
-# goes this far [m], within bounds [s]. A step of the reading within a period would else be a blow,
-# which throws the light device back; so slow motion needs a wide window, fast motion a short one
-# (Janabi-Sharifi, Hayward and Chen 2000 adapt it to the same end).
+# The speed is that of the readings after a first-order lag. Its time constant is the time in which the hand moves this
+# far [m], within bounds [s]. Without the lag, an encoder step within a period would act as an impact that throws the
+# light device back. So slow motion needs a long window, and fast motion a short one (Janabi-Sharifi, Hayward and Chen
+# 2000 adapt it for the same reason).
 _SMOOTH_WAY, _SMOOTH_LEAST, _SMOOTH_MOST = 0.3e-3, 1e-3, 20e-3
-# The damper sets in over this depth [m], a step of the reading, so that the surface is no edge.
+# The damping grows to its full value over this depth [m], an encoder step, so that the force is continuous at the
+# surface.
 _RAMP = 0.05e-3
-# On the way out this share of the spring's force stays: beyond a wall there is always some.
+# On the way out at least this share of the spring's force stays: beyond a wall the force is never zero.
 _LEAST = 0.05
 SOFT_ZONE = 1e-3
 """Depth over which the source's wall reaches its full force [m] (Vongbunyong 2008, section 7.6)."""
@@ -48,9 +48,9 @@ HARD_STIFFNESS = 3300.0
 """Stiffness of the hard wall [N/m]: full force after 1 mm, as the source's. No axis of the device
 renders more. It is not passive: contacts give back up to twice what they took
 (:func:`passive_stiffness`), and dry friction of the device takes the rest."""
-# Of the wall's damping so much counts [N·s/m], and so large a share of it: measured on the
-# simulated device over slow presses, tremor, hovering and sliding. Steps of the reading, the lag of
-# the rate and the bending of the device use up the rest; more damping than this does not help.
+# Effective part of the wall's damping: at most so many [N·s/m], and this share. Measured on the simulated device with
+# slow presses, tremor, hovering and sliding. Encoder steps, the lag of the speed and the compliance of the device use
+# up the rest; more damping does not help.
 _DAMPING_COUNTS, _SHARE_COUNTS = 10.0, 0.05
 
 
@@ -58,9 +58,9 @@ class Wall(NamedTuple):
     """A wall by name.
 
     Attributes:
-        stiffness: Of the spring [N/m]; None for that of the parameters.
-        is_full_at: In place of it: depth at which the force is full [m]; 0 for the stiffness.
-        is_damped: Whether it is damped, and so gives back less than it took.
+        stiffness: Stiffness of the spring [N/m]; None for that of the parameters.
+        is_full_at: In place of the stiffness: depth at which the force is full [m]; 0 to use the stiffness.
+        is_damped: Whether the wall is damped, and so returns less energy than it took.
     """
 
     stiffness: float | None
@@ -68,7 +68,7 @@ class Wall(NamedTuple):
     is_damped: bool
 
     def spring(self, stiffness: float, max_force: float) -> float:
-        """Its stiffness [N/m], for the parameters' stiffness [N/m] and largest force [N]."""
+        """Stiffness of the wall [N/m], for the parameters' stiffness [N/m] and largest force [N]."""
         if self.is_full_at > 0.0:
             return max_force / self.is_full_at
         return stiffness if self.stiffness is None else self.stiffness
@@ -126,9 +126,9 @@ def damped_wall(
     Args:
         p: Parameters.
         s: State; written.
-        place: Reading of the hand (3,) [m].
-        depth: Vector (3,) [m] from the nearest point of the fixture to it.
-        length: Its length [m]; 0 inside.
+        place: Measured position of the hand (3,) [m].
+        depth: Vector (3,) [m] from the nearest point of the fixture to the hand.
+        length: Length of ``depth`` [m]; 0 inside.
         period: Time since the last sample [s], for which the push will be held too.
         force: Written.
 
@@ -151,17 +151,17 @@ def damped_wall(
 
 
 def passive_stiffness(damping: float, period: float, delay: float, friction: float, step: float) -> float:
-    """Stiffness up to which contacts with a damped wall give back no more than they took [N/m].
+    """Largest stiffness [N/m] at which contacts with a damped wall return no more energy than they took.
 
-    On the safe side of what the simulated device shows: 1000 N/m at 1 kHz without delay, where
-    1260 give back more than they took, and 333 with a delay of 1 ms, where 1000 do and 500 do not.
+    The result is on the safe side for the simulated device. At 1 kHz without delay it is 1000 N/m, while 1260 N/m is
+    not passive. With a delay of 1 ms it is 333 N/m, while 500 N/m is still passive and 1000 N/m is not.
 
     Args:
-        damping: Of the wall [N·s/m]; 0 for a wall that is a spring alone, which never is passive.
-        period: Of the device's samples [s].
-        delay: Of the force beyond it [s].
+        damping: Damping of the wall [N·s/m]; 0 for a pure spring, which is never passive.
+        period: Sample period of the device [s].
+        delay: Delay of the force beyond the period [s].
         friction: Dry friction of the device [N].
-        step: Of its reading [m]; 0: none.
+        step: Encoder step of the device [m]; 0: no steps.
 
     Source:
         Colgate and Schenkel 1997, K (T / 2 + delay) <= b, with the share of b that counts measured

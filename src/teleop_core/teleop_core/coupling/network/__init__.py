@@ -1,7 +1,7 @@
 """Network: how packets travel between the master's side and the slave's, one file per kind.
 
-A kind says of every packet how long it is on the way beside the least time, or that it is lost.
-Order, rate, and what a packet carries are the same for all (:mod:`teleop_core.coupling.network.link`).
+A kind gives for every packet its delay beyond the least delay, or that the packet is lost. Order, rate, and contents
+of packets are the same for all (:mod:`teleop_core.coupling.network.link`).
 """
 
 import math
@@ -23,24 +23,24 @@ _ROW = types.float64[::1]
 DRAW = types.float64(_ROW, _ROW, _ROW, types.float64)
 """Signature of a draw kernel, so that one compiled stage serves every kind."""
 LOST = -1.0
-"""What a draw says of a packet that never arrives."""
+"""Result of a draw for a lost packet."""
 CHANCES, MEMORY = 3, 4
 """Random numbers that every packet has, and numbers that a direction remembers."""
 
 
 @dataclass(frozen=True)
 class Network:
-    """A kind of network, as one direction of it goes.
+    """A kind of network, for one direction.
 
     Attributes:
-        name: What ``--set network.there.kind=`` calls it.
+        name: Its name in ``--set network.there.kind=``.
         parameters: Its parameter group.
         draw: ``draw(numbers, memory, chances, now)``, a kernel or a plain function, called once for every packet.
             ``numbers`` are those of the parameters; ``memory`` (4,) is kept from packet to packet, and zero at the
-            start; ``chances`` (3,) are random numbers, even from 0 to 1; ``now`` is the time since the start [s].
-            Returns the time on the way beside the least one [s], or :data:`LOST`.
-        numbers: ``numbers(parameters)`` gives what ``draw`` takes, if that is
-            something else than the numbers of the parameters in their order.
+            start; ``chances`` (3,) are random numbers, uniform from 0 to 1; ``now`` is the time since the start [s].
+            Returns the delay beyond the least delay [s], or :data:`LOST`.
+        numbers: ``numbers(parameters)`` returns the ``numbers`` of ``draw``, if they are not simply the numbers of the
+            parameters in their order.
     """
 
     name: str
@@ -53,7 +53,7 @@ class Network:
 
 
 def _try(part: Network) -> None:
-    """Draw for some packets, so that what cannot work is told before anything runs."""
+    """Draw for some packets, so that errors are reported before anything runs."""
     needs = "one with draw(numbers, memory, chances, now) -> float and parameters that all have defaults"
     with tried("network", part.name, needs):
         numbers, _ = fenced(part.numbers(part.parameters()))  # one too far is NaN
@@ -75,4 +75,4 @@ NETWORKS: Registry[Network] = Registry(
 """All kinds by name."""
 
 register_network = NETWORKS.register
-"""Adds one of yours under its own name; see :meth:`Registry.register`."""
+"""Adds your network under its own name; see :meth:`Registry.register`."""

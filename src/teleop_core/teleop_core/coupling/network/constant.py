@@ -1,4 +1,4 @@
-"""Constant: every packet takes the least time."""
+"""Constant: every packet has the least delay."""
 
 from teleop_core.base import NoParameters
 from teleop_core.coupling.network import Network
@@ -7,7 +7,7 @@ from teleop_core.kernels import Array, kernel
 
 @kernel
 def constant_draw(numbers: Array, memory: Array, chances: Array, now: float) -> float:
-    """No time beside the least one [s]."""
+    """Return 0: no delay beyond the least delay [s]."""
     return 0.0
 
 

@@ -1,12 +1,12 @@
-"""Deadband: a packet is sent when what it says differs enough from what the last one said.
+"""Deadband: a packet is sent when its values differ enough from those of the last packet.
 
-The hand does not feel a force that changes by less than a share of itself (Weber's law), so such a
-change need not travel. The reader keeps the last packet. A packet goes after ``longest_pause`` all
-the same, so that who hears nothing may know that the other side is gone.
+The hand does not feel a force change smaller than a share of the force (Weber's law), so such a change need not be
+sent. The receiver keeps the last packet. A packet is sent after ``longest_pause`` in any case, so that a receiver
+without packets knows that the other side is gone.
 
 Source:
-    Perception-based deadband coding, Hinterseer, Hirche, Chaudhuri, Steinbach and Buss 2008; the
-    idea of the codec of IEEE 1918.1.1. The places have an absolute deadband here.
+    Perception-based deadband coding, Hinterseer, Hirche, Chaudhuri, Steinbach and Buss 2008; the idea of the codec of
+    IEEE 1918.1.1. Here positions have an absolute deadband.
 """
 
 import math
@@ -30,7 +30,7 @@ class DeadbandNumbers(Fields):
 
 
 class DeadbandState(LinkState):
-    """Fields of a state record with what the last packets told."""
+    """Fields of a state record with the values of the last packets."""
 
     told_pose: Annotated[Array, 2, 7]  # of each direction
     told_force: Annotated[Array, 2, 3]  # [N]
@@ -38,7 +38,7 @@ class DeadbandState(LinkState):
 
 @dataclass(frozen=True, kw_only=True)
 class DeadbandParameters:
-    """What must change before a packet is sent: place, turn or force, whichever does first."""
+    """Change of position, rotation or force after which a packet is sent; one of them is enough."""
 
     is_on: bool = parameter(False, doc="whether packets wait for a change")
     place: float = parameter(2e-4, Within(0.0, 0.1, "m"), "way of the tip before a packet is sent")
@@ -64,7 +64,7 @@ def take_deadband(p: DeadbandNumbers, parameters: DeadbandParameters, dt: float)
 
     Args:
         p: Record; written.
-        parameters: What they say.
+        parameters: Parameters of the deadband.
         dt: Tick [s].
     """
     p["has_deadband"] = parameters.is_on
@@ -82,8 +82,8 @@ def is_worth_telling(p: DeadbandNumbers, s: DeadbandState, k: int, pose: Array, 
         p: Parameters.
         s: State.
         k: Direction.
-        pose: Quaternion w, x, y, z behind the place [m].
-        force: [N].
+        pose: Position [m], then quaternion w, x, y, z.
+        force: Force [N].
     """
     if p.has_deadband == 0 or s.sent[k] == 0 or s.tick - s.sent_tick[k] >= p.longest_ticks:
         return True
@@ -92,7 +92,7 @@ def is_worth_telling(p: DeadbandNumbers, s: DeadbandState, k: int, pose: Array, 
 
 @inner
 def remember_told(s: DeadbandState, k: int, pose: Array, force: Array) -> None:
-    """Keep what the packet says that is sent."""
+    """Store the values of the packet that is sent."""
     for i in range(7):
         s.told_pose[k, i] = pose[i]
     for i in range(force.shape[0]):
@@ -101,22 +101,22 @@ def remember_told(s: DeadbandState, k: int, pose: Array, force: Array) -> None:
 
 @inner
 def _has_moved(p: DeadbandNumbers, told: Array, pose: Array) -> bool:
-    """Whether a pose (7,) is beyond the deadband around the one that was told."""
+    """Whether a pose (7,) is outside the deadband around the last sent pose."""
     way = turn = other = 0.0
     for i in range(3):
         way += (pose[i] - told[i]) * (pose[i] - told[i])
     for i in range(3, 7):
         turn += (pose[i] - told[i]) * (pose[i] - told[i])
         other += (pose[i] + told[i]) * (pose[i] + told[i])
-    # Squares of the distance to the told quaternion or its opposite, which is the same attitude:
-    # twice the sine of a quarter of the turn.
+    # Squares of the distances to the sent quaternion and to its opposite, which is the same attitude. A distance is
+    # twice the sine of a quarter of the rotation angle.
     chord = min(turn, other)
     return bool(way > p.place * p.place or chord > p.chord * p.chord)
 
 
 @inner
 def _has_changed(p: DeadbandNumbers, told: Array, force: Array) -> bool:
-    """Whether a force (3,) is beyond the deadband around the one that was told."""
+    """Whether a force (3,) is outside the deadband around the last sent force."""
     change = before = 0.0
     for i in range(force.shape[0]):
         change += (force[i] - told[i]) * (force[i] - told[i])

@@ -29,11 +29,11 @@ class GilbertElliottParameters:
 
 @kernel
 def gilbert_elliott_draw(numbers: Array, memory: Array, chances: Array, now: float) -> float:
-    """Nothing beside the least time, or lost.
+    """Return 0, no delay beyond the least delay, or :data:`LOST`.
 
-    Times change at every packet, within bursts too. The packet after a burst passes.
+    Good and bad times can change at every packet, within bursts too. The packet after a burst passes.
 
-    ``memory`` holds how many packets of the burst are still to be lost, and whether times are bad.
+    ``memory`` contains how many packets of the burst are still to be lost, and whether times are bad.
     """
     border = numbers[1] if memory[1] > 0.0 else numbers[0]
     memory[1] = 1.0 if chances[0] < border else 0.0

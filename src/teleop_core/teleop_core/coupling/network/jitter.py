@@ -1,4 +1,4 @@
-"""Jitter: packets take different times, each its own or many in a row the same."""
+"""Jitter: packets have different delays, each its own delay, or many in a row the same delay."""
 
 import math
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ from teleop_core.kernels import Array, kernel
 
 @dataclass(frozen=True, kw_only=True)
 class JitterParameters:
-    """Time beside the least one: of most packets about one mean, of some another."""
+    """Delay beyond the least delay: most packets have one mean, some packets another mean."""
 
     mean: float = parameter(0.02, Within(0.0, 5.0, "s"), "mean of most packets, exponentially distributed")
     slow_mean: float = parameter(0.05, Within(0.0, 5.0, "s"), "mean of the slow ones")
@@ -25,9 +25,9 @@ class JitterParameters:
 
 @kernel
 def jitter_draw(numbers: Array, memory: Array, chances: Array, now: float) -> float:
-    """Time beside the least one [s]: drawn anew, or that of the packet before.
+    """Delay beyond the least delay [s]: drawn anew, or that of the last packet.
 
-    ``memory`` holds the delay, when the last packet was sent, and whether there was one.
+    ``memory`` contains the delay, when the last packet was sent, and whether there was one.
     """
     held = memory[2] > 0.0 and numbers[3] > 0.0
     if held and chances[0] < math.exp(-(now - memory[1]) / numbers[3]):

@@ -1,9 +1,9 @@
-"""Link: packets on their way, one direction of a network.
+"""Link: packets in transit, one direction of a network.
 
-A packet waits in a queue while the line is busy with those before it. Its transmission begins at ``max(sent, end of the
-one before)`` and takes its size over the bandwidth: a queue of one server (Kleinrock 1975, section 1.2). Every packet
-is due at a tick, found when its transmission begins. What is due at the same tick shares a place in a calendar of
-ticks, where the newest packet stays; so a tick costs the same with any delay.
+A packet waits in a queue while the line is busy with earlier packets. Its transmission begins at ``max(sent, end of
+the one before)`` and lasts its size divided by the bandwidth: a queue of one server (Kleinrock 1975, section 1.2). The
+tick of its arrival is determined when its transmission begins. Packets due at the same tick share an entry in a
+calendar of ticks, which keeps the newest packet. So the cost of a tick does not depend on the delay.
 """
 
 from typing import Annotated, Any, NamedTuple
@@ -14,9 +14,9 @@ from teleop_core.coupling.network import CHANCES, MEMORY, packet_size
 from teleop_core.kernels import Array, Fields, Integers, inner
 
 LONGEST = 16384
-"""Ticks that a packet may be on the way; one that would take longer is lost."""
+"""Largest delay of a packet [ticks]; a packet that would take longer is lost."""
 QUEUE = 1024
-"""Packets for which a queue has places."""
+"""Largest number of packets in a queue."""
 BLOCK = 1000
 """Ticks for which random numbers are drawn at once."""
 _BothWays = Annotated[Integers, 2]
@@ -38,7 +38,7 @@ class LinkState(Fields):
 
     tick: int
     next: int  # random numbers used
-    behind: int  # ticks by which the present one comes late
+    behind: int  # ticks by which the present tick is late
     sent: _BothWays
     lost: _BothWays
     newest: _BothWays  # that arrived
@@ -46,12 +46,12 @@ class LinkState(Fields):
     sent_tick: _BothWays
     arrived: _BothWays  # whether one just came
     free: Annotated[Array, 2]  # tick, with fractions, at which the line is free
-    head: _BothWays  # place of the packet that waits longest
+    head: _BothWays  # index of the packet that has waited longest
     waits: _BothWays  # packets that wait
 
 
 class Way(NamedTuple):
-    """One direction: how it draws, what is in a packet, and the calendar of what is due."""
+    """One direction: its draw kernel, the contents of a packet, and the calendar of due packets."""
 
     draw: Any
     numbers: Array
@@ -68,18 +68,18 @@ class Way(NamedTuple):
     sizes: Array  # bytes of a message of each topic (K,)
     waiting: Array  # queue: values, motion, bytes (QUEUE, W + 4); stamps, number (QUEUE, K + 1)
     waiting_ns: Any
-    way: Array  # motion since the packet before, of all packets due then (LONGEST, 3) [m]
-    moved: Array  # motion of the packet that is made, and of those that arrived (2, 3) [m]
+    way: Array  # summed motion of all packets due at a tick (LONGEST, 3) [m]
+    moved: Array  # motion of the packet that is being made, and of the packets that arrived (2, 3) [m]
 
     def clear(self) -> None:
-        """Forget everything on the way."""
+        """Forget all packets in transit."""
         self.due[:] = 0
         for array in (self.memory, self.came, self.came_ns, self.moved):
             array[...] = 0
 
 
 def make_way(width: int, sizes: Array, draw: Any, numbers: Array) -> Way:
-    """Direction whose packets carry some numbers of topics with messages of some sizes (K,)."""
+    """Make a direction whose packets have ``width`` numbers, of topics with message sizes ``sizes`` (K,)."""
     topics = len(sizes)
     return Way(
         draw=draw, numbers=numbers, memory=np.zeros(MEMORY), chances=np.zeros((BLOCK, CHANCES + 1)),
@@ -118,7 +118,7 @@ def _due(p: LinkNumbers, s: LinkState, way: Way, k: int, dt: float) -> int:
 
 @inner
 def _packet_bytes(way: Way) -> float:
-    """Bytes of ``way.packet``: a topic that nobody has written yet is not in it."""
+    """Bytes of ``way.packet``; a topic that has not been written yet does not count."""
     size = float(packet_size.HEADER)
     for i in range(way.sizes.shape[0]):
         if way.packet_ns[i] != 0:
@@ -130,7 +130,7 @@ def _packet_bytes(way: Way) -> float:
 def send_packet(p: LinkNumbers, s: LinkState, way: Way, k: int, dt: float) -> None:
     """Send ``way.packet``; the motion in ``way.moved[0]`` goes with it.
 
-    Where the queue is full, the oldest packet in it is lost, or this one if order is kept.
+    If the queue is full, its oldest packet is lost, or this packet if order is kept.
 
     Args:
         p: Parameters.
@@ -171,7 +171,7 @@ def _leave_queue(s: LinkState, k: int) -> None:
 
 @inner
 def serve_line(p: LinkNumbers, s: LinkState, way: Way, k: int, dt: float) -> None:
-    """Begin the transmission of what waits, for as long as the line is free.
+    """Begin the transmission of waiting packets while the line is free.
 
     Args:
         p: Parameters.
@@ -193,14 +193,14 @@ def serve_line(p: LinkNumbers, s: LinkState, way: Way, k: int, dt: float) -> Non
 
 @inner
 def _put_in_calendar(way: Way, waiting: int, due: int) -> None:
-    """Put the packet at a place of the queue where it is due."""
+    """Put the packet at index ``waiting`` of the queue into the calendar, at the tick ``due``."""
     width, topics = way.packet.shape[0], way.packet_ns.shape[0]
     at = due % LONGEST
     if way.due[at] != due:
         way.due[at] = due
         for i in range(3):
             way.way[at, i] = 0.0
-    way.number[at] = way.waiting_ns[waiting, topics]  # newer than what is due then already
+    way.number[at] = way.waiting_ns[waiting, topics]  # newer than the packet already due at that tick
     for i in range(width):
         way.values[at, i] = way.waiting[waiting, i]
     for i in range(topics):
@@ -211,9 +211,9 @@ def _put_in_calendar(way: Way, waiting: int, due: int) -> None:
 
 @inner
 def take_packet(s: LinkState, way: Way, k: int) -> None:
-    """Take what is due now: ``way.came`` is the newest packet, ``s.arrived`` whether it is new.
+    """Take the packets that are due now: ``way.came`` is the newest packet, ``s.arrived`` whether it is new.
 
-    ``way.moved[1]`` gets the motion of all that is due, overtaken or not.
+    ``way.moved[1]`` gets the summed motion of all due packets, including overtaken packets.
     """
     s.arrived[k] = 0
     at = s.tick % LONGEST

@@ -1,7 +1,7 @@
 """Network: a stage between the master's side and the slave's, which delays and loses packets.
 
-Commands go there, what the slave says of itself comes back; the readers on either side get what
-arrived, under its own stamp, so that its age is known.
+Commands go to the slave, and the slave's values come back. The readers on either side get the values that arrived,
+with their original stamps, so that their age is known.
 """
 
 import math
@@ -41,11 +41,11 @@ THERE, BACK = 0, 1
 _TOLD = 20
 """Ticks from one report to the next."""
 _FOLLOWS_NS = 100_000_000
-"""A slave whose setpoint is of an older command than this goes its own way [ns]."""
+"""A slave whose setpoint belongs to a command older than this does not follow [ns]."""
 _SETPOINT, _POSE, _FORCE, _REACH = 0, 7, 14, 20
 _ENERGY = _REACH + len(SLAVE_REACH.columns)
-"""Places in a packet from the slave: setpoint, measured pose, force, reach, energies."""
-_ENERGY_THERE = 7  # place of the energies in a packet to the slave, behind the command
+"""Indices in a packet from the slave: setpoint, measured pose, force, reach, energies."""
+_ENERGY_THERE = 7  # index of the energies in a packet to the slave, after the command
 _JAW_THERE = _ENERGY_THERE + len(ENERGY)
 _FORCE_THERE = _JAW_THERE + 1
 _WIDTHS = (_FORCE_THERE + 6, _ENERGY + len(ENERGY))
@@ -86,22 +86,22 @@ def _unpack(packet: Array, at: int, row_values: Array) -> None:
 
 @inner
 def _clock_ahead(p: NetworkNumbers, s: NetworkState, time_ns: int) -> int:
-    """By how much the slave's clock is ahead of ours [ns] at a time [ns] of ours."""
+    """Lead of the slave's clock over our clock [ns], at a time [ns] of our clock."""
     return p.clock_offset_ns + int(p.clock_drift * (time_ns - s.first_ns))
 
 
 @inner
 def _as_stamped_there(p: NetworkNumbers, s: NetworkState, stamp_ns: int) -> int:
-    """Stamp that the slave's clock gives what was sampled at a time [ns] of ours."""
+    """Stamp on the slave's clock of a sample at a time [ns] of our clock."""
     if stamp_ns <= NO_COMMAND_NS:
         return stamp_ns
-    # A stamp of 0 or less says that there is no sample.
+    # A stamp of 0 or less means that there is no sample.
     return max(stamp_ns + _clock_ahead(p, s, stamp_ns), NO_COMMAND_NS)
 
 
 @inner
 def _send_there(p: NetworkNumbers, s: NetworkState, there: link.Way, row: Row, dt: float) -> None:
-    """Send the command if it is a new one, and its sender has heard where the slave is."""
+    """Send the command if it is new, and if the master's side has received a pose of the slave."""
     is_new = row.slave_servo_cp_ns not in (0, s.sent_ns)
     if not (is_new and s.newest[BACK] > 0 and link.may_send(p, s, THERE)):
         return
@@ -125,7 +125,7 @@ def _send_there(p: NetworkNumbers, s: NetworkState, there: link.Way, row: Row, d
 
 @inner
 def _send_back(p: NetworkNumbers, s: NetworkState, back: link.Way, row: Row, dt: float) -> None:
-    """Send what the slave says of itself, once it has said anything."""
+    """Send the slave's values, once there are any."""
     if row.slave_setpoint_cp_ns == 0 or not link.may_send(p, s, BACK):
         return
     force = row.slave_measured_cf[:3]
@@ -147,7 +147,7 @@ def _send_back(p: NetworkNumbers, s: NetworkState, back: link.Way, row: Row, dt:
 
 @inner
 def _take_there(p: NetworkNumbers, s: NetworkState, there: link.Way, row: Row) -> None:
-    """Take the command that arrived; increments are added to where the slave is led, or was led last."""
+    """Take the command that arrived; increments are added to the slave's setpoint, or to its last command."""
     link.take_packet(s, there, THERE)
     if s.arrived[THERE]:
         _unpack(there.came, 0, row.network_servo_cp)
@@ -239,7 +239,7 @@ class NetworkLink(RunningStage):
         return link.make_way(width, packet_size.message_sizes(topics), kind.draw_pointer, numbers)
 
     def reset(self) -> None:
-        """Nothing is on the way, and the random numbers of the seed begin anew."""
+        """Empty both directions, and restart the random numbers from the seed."""
         assign(self.state, 0)
         assign(self.signals, self._begin)
         for way in self._ways:
@@ -248,7 +248,7 @@ class NetworkLink(RunningStage):
         self.state["next"] = link.BLOCK
 
     def retune(self, parameters: NetworkParameters) -> None:
-        """Take another network from the next packet on; what is on its way arrives as it would."""
+        """Take another network from the next packet on; packets in transit arrive as before."""
         p = self.parameters
         p["is_incremental"] = parameters.commands == "incremental"
         p["clock_offset_ns"] = round(1e9 * parameters.clock_offset)
@@ -284,7 +284,7 @@ class NetworkLink(RunningStage):
         self.state["next"] = 0
 
     def concerns(self) -> list[str]:
-        """A direction through which nothing comes, in words."""
+        """A direction in which no packets arrive, in words."""
         s, found = self.state, []
         for k, way in ((THERE, "to the slave"), (BACK, "from the slave")):
             behind = int(s["sent"][k] - s["newest"][k])

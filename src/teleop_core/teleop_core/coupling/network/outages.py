@@ -11,9 +11,9 @@ _LEVEL = "published: UVA-DSA telesurgery QoS analysis 2026, the first level of o
 
 @dataclass(frozen=True, kw_only=True)
 class OutagesParameters:
-    """How long everything passes between outages, and how long nothing does at most.
+    """Length of the pauses between outages, and largest length of an outage.
 
-    The share ``longest / (longest + 2 pause)`` is lost over a long time.
+    In the long run the share ``longest / (longest + 2 pause)`` of the packets is lost.
     """
 
     pause: float = parameter(
@@ -33,7 +33,7 @@ class OutagesParameters:
 
 @kernel
 def outages_draw(numbers: Array, memory: Array, chances: Array, now: float) -> float:
-    """Nothing beside the least time, or lost.
+    """Return 0, no delay beyond the least delay, or :data:`LOST`.
 
     The first packet begins an outage. The packet that begins one is lost; the first one at or after
     its end passes, and begins the pause (NetFI's communication loss).

@@ -18,10 +18,10 @@ _ENCAPSULATION, _STAMP, _LENGTH, _DOUBLE = 4, 8, 4, 8
 
 
 def message_size(topic: Topic) -> int:
-    """Bytes of one message of a topic without joints, as CDR has it.
+    """Bytes of one message of a topic without joints, in CDR.
 
     Args:
-        topic: Its frame and the names of its numbers count, since the message carries them.
+        topic: The topic; its frame and the names of its numbers count, since the message contains them.
     """
     size, names = _text(_STAMP, topic.frame_id), topic.names(())
     if not topic.kind.has_names:
@@ -43,5 +43,5 @@ def _aligned(size: int, step: int) -> int:
 
 
 def _text(size: int, text: str) -> int:
-    """Size with a text behind it: its length, its bytes, and a zero."""
+    """Size after adding a text: its length field, its bytes, and a zero."""
     return _aligned(size, _LENGTH) + _LENGTH + len(text.encode()) + 1

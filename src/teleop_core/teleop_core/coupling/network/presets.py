@@ -118,7 +118,7 @@ class NetworkParameters:
 
     @property
     def ways(self) -> tuple[WayParameters, WayParameters]:
-        """To the slave, and back from it: of the preset, or one's own."""
+        """Parameters to the slave, and back from it: those of the preset, or the given ones."""
         if self.preset == "own":
             return self.there, self.back
         named = PRESETS[self.preset]

@@ -1,4 +1,4 @@
-"""Trace: packets take the times of a measured network, from a file."""
+"""Trace: packets have the delays of a measured network, read from a file."""
 
 import csv
 import math
@@ -13,7 +13,7 @@ from teleop_core.coupling.network import LOST, Network
 from teleop_core.kernels import Array, kernel
 
 _NAME = "trace.file"
-_SLOW = 20.0  # [s] from row to row: a session would hardly see the network change
+_SLOW = 20.0  # [s] from row to row: with a longer interval the network would hardly change during a session
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -28,7 +28,7 @@ class TraceParameters:
 
 
 def read_trace(path: str) -> Array:
-    """Numbers of a trace, times [s] from 0 on each with its delay [s]; :data:`LOST` for a loss.
+    """Numbers of a trace: times [s] from 0, each followed by its delay [s] or :data:`LOST`.
 
     Raises:
         ParameterError: The file cannot be read, or its times are negative or not in order, or a
@@ -77,7 +77,7 @@ def _row(path: str, number: int, line: list[str], before: float) -> tuple[float,
 
 
 def trace_numbers(parameters: TraceParameters) -> Array:
-    """Numbers of the file; of none, a network that delays nothing."""
+    """Numbers of the file; without a file, those of a network without delay."""
     return read_trace(parameters.file) if parameters.file else np.array([0.0, 0.0, 1.0, 0.0])
 
 
@@ -85,7 +85,7 @@ def trace_numbers(parameters: TraceParameters) -> Array:
 def trace_draw(numbers: Array, memory: Array, chances: Array, now: float) -> float:
     """Delay of the last row before now [s]; the last gap of the file is as long as its first.
 
-    ``memory`` holds the place in the file, and how long it was before this turn of it [s].
+    ``memory`` contains the row in the file, and the total length of the earlier passes through it [s].
     """
     rows = numbers.shape[0] // 2
     whole = numbers[2 * rows - 2] + numbers[2]

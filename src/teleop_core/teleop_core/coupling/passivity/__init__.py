@@ -1,9 +1,9 @@
-"""Passivity: what keeps force that comes late from giving energy, one file per kind.
+"""Passivity: prevents delayed forces from generating energy, one file per kind.
 
-Hand and slave are joined at two ports. At the hand's, the push on it and its motion; at the
-slave's, the force on the tip and the tip's motion. What goes in and out is counted at both for
-every kind (:mod:`teleop_core.coupling.passivity.port`); a kind says what is done about it, on either
-side, knowing its own port and what it heard of the other one.
+Hand and slave are connected at two ports. The hand's port has the push on the hand and its motion. The slave's port
+has the force on the tip and the tip's motion. The energy into and out of both ports is counted for every kind
+(:mod:`teleop_core.coupling.passivity.port`). A kind defines how each side uses it: a side knows its own port and what
+it received from the other side.
 """
 
 from collections.abc import Callable
@@ -26,7 +26,7 @@ HAND = types.void(_ROW, _ROW, _ROW, _ROW, _ROW, _ROW, _ROW, _ROW, _ROW, types.fl
 SLAVE = types.void(_ROW, _ROW, _ROW, _ROW, _ROW, _ROW, _ROW, _ROW, _ROW, types.float64)
 """Signatures of both kernels, so that one compiled stage serves every kind."""
 MEMORY = 12
-"""Numbers that each side of a kind remembers."""
+"""How many numbers each side of a kind remembers."""
 
 
 @kernel
@@ -34,33 +34,36 @@ def leave_command(
     numbers: Array, memory: Array, flow: Array, force: Array, tip: Array, last: Array,
     heard: Array, port: Array, command: Array, period: float,
 ) -> None:  # fmt: skip
-    """Let the slave have the command as it came."""
+    """Pass the command to the slave unchanged."""
 
 
 @dataclass(frozen=True)
 class Passivity:
-    """A kind of passivity: what it makes of the push on the hand, and of the slave's command.
+    """A kind of passivity: how it changes the push on the hand and the slave's command.
 
-    Both kernels may write to ``port``, their row of :data:`~teleop_core.graph.topics.ENERGY`, and get ``heard``, the
-    other side's, as it arrived; energies are those of the slave [J]. ``flow`` (3,) is what the other side told since
-    the last call, what went in and what went out at this port. ``memory`` (12,) is kept from call to call, and zero at
-    the start; energies begin anew with every ``round``, and at the slave ``memory`` with them.
+    Both kernels may write to ``port``, their row of :data:`~teleop_core.graph.topics.ENERGY`. They get ``heard``, the
+    other side's row as it arrived. Energies are in the slave's scale [J]. ``flow`` (3,) contains, since the last call,
+    the energy that the other side credited, and the energy into and out of this port. ``memory`` (12,) is kept from
+    call to call, and zero at the start; energies begin anew with every ``round``, and at the slave ``memory`` with
+    them.
 
     Attributes:
-        name: What ``--set reflection.passivity=`` calls it.
+        name: Its name in ``--set reflection.passivity=``.
         parameters: Its parameter group.
         hand: ``hand(numbers, memory, last, moved, led, flow, heard, port, push, scale, period)``, called for every
-            sample of the master. ``last`` (3,) is the push since the sample before [N]; ``moved`` (3,) how far the hand
-            went under it; ``led`` (3,) how far it led the slave, over the gain of motion [m]; all along the master's
-            base; ``push`` (3,) the one that is asked for, to be made the one that is given; ``scale`` the hand's energy
-            over that of the slave; ``period`` the time since the sample before [s].
+            sample of the master. ``last`` (3,) is the push since the last sample [N]; ``moved`` (3,) is the motion of
+            the hand since then; ``led`` (3,) is the commanded motion of the slave, divided by the motion gain [m]; all
+            are in axes of the master's base. ``push`` (3,) is the wanted push, and must be overwritten with the
+            allowed push. ``scale`` is the hand's energy divided by that of the slave; ``period`` is the time since the
+            last sample [s].
         slave: ``slave(numbers, memory, flow, force, tip, last, heard, port, command, period)``, called for every
-            command that arrives, with a stage ``passivity`` alone. ``numbers`` are those of that stage; ``force`` (6,)
-            is on the tip [N, N m], whose pose is ``tip`` (7,); ``last`` (7,) the command before it, as it was given;
-            ``command`` (7,) the one that came, to be made the one that is given.
-        numbers: ``numbers(parameters)`` gives what ``hand`` takes, if that is
-            something else than the numbers of the parameters in their order.
-        needs_slave: Whether it works with a stage ``passivity`` alone.
+            command that arrives, only if there is a stage ``passivity``. ``numbers`` are those of that stage;
+            ``force`` (6,) is the wrench on the tip [N, N m], whose pose is ``tip`` (7,); ``last`` (7,) is the last
+            command given to the slave; ``command`` (7,) is the command that came, and must be overwritten with the
+            command to give.
+        numbers: ``numbers(parameters)`` returns the ``numbers`` of ``hand``, if they are not simply the numbers of the
+            parameters in their order.
+        needs_slave: Whether it works only together with a stage ``passivity``.
     """
 
     name: str
@@ -76,7 +79,7 @@ class Passivity:
 
 
 def _try(part: Passivity) -> None:
-    """Call both sides for some samples, so that what cannot work is told before anything runs."""
+    """Call both sides for some samples, so that errors are reported before anything runs."""
     needs = (
         "one with hand(numbers, memory, last, moved, led, flow, heard, port, push, scale, period) "
         "and parameters that all have defaults"
@@ -108,4 +111,4 @@ PASSIVITIES: Registry[Passivity] = Registry(
 """All kinds by name."""
 
 register_passivity = PASSIVITIES.register
-"""Adds one of yours under its own name; see :meth:`Registry.register`."""
+"""Adds your kind under its own name; see :meth:`Registry.register`."""

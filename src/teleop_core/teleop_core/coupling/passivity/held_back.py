@@ -1,7 +1,7 @@
-"""Held back: a command that goes against the force on the tip only as far as the energy allows.
+"""Held back: a command that moves against the force on the tip only as far as the energy allows.
 
-What it loses is *drift*, from what is given to what was commanded. It is made up for where that is
-allowed, and met by a hand that comes back.
+The difference between the original and the given command is *drift*. Drift is removed when the energy allows it, or
+when the hand moves back.
 """
 
 import math
@@ -14,14 +14,14 @@ from teleop_core.kernels.room import room
 
 @inner
 def hold_back(force: Array, size: float, last: Array, left: float, least: float, port: Array, command: Array) -> float:
-    """Let the command (7,) go against the force as far as the remaining work allows; the rest is drift.
+    """Let the command (7,) move against the force as far as the remaining work allows; the rest is drift.
 
     Args:
-        force: On the tip (6,), with a size [N]; none if that is no more than ``least``.
-        size: See ``force``.
-        last: Command before, as it was given.
-        left: Work that the command may do against the force [J]; negative: it must go back.
-        least: See ``force``.
+        force: Wrench on the tip (6,).
+        size: Size of its force [N].
+        last: Last command given to the slave.
+        left: Work that the command may do against the force [J]; if negative, the command must go back.
+        least: A force of at most this size counts as no contact [N].
         port: Drift and the work that was withheld; written.
         command: Written.
 
@@ -43,15 +43,15 @@ def hold_back(force: Array, size: float, last: Array, left: float, least: float,
 
 @inner
 def norm(force: Array) -> float:
-    """Size of a force, of its first three numbers."""
+    """Size of a force: the norm of its first three numbers."""
     return math.sqrt(force[0] * force[0] + force[1] * force[1] + force[2] * force[2])
 
 
 @inner
 def met_way(command: Array, last: Array, drift: Array) -> float:
-    """Way [m] on which the command (7,), as it came, went back towards the one given before.
+    """Distance [m] by which the original command (7,) moved back towards the last given command.
 
-    Drift that shrinks by this way moves nothing: the given command waits for the hand.
+    Drift that shrinks by this distance does not move the slave: the given command waits for the hand.
     """
     size, way = norm(drift), 0.0
     if size == 0.0:
@@ -63,7 +63,7 @@ def met_way(command: Array, last: Array, drift: Array) -> float:
 
 @inner
 def make_up(numbers: Array, drift: Array, met: float, period: float) -> None:
-    """Let drift (3,) [m] fade, no faster than it may, and by the way ``met`` [m] besides."""
+    """Reduce drift (3,) [m] within its largest speed, and additionally by the distance ``met`` [m]."""
     square = 0.0
     for i in range(3):
         square += drift[i] * drift[i]
@@ -79,20 +79,20 @@ def make_up(numbers: Array, drift: Array, met: float, period: float) -> None:
 def hold_lead(
     numbers: Array, memory: Array, left: float, stop: float, force: Array, tip: Array, port: Array, command: Array
 ) -> None:
-    """Let the command (7,) be ahead of the tip only as far as the remaining energy pays for the way.
+    """Let the command (7,) be ahead of the tip only as far as the remaining energy pays for the distance.
 
-    The arm goes on to its command whatever it meets. So the way from the tip to the command is paid
-    for before it is begun, as against a spring that has the present force already: friction may be
-    as large beside it. Turns against the torque are paid for too. Back from what was touched last
-    the command may go freely. With nothing left it goes nowhere else.
+    The arm moves on to its command whatever it touches. So the energy for the distance from tip to command is reserved
+    before the motion begins. It is computed for a spring that already has the present force, with friction as large in
+    addition. Rotations against the torque are paid for too. Back from the last contact the command may move freely. If
+    no energy is left, this is the only motion allowed.
 
     Args:
         numbers: Those of :func:`teleop_core.coupling.passivity.tdpa.tdpa_slave`.
-        memory: Its second to fourth number: direction of the last force; written.
-        left: Energy that is left [J].
-        stop: Force at which the command may not be ahead of the tip against it [N].
-        force: On the tip (6,).
-        tip: Its pose (7,).
+        memory: Memory; its second to fourth number are the direction of the last force; written.
+        left: Remaining energy [J].
+        stop: Force at which the command may no longer be ahead of the tip, against this force [N].
+        force: Wrench on the tip (6,).
+        tip: Pose of the tip (7,).
         port: Drift and the work that was withheld; written.
         command: Written.
     """
@@ -121,7 +121,7 @@ def hold_lead(
 
 @inner
 def _take_back(along: Array, way: float, force: float, port: Array, command: Array) -> None:
-    """Take a command back by a way [m] along a direction (3,): it becomes drift."""
+    """Move a command back by a distance [m] along a direction (3,); this distance becomes drift."""
     port[WITHHELD] += force * way
     for i in range(3):
         command[i] += along[i] * way
@@ -130,9 +130,9 @@ def _take_back(along: Array, way: float, force: float, port: Array, command: Arr
 
 @inner
 def _hold_turn(left: float, torque: Array, least: float, tip: Array, command: Array) -> None:
-    """Let an attitude (4,) be turned against the torque (3,) as far as what is left [J] pays for.
+    """Let an attitude (4,) rotate against the torque (3,) as far as the remaining energy ``left`` [J] pays for.
 
-    A torque is none if it is less than the least force has on a lever of 1 cm.
+    A torque smaller than that of the least force on a lever of 1 cm counts as zero.
     """
     size, lead, back = norm(torque), room(3), room(4)
     if size <= 0.01 * least:

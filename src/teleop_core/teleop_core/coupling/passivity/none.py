@@ -1,4 +1,4 @@
-"""None: the hand gets what is asked for, and the slave what is commanded."""
+"""None: no passivity; the hand gets the wanted push, and the slave gets the original command."""
 
 from teleop_core.base import NoParameters
 from teleop_core.coupling.passivity import Passivity
@@ -10,7 +10,7 @@ def leave_push(
     numbers: Array, memory: Array, last: Array, moved: Array, led: Array, flow: Array,
     heard: Array, port: Array, push: Array, scale: float, period: float,
 ) -> None:  # fmt: skip
-    """Let the hand have the push that is asked for."""
+    """Leave the wanted push of the hand unchanged."""
 
 
 NONE = Passivity("none", NoParameters, leave_push)

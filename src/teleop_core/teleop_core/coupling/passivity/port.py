@@ -1,8 +1,8 @@
-"""Port: where hand or slave touch what is between them, and the energy that goes through it.
+"""Port: the connection of hand or slave to the system between them, and the energy that flows through it.
 
-The power of a port is the sum of each force times its own speed: forces with speeds, torques with
-turns. What goes in is counted apart from what goes out, so that both only grow: a message of them
-that is lost, late or doubled takes nothing away from the next one.
+The power of a port is force times velocity plus torque times angular velocity. Energy in and energy out are counted
+separately, so that both only grow. So a message with them that is lost, late or doubled does not make the next message
+wrong.
 
 Source:
     Hannaford and Ryu 2002 for the observer; Ryu, Artigas and Preusche 2010 for monotone energies
@@ -23,7 +23,7 @@ LAW, ROUND, IN, OUT, TOLD, HEARD, MARGIN, WITHHELD, TURN_IN, TURN_OUT, DRIFT, IM
 
 @kernel
 def port_work(force: Array, way: Array) -> float:
-    """Work [J] of a force (3,) [N] on a way (3,) [m], or of a torque [N m] on a turn [rad]."""
+    """Work [J] of a force (3,) [N] along a displacement (3,) [m], or of a torque [N m] along a rotation [rad]."""
     work = 0.0
     for i in range(3):
         work += force[i] * way[i]
@@ -32,7 +32,7 @@ def port_work(force: Array, way: Array) -> float:
 
 @kernel
 def begin_round(port: Array, law: float, number: float) -> None:
-    """Begin to count anew: no energy is in or out, told or heard."""
+    """Restart the count: all energies, in, out, told and heard, are zero."""
     for i in range(port.shape[0]):
         port[i] = 0.0
     port[LAW], port[ROUND] = law, number
@@ -40,7 +40,7 @@ def begin_round(port: Array, law: float, number: float) -> None:
 
 @inner
 def count(port: Array, at: int, work: float) -> None:
-    """Add what came in, or with the other sign went out, to the columns ``at`` and after it."""
+    """Add positive work to the column ``at`` (in), and the size of negative work to the next column (out)."""
     if work > 0.0:
         port[at] += work
     else:
@@ -49,9 +49,9 @@ def count(port: Array, at: int, work: float) -> None:
 
 @kernel
 def hear_energy(port: Array, heard: Array) -> float:
-    """Take what the other side tells of this round; returns what is new of it [J].
+    """Take the energy that the other side has credited in this round; return its increase [J].
 
-    What is older than what was heard already tells less and changes nothing.
+    An older message contains a smaller energy, and changes nothing.
     """
     if heard[LAW] != port[LAW] or heard[ROUND] != port[ROUND] or heard[TOLD] <= port[HEARD]:
         return 0.0

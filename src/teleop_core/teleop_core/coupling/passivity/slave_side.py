@@ -1,7 +1,7 @@
-"""Passivity as a stage: the slave's port, between what arrives of the hand and inverse kinematics.
+"""Passivity as a stage: the slave's port, between the arriving commands and inverse kinematics.
 
-It counts what goes through the slave's tip and lets the passivity that the hand's side names change the command.
-Without it nobody limits what the slave gives.
+It counts the energy through the slave's tip, and applies the passivity law that the hand's side names to the command.
+Without this stage the energy that the slave gives is not limited.
 """
 
 from dataclasses import dataclass
@@ -68,7 +68,7 @@ class PassivityParameters:
 
 
 class Laws(NamedTuple):
-    """The slave's side of all kinds, and what they remember."""
+    """The slave's side of all kinds, and their memory."""
 
     slaves: Any
     numbers: Array
@@ -83,7 +83,7 @@ class PortState(Fields):
     tip: PoseRow
     tip_ns: int
     force: Wrench
-    felt: Wrench  # mean over the way of the tip
+    felt: Wrench  # mean over the last motion of the tip
     before: Wrench
     command_ns: int
     has_last: int
@@ -91,10 +91,10 @@ class PortState(Fields):
 
 @inner
 def _observe(s: PortState, laws: Laws, row: Row, port: Array) -> None:
-    """Count what went through the tip since it was measured last.
+    """Count the energy through the tip since its last measurement.
 
-    The force is that of the time when the tip was measured: the mean of both ends of its way, so
-    that a spring takes and gives the same.
+    The force is the mean of the forces at both measured ends of the motion, so that a spring takes and returns the
+    same energy.
     """
     is_late = row.slave_measured_cf_ns > row.slave_measured_cp_ns
     for i in range(6):
@@ -119,7 +119,7 @@ def _observe(s: PortState, laws: Laws, row: Row, port: Array) -> None:
 
 @inner
 def _begin(s: PortState, laws: Laws, heard: Array, port: Array) -> None:
-    """Begin the round that the hand tells of, without any drift."""
+    """Begin the round that the hand's side announces, without any drift."""
     begin_round(port, heard[LAW], heard[ROUND])
     for i in range(laws.memory.shape[0]):
         laws.memory[i] = 0.0
@@ -133,7 +133,7 @@ def passivity_step(p: Fields, s: PortState, laws: Laws, row: Row, dt: float) -> 
     """One tick: count the energy at the tip, and answer a command that has come.
 
     Args:
-        p: Nothing.
+        p: Not used.
         s: State record; written.
         laws: :class:`Laws`; written.
         row: Signals; ``slave_energy`` and ``passivity_servo_cp`` are written.
@@ -150,7 +150,7 @@ def passivity_step(p: Fields, s: PortState, laws: Laws, row: Row, dt: float) -> 
     s.command_ns = row.slave_servo_cp_ns
     copy(row.slave_servo_cp, row.passivity_servo_cp)
     law = int(port[LAW])
-    # The first command of a round is where the slave is; while it goes its own way all are.
+    # The first command of a round is the slave's position; so are all commands while the slave does not follow.
     if s.has_last and 0 <= law < len(laws.slaves):
         laws.slaves[law](
             laws.numbers, laws.memory, laws.flow, s.force, s.tip, laws.last, heard, port,
@@ -177,7 +177,7 @@ class SlaveSide(RunningStage):
         self.reset()
 
     def reset(self) -> None:
-        """No energy, no drift, no command."""
+        """Set energy and drift to zero, and forget the command."""
         assign(self.state, 0)
         assign(self.signals, self._start)
         for array in self._laws[2:]:

@@ -1,8 +1,8 @@
-"""Tank: the energies of TDPA, and a slave that stops before something hard.
+"""Tank: the energies of TDPA, and a slave that stops at a hard obstacle.
 
-Without a stage ``passivity`` the push gives the hand no more than it took from it, by its own port.
-An empty tank pushes no hand back, so that one before something hard goes on until a drive gives all
-it has. With the stage the slave's command stops there by the force on the tip.
+Without a stage ``passivity`` the push returns no more energy to the hand than it took, counted at the hand's port. An
+empty tank does not push the hand back. So a slave at a hard obstacle goes on until a drive is at its effort limit.
+With the stage, the force on the tip stops the slave's command there.
 """
 
 from teleop_core.coupling.passivity import Passivity
@@ -15,7 +15,7 @@ def tank_slave(
     numbers: Array, memory: Array, flow: Array, force: Array, tip: Array, last: Array,
     heard: Array, port: Array, command: Array, period: float,
 ) -> None:  # fmt: skip
-    """Let the command (7,) be ahead of the tip the less, the larger the force is, and stop.
+    """Let the command (7,) be ahead of the tip; the larger the force, the smaller the lead, down to zero.
 
     Arguments are those of :func:`teleop_core.coupling.passivity.tdpa.tdpa_slave`; the sixth of
     ``numbers`` is the force that stops it [N].

@@ -1,9 +1,9 @@
 """TDPA: observers and controllers at both ports, by energies that only grow.
 
-Each side tells the other how much of what came in at its port the other one may give. The hand's
-push is no larger than what was heard pays for until the next sample; the slave's command is ahead
-of the tip only as far as what was heard pays for. What the command loses so is made up for where
-that can be paid. While the slave has little, the hand pays by a drag.
+Each side credits the other side with energy that came in at its own port. The hand's push is no larger than the
+received credit pays for until the next sample. The slave's command is ahead of the tip only as far as the received
+credit pays for. The drift that results is removed later, when energy is left. While the slave has little energy, a
+drag on the hand supplies it.
 """
 
 import math
@@ -15,18 +15,18 @@ from teleop_core.coupling.passivity.port import DRIFT, HEARD, IN, LAW, MARGIN, R
 from teleop_core.kernels import Array, inner, kernel
 
 READING = 0.06e-3
-"""A step of the device's reading [m]."""
+"""An encoder step of the device [m]."""
 SPARE = 0.005
-"""Push that is given without any energy to pay for it [N]."""
+"""Push that is allowed even without energy [N]."""
 SPEED_TIME = 0.01
-"""Time constant of the speed that a drag answers, above the steps of the reading [s]."""
+"""Time constant of the speed used for the drag [s]; long enough to smooth encoder steps."""
 _SPEED = 1
-"""Place of the hand's speed in its memory."""
+"""Index of the hand's speed in its memory."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class StoreParameters:
-    """Energy that the hand's side keeps for itself, and the least that it leaves to the slave."""
+    """Energy that the hand's side keeps, and the least energy that it leaves to the slave."""
 
     kept_way: float = parameter(
         3e-4,
@@ -52,7 +52,7 @@ class StoreParameters:
 
 @inner
 def tell(port: Array, kept: float) -> None:
-    """Credit the other side with the energy that came in here, less ``kept`` [J] and what is owed."""
+    """Credit the other side with the energy that came in here, minus ``kept`` [J] and minus debts."""
     told = min(port[IN] - port[TOLD], port[MARGIN] - kept)
     if told > 0.0:
         port[TOLD] += told
@@ -64,11 +64,11 @@ def tdpa_hand(
     numbers: Array, memory: Array, last: Array, moved: Array, led: Array, flow: Array,
     heard: Array, port: Array, push: Array, scale: float, period: float,
 ) -> None:  # fmt: skip
-    """Make the push (3,) [N] no larger than what is left can pay for until the next sample.
+    """Make the push (3,) [N] no larger than the remaining energy can pay for until the next sample.
 
-    What is left is what was heard and what came in, less what was told and what went out. A touch that is over leaves
-    nothing, but what is owed stays owed. Where a slave's port is heard of, it is told what came in; while it has less
-    than its store, or energy is owed here, a drag on the hand brings some in.
+    The remaining energy is what was heard and what came in, minus what was told and what went out. After a contact it
+    is set to zero, but a debt stays. If values of a slave's port arrive, the slave is credited with what came in.
+    While the slave has less than its store, or while there is a debt here, a drag on the hand supplies energy.
 
     Source:
         Ryu, Artigas and Preusche 2010 for the law. Theirs is a damper by a measured speed; the
@@ -84,7 +84,7 @@ def tdpa_hand(
     size, lacks = math.sqrt(square), max(-port[MARGIN], 0.0)
     if heard[LAW] == port[LAW] and heard[ROUND] == port[ROUND]:
         tell(port, numbers[0] * size / scale)
-        # What was told and is on its way counts as there.
+        # Credits still in transit count as arrived.
         lacks += max(numbers[1] - heard[MARGIN] - (port[TOLD] - heard[HEARD]), 0.0)
     if square == 0.0:
         port[MARGIN] = min(port[MARGIN], 0.0)
@@ -98,7 +98,7 @@ def tdpa_hand(
 def pay_push(port: Array, push: Array, size: float, way: float, scale: float) -> None:
     """Make a push (3,) of some size [N] no larger than the margin pays for until the next sample.
 
-    The hand went ``way`` [m], the sum over its axes, since the sample before.
+    The hand moved by ``way`` [m], the sum over its axes, since the last sample.
     """
     most = SPARE + scale * max(port[MARGIN], 0.0) / (READING + 2.0 * way)
     if size > most:
@@ -108,9 +108,9 @@ def pay_push(port: Array, push: Array, size: float, way: float, scale: float) ->
 
 @inner
 def keep_account(numbers: Array, flow: Array, force: Array, port: Array) -> float:
-    """Count what is left at the slave's port, tell of it, and return it with the credit [J].
+    """Update the energy left at the slave's port, report it, and return it plus the arm's loan [J].
 
-    Nothing that is owed is ever forgiven, so what the arm lends in all is bounded.
+    Debts are never cancelled, so the total loan of the arm is bounded.
     """
     port[MARGIN] += flow[0] + flow[1] - flow[2]
     tell(port, 0.0)
@@ -122,7 +122,7 @@ def lead_slave(
     numbers: Array, memory: Array, flow: Array, force: Array, tip: Array, last: Array, port: Array,
     command: Array, stop: float, period: float,
 ) -> None:  # fmt: skip
-    """Turn the command (7,) that came into the one that is given to the slave; see :func:`tdpa_slave`."""
+    """Replace the command (7,) that came by the command to give to the slave; see :func:`tdpa_slave`."""
     left, drift = keep_account(numbers, flow, force, port), port[DRIFT : DRIFT + 3]
     met = held_back.met_way(command, last, drift) if held_back.norm(force) <= numbers[2] else 0.0
     held_back.make_up(numbers, drift, met, period)
@@ -138,28 +138,28 @@ def tdpa_slave(
 ) -> None:  # fmt: skip
     """Let the command (7,) be ahead of the tip as far as the remaining energy pays for.
 
-    What is left is counted at the tip, by its force and its way on all six axes: what was heard and
-    what came in, less what was told and what went out, and the credit, once for all. The last
-    numbers of ``port`` are the drift, from what is given to what was commanded [m].
+    The remaining energy is counted at the tip, from its wrench and its motion on all six axes. It is what was heard
+    and what came in, minus what was told and what went out, plus the loan, which is given only once. The last numbers
+    of ``port`` are the drift, from the given to the original command [m].
 
     Args:
-        numbers: Time constant [s] and largest speed [m/s] with which drift goes away; a force below
-            which nothing is touched [N]; what the arm may lend [J]; two that are not used; and the
-            stiffness against which a lead is paid for [N/m].
+        numbers: Time constant [s] and largest speed [m/s] with which drift decays; the force below which there is no
+            contact [N]; the largest loan of the arm [J]; two unused numbers; and the stiffness for which a lead is
+            paid [N/m].
         memory: Direction of the last force; written.
         flow: Heard, in, out [J].
-        force: On the tip (6,).
-        tip: Its pose (7,).
-        last: Command before, as it was given.
+        force: Wrench on the tip (6,).
+        tip: Pose of the tip (7,).
+        last: Last command given to the slave.
         heard: Not used.
         port: Written.
         command: Written.
-        period: Since the command before [s].
+        period: Time since the last command [s].
 
     Source:
-        Ryu, Artigas and Preusche 2010, an admittance that takes from the command; Coelho, Ott,
-        Singh, Lizarralde and Kondak 2019 for drift that is made up for while energy is left. That
-        drift goes away in the air by the way on which the command comes back is ours.
+        Ryu, Artigas and Preusche 2010, an admittance that takes from the command; Coelho, Ott, Singh, Lizarralde and
+        Kondak 2019 for drift that is made up for while energy is left. Our addition: without contact, drift also
+        decays by the distance by which the command moves back.
     """
     lead_slave(numbers, memory, flow, force, tip, last, port, command, 1e9, period)
 

@@ -1,7 +1,8 @@
 """Wave: hand and slave exchange waves, each a mix of force and speed.
 
-A wave carries energy: what the two-port holds is what is on its way. Its integral and its energy travel, which are both
-sums, so a packet that is lost, late or doubled takes nothing away from the next one and adds no energy.
+A wave carries energy: the energy in the two-port is that of the waves in transit. Packets contain the wave's integral
+and its energy, which are both sums. So a lost, late or doubled packet does not make the next one wrong and adds no
+energy.
 """
 
 import math
@@ -18,7 +19,7 @@ from teleop_core.kernels import Array, inner, kernel
 
 @dataclass(frozen=True, kw_only=True)
 class WaveParameters:
-    """What waves travel through."""
+    """Parameters of the wave variables."""
 
     impedance: float = parameter(
         10.0,
@@ -30,30 +31,33 @@ class WaveParameters:
 
 
 DRAG = 1.5
-"""Drag that the hand feels over what its wave takes: what is more pays for what the wave lacks."""
+"""Drag on the hand, divided by what its wave takes; the part above 1 pays for energy that the wave lacks."""
 HASTE = 0.01
-"""Time in which energy is spent on a wave that lags behind what it is to say [s]."""
+"""Time in which energy is spent on a wave that lags behind its wanted integral [s]."""
 KEPT_WAY = 3e-4
-"""Way over which the hand's side keeps what the push needs, as that of TDPA [m]."""
+"""Distance over which the hand's side reserves energy for the push, as in TDPA [m]."""
 RESERVE, TAKEN, OWED, SPEED = 1, 2, 5, 8
-"""Places in the memory of either side: energy that was heard and not yet given [J], integral of the
-wave that was given, integral of the own wave that is not yet told [√W s]; the hand's speed [m/s].
-The first place is the round at the hand, and what is left by the command at the slave."""
+"""Indices in the memory of either side.
+
+They are: received energy that is not yet given [J]; integral of the received wave that was given; integral of the own
+wave that is not yet sent [√W s]; the hand's speed [m/s]. Index 0 is the round at the hand, and the energy that the
+command left over at the slave.
+"""
 
 
 @kernel
 def draw(owed: Array, energy: float, period: float, haste: float, wave: Array) -> float:
-    """Take the part of a wave's integral that is due now; returns its energy [J].
+    """Take the part of a wave's integral that is due now; return its energy [J].
 
-    What a wave of constant size brought in some time is given in the same time. Whatever the wave
-    was, its energy suffices for all of it: no wave gets as far with less than one of constant size.
+    The integral of a constant wave is given in the same time in which it arrived. The energy of any wave suffices for
+    its whole integral, because a constant wave needs the least energy for a given integral.
 
     Args:
-        owed: Integral of the wave that is still to be given (3,) [√W s]; written.
-        energy: What there is for it [J].
-        period: Time for which the wave holds [s].
-        haste: Time in which all of the energy may be spent [s]; infinite to be frugal.
-        wave: Its size over that time (3,) [√W]; written.
+        owed: Remaining integral of the wave (3,) [√W s]; written.
+        energy: Available energy [J].
+        period: Time for which the wave is constant [s].
+        haste: Time in which all of the energy may be spent [s]; infinite to save energy.
+        wave: Wave during that time (3,) [√W]; written.
 
     Source:
         Niemeyer and Slotine 1998, integral and energy of a wave as what travels.
@@ -74,7 +78,7 @@ def draw(owed: Array, energy: float, period: float, haste: float, wave: Array) -
 
 @inner
 def _take(memory: Array, gained: float, heard: Array, port: Array, period: float) -> Array:
-    """The wave (3,) [√W] that comes out for the next ``period``; the margin gets its energy."""
+    """Return the received wave (3,) [√W] for the next ``period``; add its energy to the margin."""
     owed, wave = np.zeros(3), np.zeros(3)
     memory[RESERVE] += gained
     if heard[ROUND] == port[ROUND] and heard[TOLD] == port[HEARD]:  # the newest of this round
@@ -90,7 +94,7 @@ def _take(memory: Array, gained: float, heard: Array, port: Array, period: float
 
 @inner
 def _tell(memory: Array, port: Array, kept: float, period: float) -> None:
-    """Send as much of the own wave as the margin, less ``kept`` [J], pays for."""
+    """Send as much of the own wave as the margin, minus ``kept`` [J], pays for."""
     wave = np.zeros(3)
     spent = draw(memory[OWED : OWED + 3], port[MARGIN] - kept, period, HASTE, wave)
     port[TOLD] += spent
@@ -104,11 +108,11 @@ def wave_hand(
     numbers: Array, memory: Array, last: Array, moved: Array, led: Array, flow: Array,
     heard: Array, port: Array, push: Array, scale: float, period: float,
 ) -> None:  # fmt: skip
-    """Write the push (3,) [N] that the wave from the slave and the hand's speed ask for.
+    """Write the push (3,) [N] that results from the slave's wave and the hand's speed.
 
-    With impedance b, speed v and wave w that came, the push is ``sqrt(2 b) w - b v``, and the wave
-    that goes is ``sqrt(2 b) v - w``; both are of the slave's scale of energy. The first part of the
-    push is no larger than the margin pays for until the next sample, as that of TDPA.
+    With impedance b, speed v and received wave w, the push is ``sqrt(2 b) w - b v`` and the sent wave is ``sqrt(2 b) v
+    - w``; both are in the slave's scale of energy. The first part of the push is no larger than the margin pays for
+    until the next sample, as in TDPA.
 
     Source:
         Niemeyer and Slotine 1991.
@@ -144,7 +148,7 @@ def pay_command(
     """
     size = held_back.norm(force)
     lent = numbers[3] * min(max(2.0 - size / numbers[4], 0.0), 1.0)
-    # What is overdrawn is given back by going back, no faster than drift goes away.
+    # An overdrawn margin is repaid by moving back, no faster than drift decays.
     left = max(min(port[MARGIN], memory[0]) + lent, -size * numbers[1] * period)
     inwards = held_back.hold_back(force, size, last, left, numbers[2], port, command)
     memory[0] -= max(inwards, 0.0)
@@ -155,12 +159,12 @@ def wave_slave(
     numbers: Array, memory: Array, flow: Array, force: Array, tip: Array, last: Array,
     heard: Array, port: Array, command: Array, period: float,
 ) -> None:  # fmt: skip
-    """Write the command (7,) that the wave from the hand and the force on the tip ask for.
+    """Write the command (7,) that results from the hand's wave and the force on the tip.
 
-    The port is matched by a damper of the impedance b: with force f and wave u that came, the
-    command goes at ``u / sqrt(2 b) + f / (2 b)``, and the wave that goes is ``f / sqrt(2 b)``. So
-    no wave from the hand comes back by itself, and a command in the air is the hand's. Against the
-    force it goes as far as is paid for, as that of TDPA; in the air drift goes away.
+    A damper of the impedance b matches the port. With force f and received wave u, the speed of the command is ``u /
+    sqrt(2 b) + f / (2 b)``, and the sent wave is ``f / sqrt(2 b)``. So waves from the hand are not reflected, and
+    without contact the command is the hand's. Against the force the command moves as far as is paid for, as in TDPA;
+    without contact drift decays.
 
     Source:
         Niemeyer and Slotine 1991, with their matching of impedance at the slave.
@@ -173,7 +177,7 @@ def wave_slave(
     wave = _take(memory, flow[0], heard, port, period)
     memory[0] += port[MARGIN] - before + flow[1]
     port[MARGIN] += flow[1] - flow[2]
-    if is_free:  # of what the damper took, what may be owed for the arm's lag is kept
+    if is_free:  # a part of the damper's energy is kept, for a possible debt from the arm's lag
         port[MARGIN] *= numbers[0] / (numbers[0] + period)
         memory[0] = port[MARGIN]
     for i in range(3):

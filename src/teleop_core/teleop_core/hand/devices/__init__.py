@@ -1,6 +1,6 @@
-"""Devices: what a person holds at this machine, a gamepad or a 3-D mouse, as rates and buttons.
+"""Devices: input devices of this machine, a gamepad or a 3-D mouse, read as rates and buttons.
 
-None of them is needed to import this package; their libraries are the extra ``devices``.
+This package can be imported without their libraries, which are the extra ``devices``.
 """
 
 from typing import NamedTuple, Protocol
@@ -13,15 +13,15 @@ __all__ = ["NOTHING", "Device", "Reading"]
 
 
 class Reading(NamedTuple):
-    """What a device says now.
+    """Present reading of a device.
 
     Attributes:
-        rates: How far it is deflected along x, y, z and about x, y, z of the master's base: x to
-            the right, y up, z towards the person; each from -1 to 1, shape (6,).
+        rates: Deflection along x, y, z and about x, y, z of the master's base, each from -1 to 1, shape (6,); x points
+            to the right, y up, z towards the person.
         is_held: Whether the person wants to move the stylus.
         fixture: Whether the fixture button is pressed.
         mode: Whether the mode button is pressed.
-        jaw: How far the jaw is closed, 0 open to 1 closed; None of a device that leads none.
+        jaw: How far the jaw is closed, 0 open to 1 closed; None for a device without a jaw control.
     """
 
     rates: Array
@@ -32,27 +32,27 @@ class Reading(NamedTuple):
 
 
 NOTHING = Reading(np.zeros(6))
-"""Reading of a device that nobody touches."""
+"""Reading of an untouched device."""
 
 
 class Device(Protocol):
-    """A device that is open; all calls come from one thread.
+    """An open device; all calls must come from one thread.
 
     Attributes:
-        name: What it calls itself.
+        name: Name that the device reports.
     """
 
     name: str
 
     def read(self) -> Reading:
-        """What it says now; does not wait.
+        """Return the present reading, without waiting.
 
         Raises:
-            SessionError: It is gone.
+            SessionError: The device is disconnected.
         """
 
     def rumble(self, share: float) -> None:
-        """Let the person feel a force, 0 to 1 of the largest; nothing where it cannot."""
+        """Display a force by vibration, as a share of the largest, 0 to 1; does nothing without a motor."""
 
     def close(self) -> None:
-        """Give it back."""
+        """Close the device."""

@@ -25,7 +25,7 @@ _HINTS = {
 
 @dataclass(frozen=True, kw_only=True)
 class GamepadParameters(pilot.PilotParameters):
-    """How a gamepad moves the stylus, and how it tells the force."""
+    """How a gamepad moves the stylus, and how it displays the force."""
 
     rumble: float = parameter(1.0, Within(0.0, 1.0), "rumble at the device's peak force; 0: none", fixed=True)
     triggers: str = parameter(
@@ -37,7 +37,7 @@ class GamepadParameters(pilot.PilotParameters):
 
 
 class Sdl:
-    """SDL's joysticks and those of them whose layout it knows.
+    """Joysticks found by SDL, and those whose layout SDL knows.
 
     Raises:
         SessionError: pygame-ce is not installed.
@@ -65,18 +65,19 @@ class Sdl:
 
 
 class Gamepad:
-    """A gamepad that is open; see :class:`teleop_core.hand.devices.Device`.
+    """An open gamepad; see :class:`teleop_core.hand.devices.Device`.
 
-    The left stick moves the stylus to the sides and away, the right one up, and turns it about the vertical; the
-    triggers roll it, or the right one closes the jaw; the cross tips it. It moves while a shoulder button is held. The
-    lower button of the right hand (A) is the fixture, the right one (B) the mode.
+    The left stick moves the stylus sideways, forwards and backwards. The right stick moves it up and down, and turns
+    it about the vertical. The triggers roll the stylus, or the right trigger closes the jaw; the direction pad tilts
+    it. The stylus moves only while a shoulder button is held. Button A is the fixture button, button B the mode
+    button.
 
     Args:
-        wanted: Part of its name; empty: the first.
+        wanted: Part of the gamepad's name; if empty, the first gamepad is opened.
         leads_jaw: Whether the right trigger closes the jaw.
 
     Raises:
-        SessionError: There is none; the text says what was found.
+        SessionError: There is no such gamepad; the message lists what was found.
     """
 
     def __init__(self, wanted: str = "", *, leads_jaw: bool = False) -> None:
@@ -91,7 +92,7 @@ class Gamepad:
         raise SessionError(f"no gamepad{called}; found: {', '.join(texts) or 'none'}")
 
     def read(self) -> Reading:
-        """What it says now; raises SessionError if it is gone."""
+        """Return the present reading; raises SessionError if the gamepad is disconnected."""
         self._sdl.pygame.event.pump()
         self._sdl.pygame.event.clear()
         if not self._own.attached():
@@ -124,19 +125,19 @@ class Gamepad:
         return bool(self._own.get_button(number))
 
     def rumble(self, share: float) -> None:
-        """Rumble with a share, 0 to 1; nothing where it cannot."""
+        """Rumble with a share, 0 to 1; does nothing if the gamepad cannot rumble."""
         if share > 0.0:
             self._own.rumble(share, share, round(1000 * _RUMBLE_TIME))
         else:
             self._own.stop_rumble()
 
     def close(self) -> None:
-        """Give it back."""
+        """Close the gamepad."""
         self._own.quit()
 
 
 def open_gamepad(parameters: GamepadParameters) -> Gamepad:
-    """The gamepad that is wanted; raises as :class:`Gamepad`."""
+    """Open the gamepad that the parameters name; raises as :class:`Gamepad`."""
     return Gamepad(parameters.device, leads_jaw=parameters.triggers == "jaw")
 
 

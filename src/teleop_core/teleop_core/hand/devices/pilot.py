@@ -1,4 +1,4 @@
-"""Pilot: rates of a device, summed up to poses that a remote hand follows."""
+"""Pilot: integrates rates of a device to poses that a remote hand follows."""
 
 from dataclasses import dataclass
 
@@ -9,8 +9,8 @@ from teleop_core.hand.devices import Reading
 from teleop_core.hand.operators.remote import RemoteHand
 from teleop_core.kernels import Array, length, turn_by
 
-_NEAR = 0.02  # share of the jaw's way: a trigger that is as far pressed as before
-_LONGEST = 0.05  # a reader that slept longer has lost time, not made way [s]
+_NEAR = 0.02  # share of the jaw's travel: a trigger within this of its former position has returned to it
+_LONGEST = 0.05  # time beyond this between two readings is not integrated [s]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,13 +48,13 @@ class PilotParameters(RateParameters):
 
 
 def beyond(rates: Array, dead_zone: float) -> Array:
-    """Rates (N,) from -1 to 1 without the dead zone: 0 within it, then rising to 1 steadily."""
+    """Apply a dead zone to rates (N,) from -1 to 1: 0 within the zone, then linear up to 1."""
     size = np.clip((np.abs(rates) - dead_zone) / (1.0 - dead_zone), 0.0, 1.0)
     return np.asarray(np.sign(rates) * size)
 
 
 def steer(pose: Array, rates: Array, time: float, parameters: RateParameters, low: Array, high: Array) -> None:
-    """Move a pose (7,) at rates (6,) from -1 to 1 for a time [s]; its place stays from ``low`` to ``high`` (3,) [m]."""
+    """Move a pose (7,) at rates (6,) from -1 to 1 for a time [s]; clip its position to ``low``, ``high`` (3,) [m]."""
     moved = beyond(rates, parameters.dead_zone)
     pose[:3] = np.clip(pose[:3] + time * parameters.speed * moved[:3], low, high)
     turn_by(time * parameters.turn_speed * moved[3:], pose[3:])
@@ -62,10 +62,10 @@ def steer(pose: Array, rates: Array, time: float, parameters: RateParameters, lo
 
 
 class Pilot:
-    """Tells a hand where a person steers the stylus.
+    """Sends the poses to which a person steers the stylus to a hand.
 
     Args:
-        hand: Who is told.
+        hand: The hand that receives the poses.
         parameters: Speeds and dead zone.
     """
 
@@ -75,7 +75,7 @@ class Pilot:
         self._has_buttons, self._leads_jaw = (False, False), True
 
     def step(self, reading: Reading, dt: float) -> None:
-        """Take what the device says, ``dt`` [s] after the last time."""
+        """Take a reading of the device, ``dt`` [s] after the last one."""
         self._press(reading)
         self._close(reading)
         if not reading.is_held:
@@ -83,7 +83,7 @@ class Pilot:
             return
         time = min(dt, _LONGEST)
         if self._pose is None:
-            self._pose, time = self._hand.pose, 0.0  # the first pose of a grip is where it is
+            self._pose, time = self._hand.pose, 0.0  # the first pose of a grip is the present pose of the stylus
         steer(self._pose, reading.rates, time, self._parameters, *self._hand.room)
         self._hand.want(self._pose)
 
@@ -94,14 +94,15 @@ class Pilot:
             self._pose = None
 
     def lose(self) -> None:
-        """Let go of the stylus, and leave the jaw as it is: the device is gone."""
+        """Let go of the stylus after the device was disconnected, and leave the jaw unchanged."""
         self.let_go()
         self._leads_jaw = False
 
     def _close(self, reading: Reading) -> None:
-        """Close the jaw as far as the device says.
+        """Close the jaw as far as the device's trigger is pressed.
 
-        One that came back says that nothing is pressed. It leads the jaw again once it was closed as far as it is.
+        A device that was reconnected reports an unpressed trigger. It moves the jaw again only after the trigger was
+        pressed as far as the jaw is closed.
         """
         if reading.jaw is None:
             return

@@ -20,7 +20,7 @@ _USAGE = (0x01, 0x08)  # generic desktop, multi-axis controller
 _MOVED, _TURNED, _PRESSED = 1, 2, 3  # kinds of reports
 _FULL = 350.0
 _LONGEST = 64  # bytes of a report
-_REST = 0.5  # a cap at rest for longer is let go of; one that is silent for longer is at rest [s]
+_REST = 0.5  # a cap at rest for longer counts as released; without reports for longer it is at rest [s]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -29,14 +29,14 @@ class SpaceMouseParameters(pilot.PilotParameters):
 
 
 class Reports:
-    """What the reports of a space mouse add up to.
+    """State of a space mouse, collected from its reports.
 
-    Numbers are little-endian, of 16 bits: x, y, z in report 1, turns about them in report 2, or
-    all six in report 1, with about 350 at full deflection; buttons are the bits of report 3. The
-    x of the mouse is to the right, its y towards the person, its z down.
+    Numbers are 16-bit little-endian integers, about 350 at full deflection. Report 1 has x, y, z and report 2 the
+    rotations about them, or report 1 has all six. Buttons are the bits of report 3. The x axis of the mouse points to
+    the right, y towards the person, z down.
 
     Attributes:
-        deflection: Place and turn in the mouse's axes, -1 to 1, shape (6,).
+        deflection: Translation and rotation of the cap in the mouse's axes, -1 to 1, shape (6,).
         buttons: Bits of the buttons, the first one lowest.
     """
 
@@ -45,7 +45,7 @@ class Reports:
         self.buttons = 0
 
     def take(self, report: bytes) -> bool:
-        """Take a report; whether it was one that is known, and whole."""
+        """Take a report; return whether it is complete and of a known kind."""
         kind, data = report[:1], report[1:]
         if kind == bytes([_PRESSED]) and data:
             self.buttons = int.from_bytes(data[:4], "little")
@@ -65,16 +65,16 @@ class Reports:
 
 
 class SpaceMouse:
-    """A 3-D mouse that is open; see :class:`teleop_core.hand.devices.Device`.
+    """An open 3-D mouse; see :class:`teleop_core.hand.devices.Device`.
 
     It moves the stylus while its cap is touched. Its first button is the fixture, its second one the mode.
 
     Args:
-        wanted: Part of its name; empty: the first.
+        wanted: Part of the mouse's name; if empty, the first mouse is opened.
         dead_zone: Share of the deflection at which the cap counts as untouched.
 
     Raises:
-        SessionError: hidapi is not installed; there is no such mouse; it may not be read.
+        SessionError: hidapi is not installed; there is no such mouse; or there is no permission to read it.
     """
 
     def __init__(self, wanted: str = "", dead_zone: float = 0.1) -> None:
@@ -95,7 +95,7 @@ class SpaceMouse:
         self._touched = self._heard = -np.inf
 
     def read(self) -> Reading:
-        """What it says now; raises SessionError if it is gone."""
+        """Return the present reading; raises SessionError if the mouse is disconnected."""
         now = time.monotonic()
         try:
             while report := self._own.read(_LONGEST):
@@ -112,10 +112,10 @@ class SpaceMouse:
         return Reading(rates, now - self._touched < _REST, bool(pressed & 1), bool(pressed & 2))
 
     def rumble(self, share: float) -> None:
-        """Nothing: it has no motor."""
+        """Do nothing: the mouse has no motor."""
 
     def close(self) -> None:
-        """Give it back."""
+        """Close the mouse."""
         self._own.close()
 
 
@@ -130,7 +130,7 @@ def space_mice() -> list[tuple[str, bytes]]:
 
 
 def is_space_mouse(vendor: int, product: int) -> bool:
-    """Whether numbers of a USB device are those of a 3-D mouse."""
+    """Whether vendor and product numbers of a USB device are those of a 3-D mouse."""
     return vendor == _MAKER or (vendor == _OLD_MAKER and product in _OLD)
 
 
@@ -143,7 +143,7 @@ def _hid() -> Any:
 
 
 def open_space_mouse(parameters: SpaceMouseParameters) -> SpaceMouse:
-    """The mouse that is wanted; raises as :class:`SpaceMouse`."""
+    """Open the mouse that the parameters name; raises as :class:`SpaceMouse`."""
     return SpaceMouse(parameters.device, parameters.dead_zone)
 
 

@@ -1,4 +1,4 @@
-"""Contact: the energy that a stretch of the device's force took from the hand and gave back."""
+"""Contact: the energy that the hand gave to the device and got back during one continuous force."""
 
 import math
 
@@ -13,26 +13,27 @@ _NUMBER, _TAKEN, _RETURNED, _FRICTION = (
 class ContactState(Fields):
     """Fields of a state record with the present contact."""
 
-    tip: Vector3  # where the tip of the stylus was [m]
+    tip: Vector3  # last position of the tip of the stylus [m]
     is_touched: int
 
 
 @inner
 def account(s: ContactState, force: Array, friction: float, moved: float, place: Array, contact: Array) -> None:
-    """Add the energy of a tick to the present contact; a new one begins where force begins.
+    """Add the energy of a tick to the present contact; a new contact begins when the force begins.
 
-    The force is constant within a tick, so force times the way of the device is its work, without any error: the wall
-    takes energy where the hand pushes the device against the force, and gives it back where the device goes along. What
-    the device's structure keeps in bending is not in it: of what is given back a part never reaches the hand.
+    The force is constant within a tick, so force times displacement of the device is exactly its work. The wall takes
+    energy while the hand pushes the device against the force, and returns energy while the device moves with the
+    force. The energy stored in bending of the device's structure is not counted. Therefore a part of the returned
+    energy never reaches the hand.
 
     Args:
         s: State; written.
         force: What the device applied during the tick (3,) [N].
         friction: Dry friction of the device [N].
-        moved: Way of the device against friction during the tick [m].
-        place: Place of the device at its encoders, before they round it, at the end of the tick
-            (3,) [m], in the master's base.
-        contact: Row of ``master/contact``, number and energies; written.
+        moved: Distance of the device against friction during the tick [m].
+        place: Position of the device at its encoders, before rounding, at the end of the tick (3,) [m], in the
+            master's base.
+        contact: Row of ``master/contact``: number and energies of the contact; written.
     """
     work, square = 0.0, 0.0
     for i in range(3):
@@ -53,5 +54,5 @@ def account(s: ContactState, force: Array, friction: float, moved: float, place:
 
 @inner
 def distance(a: Array, b: Array) -> float:
-    """Distance of two places (3,) [m]."""
+    """Distance of two points (3,) [m]."""
     return math.sqrt((a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2 + (a[2] - b[2]) ** 2)

@@ -1,4 +1,4 @@
-"""Device: what the haptic master reads of the hand, as a Phantom Omni or as a jointed handle."""
+"""Device: how the haptic master measures the hand, as a Phantom Omni or as a jointed handle."""
 
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -23,7 +23,7 @@ _OMNI = "published: Vongbunyong 2008, table 5.1"
 
 @dataclass(frozen=True, kw_only=True)
 class DeviceParameters:
-    """The Phantom Omni: what its maker publishes, and what follows or is assumed beside it."""
+    """The Phantom Omni: numbers that its maker publishes, and derived or assumed numbers."""
 
     workspace: tuple[float, ...] = parameter(
         (0.16, 0.12, 0.07),
@@ -86,7 +86,7 @@ class DeviceParameters:
 
 
 class Handle(NamedTuple):
-    """A jointed handle: its kinematics, where it stands, and its last joints."""
+    """A jointed handle: its kinematics, the pose of its base, and its last joint positions."""
 
     ik: Any
     fk: Any
@@ -100,14 +100,14 @@ class Handle(NamedTuple):
 
 
 class ReadingNumbers(Fields):
-    """Fields of a parameter record with how finely the device reads."""
+    """Fields of a parameter record with the resolution of the device."""
 
     resolution: float  # of its place [m]
     gimbal: float  # bound of the noise of its attitude [rad]
 
 
 class ReadingState(Fields):
-    """Fields of a state record with what was read last."""
+    """Fields of a state record with the last reading."""
 
     reading: Vector3  # [m]
     rate: Vector3  # [m/s]
@@ -117,13 +117,13 @@ class ReadingState(Fields):
 
 @kernel
 def read_phantom(p: ReadingNumbers, position: Array, attitude: Array, noise: Array, pose: Array) -> None:
-    """Write the pose (7,) that the Phantom reads: place in steps, attitude with noise (3,)."""
+    """Write the pose (7,) that the Phantom reads: position in encoder steps, attitude with noise (3,)."""
     wobble = room(3)
     for i in range(3):
         pose[i] = position[i]
         if p.resolution > 0.0:
             pose[i] = round(position[i] / p.resolution) * p.resolution
-        # The noise counts as two standard deviations and never exceeds its bound.
+        # The bound counts as two standard deviations, and the noise never exceeds it.
         wobble[i] = p.gimbal * min(max(0.5 * noise[i], -1.0), 1.0)
     rotate_by_vector(attitude, wobble[0], wobble[1], wobble[2], pose[3:7])
 
@@ -132,8 +132,8 @@ def read_phantom(p: ReadingNumbers, position: Array, attitude: Array, noise: Arr
 def read_handle(handle: Handle, position: Array, attitude: Array, pose: Array) -> None:
     """Write the pose (7,) that a jointed handle reads: its joints in encoder steps, through fk.
 
-    The hand moves the tip; the joints that go with it come from the inverse kinematics, next to
-    those of the last sample.
+    The hand moves the tip. The joint positions come from the inverse kinematics; of several solutions, the one nearest
+    to the last sample is taken.
     """
     T, U, residual, q = room(4, 4), room(4, 4), room(2), handle.q
     for i in range(3):
@@ -153,7 +153,7 @@ def read_handle(handle: Handle, position: Array, attitude: Array, pose: Array) -
 
 @inner
 def measure_twist(s: ReadingState, pose: Array, twist: Array, dt: float) -> None:
-    """Write the twist (6,) from the readings of two samples through a 5 ms low-pass."""
+    """Write the twist (6,) from two successive readings, through a 5 ms low-pass."""
     share = dt / (dt + 5e-3)
     for i in range(3):
         s.rate[i] += ((pose[i] - s.reading[i]) / dt - s.rate[i]) * share
@@ -166,7 +166,7 @@ def measure_twist(s: ReadingState, pose: Array, twist: Array, dt: float) -> None
     multiply_quaternions(pose[3:7], back, back)
     sign = 1.0 if back[0] >= 0.0 else -1.0
     for i in range(3):
-        # Small turn between two samples: twice the vector part, in base axes.
+        # For a small rotation between two samples: twice the vector part, in base axes.
         s.turning[i] += (sign * 2.0 * back[1 + i] / dt - s.turning[i]) * share
         twist[3 + i] = s.turning[i]
     for i in range(4):
@@ -176,11 +176,11 @@ def measure_twist(s: ReadingState, pose: Array, twist: Array, dt: float) -> None
 def make_handle(parameters: DeviceParameters, T_base_rest: Array) -> Handle | None:
     """Arguments of :func:`read_handle` for the wanted handle, None for the Phantom.
 
-    The handle's home is laid onto the place where the stylus rests, so that the same paths and
-    the same motion scaling serve every device.
+    The base of the handle is placed so that its home pose is the rest pose of the stylus. So the same paths and the
+    same motion scaling work for every device.
 
     Args:
-        parameters: Which handle.
+        parameters: Parameters that name the handle.
         T_base_rest: Pose of the resting tip in the master's base (4, 4).
 
     Returns:

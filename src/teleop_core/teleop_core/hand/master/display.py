@@ -1,4 +1,4 @@
-"""Display: a stage that shows the operator the slave as a screen does, frame by frame and with latency."""
+"""Display: a stage that shows the slave to the operator like a screen, frame by frame and with latency."""
 
 from dataclasses import dataclass
 from typing import Annotated
@@ -8,9 +8,9 @@ from teleop_core.graph import Row, Stage, topics
 from teleop_core.kernels import Array, Fields, Integers, kernel
 
 _FRAMES = 512
-"""Frames that can be on their way to the screen."""
+"""Largest number of frames in the latency of the screen."""
 SHOWS = ("slave", "command")
-"""What a frame shows: what the slave says of itself, or where it was told to go."""
+"""What a frame shows: the slave's measured pose, or its commanded pose."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,7 +43,7 @@ class DisplayParameters:
 
 
 class DisplayNumbers(Fields):
-    """Parameter record of the display, as its group has it."""
+    """Parameter record of the display, with the fields of its parameter group."""
 
     rate: float
     latency: float
@@ -51,11 +51,11 @@ class DisplayNumbers(Fields):
 
 
 class DisplayState(Fields):
-    """Frames on their way to the screen."""
+    """Frames that are taken but not yet shown."""
 
     taken: int  # frames so far
     shown: int
-    due_ns: int  # when the next one is taken
+    due_ns: int  # when the next frame is taken
     frames: Annotated[Array, 7 * _FRAMES]
     stamps: Annotated[Integers, _FRAMES]
     times: Annotated[Integers, _FRAMES]
@@ -63,16 +63,16 @@ class DisplayState(Fields):
 
 @kernel
 def display_step(p: DisplayNumbers, s: DisplayState, row: Row, dt: float) -> None:
-    """One tick: take a frame if one is due, and show the newest whose latency is over.
+    """One tick: take a frame if one is due, and show the newest frame whose latency is over.
 
     Args:
         p: Parameter record.
         s: State record; written.
-        row: Signals; ``display_measured_cp`` is written, with the stamp of what it shows.
+        row: Signals; ``display_measured_cp`` is written, with the stamp of the pose that it shows.
         dt: Tick [s].
     """
     stamp_ns = row.slave_servo_cp_ns if p.shows == 1 else row.slave_measured_cp_ns
-    if row.now_ns >= s.due_ns and stamp_ns > 0:  # else there is nothing to see yet
+    if row.now_ns >= s.due_ns and stamp_ns > 0:  # without it there is no pose to show yet
         s.due_ns = max(s.due_ns, row.now_ns - 1_000_000_000) + int(1e9 / p.rate)
         at = s.taken % _FRAMES
         shown = row.slave_servo_cp if p.shows == 1 else row.slave_measured_cp

@@ -1,4 +1,4 @@
-"""Hand: the operator as a mass on a spring and damper that wants to follow a path."""
+"""Hand: the operator's hand as a mass that a spring and a damper pull along the wanted path."""
 
 import math
 from dataclasses import dataclass
@@ -13,14 +13,14 @@ from teleop_core.kernels.portable import matrix_exponential
 from teleop_core.kernels.room import room
 
 _FASTEST = 1.5
-"""Largest part of an oscillation of hand against device in a step between two frictions [rad]."""
+"""Largest phase [rad] of the oscillation of hand against device in one step of constant friction."""
 _PLACE, _SPEED, _HAND, _HAND_SPEED = range(4)  # what a step gives
-_PUSH = 5  # the last of what a step takes
+_PUSH = 5  # index of the last input of a step
 
 
 @dataclass(frozen=True, kw_only=True)
 class HandParameters:
-    """The operator's hand: a mass on a spring and damper that wants to follow the path."""
+    """The operator's hand: a mass that a spring and a damper pull along the wanted path."""
 
     mass: float = parameter(
         0.15,
@@ -56,7 +56,7 @@ class HandNumbers(Fields):
 
 
 class HandState(Fields):
-    """Fields of a state record with where both are."""
+    """Fields of a state record with position and speed of hand and device."""
 
     position: Vector3  # of the device [m]
     speed: Vector3  # [m/s]
@@ -69,10 +69,11 @@ class HandState(Fields):
 def move_hand(p: HandNumbers, s: HandState, wanted: Array, force: Array, dt: float) -> None:
     """Move hand and device on by one tick under the motors' force (3,) [N].
 
-    Two masses on each axis: the hand, which a spring and a damper pull along its path, and the device with its motors,
-    encoders and dry friction; between them the device's structure, a spring and a damper. The motors' force is held and
-    the path is straight within the tick, so each step is exact. Friction is a force of any direction up to its bound,
-    held for a step. It takes all speed that it can, so the device sticks, without creep, until what pulls is larger.
+    The model has two masses on each axis. A spring and a damper pull the hand along its path. The device has motors,
+    encoders and dry friction. The device's structure, a spring and a damper, connects both masses. Within a tick the
+    motor force is constant and the path is straight, so each step is exact. Friction is a force of any direction up to
+    its bound, constant during a step. It takes as much speed as it can. So the device sticks, without creep, until the
+    pulling force exceeds the bound.
 
     Source:
         Exact step of a linear system under held input, as in any book on sampled control (Astrom and Wittenmark 1997,
@@ -89,13 +90,13 @@ def move_hand(p: HandNumbers, s: HandState, wanted: Array, force: Array, dt: flo
         if s.position[i] < low or s.position[i] > high:  # the device's stops
             s.position[i] = min(max(s.position[i], low), high)
             s.speed[i] = 0.0
-            # They are in its joints; a hand that leans on one shall bend nothing.
+            # The stops are in the device's joints; a hand that pushes against one must not bend the structure.
             s.hand[i], s.hand_speed[i] = s.position[i], 0.0
 
 
 @inner
 def _push_on(p: HandNumbers, s: HandState, aim_speed: Array, force: Array, time: float) -> None:
-    """Make one step that begins ``time`` [s] after the tick."""
+    """Make one step that begins ``time`` [s] after the start of the tick."""
     given, needed = room(3, 6), room(3)
     square, rests = 0.0, True
     for i in range(3):
@@ -127,11 +128,12 @@ def _flows(row: Array, given: Array) -> float:
 
 
 def join(p: HandNumbers, hand: HandParameters, device: DeviceParameters, dt: float) -> None:
-    """Write the exact step of hand and device, and how many of them make a tick.
+    """Write the exact step of hand and device, and the number of steps in a tick.
 
-    ``flow[0]`` (3, 4, 6) gives on each axis the way of the device, its speed, the way of the hand and its speed after a
-    step, from: the speeds of device and hand, the hand from the device, the aim from the hand, the speed of the aim,
-    and the force on the device. ``flow[1]`` is the same while friction holds the device.
+    ``flow[0]`` (3, 4, 6) is a matrix for each axis. Its results after a step are displacement and speed of the device,
+    and displacement and speed of the hand. Its inputs are the speeds of device and hand, the hand relative to the
+    device, the aim relative to the hand, the speed of the aim, and the force on the device. ``flow[1]`` is the same
+    while friction holds the device.
 
     Args:
         p: Parameter record; ``flow`` and ``steps`` are written.
@@ -147,8 +149,8 @@ def join(p: HandNumbers, hand: HandParameters, device: DeviceParameters, dt: flo
         bend[4] = stiffness
         pull = np.array([0.0, 0.0, 0.0, -1.0, 0.0, 0.0, 1.0, 0.0]) * hand.damping
         pull[5] = hand.stiffness
-        # Rates of the way of the device, its speed, the way of the hand, its speed, and of what a
-        # step takes besides: hand from device, aim from hand, speed of the aim, force.
+        # Rates of displacement and speed of the device, of displacement and speed of the hand, and of the other inputs
+        # of a step: hand relative to device, aim relative to hand, speed of the aim, force.
         rates = np.zeros((8, 8))
         rates[0, 1] = rates[2, 3] = rates[4, 3] = rates[5, 6] = 1.0
         rates[4, 1] = rates[5, 3] = -1.0

@@ -25,12 +25,14 @@ from teleop_core.kernels.room import room
 from teleop_core.slave.operation.states import State
 
 _DOUBT_NS = 1_000_000_000
-"""Time for which a source of force is not believed after it was out of range [ns]."""
+"""Time for which forces are ignored after a force was out of range [ns]."""
 _GRIP_NS = 300_000_000
-"""Time for which the clutch stays pressed after a hand that had let go is there again [ns]; it has
-brought the stylus to where it wants it by then."""
-_FASTEST = 3.0  # a hand that is farther than so fast a one gets [m/s] is another grip
-_NEAR = 2e-3  # one that is no farther after a silence [m] is the same
+"""Time for which the clutch stays pressed after a hand that had let go grips again [ns].
+
+Within this time the hand brings the stylus to its wanted position.
+"""
+_FASTEST = 3.0  # a hand that moves faster than this between two samples [m/s] has begun a new grip
+_NEAR = 2e-3  # a hand that has moved by no more than this after a silence [m] continues the same grip
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,7 +61,7 @@ class HapticMasterParameters:
 class MasterNumbers(hand_mechanics.HandNumbers, ReadingNumbers, rendering.RenderingNumbers):
     """Parameter record of the haptic master."""
 
-    force_range: float  # beyond which a force is not given [N]
+    force_range: float  # a larger force is not applied [N]
     silence_ns: int
 
 
@@ -67,7 +69,7 @@ class MasterState(hand_mechanics.HandState, ReadingState, rendering.RenderingSta
     """State record of the haptic master."""
 
     next_noise: int
-    aim: PoseRow  # where the operator wants the stylus
+    aim: PoseRow  # pose of the stylus that the operator wants
     told_ns: int
     heard_ns: int
     free_ns: int
@@ -83,7 +85,7 @@ _MOST = topics.MASTER_CONTACT.columns.index("largest_force")
 
 @inner
 def _is_sound(p: MasterNumbers, s: MasterState, force: Array, now_ns: int) -> bool:
-    """Whether the force (6,) can be given: within its range now, and in the last second."""
+    """Whether the force (6,) may be applied: it is within its range, and was so for the last second."""
     square = force[0] * force[0] + force[1] * force[1] + force[2] * force[2]
     if not square <= p.force_range * p.force_range:  # NaN is not
         s.doubted_ns, s.doubted = now_ns, square**0.5
@@ -94,10 +96,10 @@ def _is_sound(p: MasterNumbers, s: MasterState, force: Array, now_ns: int) -> bo
 
 @inner
 def _holds(p: MasterNumbers, s: MasterState, row: Row) -> bool:
-    """Whether a hand holds the stylus; if so, take its wanted place.
+    """Return whether a hand holds the stylus; if so, store its wanted pose.
 
-    A hand that is suddenly elsewhere, or after a silence, is another grip: it brings the stylus
-    there before the clutch is released.
+    A hand that jumps, or returns elsewhere after a silence, begins a new grip: it brings the stylus to its wanted pose
+    before the clutch is released.
     """
     silence_ns = row.now_ns - s.heard_ns
     if row.hand_servo_cp_ns != s.told_ns:
@@ -116,13 +118,13 @@ def _holds(p: MasterNumbers, s: MasterState, row: Row) -> bool:
 
 @kernel
 def haptic_master_step(p: MasterNumbers, s: MasterState, handle: Handle, noises: Array, row: Row, dt: float) -> None:
-    """One tick: feel master_servo_cf, move, and write what the device measures and the contact.
+    """One tick: apply master_servo_cf, move the device, and write its measurements and the contact.
 
     Args:
         p: Parameter record.
         s: State record; written.
-        handle: None for the Phantom, else as :func:`teleop_core.hand.master.device.make_handle` gives.
-        noises: Standard normal numbers of the coming ticks (N, 6), of which the last three shake the gimbal's readings.
+        handle: None for the Phantom; otherwise the result of :func:`teleop_core.hand.master.device.make_handle`.
+        noises: Standard normal numbers of the coming ticks (N, 6); the last three are noise of the gimbal's readings.
         row: Signals.
         dt: Tick [s].
     """
@@ -157,10 +159,10 @@ def haptic_master_step(p: MasterNumbers, s: MasterState, handle: Handle, noises:
 class HapticMaster(RunningStage):
     """Stage that simulates the device and the mechanics of the hand.
 
-    The same parameters give the same motion, bit for bit, as long as the same hand and the same forces act on it.
+    The same parameters, hand and forces give the same motion, bit for bit.
 
     Args:
-        parameters: What device and hand are.
+        parameters: Parameters of device and hand.
         dt: Length of a tick [s].
     """
 
@@ -174,9 +176,9 @@ class HapticMaster(RunningStage):
         self.reset()
 
     def reset(self) -> None:
-        """Stylus in the inkwell, with the random numbers of the seed; a hand is about to come."""
+        """Put the stylus into the inkwell, restart the random numbers from the seed, and wait for a hand."""
         rng = np.random.default_rng(self._fixed.seed)
-        rng.uniform(0.0, 2.0 * math.pi, PHASES)  # those of the operator, who has the seed too
+        rng.uniform(0.0, 2.0 * math.pi, PHASES)  # skip the random numbers of the operator, who uses the same seed
         self._noise.begin(rng)
         rest = transform(rotation("x", REST_TILT), np.array(REST_POSITION))
         self.handle = make_handle(self._fixed.device, rest)
@@ -209,12 +211,12 @@ class HapticMaster(RunningStage):
         p["half"] = 0.5 * np.array(device.workspace)
 
     def press(self, *, is_pressed: bool) -> None:
-        """Give no force from the next tick on while an emergency stop is pressed."""
+        """While an emergency stop is pressed, apply no force, from the next tick on."""
         self.state["is_stopped"] = is_pressed
 
     @property
     def doubted_force(self) -> float:
-        """Force that was out of range and is not believed [N]; 0 while all is well."""
+        """Rejected force that was out of range [N]; 0 if there is none."""
         return float(self.state["doubted"]) if self.state["doubted_ns"] else 0.0
 
     @property

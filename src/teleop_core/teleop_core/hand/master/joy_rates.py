@@ -1,4 +1,4 @@
-"""Joy rates: poses from the axes of a Joy, as drivers of gamepads and 3-D mice say them."""
+"""Joy rates: poses from the axes of Joy messages, which drivers of gamepads and 3-D mice send."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -9,12 +9,12 @@ from teleop_core.base import Within, parameter
 from teleop_core.hand.devices.pilot import RateParameters, steer
 from teleop_core.kernels import Array
 
-_LONGEST = 0.1  # a driver that was silent for longer has lost time, not made way [s]
+_LONGEST = 0.1  # time beyond this between two messages is not integrated [s]
 
 
 @dataclass(frozen=True, kw_only=True)
 class JoyParameters(RateParameters):
-    """How a device that says rates as a Joy moves the stylus, in the device's own frame."""
+    """How a device that sends rates in Joy messages moves the stylus, in the device's own frame."""
 
     axes: tuple[int, ...] = parameter(
         (0, 1, 2, 3, 4, 5),
@@ -30,7 +30,7 @@ class JoyParameters(RateParameters):
 
 
 class JoyRates:
-    """Pose (7,) that the rates of a Joy add up to; it begins at the origin, not turned.
+    """Pose (7,) integrated from the rates of Joy messages; it begins at the origin, without rotation.
 
     Args:
         parameters: Axes, speeds and bounds.
@@ -41,9 +41,9 @@ class JoyRates:
         self.pose: Array = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
 
     def step(self, axes: Sequence[float], buttons: Sequence[int], stamp_ns: int) -> str:
-        """Go on to the stamp [ns] of a message; what is wrong with it in words, empty if nothing.
+        """Integrate up to the stamp [ns] of a message; return what is wrong with the message, empty if nothing.
 
-        Nothing moves by a message that is wrong.
+        A wrong message does not move the pose.
         """
         p = self._parameters
         if max(p.axes) >= len(axes) or p.held_button >= len(buttons):

@@ -1,7 +1,7 @@
-"""Master bridge: the stage that brings a real device in, in the place of ``haptic_master``.
+"""Master bridge: the stage that connects a real device, in place of ``haptic_master``.
 
-It says where the device's stylus is, in ``master_base``, and hands the device the force that it
-shall give. It does not pass on samples that cannot be true: the slave holds then.
+It publishes the pose of the device's stylus in ``master_base``, and sends the commanded force to the device. It does
+not pass on samples that cannot be true; the slave holds then.
 """
 
 import math
@@ -26,9 +26,9 @@ POSE_MESSAGES = (
     "geometry_msgs/msg/Pose",
     "sensor_msgs/msg/JointState",
 )
-"""Messages in which devices say where their stylus is; the last one says where their joints are."""
+"""Message types with the pose of a stylus; the last type has joint positions instead."""
 RATE_MESSAGE = "sensor_msgs/msg/Joy"
-"""Message in which gamepads and 3-D mice say how fast the stylus goes."""
+"""Message type in which gamepads and 3-D mice send the speed of the stylus."""
 _OFF_UNIT = 1e-2  # of a quaternion's length
 _THREE = ("+x", "+y", "+z")
 
@@ -115,7 +115,7 @@ class MasterBridgeParameters:
     )
 
     def __post_init__(self) -> None:
-        """Refuse axes that mirror, and joints without a robot."""
+        """Refuse axes that form a mirrored frame, and joints without a robot."""
         for name in ("device_axes", "stylus_axes"):
             axis_map(f"master_bridge.{name}", getattr(self, name))
         if self.says_joints != bool(self.handle):
@@ -124,20 +124,20 @@ class MasterBridgeParameters:
 
     @property
     def says_joints(self) -> bool:
-        """Whether the device says where its joints are."""
+        """Whether the device sends joint positions."""
         return self.pose_message == POSE_MESSAGES[-1]
 
 
 class MasterBridge(RunningStage):
-    """Stage that says where a real device's stylus is, and what force the device shall give.
+    """Stage that publishes the stylus pose of a real device, and computes the force that the device applies.
 
-    Its node calls it: ``hear``, ``hear_joints`` or ``hear_joy`` for each message of the device,
-    ``press`` for its buttons, ``force`` for what it is sent.
+    Its node calls ``hear``, ``hear_joints`` or ``hear_joy`` for each message of the device, ``press`` for its buttons,
+    and ``force`` for the force to send.
 
     Attributes:
-        wrong: What is wrong with the newest pose, in words; empty if it is sound.
-        heard_ns: When the newest sound pose came [ns]; 0 before the first.
-        refused: Number of poses that were not believed, by reason.
+        wrong: What is wrong with the newest pose, in words; empty if it is valid.
+        heard_ns: Arrival time of the newest valid pose [ns]; 0 before the first.
+        refused: Number of rejected poses, by reason.
 
     Raises:
         TeleopError: There is no such robot, or its joints do not fit.
@@ -165,15 +165,15 @@ class MasterBridge(RunningStage):
             )
 
     def retune(self, parameters: MasterBridgeParameters) -> None:
-        """Take another gain, bound or timeout of the force."""
+        """Take new parameters: gain, bound or timeout of the force."""
         self.parameters = parameters
 
     def hear(self, pose: geometry.Array, stamp_ns: int, now_ns: int) -> bool:
-        """Take a pose of the stylus; whether ``master/measured_cp`` is new.
+        """Take a pose of the stylus; return whether ``master/measured_cp`` is new.
 
         Args:
-            pose: Place in the device's unit and quaternion w, x, y, z, (7,), in its frame.
-            stamp_ns: When it was taken [ns].
+            pose: Position in the device's unit and quaternion w, x, y, z, (7,), in the device's frame.
+            stamp_ns: Time of the measurement [ns].
             now_ns: Time [ns].
         """
         reason, self.wrong = self._doubt(pose, stamp_ns, now_ns)
@@ -190,7 +190,7 @@ class MasterBridge(RunningStage):
         return True
 
     def hear_joints(self, names: Sequence[str], position: Sequence[float], stamp_ns: int, now_ns: int) -> bool:
-        """Take where the joints of a jointed device are [rad or m]; otherwise as :meth:`hear`."""
+        """Take the joint positions of a jointed device [rad or m]; the rest is as in :meth:`hear`."""
         places = self._joints.places(names)
         if isinstance(places, str) or len(position) != len(names):
             self.wrong = places if isinstance(places, str) else "not one position for each name"
@@ -203,7 +203,7 @@ class MasterBridge(RunningStage):
         return self.hear(pose, stamp_ns, now_ns)
 
     def hear_joy(self, axes: Sequence[float], buttons: Sequence[int], stamp_ns: int, now_ns: int) -> bool:
-        """Take the axes of a Joy, as rates of the stylus; otherwise as :meth:`hear`."""
+        """Take the axes of a Joy message, as rates of the stylus; the rest is as in :meth:`hear`."""
         if text := self._rates.step(axes, buttons, stamp_ns):
             self.wrong = text
             self.refused["form"] += 1
@@ -211,7 +211,7 @@ class MasterBridge(RunningStage):
         return self.hear(self._rates.pose, stamp_ns, now_ns)
 
     def press(self, buttons: Sequence[int]) -> bool:
-        """Take the buttons of the device; false if it has fewer than are named."""
+        """Take the buttons of the device; return False if it has fewer buttons than the parameters name."""
         places = self.parameters.button_places
         if max(places) >= len(buttons):
             self.refused["buttons"] += 1
@@ -221,14 +221,14 @@ class MasterBridge(RunningStage):
         return True
 
     def is_heard(self, now_ns: int) -> bool:
-        """Whether the device has said lately where it is; ``now_ns`` is the time [ns]."""
+        """Whether a valid pose of the device came recently; ``now_ns`` is the time [ns]."""
         silence = 1e-9 * (now_ns - self.heard_ns)
         return self.heard_ns > 0 and silence <= self.parameters.force_timeout
 
     def force(self, age: float, now_ns: int) -> geometry.Array:
-        """Force (3,) that the device shall give, along its own axes [N].
+        """Force (3,) that the device must apply, along its own axes [N].
 
-        Zero if no force was commanded lately, or the place of the device is unknown.
+        Zero if no force was commanded recently, or if the pose of the device is unknown.
 
         Args:
             age: Time since ``master/servo_cf`` came [s]; infinite before the first.
@@ -244,7 +244,7 @@ class MasterBridge(RunningStage):
         return share * dot(self._rows.T, asked)
 
     def concerns(self) -> list[str]:
-        """Why the place of the stylus is not published."""
+        """Why the pose of the stylus is not published."""
         if self.wrong:
             return [f"the device is not believed: {self.wrong}"]
         if not self.heard_ns:
@@ -252,7 +252,7 @@ class MasterBridge(RunningStage):
         return []
 
     def _doubt(self, pose: geometry.Array, stamp_ns: int, now_ns: int) -> tuple[str, str]:
-        """Reason not to believe a pose, in a word and in a line; empty if there is none."""
+        """Reason to reject a pose, as one word and as a line of text; empty for a valid pose."""
         size = float((pose[3:7] ** 2).sum()) if np.isfinite(pose).all() else math.nan
         if not abs(size - 1.0) <= _OFF_UNIT:
             return "form", f"its pose is not seven finite numbers with a unit quaternion: {pose}"
@@ -262,7 +262,7 @@ class MasterBridge(RunningStage):
 
 
 def _nothing(row: object, dt: float) -> None:
-    """Stand in for a kernel: the node calls the stage."""
+    """Do nothing: placeholder for a kernel, because the node calls the stage directly."""
 
 
 MASTER_BRIDGE = Stage(

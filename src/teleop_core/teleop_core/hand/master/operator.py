@@ -1,4 +1,4 @@
-"""Operator: a simulated person who moves the stylus and presses its buttons, and sees what a real one would."""
+"""Operator: a simulated person who moves the stylus, presses its buttons, and sees what a real person would see."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -43,9 +43,9 @@ _IS_FOLLOWING = STATE["is_following"]
 
 @inner
 def _begins(p: OperatorNumbers, s: OperatorState, row: Row) -> bool:
-    """Whether the operator moves the hand: since the slave first followed, or lost patience.
+    """Whether the operator moves the hand: after the slave first followed, or after the operator's patience ended.
 
-    A state that is older than the first sample is about another master.
+    A state older than the first sample belongs to another master.
     """
     if s.first_ns == 0:
         s.first_ns = row.now_ns
@@ -59,7 +59,7 @@ def _begins(p: OperatorNumbers, s: OperatorState, row: Row) -> bool:
 
 @inner
 def tremble(p: OperatorNumbers, s: OperatorState, noise: Array, tremor: Array, dt: float) -> None:
-    """Write the wanted tremor (3,) [m]: one line per axis whose frequency wanders in its band."""
+    """Write the wanted tremor (3,) [m]: one sine per axis whose frequency varies within its band."""
     for i in range(3):
         # Ornstein-Uhlenbeck process of unit variance and half a second of memory.
         s.wander[i] += -s.wander[i] * (dt / 0.5) + noise[i] * math.sqrt(2.0 * dt / 0.5)
@@ -72,17 +72,17 @@ def tremble(p: OperatorNumbers, s: OperatorState, noise: Array, tremor: Array, d
 def operator_step(
     p: OperatorNumbers, s: OperatorState, wanted: Sequence[follower.Wanted], noises: Array, row: Row, dt: float
 ) -> None:
-    """One tick: write where the hand is wanted, its tremor and the buttons.
+    """One tick: write the wanted pose of the hand, its tremor and the buttons.
 
-    Until the slave follows the hand rests, as a person's would: none of its motion is lost.
+    The hand rests until the slave follows, as a person's would. So none of its motion is lost.
 
     Args:
         p: Parameter record.
         s: State record; written.
-        wanted: What is wanted, now and in the coming ticks, record by record: ``wanted`` (3,) [m] in the master's base,
-            ``attitude`` of the stylus, quaternion (4,), ``buttons`` (3,): clutch, fixture, mode, ``tremor`` (3,) [m],
-            which the tip makes whatever friction and force are, and how far the ``jaw`` is closed.
-        noises: Standard normal numbers of the coming ticks (N, 6), of which x, y, z shake the hand.
+        wanted: One record for this tick and each coming tick: ``wanted`` position (3,) [m] in the master's base;
+            ``attitude`` of the stylus, quaternion (4,); ``buttons`` (3,): clutch, fixture, mode; ``tremor`` (3,) [m]
+            of the tip, independent of friction and force; and how far the ``jaw`` is closed.
+        noises: Standard normal numbers of the coming ticks (N, 6), of which x, y, z are the tremor's noise.
         row: Signals.
         dt: Tick [s].
     """
@@ -106,17 +106,17 @@ class RunningOperator(RunningStage):
     The same parameters give the same motion, bit for bit, unless the operator reacts to what it sees.
 
     Args:
-        parameters: Who it is.
+        parameters: Parameters of the operator.
         dt: Length of a tick [s].
 
     Raises:
-        TeleopError: The operator cannot be made, as one whose recording is missing.
+        TeleopError: The operator cannot be made, for example because its recording is missing.
     """
 
     def __init__(self, parameters: OperatorParameters, dt: float = DT) -> None:
         super().__init__(OPERATOR, 0, dt)
         self.parameters, self.state = record(OperatorNumbers), record(OperatorState)
-        # The first record of what is wanted is that of the present tick.
+        # The first record of ``wanted`` is that of the present tick.
         self._wanted, self._noise = record_array(follower.Wanted, BLOCK + 1), Noise()
         self._fixed = parameters
         self.kernel = operator_step
@@ -125,7 +125,7 @@ class RunningOperator(RunningStage):
         self.reset()
 
     def reset(self) -> None:
-        """Stylus in the inkwell, at time zero, with the random numbers of the seed."""
+        """Put the stylus into the inkwell, at time zero, and restart the random numbers from the seed."""
         fixed, row = self._fixed, self.signals
         rng = np.random.default_rng(fixed.seed)
         phases = rng.uniform(0.0, 2.0 * math.pi, PHASES)
@@ -156,19 +156,19 @@ class RunningOperator(RunningStage):
 
     @property
     def has_begun(self) -> bool:
-        """Whether the hand is moved yet."""
+        """Whether the operator has begun to move the hand."""
         return bool(self.state["has_begun"])
 
     @property
     def hand(self) -> RemoteHand | None:
-        """Hand of a person, to be told where the stylus shall be; None if the operator has none.
+        """Remote hand, which takes wanted poses of the stylus; None if the operator has no such hand.
 
-        After :meth:`reset` it is another one.
+        :meth:`reset` makes a new hand.
         """
         return self._motion if isinstance(self._motion, RemoteHand) else None
 
     def prepare(self, ticks: int) -> None:
-        """Draw what is wanted in the next ticks, as far ahead as the operator can be asked."""
+        """Compute the wanted motion of the next ticks, as far ahead as the operator allows."""
         self._noise.prepare(self.state, ticks)
         now = int(self.state["next"])
         left = self._end - now  # with the record of the present tick
@@ -182,7 +182,7 @@ class RunningOperator(RunningStage):
 
     def _draw(self, drawn: Any) -> None:
         count = len(drawn)
-        if self._person is not None and count <= follower.MOST:  # faster than by way of turns
+        if self._person is not None and count <= follower.MOST:  # faster than through rotation vectors
             drawn[:] = self._person.draw((self._tick + 1) * self.dt, self.dt, count)
             self._tick += count
             return
@@ -202,7 +202,7 @@ class RunningOperator(RunningStage):
         """Motion, buttons, tremor and jaw (N, 13) of the operator.
 
         Raises:
-            PartError: What he answers has another shape, or is not finite.
+            PartError: The operator's answer has the wrong shape, or is not finite.
         """
         name = self._fixed.kind.kind
         moves = np.asarray(self._asked(self._motion, times))
@@ -220,16 +220,16 @@ class RunningOperator(RunningStage):
         return whole
 
     def _asked(self, question: Callable[..., Any], *arguments: Any) -> Any:
-        """What the operator answers.
+        """Return the operator's answer.
 
         Raises:
-            PartError: He raises; an error of ours is passed on as it is.
+            PartError: The operator raises an exception. A TeleopError is passed on unchanged.
         """
         try:
             return question(*arguments)
         except TeleopError:
             raise
-        except Exception as error:  # whatever a foreign operator raises, one line names him
+        except Exception as error:  # whatever a user's operator raises, one line names this operator
             reason = f"{type(error).__name__}: {' '.join(str(error).split())}"
             text = "one with make(parameters, setting) -> motion and motion(times) -> rows"
             name = self._fixed.kind.kind
@@ -246,7 +246,7 @@ class RunningOperator(RunningStage):
 
 
 def _held(presses: tuple[float, ...], times: Array) -> Array:
-    """Whether a button is held at times (N,) [s], by when it is pressed and released in turn."""
+    """Whether a button is held at times (N,) [s]; ``presses`` are its alternating press and release times."""
     return (np.searchsorted(presses, times, side="right") % 2).astype(np.float64)
 
 

@@ -1,23 +1,23 @@
-"""Rendering: what the device makes of a commanded force, by its peak and its warmth."""
+"""Rendering: the force that the device applies for a commanded force, limited by peak force and motor heat."""
 
 import math
 
 from teleop_core.kernels import Array, Fields, inner
 
-# The peak force falls to the continuous one while the motors take up the last quarter of the heat that they bear.
+# The peak force falls to the continuous force while the motors take up the last quarter of their allowed heat.
 _LAST = 0.25
 
 
 class RenderingNumbers(Fields):
-    """Fields of a parameter record with the forces that the motors bear."""
+    """Fields of a parameter record with the allowed forces of the motors."""
 
     peak_force: float  # [N]
     continuous: float  # [N]
-    warming: float  # share of a tick in which the motors warm
+    warming: float  # share by which the heat approaches its final value in a tick
 
 
 class RenderingState(Fields):
-    """Fields of a state record with their warmth."""
+    """Fields of a state record with the heat of the motors."""
 
     heat: float  # mean square of the force [N²]
 
@@ -26,10 +26,10 @@ class RenderingState(Fields):
 def largest_force(p: RenderingNumbers, s: RenderingState) -> float:
     """Force that the device can apply in this tick [N].
 
-    The heat of the motors is the mean square of the force, taken by a first-order lag: a balance of
-    Joule heat and cooling. It never exceeds the square of the continuous force. Up to three
-    quarters of that the peak force is there; then the square of what is there falls in proportion
-    to what is left, so that a command that stays ends at the continuous force.
+    The heat of the motors is the mean square of the force, by a first-order lag: a balance of Joule heat and cooling.
+    It never exceeds the square of the continuous force. Up to three quarters of that square, the peak force is
+    available. Above, the square of the available force falls linearly with the heat. So a constant command ends at the
+    continuous force.
 
     Args:
         p: Parameters.
@@ -40,19 +40,19 @@ def largest_force(p: RenderingNumbers, s: RenderingState) -> float:
         return p.peak_force
     left = max(bearable - s.heat, 0.0)
     square = bearable + (p.peak_force * p.peak_force - bearable) * min(left / (_LAST * bearable), 1.0)
-    # Long ticks beside a short time constant: no more than fills what is left.
+    # If a tick is long compared with the time constant: no more force than fills the remaining heat.
     return math.sqrt(min(square, s.heat + left / p.warming))
 
 
 @inner
 def render(p: RenderingNumbers, s: RenderingState, command: Array, force: Array) -> float:
-    """Write the force (3,) [N] that the device applies for a command (3,) [N], and warm it.
+    """Write the force (3,) [N] that the device applies for a command (3,) [N], and update the heat.
 
     Args:
         p: Parameters.
         s: State; written.
-        command: What is asked for.
-        force: What is applied: in the direction of the command.
+        command: Commanded force.
+        force: Applied force, in the direction of the command; written.
 
     Returns:
         The largest force that was possible [N].

@@ -1,8 +1,7 @@
-"""Operators: what the hand wants to do, one file per kind.
+"""Operators: the motion that the hand wants, one file per kind.
 
-An operator is asked for motion at some times, a block of ticks at once, and answers with places and
-turns of the hand relative to where the stylus rests. The simulated hand then tries to get there
-against its mass, its tremor and the device's force.
+An operator is asked for its motion during a block of ticks. It returns positions and rotations of the hand relative to
+the rest pose of the stylus. The simulated hand then follows them, against its mass, its tremor and the device's force.
 """
 
 from collections.abc import Callable
@@ -23,22 +22,22 @@ Motion = Callable[[Array], Array]
 """Times (N,) since the start [s] to rows (N, 3), (N, 6), (N, 9), (N, 12) or (N, 13).
 
 Columns: position x, y, z [m] and rotation vector [rad] relative to the start, in the master's base; then the buttons
-clutch, fixture, mode (1 pressed); then tremor x, y, z [m], by which the tip is off whatever the device's friction is;
-then how far the jaw is closed, from 0 to 1. What is left out is zero.
+clutch, fixture, mode (1 pressed); then tremor x, y, z [m], an offset of the tip that friction does not reduce; then
+how far the jaw is closed, from 0 to 1. Missing columns count as zero.
 """
 
 
 class Seen(NamedTuple):
-    """What an operator sees and feels, as it was told when it last made a step.
+    """What an operator sees and feels, as of the operator's last step.
 
-    Views of the signals: read them when the motion is asked for. Who answers to them is asked as
-    late as possible: ``ahead=1``. What is told of the slave comes as late as a declared delay says:
-    ``delays=["slave/measured_cp@operator=0.3"]``.
+    The attributes are views of the signals: read them when the motion is asked for. An operator that reacts to them
+    should have ``ahead=1``, so that it is asked as late as possible. The slave's values come with the declared delay,
+    such as ``delays=["slave/measured_cp@operator=0.3"]``.
 
     Attributes:
-        slave: Pose (7,) of the slave's tip in its base; zero before it is told.
+        slave: Pose (7,) of the slave's tip in its base; zero before the first value comes.
         stylus: Pose (7,) of the stylus in the master's base.
-        force: Force and torque (6,) that the device gives the hand.
+        force: Force and torque (6,) of the device on the hand.
         state: Numbers of ``teleop/state``, as :data:`~teleop_core.graph.topics.TELEOP_STATE` names them.
         task: Numbers of ``task/state``, as :data:`~teleop_core.graph.topics.TASK_STATE` names them;
             zero without a task, and before it begins.
@@ -52,13 +51,13 @@ class Seen(NamedTuple):
 
 
 class Setting(NamedTuple):
-    """What an operator is made with beside parameters of its own.
+    """What an operator is made with, in addition to its own parameters.
 
     Attributes:
-        common: The whole group ``operator``.
+        common: The whole parameter group ``operator``.
         phases: Random phases (6, 4) [rad] of the session's seed, the same for every operator.
         seed: Seed of the session, for more random numbers.
-        seen: What the operator sees and feels; None where only the length of a motion is asked for.
+        seen: What the operator sees and feels; None if only the length of a motion is asked for.
     """
 
     common: Any
@@ -72,18 +71,18 @@ class Operator:
     """A kind of operator.
 
     Attributes:
-        name: What ``--set operator=`` calls it.
+        name: Its name in ``--set operator=``.
         make: ``make(parameters, setting)`` gives the :data:`Motion` of one session.
         parameters: Its parameter group, beside those that all operators share.
-        ahead: Ticks for which it can be asked at once: 1 for one who answers to what happens.
-        trembles: Whether its motion has all its tremor, so that ``operator.tremor_amplitude`` is not added.
+        ahead: Largest number of ticks for which it is asked at once; 1 for an operator that reacts to what happens.
+        trembles: Whether its motion contains its own tremor, so that ``operator.tremor_amplitude`` is not added.
         approaches: Whether it begins with a smooth move to ``operator.center`` that takes ``operator.approach_time``.
-        length: ``length(parameters, setting)`` says how long its motion lasts [s], which a session
-            then does too if its duration is not given; None for a motion without end.
-        needs: Names of stages without which it does nothing.
-        is_here: False for one in whose place another node sends ``hand/servo_cp``.
-        opens: ``opens(parameters)`` opens a device of this machine that moves the hand, which is
-            a :class:`~teleop_core.hand.operators.remote.RemoteHand`; in live sessions alone.
+        length: ``length(parameters, setting)`` returns the duration of its motion [s]. A session without a given
+            duration lasts as long. None for a motion without end.
+        needs: Names of the stages that it needs; without them it does nothing.
+        is_here: False if another node sends ``hand/servo_cp`` in place of this operator.
+        opens: ``opens(parameters)`` opens a device of this machine that moves the hand, in live sessions only. The
+            hand is then a :class:`~teleop_core.hand.operators.remote.RemoteHand`.
     """
 
     name: str
@@ -99,15 +98,15 @@ class Operator:
 
 
 def following(name: str, times: object, rows: object) -> Operator:
-    """Operator who follows given samples, linear in between, and rests before and after them.
+    """Return an operator that follows given samples, linear in between, and rests before and after them.
 
     Args:
-        name: What it is called.
-        times: Times (N,) since the start [s], rising.
+        name: Name of the operator.
+        times: Times (N,) since the start [s], increasing.
         rows: Rows as of :data:`Motion`; buttons are held, not interpolated.
 
     Raises:
-        PartError: Shapes do not fit, times do not rise, or a number is not finite.
+        PartError: Shapes do not fit, times do not increase, or a number is not finite.
     """
     motion = sampled_motion(name, times, rows)
     return Operator(name, lambda parameters, setting: motion)
@@ -148,7 +147,7 @@ def _checked(name: str, part: object) -> Operator:
             text = "one whose parameters are a dataclass, not an instance of one"
             raise PartError("operator", name, text)
         return part
-    if callable(part):  # a motion alone: the shortest way to an own operator
+    if callable(part):  # a plain motion function: the shortest form of a user's operator
         motion: Motion = part
         return Operator(name, lambda parameters, setting: motion)
     raise PartError("operator", name, f"an Operator or motion(times), not a {type(part).__name__}")
@@ -177,5 +176,5 @@ OPERATORS: Registry[Operator] = Registry(
 
 
 def register_operator(name: str, operator: Operator | Motion, *, replace: bool = False) -> Operator:
-    """Add an operator, or a motion alone, for the rest of the program; see :meth:`Registry.add`."""
+    """Add an operator, or a plain motion function, for the rest of the program; see :meth:`Registry.add`."""
     return OPERATORS.add(name, operator, replace=replace)

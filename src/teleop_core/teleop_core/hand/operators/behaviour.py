@@ -1,4 +1,4 @@
-"""Behaviour of the hand: which operator moves it, and what the smooth ones share."""
+"""Behaviour of the hand: which operator moves it, and the parameters that smooth operators share."""
 
 from dataclasses import dataclass, field
 from itertools import pairwise
@@ -35,9 +35,9 @@ class ButtonParameters:
 
 @dataclass(frozen=True, kw_only=True)
 class RoomParameters:
-    """What the operator knows of the device: how far the stylus can go.
+    """Range of the stylus, as the operator knows it.
 
-    In a session it is that of the haptic master where nothing else is said.
+    In a session the default is the range of the haptic master.
     """
 
     workspace: tuple[float, ...] = parameter(
@@ -57,14 +57,14 @@ class RoomParameters:
 
     @property
     def corners(self) -> tuple[Array, Array]:
-        """Low and high corner (3,) [m] of where the stylus can go from the inkwell, which is within them."""
+        """Low and high corner (3,) [m] of the range of the stylus, relative to the inkwell, which is inside."""
         middle, half = -np.array(self.start), 0.5 * np.array(self.workspace)
         return np.minimum(middle - half, 0.0), np.maximum(middle + half, 0.0)
 
 
 @dataclass(frozen=True, kw_only=True)
 class OperatorParameters:
-    """Who moves the hand; motions are relative to where the stylus starts, in its base."""
+    """Which operator moves the hand; motions are relative to the start of the stylus, in the master's base."""
 
     kind: Choice = choice(OPERATORS, "random", fixed=True, doc="who moves the hand, and how")
     seed: int = parameter(1, Within(0), "seed of everything random in the session", fixed=True)
@@ -145,7 +145,7 @@ def insist_on_virtual(stage: str, group: object) -> None:
         group: Its parameters.
 
     Raises:
-        ParameterError: A person must move its device; the text names who works.
+        ParameterError: The operator needs a person at a device; the message names operators that work.
     """
     if not isinstance(group, OperatorParameters) or _is_virtual(group.kind.kind):
         return
@@ -155,6 +155,6 @@ def insist_on_virtual(stage: str, group: object) -> None:
 
 
 def _is_virtual(name: str) -> bool:
-    """Whether an operator can move the hand faster than time goes."""
+    """Whether an operator can move the hand faster than real time."""
     operator = OPERATORS.find(name)
     return operator.opens is None and operator.is_here

@@ -1,7 +1,7 @@
 """Follower: a stylus that follows wanted poses smoothly, with a stated delay and bounded motion.
 
-Place and attitude each follow as a critically damped system of second order. What it wants to do is bounded: its speed,
-its acceleration, and the room that it stays in. So no jump of what is wanted ever comes out as one.
+Position and attitude each follow as a critically damped system of second order. Speed, acceleration and position are
+bounded. So a jump of the wanted pose never becomes a jump of the stylus.
 """
 
 import math
@@ -18,7 +18,7 @@ MOST = 4
 
 
 class Wanted(Fields):
-    """What a hand wants in a tick, in the master's base."""
+    """Pose, buttons, tremor and jaw that a hand wants in a tick, in the master's base."""
 
     wanted: Vector3  # place of the stylus [m]
     attitude: Quaternion
@@ -28,10 +28,10 @@ class Wanted(Fields):
 
 
 class Bounds(Fields):
-    """How a stylus may follow."""
+    """Bounds of a stylus that follows."""
 
     rate: float  # twice the inverse of the delay [1/s]
-    speed: float  # largest ones [m/s, m/s², rad/s, rad/s²]
+    speed: float  # largest values [m/s, m/s², rad/s, rad/s²]
     acceleration: float
     turn_speed: float
     turn_acceleration: float
@@ -40,7 +40,7 @@ class Bounds(Fields):
 
 
 class FollowerState(Fields):
-    """Where a stylus is that follows."""
+    """State of a stylus that follows."""
 
     time: float  # [s]
     next: float  # time of the next tick [s]
@@ -54,12 +54,12 @@ class FollowerState(Fields):
 
 @kernel
 def follow(b: Bounds, s: FollowerState, rows: Any) -> None:
-    """Follow the target for some ticks, and write where the stylus is in each.
+    """Follow the target for some ticks, and write the pose of the stylus in each tick.
 
     Args:
         b: Bounds.
         s: State; written.
-        rows: Records (N,) of :class:`Wanted`; written, but for the tremor.
+        rows: Records (N,) of :class:`Wanted`; all fields except the tremor are written.
     """
     gap, turn = np.empty(3), np.empty(3)
     for k in range(rows.shape[0]):
@@ -88,7 +88,7 @@ def follow(b: Bounds, s: FollowerState, rows: Any) -> None:
 def _approach(gap: Array, velocity: Array, rate: float, fastest: float, hardest: float, h: float) -> None:
     """Change a velocity (3,) over ``h`` [s] so that it closes a gap (3,) at critical damping.
 
-    Half of the acceleration allowed can end the velocity that it goes for in time.
+    The wanted velocity is so small that half of the allowed acceleration can stop it in time.
     """
     far = math.sqrt(gap[0] * gap[0] + gap[1] * gap[1] + gap[2] * gap[2])
     fast = min(0.5 * rate * far, fastest, math.sqrt(0.5 * hardest * far))
@@ -113,14 +113,14 @@ def _normalise(quaternion: Array) -> None:
 
 
 class Follower:
-    """Stylus that goes where it is wanted.
+    """Stylus that follows wanted poses.
 
     Args:
-        delay: How far it is behind a steady motion [s], > 0.
-        speed: Largest speeds of place and turn [m/s, rad/s].
-        acceleration: Their largest accelerations [m/s², rad/s²].
-        start: Pose (7,) that it starts at rest in: place [m], quaternion w, x, y, z.
-        room: Corners low and high (3,) [m] of the box that it stays in.
+        delay: Delay behind a steady motion [s], > 0.
+        speed: Largest linear and angular speed [m/s, rad/s].
+        acceleration: Largest linear and angular acceleration [m/s², rad/s²].
+        start: Pose (7,) in which it starts at rest: position [m], quaternion w, x, y, z.
+        room: Low and high corner (3,) [m] of the box in which it stays.
     """
 
     def __init__(
@@ -143,12 +143,12 @@ class Follower:
 
     @property
     def time(self) -> float:
-        """Time that it has come to [s]."""
+        """Time up to which the motion is computed [s]."""
         return float(self._state["time"])
 
     @property
     def pose(self) -> Array:
-        """Where it is now (7,); a copy."""
+        """Present pose (7,); a copy."""
         return np.array(self._state["pose"])
 
     def aim(self, pose: Array) -> None:
@@ -156,7 +156,7 @@ class Follower:
         self._state["target"] = pose
 
     def brake(self) -> None:
-        """Come to rest from now on, as soon as it can without coming back."""
+        """Come to rest from now on, as soon as possible without moving back."""
         s, b = self._state, self._bounds
         s["target"] = s["pose"]
         s["target"][:3] += s["velocity"] / b["rate"]
@@ -170,12 +170,12 @@ class Follower:
         """Go on for some ticks.
 
         Args:
-            first: Time of the first one [s], not before :attr:`time`.
-            tick: Time from one to the next [s].
-            count: How many, 1 to :data:`MOST`.
+            first: Time of the first tick [s], not before :attr:`time`.
+            tick: Length of a tick [s].
+            count: Number of ticks, 1 to :data:`MOST`.
 
         Returns:
-            Records (count,) of :class:`Wanted`, which the next call writes again.
+            Records (count,) of :class:`Wanted`; the next call overwrites them.
         """
         self._state["next"], self._state["tick"] = first, tick
         self._follow[count]()

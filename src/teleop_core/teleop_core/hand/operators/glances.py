@@ -1,4 +1,4 @@
-"""Glances: what an operator who looks has seen and felt lately, and how it was at a time in between."""
+"""Glances: what a visually guided operator has seen and felt recently, interpolated in time."""
 
 from collections import deque
 from typing import NamedTuple
@@ -7,7 +7,7 @@ from teleop_core.hand.operators import Seen
 from teleop_core.kernels import Array, length
 
 STILL_TIME = 0.02
-"""At rest is what changes little in this time [s]."""
+"""A motion is at rest if it changes little in this time [s]."""
 
 
 class Glance(NamedTuple):
@@ -20,10 +20,10 @@ class Glance(NamedTuple):
 
 
 class Glances:
-    """Memory of an operator who looks.
+    """Memory of an operator who corrects by sight.
 
     Args:
-        eye: After which what was seen or felt can be used [s].
+        eye: Delay after which a glance can be used [s].
     """
 
     def __init__(self, eye: float) -> None:
@@ -34,15 +34,15 @@ class Glances:
         return bool(self._kept)
 
     def take(self, now: float, seen: Seen, goal: Array) -> None:
-        """Keep what is seen and felt at a time [s], and forget what the eye has long seen."""
+        """Store what is seen and felt at a time [s], and drop glances that are no longer needed."""
         kept = self._kept
-        if seen.slave[:3].any():  # else it has not been shown yet
+        if seen.slave[:3].any():  # otherwise no pose has been shown yet
             kept.append(Glance(now, seen.slave.copy(), goal.copy(), seen.force[:3].copy()))
         while len(kept) > 2 and kept[1].time <= now - self._eye - STILL_TIME:
             kept.popleft()
 
     def at(self, when: float) -> Glance:
-        """What can be used at a time [s]: what was seen and felt before it, between two glances."""
+        """What can be used at a time [s]: the state one eye delay earlier, interpolated between two glances."""
         at, kept = when - self._eye, self._kept
         later = next((i for i, glance in enumerate(kept) if glance.time > at), len(kept))
         if later in {0, len(kept)}:
@@ -53,7 +53,7 @@ class Glances:
         return Glance(at, tip, goal, force)
 
     def since(self, begin: float, until: float) -> list[Glance]:
-        """Glances from a time [s] on that can be used at another one."""
+        """Glances from the time ``begin`` [s] on that can be used at the time ``until`` [s]."""
         return [glance for glance in self._kept if begin <= glance.time <= until - self._eye]
 
     def speed_of_goal(self, width: float) -> Array:

@@ -1,4 +1,4 @@
-"""Hand room: how far a hand can go and turn from where it is, and where to bring it back to."""
+"""Hand room: how far a hand can move and turn from its pose, and to which pose to bring it back."""
 
 import numpy as np
 
@@ -18,24 +18,24 @@ def turned(attitude: Array, turn: Array) -> tuple[Array, Array]:
 
 
 class HandRoom:
-    """Where a hand can be.
+    """Range of a hand.
 
     Args:
-        corners: Low and high one (3,) [m], from where the hand rests.
-        largest_turn: How far it can turn from there [rad].
+        corners: Low and high corner (3,) [m], relative to the rest position of the hand.
+        largest_turn: Largest rotation from the rest attitude [rad].
     """
 
     def __init__(self, corners: tuple[Array, Array], largest_turn: float) -> None:
         self._low, self._high, self._turn = corners[0] + _MARGIN, corners[1] - _MARGIN, largest_turn
 
     def share(self, hand: Array, step: Array, turn: Array) -> float:
-        """Share, at most 1, of a step (3,) [m] and a turn (3,) [rad] for which a hand at a pose (7,) has room."""
+        """Largest share, at most 1, of a step (3,) [m] and turn (3,) [rad] that a hand at a pose (7,) can make."""
         room = np.maximum(np.where(step > 0.0, self._high - hand[:3], hand[:3] - self._low), 0.0)
         shares = np.linspace(min(1.0, float((room / np.maximum(np.abs(step), 1e-12)).min())), 0.0, 21).tolist()
         return next((s for s in shares if length(turned(hand[3:], s * turn)[1]) <= self._turn), 0.0)
 
     def back(self, hand: Array, step: Array, turn: Array) -> tuple[Array, Array]:
-        """Step (3,) [m] and turn (3,) [rad] of a hand to where it has the most room for what is to come."""
+        """Step (3,) [m] and turn (3,) [rad] that bring a hand to where it has most room for the coming motion."""
         middle, angle = 0.5 * (self._low + self._high), np.zeros(3)
         begin = -min(0.5, self._turn / max(float(length(turn)), 1e-12)) * turn
         turn_within(hand[3:], turned(_REST, begin)[0], angle)

@@ -1,9 +1,9 @@
-"""Human: a hand that reaches from target to target, sees what it missed, corrects, and rests.
+"""Human: a hand that reaches from target to target, sees its error, corrects, and rests.
 
-A reach is a first submovement that falls short of its target and is blurred by noise that grows
-with speed. Further ones begin a reaction time after the eye could see the error. Each is a
-minimum-jerk movement; where two overlap they add up. Between reaches the hand dwells, or goes on at
-once. Tremor goes on all the time. Where the numbers come from stands in ``docs/human_operator.md``.
+A reach begins with a first submovement that falls short of its target, with noise that grows with speed. Each
+correction begins a reaction time after the eye could see the error. Each submovement is a minimum-jerk movement;
+overlapping ones add up. Between reaches the hand dwells, or goes on immediately. Tremor never stops. The sources of
+the numbers are in ``docs/human_operator.md``.
 """
 
 import math
@@ -20,11 +20,11 @@ from teleop_core.hand.operators.behaviour import OperatorParameters
 from teleop_core.hand.operators.shapes import minimum_jerk
 from teleop_core.kernels import Array, dot, length
 
-_TRIES = 50  # targets that are drawn before one anywhere in the region is taken
-_LINES = 16  # sines that tremor is made of, per axis
+_TRIES = 50  # number of targets drawn before any target in the region is accepted
+_LINES = 16  # number of sines of the tremor, per axis
 _TREMOR_BAND = (8.0, 12.0)
-# Middle and half width of the peak of its spectrum, and where it is cut off [Hz]: the peak is known
-# to lie within the band, its width is assumed.
+# Middle and half width of the tremor's spectral peak, and the cut-off frequencies [Hz]. The peak is known to lie
+# within the band; its width is assumed.
 _PEAK, _HALF_WIDTH, _CUT = 10.0, 1.5, (4.0, 20.0)
 
 
@@ -167,7 +167,7 @@ class HumanParameters:
 class Submovement(NamedTuple):
     """A minimum-jerk movement: when it begins, how long it takes [s], and where it leads.
 
-    ``step`` (6,) is the way [m] and the turn as a rotation vector [rad].
+    ``step`` (6,) is the displacement [m] and the rotation vector [rad].
     """
 
     begin: float
@@ -176,17 +176,17 @@ class Submovement(NamedTuple):
 
     @property
     def end(self) -> float:
-        """When it is over [s]."""
+        """Time of its end [s]."""
         return self.begin + self.duration
 
 
 def submovements(p: HumanParameters, region: OperatorParameters, rng: np.random.Generator) -> Iterator[Submovement]:
-    """All that the hand does after the approach, without end, each later than the one before.
+    """Yield the submovements of the hand after the approach, endless, in order of time.
 
     Args:
-        p: How it reaches.
-        region: Size and largest turn.
-        rng: Random numbers; the same ones give the same movements.
+        p: Parameters of the reaches.
+        region: Size of the region and largest rotation.
+        rng: Random numbers; the same numbers give the same movements.
     """
     room = np.array([0.5 * side for side in region.size] + [region.rotation] * 3)
     place, time = np.zeros(6), 0.0
@@ -207,7 +207,7 @@ def _spread(median: float, spread: float, rng: np.random.Generator) -> float:
 
 
 def _next_target(p: HumanParameters, room: Array, place: Array, rng: np.random.Generator) -> Array:
-    """Target (6,) in the region, about ``p.reach`` away where there is room for that."""
+    """Target (6,) in the region, about ``p.reach`` away if the region is large enough."""
     half, largest = room[:3], room[3:]
     turn = np.clip(place[3:] + p.turn * largest * rng.standard_normal(3), -largest, largest)
     for _ in range(_TRIES):
@@ -221,11 +221,11 @@ def _next_target(p: HumanParameters, room: Array, place: Array, rng: np.random.G
 def _reach(
     p: HumanParameters, target: Array, place: Array, time: float, rng: np.random.Generator
 ) -> Iterator[Submovement]:
-    """First submovement to a target, which may be a turn alone, and its corrections.
+    """First submovement to a target, which may be a rotation alone, and its corrections.
 
-    The duration is that of Fitts (1954) in MacKenzie's (1992) form. The end is off by as
-    much as the submovement is fast (Schmidt et al. 1979; Meyer et al. 1988), as noise that grows
-    with the motor command makes it (Harris and Wolpert 1998).
+    The duration is that of Fitts (1954) in MacKenzie's (1992) form. The end error is proportional to the speed of the
+    submovement (Schmidt et al. 1979; Meyer et al. 1988), as noise proportional to the motor command causes it (Harris
+    and Wolpert 1998).
     """
     for number in range(p.corrections + 1):
         way = target - place
@@ -243,7 +243,7 @@ def _reach(
 
 
 def _blurred(p: HumanParameters, way: Array, duration: float, rng: np.random.Generator) -> Array:
-    """A wanted way and turn (6,) with the noise of its execution; no way, no noise."""
+    """A wanted displacement and rotation (6,) with the noise of execution; a zero displacement gets no noise."""
     out = way.copy()
     for part in (slice(0, 3), slice(3, 6)):
         size = float(length(way[part]))
@@ -257,10 +257,10 @@ def _blurred(p: HumanParameters, way: Array, duration: float, rng: np.random.Gen
 
 
 class _Walk:
-    """Sum of all submovements at any times, in memory that does not grow with them.
+    """Sum of all submovements at any times, in memory that does not grow with their number.
 
-    What is over is added up in the order of its beginning, so that the sum is the same to the bit
-    in whatever blocks it is asked for. Times that lie before what is over begin anew.
+    Finished submovements are added up in the order of their beginning. So the sum is the same, bit for bit, for any
+    division of the times into blocks. Times before the end of a finished submovement restart the sum.
     """
 
     def __init__(self, p: HumanParameters, region: OperatorParameters, seed: int) -> None:
@@ -275,7 +275,7 @@ class _Walk:
         self._place, self._over = np.zeros(6), 0.0
 
     def at(self, times: Array) -> Array:
-        """Place [m] and turn [rad] (N, 6) at rising times (N,) [s] since the approach."""
+        """Position [m] and rotation vector [rad] (N, 6) at increasing times (N,) [s] since the approach."""
         if not len(times):
             return np.empty((0, 6))
         if times[0] < self._over:
@@ -296,8 +296,8 @@ class _Walk:
 def tremor(size: float, rng: np.random.Generator) -> Motion:
     """Tremor of the tip: times (N,) [s] to offsets (N, 3) [m], the same for the same times.
 
-    Sines of random frequencies and phases, which come close to noise and never repeat. There are
-    most of them near 10 Hz and fewer farther away, so that the spectrum is that of a resonance.
+    The tremor is a sum of sines of random frequencies and phases, which is close to noise and never repeats. Most
+    frequencies are near 10 Hz and fewer farther away, so that the spectrum is that of a resonance.
 
     Args:
         size: Root mean square of the length of the offset within 8 to 12 Hz [m].
@@ -318,7 +318,7 @@ def tremor(size: float, rng: np.random.Generator) -> Motion:
     def motion(times: Array) -> Array:
         sines = times[:, None, None] * rates
         sines += phases
-        np.sin(sines, out=sines)  # in its place: fresh memory would take as long as the sines
+        np.sin(sines, out=sines)  # in place: allocating memory would take as long as the sines
         found: Array = amplitude * sines.sum(axis=2)
         return found
 
@@ -326,7 +326,7 @@ def tremor(size: float, rng: np.random.Generator) -> Motion:
 
 
 def _human(p: HumanParameters, setting: Setting) -> Motion:
-    """Approach of the centre, then reaches around it; tremor in the last three columns."""
+    """Approach the centre, then reach around it; tremor is in the last three columns."""
     common: OperatorParameters = setting.common
     walk = _Walk(p, common, setting.seed)
     trembling = tremor(p.tremor, np.random.default_rng((setting.seed, 2)))

@@ -1,9 +1,9 @@
 """Observer: an operator who looks at the slave, plans from what it saw, moves, and looks again.
 
-Each look-move cycle is one submovement towards the goal of a task, with the noise of a fast hand. Its end is seen as
-late as display, network and eye make it, and only then the next one begins. So a delay slows it down by its share of
-the cycle, and nothing in here knows how long the delay is. What is pressed is felt, which no display delays. Where the
-constants come from stands in ``docs/tasks.md``.
+Each look-move cycle is one submovement towards the goal of a task, with the noise of a fast hand. The next submovement
+begins only after the operator has seen the end of the last one, late by display, network and eye. So a delay lengthens
+each cycle, although the operator does not know the length of the delay. Contact is felt, which no display delays. The
+sources of the constants are in ``docs/tasks.md``.
 """
 
 import math
@@ -23,24 +23,24 @@ from teleop_core.kernels.axes import axis_map
 from teleop_core.kernels.geometry import turn_within
 
 AHEAD = 16
-"""Ticks for which it is asked at once, about a frame: the eye needs longer, so nothing is late."""
+"""Ticks for which it is asked at once, about a frame; the eye needs longer, so this adds no delay."""
 _COLUMNS = ("number", "act", "goal_x", "width", "goal_qw", "turn", "force", "clearance")
 _NUMBER, _ACT, _GOAL, _WIDTH, _ATTITUDE, _TURN, _FORCE, _CLEARANCE = map(topics.TASK_STATE.columns.index, _COLUMNS)
 _BOX, _SIZE = STATE["fixture_center_x"], STATE["fixture_size_x"]
 _ENDS = (topics.Limit.JOINT, topics.Limit.WORKSPACE)
-_PRESS_TIME = 0.06  # for which the hand stays closed, and the clutch is down before and after the hand moves [s]
-_STILL = 0.05  # at rest it goes this share of its way in STILL_TIME
-_SHORTEST = 0.1  # of a width: a way that is not worth a submovement
+_PRESS_TIME = 0.06  # times for which the hand stays closed, and the clutch is pressed before and after a motion [s]
+_STILL = 0.05  # a tip that moves less than this share of its path in STILL_TIME is at rest
+_SHORTEST = 0.1  # share of a goal's width; shorter displacements need no submovement
 _FELT = 0.03  # least force that is felt [N]
 _SURE = 2.0  # standard deviations that a submovement's end stays off a wall
 
 
 class Observer:
-    """Motion of one session: it reads what is seen at the time that it is asked.
+    """Motion of one session; it reads what is seen at the time of each call.
 
     Args:
-        p: Its constants.
-        setting: What it is made with; ``seen`` must have a task.
+        p: Constants of the operator.
+        setting: Setting of the operator; ``seen`` must have a task.
     """
 
     def __init__(self, p: ObserverParameters, setting: Setting) -> None:
@@ -53,16 +53,16 @@ class Observer:
         self._rng = np.random.default_rng((setting.seed, 3))
         self._glances = Glances(p.eye)
         self._hand = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])  # where the last submovement ends
-        self._softness = p.softness  # way for a newton, as it was felt last [m/N]
+        self._softness = p.softness  # last felt compliance: displacement per newton [m/N]
         self._move: Move | None = None
-        self._turns = False  # whether the stylus is turned in it
+        self._turns = False  # whether the last submovement turns the stylus
         self._number = 0.0
-        self._next = 0.0  # when it may move again, whatever it sees [s]
-        self._half_seen = math.inf  # when half of the last way was seen [s]
-        self._is_still = self._was_felt = False  # whether its end was seen, or was felt alone
-        self._close = -math.inf  # when the hand closes, and for a moment [s]
+        self._next = 0.0  # time before which it does not move, whatever it sees [s]
+        self._half_seen = math.inf  # when half of the last motion was seen [s]
+        self._is_still = self._was_felt = False  # whether the end of the last motion was seen, or only felt
+        self._close = -math.inf  # when the hand closes for a moment [s]
         self._holds, self._since = False, -math.inf  # whether the hand stays closed, and since when
-        self._lag = -1.0  # how late the last motion was seen, beside the eye [s]; < 0: not known
+        self._lag = -1.0  # how late the last motion was seen, without the eye's delay [s]; < 0: not known
 
     def __call__(self, times: Array) -> Array:
         """Rows (N, 13) of :data:`~teleop_core.hand.operators.Motion` for times (N,) [s]."""
@@ -81,7 +81,7 @@ class Observer:
         return rows
 
     def _draw(self, times: Array, rows: Array) -> None:
-        """Write the present submovement, from its begin on."""
+        """Write the present submovement into ``rows``, from its beginning on."""
         if (move := self._move) is None:
             return
         if not move.is_clutched and not self._turns and move.begin + move.duration < times[0]:
@@ -97,10 +97,10 @@ class Observer:
             rows[:, 6] = (times >= move.begin - _PRESS_TIME) & (times < move.begin + move.duration + _PRESS_TIME)
 
     def _decide(self, now: float, until: float) -> bool:
-        """Begin the next submovement, or press, if the time for either comes until then.
+        """Begin the next submovement, or press, if the time for either comes before ``until``.
 
         Returns:
-            Whether it begins a submovement.
+            Whether a submovement begins.
         """
         p, task = self._p, self._seen.task
         width, act = float(task[_WIDTH]), int(task[_ACT])
@@ -121,7 +121,7 @@ class Observer:
         return False
 
     def _way(self, glance: Glance) -> Way:
-        """What is to be done by what is seen, and where something is pressed, by what is felt."""
+        """The motion to be made, by what is seen and, during a press, by what is felt."""
         p, task, turn, lever, missing = self._p, self._seen.task, np.zeros(3), 0.0, 0.0
         is_moving = int(task[_ACT]) == Act.PASS
         goal = glance.goal if is_moving else task[_GOAL : _GOAL + 3]
@@ -142,7 +142,7 @@ class Observer:
         return Way(step, turn, lever, missing)
 
     def _feel_softness(self, felt: float) -> None:
-        """Learn from the last submovement how far it is for a newton [m/N]; by a factor of three at most."""
+        """Learn the compliance [m/N] from the last submovement; it changes by a factor of three at most."""
         if (move := self._move) is None or length(move.seen.force) < _FELT:
             return
         more, pressed = felt - float(length(move.seen.force)), self._pressed(move)
@@ -155,13 +155,13 @@ class Observer:
         return -float(dot(product(self._hand_of_slave, move.way.step), force)) / max(float(length(force)), _FELT)
 
     def _seen_at(self, until: float) -> float:
-        """When the end of the last submovement is seen or felt [s]; infinite if not until then.
+        """When the end of the last submovement is seen or felt [s]; infinite if this is after ``until``.
 
-        It is seen as long after half of the way was, as the hand took from there to the end; a
+        The end is expected as long after the half of the motion was seen, as the hand took from the half to the end. A
         slower arm is seen to move on.
         """
         move = self._move
-        if move is None or move.is_clutched:  # nobody begins while the arm is seen to go to its start
+        if move is None or move.is_clutched:  # no submovement begins while the arm is seen to move to its start
             return -math.inf if move is not None or self._is_at_rest(until) else math.inf
         end = move.begin + move.duration
         is_pressed = self._seen.task[_FORCE] > 0.0 and length(move.seen.force) >= _FELT
@@ -178,18 +178,18 @@ class Observer:
             return when
         gone = float(length(self._gone(self._glances.at(when), self._glances.at(when + STILL_TIME))))
         self._is_still = gone <= _STILL * float(length(move.way.both))
-        if not self._is_still:  # it still moves: half of it is seen later
+        if not self._is_still:  # the tip still moves: the half is seen later
             self._half_seen += until - when + 1e-3
             return math.inf
         return when
 
     def _is_at_rest(self, until: float) -> bool:
-        """Whether the tip was seen to stand still lately."""
+        """Whether the tip was recently seen to stand still."""
         gone = self._gone(self._glances.at(until - STILL_TIME), self._glances.at(until))
         return bool(length(gone) <= _STILL * self._seen.task[_WIDTH])
 
     def _is_felt(self, move: Move, when: float, until: float) -> bool:
-        """Whether the force tells, at rest, what a submovement did; not as long as it is the one of before."""
+        """Whether the force at rest shows the result of a submovement; not while the force is still the former one."""
         if when > until:
             return False
         still = _STILL * float(self._seen.task[_FORCE])
@@ -199,14 +199,14 @@ class Observer:
         return more >= min(0.5 * abs(expected), _FELT) - still and abs(later - felt) <= still
 
     def _gone(self, a: Glance, b: Glance) -> Array:
-        """Way and turn (6,) [m] from one glance to another, as they count in the present submovement."""
+        """Displacement and weighted rotation (6,) [m] between two glances, weighted as in the present submovement."""
         turn, lever = np.zeros(3), 0.0 if self._move is None else self._move.way.lever
         if lever > 0.0:
             turn_within(a.tip[3:], b.tip[3:], turn)
         return np.concatenate((b.tip[:3] - a.tip[:3], lever * turn))
 
     def _half_way(self, move: Move, until: float) -> float:
-        """When the tip was seen half way [s]; infinite if it was not until then."""
+        """When the tip was seen half way [s]; infinite if this was not before ``until``."""
         unseen, whole = move.unseen, float(dot(move.unseen, move.unseen))
         half = 1.0 - 0.5 * float(length(move.way.both)) / math.sqrt(whole)
         before: tuple[float, float] | None = None
@@ -224,14 +224,14 @@ class Observer:
         return math.inf
 
     def _patience(self) -> float:
-        """How long after its end a motion that does not show is waited for [s]."""
+        """How long the operator waits, after the end of a motion, for the motion to become visible [s]."""
         p = self._p
         if self._lag < 0.0:
             return p.longest_wait
         return min(p.longest_wait, p.eye + 1.5 * self._lag + p.reaction)
 
     def _begin(self, now: float, seen: Glance, way: Way) -> None:
-        """Begin a submovement along a way, as long as it is; or bring the hand back, where it or the arm ends."""
+        """Begin a submovement; or bring the hand back if the hand or the arm is at the end of its range."""
         p, task = self._p, self._seen.task
         gain, width = float(self._seen.state[STATE["gain"]]) or 1.0, float(task[_WIDTH])
         distance, angle = float(length(way.step)), float(length(way.turn))
@@ -260,9 +260,9 @@ class Observer:
             self._press(now + duration, Act.PRESS)
 
     def _careful(self, tip: Array, step: Array) -> float:
-        """Duration [s] with which the noise of a step (3,) [m] of the tip stays off walls and edges, 0 for none.
+        """Duration [s] for which the noise of a step (3,) [m] stays clear of walls and edges; 0 without any.
 
-        The fixture's walls are those of its box. Nobody aims more exactly than a goal asks for.
+        The fixture's walls are those of its box. The operator aims no more exactly than the goal requires.
         """
         p, state, task = self._p, self._seen.state, self._seen.task
         across, slowest = p.noise_across, 0.0
@@ -275,14 +275,14 @@ class Observer:
         return _SURE * p.noise * slowest
 
     def _ended(self, way: Array, duration: float) -> Array:
-        """A way or turn (3,) with the noise of a hand that makes it in a time [s]."""
+        """A displacement or rotation (3,) with the noise of a hand that makes it in ``duration`` [s]."""
         p, distance, noise = self._p, float(length(way)), self._rng.standard_normal(3)
         along = way / max(distance, 1e-12)
         ahead = along * float(dot(along, noise))
         return way + p.noise * distance / duration * (ahead + p.noise_across * (noise - ahead))
 
     def _bring_back(self, now: float, seen: Glance, step: Array, turn: Array) -> None:
-        """Clutch, and bring the hand to where it can go by a step (3,) [m] and a turn (3,) [rad] the farthest."""
+        """Clutch, and bring the hand to where it has most room for a step (3,) [m] and a turn (3,) [rad]."""
         p = self._p
         way, angle = self._room.back(self._hand, step, turn)
         duration = max(p.least_time, float(length(way)) / p.fastest, float(length(angle)) / p.fastest_turn)
@@ -298,7 +298,7 @@ class Observer:
         self._is_still = self._was_felt = False
 
     def _press(self, when: float, act: int) -> None:
-        """Close or open the hand at a time [s]; a press waits for another goal."""
+        """Close or open the hand at the time ``when`` [s]; after a press the operator waits for the next goal."""
         if act == Act.PRESS:
             self._close, self._next = when, math.inf
         elif self._holds != (act == Act.GRIP):

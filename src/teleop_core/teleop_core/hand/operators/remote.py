@@ -1,8 +1,7 @@
-"""Remote: a person as the hand, who says now and then where the stylus shall be.
+"""Remote: a hand whose wanted poses a person or a program sends.
 
-Poses come at any low rate, from a mouse, a gamepad or a program; the stylus follows them smoothly.
-Nobody is there until a first pose comes, and nobody is there again when they fall silent: the
-clutch is pressed then, so that the slave holds.
+Poses come at any low rate, from a mouse, a gamepad or a program; the stylus follows them smoothly. Before the first
+pose, and after a silence, the hand counts as absent: the clutch is pressed, so that the slave holds.
 """
 
 import math
@@ -23,12 +22,12 @@ AHEAD = follower.MOST
 BUTTONS = ("clutch", "fixture", "mode")
 _PRESSED, _BETWEEN = 0.1, 0.05  # how long a button is pressed, and released at least [s]
 _UNIT = 1e-3  # how far a quaternion may be from unit length
-_FARTHEST = 10.0  # no stylus is wanted so far from the master's base [m]
+_FARTHEST = 10.0  # poses farther than this from the master's base are refused [m]
 
 
 @dataclass(frozen=True, kw_only=True)
 class RemoteParameters:
-    """How a hand follows what a person wants from afar."""
+    """How a hand follows the poses that a remote person wants."""
 
     delay: float = parameter(
         0.045,
@@ -75,13 +74,14 @@ class RemoteParameters:
 
 
 Person = Callable[["RemoteHand", float], None]
-"""Person of a program: tells a hand what is wanted at a time [s] since the hand began to move."""
+"""A program in place of a person: sets the wanted pose of a hand at a time [s] since the hand began to move."""
 
 
 class _Wanted(NamedTuple):
-    """What was said last.
+    """The last wanted pose.
 
-    ``time`` is when [s], NaN for when it is first looked at; ``grip`` how often the stylus had been let go of before.
+    ``time`` is its time [s]; NaN means the time when it is first read. ``grip`` is how often the stylus was let go of
+    before.
     """
 
     pose: geometry.Array
@@ -90,20 +90,21 @@ class _Wanted(NamedTuple):
 
 
 class RemoteHand:
-    """Hand of a person who is not here: follows poses that are wanted, and lets go in silence.
+    """Hand of a remote person: follows wanted poses, and lets go when no poses come.
 
-    A grip is relative: its first pose is taken as where the stylus is then, later ones move it by the difference.
-    :meth:`want`, :meth:`press` and :meth:`let_go` may be called by one other thread than :meth:`motion`.
+    A grip is relative: its first pose stands for the present pose of the stylus, and later poses move the stylus by
+    their difference from the first. One thread may call :meth:`want`, :meth:`press` and :meth:`let_go`, and another
+    one :meth:`motion`.
 
     Args:
         parameters: Delay, timeout and bounds.
-        start: Pose (7,) of the stylus at the beginning: place [m] in the master's base, quaternion
-            w, x, y, z; None for where the stylus of the haptic master rests.
+        start: Pose (7,) of the stylus at the beginning: place [m] in the master's base, quaternion w, x, y, z; None
+            for the rest pose of the haptic master's stylus.
         room: Corners low and high (3,) [m] of the box that the stylus stays in; None for no bound.
 
     Attributes:
         room: Corners low and high (3,) [m] of the box that the stylus stays in.
-        closing: How far the hand closes the jaw, 0 open to 1 closed; silence leaves it as it is.
+        closing: How far the hand closes the jaw, 0 open to 1 closed; it does not change when no poses come.
         refused: Number of poses that were not used.
     """
 
@@ -132,17 +133,18 @@ class RemoteHand:
     # -- what the person wants, in any thread ----------------------------------------------------
 
     def want(self, pose: geometry.Array, time: float | None = None) -> bool:
-        """Want the stylus at a pose; the first one after silence is where it is then.
+        """Set the wanted pose; the first pose after a silence stands for the present pose of the stylus.
 
         Args:
-            pose: Place [m] in the master's base and quaternion w, x, y, z of unit length, (7,).
+            pose: Position [m] in the master's base and quaternion w, x, y, z of unit length, (7,).
             time: When it was wanted, in the time of :meth:`motion` [s]; None for now.
 
         Returns:
-            Whether it is used: not if it is not finite, its quaternion is none, or it is more than 10 m away.
+            Whether the pose is used. A pose is refused if it is not finite, is more than 10 m away, or has no unit
+            quaternion.
 
         Raises:
-            ShapeError: It has another shape.
+            ShapeError: ``pose`` does not have the shape (7,).
         """
         row = _row("pose", pose)
         numbers = row.tolist()
@@ -163,7 +165,7 @@ class RemoteHand:
         self._wanted = _Wanted(self._wanted.pose, -math.inf, self._wanted.grip + 1)
 
     def press(self, name: str, *, is_pressed: bool = True) -> None:
-        """Press or release a button; each new press of fixture or mode lasts 0.1 s at least.
+        """Press or release a button; each new press of fixture or mode lasts at least 0.1 s.
 
         Args:
             name: ``clutch``, ``fixture`` or ``mode``.
@@ -179,7 +181,7 @@ class RemoteHand:
         self._down[name] = is_pressed
 
     def close(self, share: float) -> None:
-        """Close the jaw so far: 0 open to 1 closed; what is beyond is cut, NaN changes nothing."""
+        """Close the jaw to ``share``: 0 open to 1 closed. Values beyond are clipped; NaN changes nothing."""
         if not math.isnan(share):
             self.closing = min(max(share, 0.0), 1.0)
 
@@ -192,27 +194,27 @@ class RemoteHand:
 
     @property
     def is_held(self) -> bool:
-        """Whether somebody holds the stylus."""
+        """Whether a person or program holds the stylus."""
         return self._is_held
 
     @property
     def pose(self) -> geometry.Array:
-        """Where the stylus is wanted by the hand now (7,), in the master's base."""
+        """Present pose (7,) of the stylus that the hand wants, in the master's base."""
         return self._follower.pose
 
     @property
     def time(self) -> float:
-        """Time that the motion has come to [s]."""
+        """Time up to which the motion is computed [s]."""
         return self._follower.time
 
     def motion(self, times: geometry.Array) -> geometry.Array:
-        """Where the stylus goes: the :data:`~teleop_core.hand.operators.Motion` of an operator.
+        """Motion of the stylus: the :data:`~teleop_core.hand.operators.Motion` of an operator.
 
         Args:
             times: Times (N,) [s], a tick apart from each other, later than those of the last call.
 
         Returns:
-            Rows (N, 13): place and turn relative to the start, buttons, no tremor, and the jaw.
+            Rows (N, 13): position and rotation vector relative to the start, buttons, zero tremor, and the jaw.
         """
         rows = np.zeros((len(times), 13))
         tick = float(times[1] - times[0]) if len(times) > 1 else 0.0
@@ -228,7 +230,7 @@ class RemoteHand:
     __call__ = motion
 
     def draw(self, first: float, tick: float, count: int) -> Any:
-        """The same as records, for a few ticks, as the haptic master needs them.
+        """Return the motion of a few ticks as records, in the form for the haptic master.
 
         Args:
             first: Time of the first tick [s].
@@ -236,8 +238,8 @@ class RemoteHand:
             count: How many ticks, 1 to 4.
 
         Returns:
-            Records (count,) of :class:`teleop_core.hand.operators.follower.Wanted`: places and
-            attitudes in the master's base. The next call writes them again.
+            Records (count,) of :class:`teleop_core.hand.operators.follower.Wanted`: positions and attitudes in the
+            master's base. The next call overwrites them.
         """
         if self._wanted is not self._seen:
             self._listen(first)
@@ -272,7 +274,7 @@ class RemoteHand:
         self._follower.aim(self._moved(wanted.pose))
 
     def _moved(self, pose: geometry.Array) -> geometry.Array:
-        """Where the stylus was gripped, moved by as much as the wanted pose was since then."""
+        """Pose of the stylus at the grip, moved by the change of the wanted pose since then."""
         target = np.empty(7)
         target[:3] = self._held[:3] + (pose[:3] - self._first[:3])
         geometry.multiply_quaternions(pose[3:], self._turn, target[3:])
@@ -286,10 +288,10 @@ class RemoteHand:
 
 
 class _Button:
-    """Button whose presses are all seen, however short and close they are.
+    """Button of which no press is missed, however short the presses and the pauses between them are.
 
     Attributes:
-        presses: How many there were.
+        presses: Number of presses so far.
     """
 
     def __init__(self) -> None:
@@ -298,9 +300,9 @@ class _Button:
         self._is_pressed = False
 
     def at(self, now: float, *, is_down: bool) -> bool:
-        """Whether it is pressed at a time [s], which rises from call to call.
+        """Whether the button is pressed at the time ``now`` [s], which increases from call to call.
 
-        It is released between two presses, also where the time between them was slept through.
+        The button is released between two presses, even if no call came between them.
         """
         if self._shown < self.presses and now >= self._next:
             if self._is_pressed:
@@ -321,7 +323,7 @@ def _row(name: str, pose: object) -> geometry.Array:
     """Copy of a pose (7,).
 
     Raises:
-        ShapeError: It has another shape.
+        ShapeError: ``pose`` does not have the shape (7,).
     """
     row = np.array(pose, dtype=np.float64)
     if row.shape != (7,):
@@ -337,7 +339,7 @@ def hand_of(setting: Setting) -> RemoteHand:
 
 
 def make_remote(_: object, setting: Setting) -> Motion:
-    """A hand, which ``hand`` of the stage ``operator`` gives to feed it."""
+    """Make a remote hand; callers get it as ``hand`` of the stage ``operator``, to send poses to it."""
     return hand_of(setting)
 
 
@@ -345,14 +347,14 @@ REMOTE = Operator("remote", make_remote, RemoteParameters, ahead=AHEAD, trembles
 
 
 def remote_operator(name: str, person: Person) -> Operator:
-    """Operator whose hand is told by a program what is wanted, as from afar.
+    """Return an operator whose hand gets its wanted poses from a program.
 
     The parameters of the hand are ``operator.remote``.
 
     Args:
-        name: What it is called.
-        person: Asked once every 4 ticks; calls :meth:`RemoteHand.want`, :meth:`RemoteHand.let_go`
-            or :meth:`RemoteHand.press` as often as it likes, or not at all.
+        name: Name of the operator.
+        person: Called once every 4 ticks. It may call :meth:`RemoteHand.want`, :meth:`RemoteHand.let_go` and
+            :meth:`RemoteHand.press` any number of times.
     """
 
     def make(_: object, setting: Setting) -> Motion:

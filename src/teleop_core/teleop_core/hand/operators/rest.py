@@ -1,4 +1,4 @@
-"""Rest: where the stylus rests before a session, from which operators count."""
+"""Rest: the rest pose of the stylus before a session; motions of operators are relative to it."""
 
 import math
 
@@ -9,10 +9,10 @@ from teleop_core.kernels.geometry import Array, quaternion_from_rotation, rotati
 REST_TILT = math.radians(-23.4)
 """Tilt of the stylus in its inkwell about x [rad].
 
-Vongbunyong 2008, table 6.1; the sign is the one that meets the slave's home.
+Vongbunyong 2008, table 6.1; the sign is the one that agrees with the slave's home.
 """
 REST_POSITION = (0.0, -0.065511, -0.088114)
-"""Place of its tip there [m], in the master's base."""
+"""Position of the stylus tip in the inkwell [m], in the master's base."""
 
 
 def rest_pose() -> Array:

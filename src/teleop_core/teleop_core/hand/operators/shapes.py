@@ -12,7 +12,7 @@ from teleop_core.kernels import Array, dot
 
 
 def minimum_jerk(share: Array) -> Array:
-    """Smooth step from 0 to 1 with rest at both ends, over ``share`` of its time clipped to [0, 1].
+    """Smooth step from 0 to 1, at rest at both ends; ``share`` of its time is clipped to [0, 1].
 
     Source:
         Flash and Hogan 1985, eq. 6.
@@ -25,9 +25,9 @@ def minimum_jerk(share: Array) -> Array:
 _CYCLES = np.array([1.0, math.sqrt(3.0), math.sqrt(7.0), math.sqrt(13.0)])
 _SHARES = np.array([0.5, 0.4, 0.25, 0.15])
 PHASES = (6, len(_CYCLES))
-"""Shape of the random phases: three axes of place and three of turn."""
+"""Shape of the random phases: three axes of position and three of rotation."""
 Shape = Callable[[OperatorParameters, Array, Array], Array]
-"""Parameters, phases (6, 4) and times (N,) [s] since the approach to places (N, 3) [m]."""
+"""Function of parameters, phases (6, 4) and times (N,) [s] since the approach; returns positions (N, 3) [m]."""
 
 
 def smooth(p: OperatorParameters, phases: Array, shape: Shape, *, grows: bool = True) -> Motion:
@@ -36,7 +36,7 @@ def smooth(p: OperatorParameters, phases: Array, shape: Shape, *, grows: bool = 
     Args:
         p: Centre, approach, tilt, largest turn.
         phases: Random phases (6, 4) [rad].
-        shape: Places around the centre.
+        shape: Function that gives positions around the centre.
         grows: Whether the shape grows over its first second, so that it starts at rest.
 
     Returns:
@@ -57,7 +57,7 @@ def smooth(p: OperatorParameters, phases: Array, shape: Shape, *, grows: bool = 
 
 
 def random_unit(p: OperatorParameters, phases: Array, times: Array) -> Array:
-    """Smooth random motion within [-1, 1] on three axes, (N, 3), of phases (3, 4)."""
+    """Smooth random motion within [-1, 1] on three axes, (N, 3), with phases (3, 4)."""
     rate = 2.0 * math.pi * _CYCLES / p.period
     waves = np.sin(times[:, None, None] * rate + phases)
     return np.sin(0.5 * math.pi * dot(waves, _SHARES))
@@ -104,4 +104,4 @@ CIRCLE = _operator("circle", _circle)
 POINTS = _operator("points", _points, grows=False)
 HOLD = _operator("hold", _hold)
 ELSEWHERE = replace(HOLD, name="elsewhere", is_here=False)
-"""Nobody here: another node sends the hand's topics, in live sessions alone."""
+"""No operator in this session: another node sends the hand's topics; for live sessions only."""

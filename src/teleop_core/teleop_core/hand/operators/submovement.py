@@ -1,4 +1,4 @@
-"""Submovement: one move of an operator who looks, and the way that it is to go."""
+"""Submovement: one movement of an operator who corrects by sight, and its wanted displacement."""
 
 from typing import NamedTuple
 
@@ -9,28 +9,28 @@ from teleop_core.kernels import Array
 
 
 class Way(NamedTuple):
-    """What is to be done: way of the tip (3,) [m] in the slave's base, turn (3,) [rad] in the tool's frame."""
+    """Wanted motion: displacement of the tip (3,) [m] in the slave's base, rotation (3,) [rad] in the tool's frame."""
 
     step: Array
     turn: Array
-    lever: float  # way that counts as much as a turn of one radian [m]; 0: no turn is asked for
-    missing: float = 0.0  # share of the force that is asked for
+    lever: float  # displacement that counts as much as a rotation of one radian [m]; 0: no rotation is required
+    missing: float = 0.0  # share of the required force
 
     @property
     def both(self) -> Array:
-        """Way and turn (6,) [m], as they count."""
+        """Displacement and weighted rotation (6,) [m]."""
         return np.concatenate((self.step, self.lever * self.turn))
 
 
 class Move(NamedTuple):
-    """A submovement: its begin and duration [s], and where the hand goes and turns."""
+    """A submovement: its start time and duration [s], and the motion of the hand."""
 
     begin: float
     duration: float
-    start: Array  # place (3,) [m] and attitude (4,) of the hand at its begin, from those at rest
+    start: Array  # position (3,) [m] and attitude (4,) of the hand at its start, relative to rest
     step: Array  # of the hand (3,) [m]
-    turn: Array  # of the stylus in its own frame (3,) [rad]
+    turn: Array  # rotation of the stylus in its own frame (3,) [rad]
     seen: Glance  # what was seen when it began
     way: Way  # of the tip, as the hand feels
-    unseen: Array  # that way, and those before it that were felt and not seen (6,) [m]
+    unseen: Array  # this motion, and those before it that were felt but not seen (6,) [m]
     is_clutched: bool = False  # the slave does not follow

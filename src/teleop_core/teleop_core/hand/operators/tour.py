@@ -1,7 +1,7 @@
 """Tour: stops at one point after the other, then draws a smooth line through all of them.
 
-How long a leg takes, how long each rest, and how fast the stylus turns meanwhile
-(``operator.period``) are set apart from each other.
+Three times are set separately: the duration of a leg, the duration of each rest, and the period of the stylus rotation
+(``operator.period``).
 """
 
 from dataclasses import dataclass
@@ -57,9 +57,9 @@ class TourParameters:
 
 
 def through(points: Array, share: Array) -> Array:
-    """Smooth line (M, 3) through points (N, 3), N >= 2, at shares (M,) of its way, 0 to 1.
+    """Smooth line (M, 3) through points (N, 3), N >= 2, at shares (M,) of its length, 0 to 1.
 
-    Between neighbours it is a cubic whose slope at a point is that from the point before to the point after.
+    Between neighbours the line is a cubic. Its slope at a point is that from the previous point to the next point.
 
     Source:
         Catmull and Rom 1974.
@@ -74,7 +74,7 @@ def through(points: Array, share: Array) -> Array:
 
 
 def tour(p: TourParameters, times: Array) -> Array:
-    """Places (N, 3) [m] around the centre at times (N,) [s] since the tour began there."""
+    """Positions (N, 3) [m] around the centre at times (N,) [s] since the tour began at the centre."""
     stops = np.vstack((np.zeros(3), p.stops))
     legs = len(stops) - 1
     whole = np.minimum(times / (p.leg_time + p.rest_time), legs - 1e-9)

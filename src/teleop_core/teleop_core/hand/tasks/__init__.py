@@ -1,8 +1,8 @@
-"""Tasks: what an operator is to do, and whether it was done, one file per task.
+"""Tasks: what an operator has to do, and whether it was done, one file per task.
 
-A task says where the tip shall be now and how near, and what to do there. It sees where the tip
-really is and what the hand does, and counts attempts, successes and errors. The same task is for
-people and for simulated operators; its state is a topic, and a score.
+A task sets the goal of the tip, its width, and the action at the goal. It reads the true pose of the tip and the
+closing of the hand, and counts attempts, successes and errors. People and simulated operators do the same tasks. The
+state of a task is a topic, and a score.
 """
 
 from collections.abc import Callable
@@ -31,18 +31,19 @@ SCENE = (
     "grips", "other_grips", "transferred", "dropped",
     *(f"{axis}{i}" for i in range(topics.JAW_OBJECTS) for axis in "xyz"),
 )  # fmt: skip
-"""What a task sees: time since it began [s]; the tip's true pose in slave_base [m]; how far the hand closes, 0 to 1;
-the world's force on the tip [N]; whether the arm is the second one; whether its jaw grips, and that of the other arm;
-how many blocks came onto another peg, and onto none; the middle of each block [m], zero for one that is not there."""
+"""Inputs of a task: time since it began [s]; the tip's true pose in slave_base [m]; how far the hand closes, 0 to 1;
+the contact force on the tip [N]; whether the arm is the second one; whether its jaw grips, and the other arm's jaw;
+how many blocks came onto another peg, and onto none; the middle of each block [m], zero for a missing block.
+"""
 
 
 class Act(IntEnum):
-    """What a task asks for at its goal."""
+    """What the operator has to do at the goal."""
 
-    PRESS = 0  # close the hand there, as a mouse is clicked
+    PRESS = 0  # close the hand there for a moment, like a mouse click
     PASS = 1  # be there
-    GRIP = 2  # be there, and have the hand closed from then on
-    LET_GO = 3  # be there, and have it open from then on
+    GRIP = 2  # be there, and keep the hand closed from then on
+    LET_GO = 3  # be there, and keep the hand open from then on
 
 
 class Miss(IntEnum):
@@ -52,8 +53,8 @@ class Miss(IntEnum):
     BESIDE = 1  # it ended beside the goal
     LATE = 2  # it took too long
     FORCE = 3  # it pressed too hard
-    DROP = 4  # what was carried came to rest beside its goal
-    WRONG = 5  # what was carried came to rest on a goal of another one
+    DROP = 4  # the carried object came to rest beside its goal
+    WRONG = 5  # the carried object came to rest on another object's goal
 
 
 @dataclass(frozen=True)
@@ -61,14 +62,14 @@ class Task:
     """A task.
 
     Attributes:
-        name: What ``--set task=`` calls it.
+        name: Its name in ``--set task=``.
         parameters: Its parameter group.
-        judge: ``judge(numbers, memory, scene, state)``, a kernel or a plain function, called every
-            tick once the slave follows. ``numbers`` are those of the parameters; ``memory`` (64,)
-            is kept from tick to tick, and zero at first; ``scene`` has the numbers that
-            :data:`SCENE` names; ``state`` those of ``task/state``, which it writes, as they were.
-        numbers: ``numbers(parameters)`` gives what ``judge`` takes, if that is something else than
-            the numbers of the parameters in their order.
+        judge: ``judge(numbers, memory, scene, state)``, a kernel or a plain function, called every tick once the slave
+            follows. ``numbers`` are those of the parameters; ``memory`` (64,) is kept from tick to tick, and zero at
+            first; ``scene`` has the numbers that :data:`SCENE` names; ``state`` has the numbers of ``task/state`` of
+            the last tick, and is written.
+        numbers: ``numbers(parameters)`` returns the ``numbers`` of ``judge``, if they are not simply the numbers of
+            the parameters in their order.
     """
 
     name: str
@@ -81,7 +82,7 @@ class Task:
 
 
 def _try(part: Task) -> None:
-    """Judge some ticks, so that what cannot work is told before anything runs."""
+    """Judge some ticks, so that errors are reported before anything runs."""
     needs = "one with judge(numbers, memory, scene, state) and parameters that all have defaults"
     with tried("task", part.name, needs):
         numbers, _ = fenced(part.numbers(part.parameters()))  # one too far is NaN
@@ -107,7 +108,7 @@ def _try(part: Task) -> None:
 
 
 def _lead(part: Task, numbers: Array, memory: Array, scene: Array, state: Array) -> None:
-    """Be at each goal for ten minutes, press, and be pressed as asked, until an attempt succeeds."""
+    """Simulate a tip at each goal for ten minutes, with the required presses and forces, until an attempt succeeds."""
     at = {name: i for i, name in enumerate(topics.TASK_STATE.columns)}
     for i in range(12_000):
         if state[at["successes"]] > 0.0:
@@ -129,4 +130,4 @@ TASKS: Registry[Task] = Registry(
 """All tasks by name."""
 
 register_task = TASKS.register
-"""Adds one of yours under its own name; see :meth:`Registry.register`."""
+"""Adds your task under its own name; see :meth:`Registry.register`."""

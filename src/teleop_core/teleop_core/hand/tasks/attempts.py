@@ -1,7 +1,7 @@
-"""Attempts: what tasks share: presses, goals that are set, and attempts at them that are counted.
+"""Attempts: functions that tasks share: detect presses, set goals, and count attempts.
 
-A task's memory holds from :data:`KEPT` on: place of the tip when the goal was set (3,) [m], the
-time then [s], and whether the hand was closed.
+A task's memory contains, from :data:`KEPT` on: the position of the tip when the goal was set (3,) [m], the time of
+that [s], and whether the hand was closed.
 """
 
 import math
@@ -15,9 +15,9 @@ from teleop_core.kernels import Array, inner
 KEPT = 59
 PRESS, PASS, GRIP, LET_GO = map(int, Act)
 NONE, BESIDE, LATE, FORCE, DROP, WRONG = map(int, Miss)
-"""What kernels take for an :class:`Act` and a :class:`Miss`."""
+"""Integer values of :class:`Act` and :class:`Miss` for kernels."""
 _SINCE, _CLOSED = KEPT + 3, KEPT + 4
-_OPENS, _CLOSES = 0.4, 0.6  # closing at which a hand counts as open and closed again
+_OPENS, _CLOSES = 0.4, 0.6  # closing at which a hand counts as open again, and as closed again
 (_NUMBER, _ACT, _GOAL, _, _, _WIDTH, _ATTEMPTS, _SUCCESSES, _ERRORS, _WAY, _OFF, _TIME, _MISS) = range(13)
 _ATTITUDE, _TURN = (topics.TASK_STATE.columns.index(name) for name in ("goal_qw", "turn"))
 _PUSH = SCENE.index("fx")
@@ -25,7 +25,7 @@ _PUSH = SCENE.index("fx")
 
 @inner
 def was_pressed(memory: Array, closing: float) -> bool:
-    """Whether the hand closes just now, which it did not in the tick before."""
+    """Whether the hand closes in this tick, after it was open in the last tick."""
     before = memory[_CLOSED]
     if closing >= _CLOSES:
         memory[_CLOSED] = 1.0
@@ -36,7 +36,7 @@ def was_pressed(memory: Array, closing: float) -> bool:
 
 @inner
 def move_goal(state: Array, act: int, x: float, y: float, z: float, width: float) -> None:
-    """Set the next goal of the same attempt at a place [m], as wide as it is [m]."""
+    """Set the next goal of the same attempt at a position [m], with a width [m]."""
     state[_NUMBER] += 1.0
     state[_ACT], state[_WIDTH] = float(act), width
     state[_GOAL], state[_GOAL + 1], state[_GOAL + 2] = x, y, z
@@ -44,7 +44,7 @@ def move_goal(state: Array, act: int, x: float, y: float, z: float, width: float
 
 @inner
 def begin_goal(memory: Array, scene: Array, state: Array, act: int, x: float, y: float, z: float, width: float) -> None:
-    """Set the goal of the next attempt at a place [m], as wide as it is [m]."""
+    """Set the goal of the next attempt at a position [m], with a width [m]."""
     move_goal(state, act, x, y, z, width)
     for i in range(3):
         memory[KEPT + i] = scene[1 + i]
@@ -53,7 +53,7 @@ def begin_goal(memory: Array, scene: Array, state: Array, act: int, x: float, y:
 
 @inner
 def is_at_goal(scene: Array, state: Array) -> bool:
-    """Whether the tip is within the goal, a ball as wide as the goal is, and turned as it asks for."""
+    """Whether the tip is within the goal, a ball of the goal's width, and has the required attitude."""
     off, same = 0.0, 0.0
     for i in range(3):
         off += (scene[1 + i] - state[_GOAL + i]) * (scene[1 + i] - state[_GOAL + i])
@@ -71,7 +71,7 @@ def waited(memory: Array, scene: Array) -> float:
 
 @inner
 def end_attempt(memory: Array, scene: Array, state: Array, miss: int) -> None:
-    """Count an attempt that ended where the tip is now, with a :class:`Miss` or without one."""
+    """Count an attempt that ended at the tip's present position, with or without a :class:`Miss`."""
     way, along = 0.0, 0.0
     for i in range(3):
         to_goal = state[_GOAL + i] - memory[KEPT + i]
@@ -86,7 +86,7 @@ def end_attempt(memory: Array, scene: Array, state: Array, miss: int) -> None:
 
 @dataclass(frozen=True, kw_only=True)
 class PressedParameters:
-    """What is an error where things are touched; first of the numbers of such a task."""
+    """Bounds of tasks with contact; they are the first numbers of such a task."""
 
     width: float = parameter(0.004, Within(1e-4, 0.1, "m"), "of a goal, a ball")
     most: float = parameter(2.0, Within(0.01, 500.0, "N"), "a larger force is an error")
@@ -95,7 +95,7 @@ class PressedParameters:
 
 @inner
 def failed(numbers: Array, memory: Array, scene: Array) -> int:
-    """:class:`Miss` of an attempt by :class:`PressedParameters`, FORCE or LATE; NONE so far."""
+    """:class:`Miss` of an attempt by :class:`PressedParameters`: FORCE or LATE; NONE without an error so far."""
     square = 0.0
     for i in range(3):
         square += scene[_PUSH + i] * scene[_PUSH + i]
@@ -106,13 +106,13 @@ def failed(numbers: Array, memory: Array, scene: Array) -> int:
 
 @inner
 def tell_attempt(memory: Array, scene: Array, state: Array) -> None:
-    """Count an attempt that succeeds where the tip is within the goal now."""
+    """Count an attempt; it succeeds if the tip is now within the goal."""
     end_attempt(memory, scene, state, NONE if is_at_goal(scene, state) else BESIDE)
 
 
 @dataclass(frozen=True, kw_only=True)
 class LedParameters:
-    """How a goal that is followed is judged; first of the numbers of a task that leads."""
+    """How following a moving goal is judged; these are the first numbers of such a task."""
 
     width: float = parameter(0.006, Within(1e-4, 0.1, "m"), "twice the distance from it that is near")
     step: float = parameter(
@@ -122,15 +122,15 @@ class LedParameters:
 
 @inner
 def lead_on(numbers: Array, memory: Array, scene: Array, state: Array, y: float, z: float) -> None:
-    """Move a goal that is followed by (y, z) [m] from where the task began, and judge each step.
+    """Put a moving goal at (y, z) [m] from the start of the task, and judge each step.
 
     Args:
-        numbers: Of the task, those of :class:`LedParameters` first.
-        memory: Of the task; holds the place where it began (3,), and the time of the next step [s].
+        numbers: Numbers of the task, those of :class:`LedParameters` first.
+        memory: Memory of the task: the position at its start (3,), and the time of the next step [s].
         scene: What the task sees.
-        state: Of the task; written.
-        y: Where the goal is now, from the place where the task began [m].
-        z: The same along z [m].
+        state: State of the task; written.
+        y: Present y of the goal, relative to the start of the task [m].
+        z: Present z of the goal, relative to the start of the task [m].
     """
     if state[_NUMBER] == 0.0:
         for i in range(3):

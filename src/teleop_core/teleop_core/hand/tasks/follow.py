@@ -1,4 +1,4 @@
-"""Follow: stay near a point that nobody can foresee, as pilots are tested with."""
+"""Follow: stay near a point with unpredictable motion, as in tests of pilots."""
 
 import math
 from dataclasses import dataclass
@@ -7,13 +7,13 @@ from teleop_core.base import Within, parameter
 from teleop_core.hand.tasks import Task, attempts
 from teleop_core.kernels import Array, kernel
 
-# Rounds in a period, three for each of y and z: prime numbers, so that nothing comes again in it.
+# Cycles per period, three for each of y and z: prime numbers, so that the motion does not repeat within a period.
 _ROUNDS = (2, 5, 11, 3, 7, 13)
 
 
 @dataclass(frozen=True, kw_only=True)
 class FollowParameters(attempts.LedParameters):
-    """A point that wanders in the slave's y-z plane, from where the task begins.
+    """A point that moves in the slave's y-z plane, around the start of the task.
 
     Source:
         Sums of sines as targets: McRuer and Jex 1967, IEEE Trans. Human Factors in Electronics 8.
@@ -27,7 +27,7 @@ class FollowParameters(attempts.LedParameters):
 def follow_judge(numbers: Array, memory: Array, scene: Array, state: Array) -> None:
     """Move the goal on, and count at each step whether the tip is near it.
 
-    Of the three sines of an axis a faster one is smaller.
+    Of the three sines of an axis, faster ones have smaller amplitudes.
     """
     angle, y, z = 2.0 * math.pi * scene[0] / numbers[3], 0.0, 0.0
     for i in range(3):

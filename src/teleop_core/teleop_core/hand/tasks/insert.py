@@ -1,4 +1,4 @@
-"""Insert: lead the tip into a hole, as deep as it shall be, and out again, time after time."""
+"""Insert: move the tip into a hole to a given depth, and out again, repeatedly."""
 
 import math
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ _CLEARANCE = topics.TASK_STATE.columns.index("clearance")
 
 @dataclass(frozen=True, kw_only=True)
 class InsertParameters(attempts.PressedParameters):
-    """Where the hole is, and how deep to go; the object that has it is a part of the world."""
+    """Position of the hole, and how deep to go; the object with the hole is a part of the world."""
 
     place: tuple[float, ...] = parameter(
         (0.3, 0.0, 0.0), Within(-10.0, 10.0, "m"), "of its mouth in the slave's base, as world.place", length=3
@@ -32,9 +32,9 @@ class InsertParameters(attempts.PressedParameters):
 
 @kernel
 def insert_judge(numbers: Array, memory: Array, scene: Array, state: Array) -> None:
-    """Lead the tip before the mouth, then in; each way in is an attempt.
+    """Set the goal in front of the hole, then inside; each insertion is an attempt.
 
-    ``memory`` holds whether the goal is inside.
+    ``memory`` contains whether the goal is inside.
     """
     if state[0] > 0.0:
         is_there, was_inside = attempts.is_at_goal(scene, state), memory[0] > 0.0

@@ -1,4 +1,4 @@
-"""Palpate: press down on one place after another with a force, hold it there, and let go."""
+"""Palpate: press down on one place after another with a given force, hold the force, and release."""
 
 import math
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ _FORCE = topics.TASK_STATE.columns.index("force")
 
 @dataclass(frozen=True, kw_only=True)
 class PalpateParameters(attempts.PressedParameters):
-    """Places below a row along y, in whose middle the tip is when the task begins."""
+    """Places below a row of points along y; the tip is in the middle of the row when the task begins."""
 
     count: int = parameter(5, Within(1, 99), "places of the row")
     spacing: float = parameter(0.005, Within(0.0, 0.1, "m"), "between places")
@@ -27,9 +27,9 @@ class PalpateParameters(attempts.PressedParameters):
 
 @kernel
 def palpate_judge(numbers: Array, memory: Array, scene: Array, state: Array) -> None:
-    """Lead the tip above a place, down until the force is right, and on when it was held.
+    """Set the goal above a place, then down until the force is right, then on after the force was held.
 
-    ``memory`` holds the beginning (3,), whether it presses, and since when the force is right [s].
+    ``memory`` contains the start position (3,), whether the tip presses, and since when the force is right [s].
     """
     if state[0] == 0.0:
         for i in range(3):

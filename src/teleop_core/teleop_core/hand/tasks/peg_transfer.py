@@ -14,7 +14,7 @@ _ONE_WAY, _WAYS = 2, 2 * JAW_OBJECTS
 
 @dataclass(frozen=True, kw_only=True)
 class PegTransferParameters:
-    """What is to be done with the blocks of ``jaw_sim``; the kinds are those of Hwang et al. 2020, arXiv 2012.12844."""
+    """What to do with the blocks of ``jaw_sim``; the kinds are those of Hwang et al. 2020, arXiv 2012.12844."""
 
     arms: str = parameter(
         "one",
@@ -40,14 +40,14 @@ class PegTransferParameters:
 
 
 def numbers(p: PegTransferParameters) -> Array:
-    """Numbers that the judge takes: lift, width, longest, kind, six ways, clearance, tries."""
+    """Numbers of the judge: lift, width, longest, kind, x and y of six displacements, clearance, tries."""
     kind = transfer.KINDS.index(p.arms)
     return np.array([p.lift, p.width, p.longest, kind, *np.resize(p.ways, _WAYS), p.clearance, p.tries], np.float64)
 
 
 @kernel
 def peg_transfer_judge(numbers: Array, memory: Array, scene: Array, state: Array) -> None:
-    """Lead each hand from step to step, and judge each block where it comes to rest: :mod:`.transfer`."""
+    """Set the goals of each hand step by step, and judge each block when it comes to rest; see :mod:`.transfer`."""
     transfer.lead(numbers, memory, scene, state)
 
 

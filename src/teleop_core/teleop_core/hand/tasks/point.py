@@ -1,4 +1,4 @@
-"""Point: press in targets on a ring, one across from the other, as pointing devices are tested."""
+"""Point: press in targets on a ring, alternately on opposite sides, as in tests of pointing devices."""
 
 import math
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ from teleop_core.kernels import Array, kernel
 
 @dataclass(frozen=True, kw_only=True)
 class PointParameters:
-    """A ring of targets around the place where the tip is when the task begins."""
+    """A ring of targets around the position of the tip when the task begins."""
 
     count: int = parameter(
         13,
@@ -29,10 +29,9 @@ class PointParameters:
 def point_judge(numbers: Array, memory: Array, scene: Array, state: Array) -> None:
     """Count presses inside and outside of the target; each press sets the next target.
 
-    Targets lie across from each other in turn (ISO/TS 9241-411 2012, annex B).
+    Successive targets are on opposite sides of the ring (ISO/TS 9241-411 2012, annex B).
 
-    ``memory`` holds the middle of the ring (3,), then what
-    :mod:`~teleop_core.hand.tasks.attempts` keeps.
+    ``memory`` contains the middle of the ring (3,), then what :mod:`~teleop_core.hand.tasks.attempts` keeps.
     """
     if state[0] == 0.0:
         for i in range(3):
@@ -47,7 +46,7 @@ def point_judge(numbers: Array, memory: Array, scene: Array, state: Array) -> No
     x, y, z = numbers[3], numbers[4], numbers[5]
     size = max(math.sqrt(x * x + y * y + z * z), 1e-12)
     x, y, z = x / size, y / size, z / size
-    # Two axes across the normal: one level where there is such, and the one across both.
+    # Two axes perpendicular to the normal: a horizontal one if it exists, and the one perpendicular to both.
     flat = math.sqrt(x * x + y * y)
     ax, ay = (-y / flat, x / flat) if flat > 1e-6 else (1.0, 0.0)
     along, across = radius * math.cos(angle), radius * math.sin(angle)

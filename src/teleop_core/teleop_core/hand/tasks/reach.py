@@ -1,4 +1,4 @@
-"""Reach: be at one place after another, anywhere in a box, turned as asked, as soon as it can be."""
+"""Reach: go to one pose after another, anywhere in a box, as fast as possible."""
 
 import math
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ _STEPS = (0.8191725133961645, 0.6710436067037893, 0.5497004779019703)
 
 @dataclass(frozen=True, kw_only=True)
 class ReachTaskParameters:
-    """A box around the place where the tip is when the task begins."""
+    """A box around the position of the tip when the task begins."""
 
     size: tuple[float, ...] = parameter((0.01, 0.04, 0.04), Within(0.0, 0.5, "m"), "of the box", length=3)
     width: float = parameter(0.004, Within(1e-4, 0.1, "m"), "diameter of a goal, a ball")
@@ -28,11 +28,11 @@ class ReachTaskParameters:
 
 @kernel
 def reach_judge(numbers: Array, memory: Array, scene: Array, state: Array) -> None:
-    """Set the next goal when the tip is at this one, or takes too long.
+    """Set the next goal when the tip has reached the present goal, or takes too long.
 
     Goals fill the box evenly, as the additive recurrence of Roberts 2018 does.
 
-    ``memory`` holds the middle of the box (3,), and how the tool was turned there (4,).
+    ``memory`` contains the middle of the box (3,), and the tool's attitude when the task began (4,).
     """
     if state[0] == 0.0:
         for i in range(7):
@@ -48,7 +48,7 @@ def reach_judge(numbers: Array, memory: Array, scene: Array, state: Array) -> No
     goal_y = memory[1] + numbers[1] * ((0.5 + at * _STEPS[1]) % 1.0 - 0.5)
     goal_z = memory[2] + numbers[2] * ((0.5 + at * _STEPS[2]) % 1.0 - 0.5)
     attempts.begin_goal(memory, scene, state, attempts.PASS, goal_x, goal_y, goal_z, numbers[3])
-    if numbers[6] > 0.0:  # about an axis that wanders over all directions
+    if numbers[6] > 0.0:  # about an axis that varies over all directions
         height, angle = 2.0 * (at * _STEPS[0] % 1.0) - 1.0, 2.0 * math.pi * (at * _STEPS[1] % 1.0)
         size, across = numbers[6] * (0.25 + 0.75 * (at * _STEPS[2] % 1.0)), math.sqrt(1.0 - height * height)
         x, y = size * across * math.cos(angle), size * across * math.sin(angle)

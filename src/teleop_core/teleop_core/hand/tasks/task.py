@@ -1,4 +1,4 @@
-"""Stage ``task``: sets goals, sees whether they are reached, and tells both."""
+"""Stage ``task``: sets goals, detects whether they are reached, and publishes both."""
 
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -18,7 +18,7 @@ _SECOND, _FIRST_BLOCK = SCENE.index("is_second"), SCENE.index("x0")
 
 @dataclass(frozen=True, kw_only=True)
 class TaskParameters:
-    """Which task it is."""
+    """Choice of the task."""
 
     kind: Choice = choice(TASKS, "point", fixed=True, doc="what the operator is to do")
 
@@ -30,7 +30,7 @@ class TaskState(Fields):
 
 
 class Part(NamedTuple):
-    """The task's judge, its numbers, its memory (64,) and what it sees."""
+    """The task's judge, its numbers, its memory (64,) and its scene."""
 
     judge: Any
     numbers: Array
@@ -85,13 +85,13 @@ class RunningTask(RunningStage):
         self.reset()
 
     def reset(self) -> None:
-        """No goal is set yet."""
+        """Go back to the state in which no goal is set yet."""
         assign(self.state, 0)
         assign(self.signals, self._begin)
         self._part.memory[:] = 0.0
 
     def retune(self, parameters: TaskParameters) -> None:
-        """Take new numbers of the task from the next tick on; goals that are set stay."""
+        """Take new numbers of the task from the next tick on; the present goal does not change."""
         self._part.numbers[:] = TASKS.find(parameters.kind.kind).numbers(parameters.kind.parameters)
 
 

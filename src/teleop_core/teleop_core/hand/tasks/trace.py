@@ -1,4 +1,4 @@
-"""Trace: follow a point that goes round on a ring, as near as a target is wide."""
+"""Trace: follow a point that moves around a ring, within the width of a target."""
 
 import math
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ from teleop_core.kernels import Array, kernel
 
 @dataclass(frozen=True, kw_only=True)
 class TraceParameters(attempts.LedParameters):
-    """A ring in the slave's y-z plane, on which the place where the task begins lies lowest."""
+    """A ring in the slave's y-z plane; the start of the task is its lowest point."""
 
     diameter: float = parameter(0.03, Within(1e-3, 0.5, "m"), "of the ring")
     period: float = parameter(12.0, Within(0.5, 600.0, "s"), "in which the point goes round once")

@@ -1,8 +1,9 @@
-"""Transfer: steps that bring a block from peg to peg, by one arm or two, and where a block came to rest.
+"""Transfer: steps that bring a block from peg to peg, by one arm or two, and the judgement of each block.
 
-A task's memory holds the number of the block, -1 once all are done; the height above where it stood to bring it to; how
-many blocks were on another peg and on none when the attempt began; the first places of all; and how often the block was
-taken up. Its numbers are lift, width, longest, kind, six ways, clearance, tries.
+A task's memory contains the number of the block, -1 once all are done; the height to which to lift it, above its
+start; how many blocks were on another peg and on none when the attempt began; the initial positions of all blocks; and
+how often the block was picked up. Its numbers are lift, width, longest, kind, x and y of six displacements, clearance,
+tries.
 """
 
 import math
@@ -12,22 +13,22 @@ from teleop_core.hand.tasks import SCENE, attempts
 from teleop_core.kernels import Array, inner
 
 KINDS = ("one", "two", "hand_over")
-"""Who transfers: one arm all blocks; each arm every other one; the second takes from the first."""
+"""Which arm transfers: one arm all blocks; each arm every other block; the second arm takes blocks from the first."""
 STEPS = ("wait", "reach", "grasp", "lift", "meet", "take", "release", "retreat", "carry", "place")
-"""What an arm is doing: of these the nine after the first make a transfer with a hand-over."""
+"""Steps of an arm; a transfer with a hand-over uses the nine steps after the first one."""
 (_WAIT, _REACH, _GRASP, _LIFT, _MEET, _TAKE, _RELEASE, _RETREAT, _CARRY, _PLACE) = range(len(STEPS))
 _TWO, _HAND_OVER = KINDS.index("two"), KINDS.index("hand_over")
 _STEP, _OVER = (topics.TASK_STATE.columns.index(name) for name in ("step", "is_over"))
 _SECOND, _X0 = SCENE.index("is_second"), SCENE.index("x0")
 _STARTS = 4
 _TRIES = _STARTS + 3 * topics.JAW_OBJECTS
-_MEETS = 0.01  # a block that is no farther from where both meet is there [m]
-_RESTS = 5e-4  # a block that is no higher above its start stands on the table or a peg [m]
+_MEETS = 0.01  # a block within this distance of the meeting point has reached it [m]
+_RESTS = 5e-4  # a block no higher than this above its start stands on the table or a peg [m]
 
 
 @inner
 def _verdict(numbers: Array, memory: Array, scene: Array, block: int) -> int:
-    """:class:`Miss` of a block that came to rest where it is; -1 where none came to rest."""
+    """:class:`Miss` of a block that came to rest at its present position; -1 if no block came to rest."""
     now, brought = _X0 + 3 * block, scene[_SECOND + 3] - memory[2]
     is_high = scene[now + 2] - memory[_STARTS + 3 * block + 2] > _RESTS
     if is_high or brought + scene[_SECOND + 4] - memory[3] == 0.0:
@@ -43,21 +44,21 @@ def _verdict(numbers: Array, memory: Array, scene: Array, block: int) -> int:
 
 @inner
 def _begin_step(numbers: Array, memory: Array, scene: Array, state: Array, step: int) -> None:
-    """Set the goal of a step, for the arm whose scene it is."""
+    """Set the goal of a step, for the arm to which the scene belongs."""
     block, lift, width = max(int(memory[0]), 0), numbers[0], numbers[1]
     start, now = _STARTS + 3 * block, _X0 + 3 * block
     way_x, way_y = numbers[4 + 2 * block], numbers[5 + 2 * block]
-    x, y, z = state[2], state[3], state[4]  # stay, if nothing else is said
+    x, y, z = state[2], state[3], state[4]  # by default the tip stays
     state[_STEP] = float(step)
     if step in (_REACH, _GRASP) or (step == _TAKE and scene[_SECOND] > 0.0):
         x, y, z = scene[now], scene[now + 1], scene[now + 2]
     elif step in (_LIFT, _RETREAT):
         x, y, z = memory[start], memory[start + 1], memory[start + 2] + lift
-    elif step == _MEET:  # the second one waits beyond, where it is not in the way
+    elif step == _MEET:  # the second arm waits farther away, where it does not obstruct the first
         share = 1.0 if scene[_SECOND] > 0.0 else 0.5
         x, y = memory[start] + share * way_x, memory[start + 1] + share * way_y
         z = memory[start + 2] + lift
-    elif step == _CARRY:  # so that the block comes over the peg, wherever in the jaw it is
+    elif step == _CARRY:  # so that the block comes above the peg, whatever its position in the jaw
         x = scene[1] + memory[start] + way_x - scene[now]
         y = scene[2] + memory[start + 1] + way_y - scene[now + 1]
         z = scene[3] + memory[start + 2] + memory[1] - scene[now + 2]
@@ -72,10 +73,10 @@ def _begin_step(numbers: Array, memory: Array, scene: Array, state: Array, step:
 
 @inner
 def _is_done(numbers: Array, memory: Array, scene: Array, state: Array) -> bool:
-    """Whether the present step is done: by what jaws hold, or by where the tip is."""
+    """Whether the present step is done, judged by what the jaws hold or by the tip's position."""
     step, is_second, block = int(state[_STEP]), scene[_SECOND] > 0.0, int(memory[0])
     grips, other = scene[_SECOND + 1] > 0.0, scene[_SECOND + 2] > 0.0
-    if step == _MEET and is_second:  # the block has come to where both meet
+    if step == _MEET and is_second:  # the block has reached the meeting point
         away = 0.0
         for i in range(3):
             half = 0.5 * numbers[4 + 2 * block + i] if i < 2 else numbers[0]
@@ -105,7 +106,7 @@ def _next_step(numbers: Array, memory: Array, scene: Array, step: int) -> int:
 
 @inner
 def _take_up(numbers: Array, memory: Array, scene: Array, state: Array) -> None:
-    """Begin with the block that ``memory`` names, wherever it is; wait where there is none."""
+    """Begin with the block that ``memory`` names, at its present position; wait if there is no block."""
     memory[2], memory[3] = scene[_SECOND + 3], scene[_SECOND + 4]
     begin = _MEET if int(numbers[3]) == _HAND_OVER and scene[_SECOND] > 0.0 else _REACH
     if memory[0] >= topics.JAW_OBJECTS or memory[_STARTS + 3 * int(memory[0])] == 0.0:
@@ -115,7 +116,7 @@ def _take_up(numbers: Array, memory: Array, scene: Array, state: Array) -> None:
 
 @inner
 def _next_block(numbers: Array, memory: Array, scene: Array, state: Array) -> None:
-    """Begin with the block after the present one; wait where none is left."""
+    """Begin with the block after the present one; wait if no block is left."""
     stride = 2.0 if int(numbers[3]) == _TWO else 1.0
     first = 1.0 if stride == 2.0 and scene[_SECOND] > 0.0 else 0.0
     memory[0], memory[_TRIES] = (first if state[0] == 0.0 else memory[0] + stride), 1.0
@@ -124,7 +125,7 @@ def _next_block(numbers: Array, memory: Array, scene: Array, state: Array) -> No
 
 @inner
 def _end_transfer(numbers: Array, memory: Array, scene: Array, state: Array, miss: int) -> None:
-    """Count a transfer. A dropped block is taken up again, a late one that is held goes on, as often as it may."""
+    """Count a transfer; up to ``tries`` times, pick a dropped block up again, or go on with a late held block."""
     attempts.end_attempt(memory, scene, state, miss)
     is_held = scene[_SECOND + 1] + scene[_SECOND + 2] > 0.0
     goes_on = miss == attempts.DROP or (miss == attempts.LATE and is_held)
@@ -140,7 +141,7 @@ def _end_transfer(numbers: Array, memory: Array, scene: Array, state: Array, mis
 
 @inner
 def lead(numbers: Array, memory: Array, scene: Array, state: Array) -> None:
-    """Lead an arm from step to step, and judge its block where it comes to rest, as a task's judge does."""
+    """Set the goals of an arm step by step, and judge its block when it comes to rest; see a task's judge."""
     if state[0] == 0.0:
         for i in range(3 * topics.JAW_OBJECTS):
             memory[_STARTS + i] = scene[_X0 + i]
@@ -156,7 +157,7 @@ def lead(numbers: Array, memory: Array, scene: Array, state: Array) -> None:
     if miss >= 0:
         _end_transfer(numbers, memory, scene, state, miss)
         return
-    if step == _TAKE and scene[_SECOND] > 0.0:  # from a hand that is never quite still
+    if step == _TAKE and scene[_SECOND] > 0.0:  # because a hand is never quite still
         for i in range(3):
             state[2 + i] = scene[_X0 + 3 * block + i]
     if _is_done(numbers, memory, scene, state):

@@ -1,1 +1,1 @@
-"""Closed forms: inverse kinematics of chains whose axes lie well, and which chains these are."""
+"""Closed forms: inverse kinematics of chains with special axes, and how these chains are recognised."""

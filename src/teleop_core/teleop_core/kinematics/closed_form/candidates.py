@@ -1,16 +1,16 @@
-"""Closed forms of chains: what all of them share, from the wanted pose to the status.
+"""Closed forms of chains: the steps that all of them share, from the wanted pose to the status.
 
-A closed form sees the arm as G = Rz(q1) F1 Rz(q2) F2 ... Rz(qn), with constant transforms between the joints and every
-joint about its own z axis; for arms that decompose from the tip it is the arm from tip to base. Its constants stand
-behind the chain's in the geometry row (:mod:`teleop_core.kinematics.dh_kernels`): 1 or -1 for the order, n signs, n
-groups, then transforms of twelve numbers each: before and after G, and those between the joints. Behind them stands
-what a class of arms has beside, and last 1 for an arm that is of its class only nearly
-(:mod:`teleop_core.kinematics.closed_form.decomposition`).
+A closed form treats the arm as G = Rz(q1) F1 Rz(q2) F2 ... Rz(qn), with constant transforms between the joints and
+every joint about its own z axis. An arm that decomposes from the tip is treated from tip to base. The constants of the
+closed form follow those of the chain in the geometry row (:mod:`teleop_core.kinematics.dh_kernels`): 1 or -1 for the
+order, n signs, n groups, then transforms of twelve numbers each: before and after G, and those between the joints.
+Then come the additional numbers of the class of arms. The last number is 1 for an arm that fits its class only
+approximately (:mod:`teleop_core.kinematics.closed_form.decomposition`).
 
-Branches are candidates: joint vectors in the arm's own order, with 1.0 behind those that reach the
-pose, 0.0 behind those that come nearest, and :data:`UNKNOWN` behind those that cannot be the answer
-and were not computed. The best one is brought into limits and steps; where it then misses the pose,
-damped least squares on the whole chain make the best of the rest.
+Branches are candidates: joint vectors in the arm's own order, followed by one number. It is 1.0 if the branch reaches
+the pose, 0.0 if it only comes nearest, and :data:`UNKNOWN` if the branch cannot be the answer and was not computed.
+The best branch is brought into limits and steps. If it then misses the pose, damped least squares on the whole chain
+reduce the remaining error.
 """
 
 import math
@@ -22,30 +22,30 @@ from teleop_core.kernels.room import room
 from teleop_core.kinematics import IkStatus, damped, dh_kernels, pose_residual
 from teleop_core.kinematics.branches import OUTSIDE, SLACK, cost_of, is_allowed, slowed, turn, turned, wrapped
 
-_ROUNDS, _PATH_ROUNDS = 60, 12  # of the search that makes the best of a branch out of limits
-_FEW_ROUNDS = 8  # of the search beside the seed
+_ROUNDS, _PATH_ROUNDS = 60, 12  # rounds of the search that improves a branch out of limits
+_FEW_ROUNDS = 8  # rounds of the search next to the seed
 _GROUPS = 3
-# Arm [m] at which a turn of the tip that lags moves what the tip holds: of a tool, whatever the
-# reach. Weighed by a reach of 4 m, 5 mm would count no more than 1 mrad.
+# Lever [m] at which an angular lag of the tip counts as a distance: that of a tool, independent of the reach. With a
+# reach of 4 m as the lever, 5 mm would count no more than 1 mrad.
 _LEVER = 0.1
 UNKNOWN = -1.0
 """Last entry of a candidate that was not computed."""
 BESIDE_SEED = 0.3
-"""Largest move [rad] below which the posture beside the seed is the answer."""
-INEXACT = 1e4  # added to the cost of a branch that does not reach: after all others
+"""Largest move [rad] up to which the posture next to the seed is the answer."""
+INEXACT = 1e4  # added to the cost of a branch that does not reach the pose, so that it comes last
 _FOLLOWED, _LIMITED = int(IkStatus.FOLLOWED), int(IkStatus.LIMITED)
 _NEAR_SINGULAR, _UNREACHABLE = int(IkStatus.NEAR_SINGULAR), int(IkStatus.UNREACHABLE)
 
 
 @inner
 def constants_at(n: int) -> int:
-    """Place of a closed form's constants in a geometry row of n joints."""
+    """Index of a closed form's constants in a geometry row of n joints."""
     return n + 7 + 12 * (n + 1)
 
 
 @inner
 def _placed(K: Array, at: int, T: Array, out: Array) -> None:
-    """Write the constant transform at a place times T, (4, 4)."""
+    """Write the constant transform at index ``at`` times T, (4, 4)."""
     for i in range(3):
         for j in range(4):
             k = at + 4 * i
@@ -55,7 +55,7 @@ def _placed(K: Array, at: int, T: Array, out: Array) -> None:
 
 @inner
 def wanted_motion(T: Array, K: Array, n: int, work: Array, G: Array) -> None:
-    """Write G (4, 4), what the joints are to make of ``T_base_tip``; ``work`` is memory (4, 4)."""
+    """Write G (4, 4), the part of ``T_base_tip`` that the joints must produce; ``work`` (4, 4) is scratch memory."""
     at = 2 * n + 1
     if K[0] > 0.0:
         _placed(K, at, T, work)
@@ -76,7 +76,7 @@ def wanted_motion(T: Array, K: Array, n: int, work: Array, G: Array) -> None:
 
 @inner
 def undo_turn(c: float, s: float, M: Array, columns: int) -> None:
-    """Replace M by Rz(q)ᵀ M, of the angle whose cosine and sine these are."""
+    """Replace M by Rz(q)ᵀ M; ``c`` and ``s`` are cosine and sine of q."""
     for j in range(columns):
         x, y = M[0, j], M[1, j]
         M[0, j], M[1, j] = c * x + s * y, c * y - s * x
@@ -84,7 +84,7 @@ def undo_turn(c: float, s: float, M: Array, columns: int) -> None:
 
 @inner
 def undo_between(K: Array, at: int, M: Array, out: Array, columns: int) -> None:
-    """Write F⁻¹ M of the constant transform F at a place."""
+    """Write F⁻¹ M, where F is the constant transform at index ``at``."""
     for j in range(columns):
         x, y, z = M[0, j], M[1, j], M[2, j]
         if j == 3:
@@ -125,7 +125,7 @@ def _group_cost(q: Array, K: Array, seed: Array, limits: Array, group: int, do_l
 def angle_cost(K: Array, n: int, i: int, angle: float, seed: Array, limits: Array, do_limits_count: bool) -> float:
     """:func:`cost_of` joint i of the closed form at an angle, by whole turns next to the seed.
 
-    No branch with this angle costs less.
+    Every branch with this angle costs at least this much.
     """
     j = joint_of(K, n, i)
     q = turned(K[1 + i] * angle, seed[j], limits[0, j], limits[1, j], math.isfinite(limits[2, 0]))
@@ -145,7 +145,7 @@ def branch_cost(q: Array, seed: Array, limits: Array) -> float:
 
 @inner
 def _is_better(q: Array, best: Array, K: Array, seed: Array, limits: Array, do_limits_count: bool) -> bool:
-    """Whether a branch goes before another in a path: group by group, the first that differs."""
+    """Whether a branch is better than another in a path; the first group of joints whose costs differ decides."""
     for group in range(1, _GROUPS + 1):
         ours = _group_cost(q, K, seed, limits, group, do_limits_count and group > 1)
         theirs = _group_cost(best, K, seed, limits, group, do_limits_count and group > 1)
@@ -160,12 +160,13 @@ def choose(
 ) -> tuple[int, int]:
     """Write the best of the candidates (count, n + 1), each by whole turns next to the seed.
 
-    The best has the smallest largest move of a joint, inside limits before outside. In a path limits do not count, and
-    joints that choose the branch come before those that swing beside a singularity, group by group; where two branches
-    lie beside each other limits count after the first group.
+    The best has the smallest largest move of a joint, inside limits before outside. In a path limits do not count.
+    There, groups are compared in order: joints that determine the branch come before joints that move far near a
+    singularity. If two branches are neighbours, limits count after the first group.
 
     Returns:
-        2 if it reaches the pose, 1 if only another candidate does, 0 if none does; and its place.
+        2 if the best candidate reaches the pose, 1 if only another candidate does, 0 if none does; and the index of
+        the best.
     """
     n, is_path, best, least, is_exact = q.shape[0], math.isfinite(limits[2, 0]), -1, math.inf, False
     for k in range(count):
@@ -191,7 +192,7 @@ def choose(
 
 @inner
 def box_around(seed: Array, limits: Array, box: Array) -> None:
-    """Write what limits and steps allow around a seed: lower and upper joints (2, n)."""
+    """Write the lower and upper joint bounds (2, n) that limits and steps allow around a seed."""
     for i in range(seed.shape[0]):
         near = min(max(seed[i], limits[0, i]), limits[1, i])
         box[0, i] = max(limits[0, i], near - limits[2, i])
@@ -200,15 +201,15 @@ def box_around(seed: Array, limits: Array, box: Array) -> None:
 
 @inner
 def is_nearly(geometry: Array) -> bool:
-    """Whether an arm is of its class only nearly."""
+    """Whether an arm fits its class only approximately."""
     return bool(geometry[geometry.shape[0] - 1] != 0.0)
 
 
 @inner
 def is_beside(T: Array, seed: Array, limits: Array, geometry: Array, q: Array) -> bool:
-    """Whether an arm that is nearly of its class reaches the pose beside the seed; then by ``q``.
+    """Whether an arm that fits its class approximately reaches the pose next to the seed; then write ``q``.
 
-    Beside a stretched elbow, or a limit, the branch of the seed may be none of the class.
+    Near a stretched elbow, or a limit, the seed's branch may not exist in the exact class.
     """
     if not is_nearly(geometry) or math.isfinite(limits[2, 0]):
         return False
@@ -237,7 +238,7 @@ def move_of(q: Array, seed: Array) -> float:
 def _best_of_rest(T: Array, seed: Array, limits: Array, geometry: Array, found: Array, count: int, q: Array) -> None:
     """Replace ``q`` by the joints within limits that come nearest to the pose.
 
-    A search from the branch itself, from the seed and from all other branches, of which the least error counts.
+    It searches from the branch itself, from the seed and from all other branches, and keeps the smallest error.
     """
     n, box, trial, least = q.shape[0], np.empty((2, q.shape[0])), np.empty(q.shape[0]), math.inf
     box_around(seed, limits, box)
@@ -259,8 +260,9 @@ def _best_of_rest(T: Array, seed: Array, limits: Array, geometry: Array, found: 
 def _best_of_step(T: Array, seed: Array, limits: Array, geometry: Array, does_reach: bool, q: Array) -> None:
     """Replace ``q`` by the joints within limits and step that come nearest to the pose.
 
-    A search from the branch. Where that reaches the pose, joints that a step does not bring there go at full speed. The
-    others make the best of that, or go slower with them on the straight way, whichever lags less.
+    It searches from the branch. If the branch reaches the pose, joints that cannot get there in one step move at full
+    speed. The other joints either reduce the remaining error, or move proportionally slower on the straight path; the
+    smaller lag decides.
     """
     n, box, trial = q.shape[0], np.empty((2, q.shape[0])), np.empty(q.shape[0])
     box_around(seed, limits, box)
@@ -279,7 +281,7 @@ def _best_of_step(T: Array, seed: Array, limits: Array, geometry: Array, does_re
 
 @inner
 def _lag(q: Array, T: Array, geometry: Array) -> float:
-    """Squared error of a pose, of which a place counts as a turn at :data:`_LEVER`."""
+    """Squared error of a pose; a distance counts as a rotation on the lever :data:`_LEVER`."""
     reached, error = room(4, 4), room(6)
     dh_kernels.fk(q, geometry, reached)
     return damped.pose_error(reached, T, _LEVER, error)
@@ -297,10 +299,10 @@ def settled(
     q: Array,
     residual: Array,
 ) -> int:
-    """Bring a branch into limits and steps, write its residual (2,) and say how well it does.
+    """Bring a branch into limits and steps, write its residual (2,) and return its status.
 
-    What limits and steps leave off the pose, damped least squares bring as near as they allow.
-    ``reach`` is what :func:`choose` returned.
+    If the branch then misses the pose, damped least squares bring it as near as limits and steps allow. ``reach`` is
+    what :func:`choose` returned.
     """
     reached, J = room(4, 4), room(6, 7)
     if is_allowed(q, seed, limits):
@@ -316,7 +318,7 @@ def settled(
 
 @kernel
 def told(T: Array, geometry: Array, reach: int, q: Array, residual: Array) -> int:
-    """Write the residual (2,) of joints within limits and steps, and say how well they do."""
+    """Write the residual (2,) of joints within limits and steps, and return their status."""
     reached, J = room(4, 4), room(6, 7)
     is_flat = dh_kernels.pose_of_chain(q, geometry, J, reached)
     if not pose_residual(reached, T, residual):
@@ -326,7 +328,7 @@ def told(T: Array, geometry: Array, reach: int, q: Array, residual: Array) -> in
 
 @inner
 def forget(seed: Array, limits: Array) -> None:
-    """Write what :func:`kept` asks with: zero, and no limits and no branch that is turned to it."""
+    """Write seed and limits for :func:`kept`: zero seed, infinite limits, zero steps, so that no branch is turned."""
     for i in range(seed.shape[0]):
         seed[i] = limits[2, i] = 0.0
         limits[0, i], limits[1, i] = -math.inf, math.inf
@@ -334,9 +336,9 @@ def forget(seed: Array, limits: Array) -> None:
 
 @kernel
 def kept(T: Array, found: Array, count: int, geometry: Array, solutions: Array) -> int:
-    """Write the candidates (count, n + 1) that reach the pose into ``solutions``; how many do.
+    """Write the candidates (count, n + 1) that reach the pose into ``solutions``; return their number.
 
-    Angles are within ±pi. A class is recognised with a tolerance; a search takes away what it leaves.
+    Angles are within ±pi. A class is recognised with a tolerance; a search removes the error that results.
     """
     n, number = solutions.shape[1], 0
     box, reached, residual = np.empty((2, n)), np.empty((4, 4)), np.empty(2)

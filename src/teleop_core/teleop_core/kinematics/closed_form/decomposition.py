@@ -1,16 +1,17 @@
-"""Decomposition: which arms have a closed form, recognised from where their axes lie.
+"""Decomposition: which arms have a closed form, recognised from the geometry of their axes.
 
-Classes, in the order in which they are looked for, from the base and, turned round, from the tip:
+The classes, in the order of the search; each is tried from the base and, reversed, from the tip:
 
 - *spherical wrist*: six turning joints, the last three axes meet in a point;
 - *three parallel axes*: six turning joints, axes 2, 3 and 4 are parallel;
 - *spherical shoulder and wrist*: seven turning joints, axes 1, 2, 3 meet, and 5, 6, 7 do;
-- *arm in a plane*: three parallel turning joints, with a slide along them, or with a joint before
-  them that turns their plane, one behind them that rolls the tool in it, or both.
+- *arm in a plane*: three parallel turning joints, with a slide along them, or with a first joint that turns their
+  plane, or a last joint that rolls the tool in it, or both of these.
 
-Axes meet or are parallel within :data:`NEARLY`, as in files that say 1.571 for a quarter turn; what that leaves, Newton
-steps on the chain as it is take away. Arms in a plane must be so exactly. All others are solved by search
-(:mod:`teleop_core.kinematics.dh_kernels`); those with six directions say by how much their axes miss a class.
+Axes count as meeting or parallel within the tolerance :data:`NEARLY`, because some files contain 1.571 for a quarter
+turn. Newton steps on the true chain remove the error that results. Arms in a plane must be exact. All others are
+solved by search (:mod:`teleop_core.kinematics.dh_kernels`). For arms with six directions the solution states by how
+much their axes miss a class.
 """
 
 import math
@@ -26,7 +27,7 @@ from teleop_core.kinematics.closed_form import parallel_axes, plane_arm, spheric
 
 NEARLY = 1e-3
 """Angle [rad] up to which axes are parallel, and share of the reach within which they meet."""
-_EXACT = 1e-5  # the same, up to which a Newton step is all that an arm needs beside the class
+_EXACT = 1e-5  # the same, up to which one Newton step after the closed form is enough
 _LEVEL = 1e-9  # the same, of arms in a plane
 _LEAST = 1e-3  # share of the reach, or sine, under which an arm of a class counts as degenerate
 _PARALLEL, _MEETING, _SKEW = 0.0, 1.0, 2.0
@@ -37,7 +38,7 @@ _FLIP = np.diag([1.0, -1.0, -1.0, 1.0])
 
 @dataclass(frozen=True, kw_only=True)
 class Solution:
-    """How an arm is solved: in words, by which kernels, with which constants behind its row."""
+    """How an arm is solved: description, kernels, and the constants after its geometry row."""
 
     text: str
     kernels: Kernels
@@ -57,10 +58,10 @@ SEARCH = Solution(text="search: damped least squares from the seed, then from 24
 
 @dataclass(kw_only=True)
 class _Chain:
-    """Turning joints about z with constant transforms around them, from base to tip or back.
+    """Turning joints about z with constant transforms around them, from base to tip or from tip to base.
 
-    ``signs`` say which way the arm's own joints turn; ``order`` is -1 for a chain from the tip. ``off`` is the largest
-    angle or share of the reach that was taken for none, ``misses`` says what it lacks to be of a class.
+    ``signs`` are the directions of the arm's own joints; ``order`` is -1 for a chain from the tip. ``off`` is the
+    largest angle or share of the reach that was neglected; ``misses`` tells why the chain does not fit a class.
     """
 
     order: float
@@ -77,7 +78,7 @@ class _Chain:
         return self._counts(off, joints, f"are {_degrees(off):.3g}° from parallel")
 
     def do_meet(self, joints: Sequence[int]) -> bool:
-        """Whether three neighbouring axes meet in a point; brings their frames' origins there."""
+        """Whether three neighbouring axes meet in a point; if so, move their frames' origins there."""
         axes = [self.frames()[joint][:3, 2] for joint in joints]
         if any(length(np.cross(a, b)) <= NEARLY for a, b in pairwise(axes)):
             return False
@@ -92,7 +93,7 @@ class _Chain:
         return self._counts(off / self.reach, joints, text)
 
     def null_rule(self, rows: Array) -> tuple[float, float, float] | None:
-        """Null vector (2,) of two rows (2, 2) that are one, and the larger row; None if two."""
+        """Null vector (2,) of two linearly dependent rows (2, 2), and the larger row; None if they are independent."""
         sizes = length(rows)
         large = int(sizes[1] > sizes[0])
         a, b = rows[large], rows[1 - large]
@@ -104,7 +105,7 @@ class _Chain:
         return (share, 1.0, large) if large == 0 else (1.0, share, large)
 
     def _counts(self, off: float, joints: Sequence[int], text: str) -> bool:
-        """Whether so much counts as none; the text says what else is in the way of a class."""
+        """Whether the deviation ``off`` is negligible; if not, ``text`` tells what prevents the class."""
         if off <= NEARLY:
             self.off = max(self.off, off)
             return True
@@ -147,7 +148,7 @@ class _Chain:
             self.slide(joint, float(dot(gap, w) - share * dot(gap, v)) / (1.0 - share * share))
 
     def constants(self, groups: Sequence[float], beside: Sequence[float]) -> tuple[float, ...]:
-        """Numbers of a closed form, as its file ``candidates`` reads them."""
+        """Numbers of a closed form, in the order in which the module ``candidates`` reads them."""
         inverse = [inverse_motion(self.fixed[0]), inverse_motion(self.fixed[-1])]
         matrices = [*inverse, *self.fixed[1:-1]]
         rows = np.concatenate([matrix[:3].ravel() for matrix in matrices]).tolist()
@@ -170,10 +171,10 @@ def _chains(kinds: Sequence[float], fixed: Sequence[Array], reach: float) -> tup
 
 
 def solution_of(kinds: Sequence[float], fixed: Sequence[Array], reach: float, task: Sequence[str]) -> Solution:
-    """How to solve the inverse kinematics of a chain.
+    """Return how to solve the inverse kinematics of a chain.
 
     Args:
-        kinds: Of each joint 1 for a turn, 2 for a slide; negative against its axis.
+        kinds: Kind of each joint: 1 for a turn, 2 for a slide; negative if it moves against its axis.
         fixed: Transforms (4, 4) before, between and after the joints, which move about z.
         reach: Length of the chain [m].
         task: Directions that the arm is to control.
@@ -206,7 +207,7 @@ def _spherical_wrist(chain: _Chain) -> Solution | None:
     F1, F2, t3 = chain.fixed[1], chain.fixed[2], chain.fixed[3][:3, 3]
     t1, t2, over = F1[:3, 3], F2[:3, 3], 1.0 / chain.reach
     k = product(F2[:3, :3].T, t2)
-    # Factors of joint 1 and of joint 3 in both equations, up to a turn and a scale each.
+    # Factors of joint 1 and of joint 3 in both equations, up to a rotation and a scale each.
     one = np.array([F1[:2, 2], -over * t1[:2]])
     three = np.array([F2[2, :2], over * k[:2]])
     if length(t3[:2]) * over < _LEAST or min(abs(one).max(), abs(three).max()) < _LEAST:
@@ -324,7 +325,7 @@ def _lay_in_plane(chain: _Chain, shoulder: int) -> Array | None:
     """Lay the x axes of three parallel joints along their links, and the tool's axis along -y.
 
     Returns:
-        The tip in the frame of the third (3,); None where the joints are of another kind.
+        The tip in the frame of the third joint (3,); None if the joints do not form such an arm.
     """
     F, hand = chain.fixed, shoulder + 2
     if not chain.is_parallel((shoulder, shoulder + 1, hand)):

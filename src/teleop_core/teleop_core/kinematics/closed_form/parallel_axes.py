@@ -1,9 +1,9 @@
 """Arms of six turning joints whose axes 2, 3 and 4 are parallel: closed form, up to eight branches.
 
-The three parallel joints move everything behind them in a plane. The height of axis 6 over that plane, and its slope to
-it, say where joints 1 and 5 are: two equations, linear in their sines and cosines. Where axes 5 and 6 meet, joint 5 is
-in one of them alone; else an equation of degree four is left. Then joint 6 follows, and the plane's arm of two links
-with its hand. An arm whose axes 3, 4 and 5 are parallel is one of these, from tip to base.
+The three parallel joints move everything after them in a plane. The height of axis 6 over that plane, and its slope to
+the plane, determine joints 1 and 5 by two equations, linear in their sines and cosines. If axes 5 and 6 meet, joint 5
+occurs in only one of them; otherwise an equation of degree four remains. Then joint 6 follows, and the planar arm of
+two links with its hand. An arm whose axes 3, 4 and 5 are parallel belongs to this class when treated from tip to base.
 
 Source:
     Elias and Wen 2022, section on three parallel axes; Hawkins 2013 for the arms of Universal
@@ -20,10 +20,10 @@ from teleop_core.kinematics.closed_form import candidates, subproblems
 
 _F1, _F2, _F3, _F4, _F5 = (37, 49, 61, 73, 85)
 RULE = 97
-"""Place, among the constants, of the rule of the arm's pair of equations; then B and a length."""
+"""Index, in the constants, of the rule of the arm's pair of equations; then follow B and a length."""
 _LEVEL, _COST = 3, 4
-# A pair's row: joints 1 and 5, whether it reaches, 1.0 if both are known, the least cost of its branches.
-_LATER = 1e9  # added to the cost of pairs that others go before, whatever else they are
+# Row of a pair: joints 1 and 5, whether it reaches, 1.0 if both are known, the least cost of its branches.
+_LATER = 1e9  # added to the cost of pairs that always come after the others
 _ALIGNED = 1e-10  # sine under which axis 6 counts as parallel to 2, 3 and 4, and joint 6 is free
 
 
@@ -42,7 +42,7 @@ def _equations(G: Array, K: Array, A: Array, B: Array, h: Array) -> None:
 
 @inner
 def _hand(K: Array, fifth: float, sixth: float, M: Array) -> None:
-    """Write what joints 5 and 6 make of the hand, F4 Rz(q5) F5 Rz(q6), (3, 4)."""
+    """Write the transform of the hand by joints 5 and 6, F4 Rz(q5) F5 Rz(q6), (3, 4)."""
     c5, s5, c6, s6 = math.cos(fifth), math.sin(fifth), math.cos(sixth), math.sin(sixth)
     for i in range(3):
         f0, f1 = K[_F4 + 4 * i], K[_F4 + 4 * i + 1]
@@ -56,7 +56,7 @@ def _hand(K: Array, fifth: float, sixth: float, M: Array) -> None:
 
 @inner
 def _sixth(H: Array, K: Array, fifth: float, seed: float) -> float:
-    """Joint 6 from the plane's normal in the hand; seed where axis 6 is parallel to it."""
+    """Joint 6 from the plane's normal in the hand; the seed if axis 6 is parallel to the normal."""
     c, s = math.cos(fifth), math.sin(fifth)
     u = c * K[_F4 + 8] + s * K[_F4 + 9]
     v, w = c * K[_F4 + 9] - s * K[_F4 + 8], K[_F4 + 10]
@@ -72,9 +72,9 @@ def _plane(H: Array, M: Array, K: Array, seed: float, angles: Array) -> float:
     """Write joints 2, 3 and 4 of both elbows into ``angles`` (2, 3): they turn M into H.
 
     Returns:
-        1.0 if the plane's arm reaches so far, else 0.0.
+        1.0 if the planar arm reaches that far, else 0.0.
     """
-    # The plane's motion D = H M⁻¹: its turn, and the place of axis 4.
+    # Motion in the plane, D = H M⁻¹: its rotation, and the position of axis 4.
     c = H[0, 0] * M[0, 0] + H[0, 1] * M[0, 1] + H[0, 2] * M[0, 2]
     s = H[1, 0] * M[0, 0] + H[1, 1] * M[0, 1] + H[1, 2] * M[0, 2]
     c += H[1, 0] * M[1, 0] + H[1, 1] * M[1, 1] + H[1, 2] * M[1, 2]
@@ -95,7 +95,7 @@ def _plane(H: Array, M: Array, K: Array, seed: float, angles: Array) -> float:
 
 @inner
 def _behind_first(G: Array, K: Array, first: float, M: Array, N: Array) -> None:
-    """Write what joint 1 leaves to the others into N (3, 4); ``M`` is memory."""
+    """Write the motion that remains for the joints after joint 1 into N (3, 4); ``M`` is scratch memory."""
     for i in range(3):
         for j in range(4):
             M[i, j] = G[i, j]
@@ -122,7 +122,7 @@ def _elbows(G: Array, K: Array, pair: Array, seed: Array, q: Array) -> None:
 
 @inner
 def _least_sine(G: Array, K: Array, pairs: Array, count: int) -> float:
-    """Least sine between axis 6 and the parallel ones."""
+    """Least sine between axis 6 and the parallel axes."""
     M, N, least = room(3, 4), room(3, 4), math.inf
     for k in range(count):
         if k == 0 or pairs[k, 0] != pairs[k - 1, 0]:
@@ -133,9 +133,10 @@ def _least_sine(G: Array, K: Array, pairs: Array, count: int) -> float:
 
 @inner
 def _cost(pair: Array, K: Array, seed: Array, limits: Array, first: float, least: float) -> float:
-    """Least cost of all branches of a pair, by what is known of its joints 1 and 5.
+    """Lower bound of the cost of all branches of a pair, from the known ones of its joints 1 and 5.
 
-    In a path joint 1 comes first: of pairs with its least move ``first`` joint 5 counts, all others come later.
+    In a path joint 1 comes first. Joint 5 is compared only for pairs in which joint 1 makes its least move ``first``;
+    all other pairs come later.
     """
     is_path, is_closed = math.isfinite(limits[2, 0]), pair[_LEVEL] > 0.5
     one = candidates.angle_cost(K, 6, 0, pair[0], seed, limits, not is_path)
@@ -152,7 +153,7 @@ def _cost(pair: Array, K: Array, seed: Array, limits: Array, first: float, least
 
 @inner
 def _known_cost(q: Array, K: Array, seed: Array, limits: Array, least: float) -> float:
-    """Cost of a branch (7,), above which others need not be computed: in a path of joints 5, 6."""
+    """Cost of a branch (7,), above which other branches need not be computed; in a path that of joints 5 and 6."""
     is_path, cost = math.isfinite(limits[2, 0]), 0.0
     if q[6] < 0.5:
         return math.inf
@@ -166,10 +167,11 @@ def _known_cost(q: Array, K: Array, seed: Array, limits: Array, least: float) ->
 def _branches(T: Array, geometry: Array, seed: Array, limits: Array, do_all: bool, found: Array) -> tuple[int, float]:
     """Write branches into ``found`` (8, 7), and whether each reaches the pose.
 
-    Unless all are wanted, pairs of joints 1 and 5 of the least moves come first, and none that cannot win.
+    Unless all branches are wanted, pairs of joints 1 and 5 with the least moves come first, and pairs that cannot be
+    the best are left out.
 
     Returns:
-        How many, and in a path the least sine between axis 6 and the parallel ones.
+        Number of branches, and in a path the least sine between axis 6 and the parallel axes.
     """
     K, is_path = geometry[candidates.constants_at(6) :], math.isfinite(limits[2, 0])
     G, M, A, B, h, seeds = room(4, 4), room(4, 4), room(2, 2), room(2, 2), room(2), room(2)
@@ -220,9 +222,9 @@ def ik(T: Array, seed: Array, limits: Array, geometry: Array, q: Array, residual
 
 @kernel
 def ik_all(T: Array, geometry: Array, solutions: Array) -> int:
-    """Write the branches (k, 6), at most eight, without regard to limits; how many reach T.
+    """Write the branches (k, 6), at most eight, ignoring limits; return how many reach T.
 
-    On a singularity, where a joint is free, it is zero and branches may coincide.
+    On a singularity a free joint is set to zero, and branches may coincide.
     """
     found, limits, seed = room(8, 7), room(3, 6), room(6)
     candidates.forget(seed, limits)

@@ -1,15 +1,15 @@
-"""Arms of three parallel turning joints: closed form, two branches, or four behind a first joint.
+"""Arms of three parallel turning joints: closed form, two branches, or four with a first joint.
 
-Two links and a hand move in a plane. A slide may push along its normal, as in the SCARA; a first
-joint may turn the plane about an axis in it, and a last one roll the tool about an axis in it, as
-in five-axis arms. The arm controls fewer than six directions: the place of the tip as far as it has
-one, and of the attitudes that it has there the nearest.
+Two links and a hand move in a plane. A slide may move along the normal of the plane, as in the SCARA. A first joint
+may turn the plane about an axis in it, and a last joint may roll the tool about an axis in it, as in five-axis arms.
+The arm controls fewer than six directions: the position of the tip, as far as the arm can reach it, and there the
+nearest possible attitude.
 
-Behind the chain in the geometry row (:mod:`teleop_core.kinematics.dh_kernels`) there stand:
-places of the joints first, shoulder, elbow, hand, roll (-1 for none) and their signs; place of the
-slide and what it adds to the height; both links; the angles that elbow and attitude have beside the
-joints; the tip in the hand's frame and its height over the plane; then transforms that undo what
-stands before the first joint and behind the last, and the one from the first joint to the shoulder.
+In the geometry row (:mod:`teleop_core.kinematics.dh_kernels`) the following numbers come after the chain: indices of
+the joints first, shoulder, elbow, hand, roll (-1 for none) and their signs; index of the slide and its factor on the
+height; both link lengths; the constant angles of elbow and attitude beyond the joints; the tip in the hand's frame and
+its height over the plane. Then come the transforms that undo what is before the first joint and after the last, and
+the one from the first joint to the shoulder.
 
 Source:
     Craig 2005, section 4.4 (two links); the nearest attitude is derived.
@@ -25,13 +25,13 @@ from teleop_core.kinematics.closed_form import candidates, subproblems
 from teleop_core.kinematics.dh_kernels import fk
 
 FIRST, SHOULDER, ELBOW, HAND, ROLL = 0, 1, 2, 3, 4
-"""Joints of the closed form, by their places among the constants; signs follow."""
+"""Joints of the closed form, by their indices in the constants; signs follow."""
 _SIGNS, _SLIDE, _PUSH, _UPPER, _FORE, _BEND, _TURN = 5, 10, 11, 12, 13, 14, 15
 _TIP_X, _TIP_Y, _HEIGHT, _BEFORE, _BEHIND, _TO_PLANE = 16, 17, 18, 19, 31, 40
-# Below this distance [m] a point counts as lying on the axis that turns it, and the joint stays;
-# below this sine the tool counts as normal to the plane.
+# Below this distance [m] a point counts as lying on its axis of rotation, and the joint does not move; below this sine
+# the tool counts as normal to the plane.
 _ON_AXIS, _ALIGNED = 1e-12, 1e-10
-_NEAR = 0.02  # sine of the elbow, and share of the reach, under which small moves need large ones
+_NEAR = 0.02  # sine of the elbow, and share of the reach, below which small tip moves need large joint moves
 _FOLLOWED, _LIMITED = int(IkStatus.FOLLOWED), int(IkStatus.LIMITED)
 _NEAR_SINGULAR, _UNREACHABLE = int(IkStatus.NEAR_SINGULAR), int(IkStatus.UNREACHABLE)
 
@@ -59,13 +59,13 @@ def _sum(K: Array, q: Array) -> float:
 
 @inner
 def _pointing(x: float, y: float, seed: float) -> float:
-    """Direction [rad] of a point from an axis; the seed if it lies on the axis."""
+    """Direction [rad] of a point from an axis; the seed if the point lies on the axis."""
     return math.atan2(y, x) if x * x + y * y > _ON_AXIS * _ON_AXIS else seed
 
 
 @inner
 def _elbow(x: float, y: float, a: float, b: float) -> tuple[float, bool]:
-    """Angle in [0, pi] between links a and b whose end is as far as (x, y), and whether it is."""
+    """Elbow angle in [0, pi] with which links a and b reach as far as (x, y), and whether they reach that far."""
     k = (x * x + y * y - a * a - b * b) / (2.0 * a * b)
     return math.atan2(math.sqrt(max(1.0 - k * k, 0.0)), k), abs(k) <= 1.0 + _ON_AXIS
 
@@ -74,7 +74,7 @@ def _elbow(x: float, y: float, a: float, b: float) -> tuple[float, bool]:
 def _shoulder(x: float, y: float, a: float, b: float, elbow: float, seed: float) -> float:
     """Angle [rad] of link a that points links a and b, bent by the elbow, at (x, y).
 
-    Folded onto the axis by equal links, any angle will do and the seed's is kept.
+    If equal links are folded onto the axis, any angle is a solution, and the seed is returned.
     """
     along, across = a + b * math.cos(elbow), b * math.sin(elbow)
     if along * along + across * across <= _ON_AXIS * _ON_AXIS:
@@ -85,7 +85,7 @@ def _shoulder(x: float, y: float, a: float, b: float, elbow: float, seed: float)
 
 @inner
 def _wanted(T: Array, K: Array, G: Array) -> None:
-    """Write what the joints are to make of ``T_base_tip``, without its turn behind them: (3, 4)."""
+    """Write the part of ``T_base_tip`` that the joints must produce, without the rotation after them: (3, 4)."""
     for i in range(3):
         a, b, c = K[_BEFORE + 4 * i], K[_BEFORE + 4 * i + 1], K[_BEFORE + 4 * i + 2]
         x = a * T[0, 0] + b * T[1, 0] + c * T[2, 0]
@@ -100,7 +100,7 @@ def _wanted(T: Array, K: Array, G: Array) -> None:
 def _sides(G: Array, K: Array, seed: Array) -> tuple[float, float, bool, float]:
     """Both angles [rad] of the first joint, whether they bring the plane to the tip, and the root.
 
-    The root is the distance [m] of the tip from axis 1, as it is seen in the plane.
+    The root is the distance [m] of the tip from axis 1 within the plane.
     """
     if K[FIRST] < 0.0:
         return 0.0, 0.0, True, math.inf
@@ -117,7 +117,7 @@ def _sides(G: Array, K: Array, seed: Array) -> tuple[float, float, bool, float]:
 
 @inner
 def _seen(G: Array, K: Array, first: float, M: Array, H: Array) -> None:
-    """Write G as it is seen from the plane into H (3, 4); ``M`` is memory."""
+    """Write G in the frame of the plane into H (3, 4); ``M`` is scratch memory."""
     for i in range(3):
         for j in range(4):
             H[i, j] = M[i, j] = G[i, j]
@@ -128,11 +128,11 @@ def _seen(G: Array, K: Array, first: float, M: Array, H: Array) -> None:
 
 @inner
 def _attitude(H: Array, K: Array, turned: float, roll: float) -> tuple[float, float]:
-    """Turn in the plane and roll [rad] whose rotation is next to that of H.
+    """Angle in the plane and roll [rad] whose rotation is nearest to that of H.
 
-    The turn leads the tool to its direction in the plane; turn and roll together, or their
-    difference, whichever is defined best, lead it to the attitude as a whole. A tool normal to the
-    plane leaves only that one: both move by as much from those given.
+    The angle in the plane gives the tool its direction in the plane. The sum of angle and roll, or their difference,
+    whichever is better defined, gives the whole attitude. If the tool is normal to the plane, only that sum or
+    difference is defined: both angles then change by the same amount from the given ones.
     """
     sign = -1.0 if K[ROLL] >= 0.0 and H[2, 2] < 0.0 else 1.0
     both = math.atan2(H[1, 0] - sign * H[0, 1], H[0, 0] + sign * H[1, 1])  # turn + sign roll
@@ -147,7 +147,7 @@ def _attitude(H: Array, K: Array, turned: float, roll: float) -> tuple[float, fl
 
 @inner
 def _wrist(G: Array, K: Array, first: float, seed: Array, H: Array, q: Array) -> tuple[float, float, float]:
-    """Turn in the plane [rad] and place of the hand's axis [m]; write what else is known of q."""
+    """Return angle in the plane [rad] and position of the hand's axis [m]; write the other known joints into q."""
     M = room(3, 4)
     _seen(G, K, first, M, H)
     turned, roll = _attitude(H, K, _sum(K, seed), _get(K, ROLL, seed))
@@ -171,7 +171,7 @@ def _bend(turned: float, x: float, y: float, K: Array, elbow: float, seed: Array
 
 @inner
 def _turn(q: Array, seed: Array, limits: Array, K: Array) -> None:
-    """Bring all joints but the slide by whole turns next to the seed, or into their limits."""
+    """Move all joints except the slide by whole turns next to the seed, or into their limits."""
     for joint in range(5):
         if K[joint] >= 0.0:
             turn(q, seed, limits, int(K[joint]), int(K[joint]) + 1)
@@ -179,10 +179,10 @@ def _turn(q: Array, seed: Array, limits: Array, K: Array) -> None:
 
 @inner
 def _choose(seed: Array, limits: Array, K: Array, G: Array, q: Array) -> tuple[bool, float]:
-    """Write the branch of the smallest move; whether any reaches the place, and the root.
+    """Write the branch of the smallest move; return whether any branch reaches the position, and the root.
 
-    Side and elbow of the seed come first; the others are solved only if they can still win. In a
-    path hand and roll have no say, which a stop may hold back: the elbow decides.
+    Side and elbow of the seed come first; the others are solved only if they can still be better. In a path hand and
+    roll, which a stop may hold back, do not count: the elbow decides.
     """
     n, H, trial, best = q.shape[0], room(3, 4), room(6), math.inf
     is_path, any_reaches = math.isfinite(limits[2, 0]), False
@@ -225,7 +225,7 @@ def _hold(joint: int, seed: Array, limits: Array, K: Array, q: Array) -> None:
 
 @inner
 def _settle(G: Array, seed: Array, limits: Array, K: Array, q: Array) -> None:
-    """Keep a branch inside limits and steps; each joint makes the best of those before it."""
+    """Keep a branch inside limits and steps; each joint reduces the error that earlier joints leave."""
     H = room(3, 4)
     _hold(FIRST, seed, limits, K, q)
     turned, x, y = _wrist(G, K, _get(K, FIRST, q), seed, H, q)
@@ -234,7 +234,7 @@ def _settle(G: Array, seed: Array, limits: Array, K: Array, q: Array) -> None:
     _put(K, SHOULDER, _shoulder(x, y, K[_UPPER], K[_FORE], elbow, near), q)
     _hold(SHOULDER, seed, limits, K, q)
     upper = _get(K, SHOULDER, q)
-    # The elbow points link b at the place from where link a really is.
+    # The elbow points link b at the wanted position, from the actual end of link a.
     x, y = x - K[_UPPER] * math.cos(upper), y - K[_UPPER] * math.sin(upper)
     bent = _pointing(x, y, upper + _get(K, ELBOW, seed) + K[_BEND]) - upper - K[_BEND]
     _put(K, ELBOW, bent, q)
@@ -248,7 +248,7 @@ def _settle(G: Array, seed: Array, limits: Array, K: Array, q: Array) -> None:
 
 @inner
 def _is_met(G: Array, reached: Array, K: Array, q: Array) -> bool:
-    """Whether place and attitude of the tip are as wanted, in the directions that the arm controls."""
+    """Whether position and attitude of the tip are as wanted, in the directions that the arm controls."""
     now, M, H = room(3, 4), room(3, 4), room(3, 4)
     _wanted(reached, K, now)
     off = 0.0
@@ -284,9 +284,9 @@ def ik(T: Array, seed: Array, limits: Array, geometry: Array, q: Array, residual
 
 @kernel
 def ik_all(T: Array, geometry: Array, solutions: Array) -> int:
-    """Write the branches (k, n) of the whole pose, positive elbow first; their number.
+    """Write the branches (k, n) of the whole pose, positive elbow first; return their number.
 
-    A pose that the arm cannot take in every direction has none.
+    A pose that the arm cannot reach in all six directions has no branch.
     """
     n, count = solutions.shape[1], 0
     K, G, H = geometry[candidates.constants_at(n) :], room(3, 4), room(3, 4)

@@ -1,10 +1,11 @@
 """Arms of six turning joints with a spherical wrist: closed form, up to eight branches.
 
-The last three axes meet in the wrist centre, whose place says where the first three joints are. In the frame of axis 2
-its height and its distance from axis 2's origin do not change as joint 2 turns: two equations in joints 1 and 3, linear
-in their sines and cosines. Axes 1 and 2, or 2 and 3, that are parallel or meet take one joint out of one of them; skew
-ones leave an equation of degree four. The attitude that is left gives the wrist. An arm whose first three axes meet in
-a point is one of these, from tip to base.
+The last three axes meet in the wrist centre, whose position determines the first three joints. In the frame of axis 2,
+the height of the wrist centre and its distance from the origin do not change when joint 2 turns. This gives two
+equations in joints 1 and 3, linear in their sines and cosines. If axes 1 and 2, or 2 and 3, are parallel or meet, one
+equation contains only one of the joints. If they are skew, an equation of degree four remains. The remaining attitude
+determines the wrist. An arm whose first three axes meet in a point belongs to this class when treated from tip to
+base.
 
 Source:
     Pieper 1968 (three axes that meet decouple); Elias and Wen 2022, sections on spherical wrists.
@@ -21,13 +22,13 @@ from teleop_core.kinematics.closed_form import candidates, subproblems
 
 _F1, _F2, _F3, _F4, _F5 = (37, 49, 61, 73, 85)
 RULE = 97
-"""Place, among the constants, of the rule of the arm's pair of equations; then B and a length."""
+"""Index, in the constants, of the rule of the arm's pair of equations; then follow B and a length."""
 _LEVEL, _SECOND, _COST, _TRIG = 3, 4, 5, 6
 # An arm's row: joints 1 and 3, whether it reaches, how many of its joints are known (0: one,
 # 1: both, 2: joint 2 too), joint 2, the least cost of its branches, cosine and sine of 1 and 3.
-_ALIGNED = 1e-10  # sine under which axes 4 and 6 count as one line, and joint 4 keeps its value
-_BARE = 1e-12  # distance [m] of tip and wrist centre that counts as none
-_EVEN = 1e-9  # constant term of joint 5's equation that counts as none
+_ALIGNED = 1e-10  # sine below which axes 4 and 6 count as one line, and joint 4 keeps its value
+_BARE = 1e-12  # distance [m] of tip and wrist centre that counts as zero
+_EVEN = 1e-9  # constant term of joint 5's equation that counts as zero
 
 
 @inner
@@ -48,9 +49,9 @@ def _equations(G: Array, K: Array, A: Array, B: Array, h: Array) -> None:
 
 @inner
 def _joint2(G: Array, K: Array, arm: Array, seed: float) -> float:
-    """Joint 2 that turns the wrist centre of joint 3 into that of joint 1; seed if on its axis.
+    """Joint 2 that rotates the wrist centre as given by joint 3 onto the one given by joint 1; seed if on its axis.
 
-    Cosine and sine of joints 1 and 3 stay in the arm's row.
+    Cosine and sine of joints 1 and 3 are stored in the arm's row.
     """
     c, s = math.cos(arm[0]), math.sin(arm[0])
     arm[_TRIG], arm[_TRIG + 1] = c, s
@@ -69,7 +70,7 @@ def _joint2(G: Array, K: Array, arm: Array, seed: float) -> float:
 
 @inner
 def _arm_cost(arm: Array, K: Array, seed: Array, limits: Array) -> float:
-    """Least cost of all branches of an arm, by those of its joints 1 to 3 that are known."""
+    """Lower bound of the cost of all branches of an arm, from the known ones of its joints 1 to 3."""
     do_count, level = not math.isfinite(limits[2, 0]), arm[_LEVEL]
     cost = candidates.INEXACT if do_count and arm[2] < 0.5 else 0.0
     worst = 0.0
@@ -88,7 +89,7 @@ def _arm_cost(arm: Array, K: Array, seed: Array, limits: Array) -> float:
 def middle_angle(M: Array, K: Array, at: int) -> tuple[float, float, float]:
     """Base and spread [rad] of y in Rz(x) F Rz(y) F' Rz(z) = M, and 1.0 if that has a solution.
 
-    F stands at a place among the constants, F' behind it; of both the rotations count.
+    F is at index ``at`` in the constants, F' follows it; only their rotations count.
     """
     r0, r1, r2 = K[at + 8], K[at + 9], K[at + 10]
     a0, a1, a2 = K[at + 14], K[at + 18], K[at + 22]
@@ -101,7 +102,7 @@ def middle_angle(M: Array, K: Array, at: int) -> tuple[float, float, float]:
 
 @inner
 def wrist_at(M: Array, K: Array, at: int, y: float, seed: float, angles: Array) -> None:
-    """Write x, y and z, of which y is known, into ``angles`` (3,); x is the seed where y leaves it.
+    """Write x, y and z, of which y is known, into ``angles`` (3,); x is the seed if y leaves it undetermined.
 
     M, F and F' are those of :func:`middle_angle`.
     """
@@ -122,7 +123,7 @@ def wrist_angles(M: Array, K: Array, at: int, seed: float, angles: Array) -> tup
     """Write both solutions of :func:`middle_angle` into ``angles`` (2, 3).
 
     Returns:
-        Half the difference [rad] of their angles y, and 1.0 if they solve it.
+        Half the difference [rad] of the two angles y, and 1.0 if they solve the equation.
     """
     base, spread, is_exact = middle_angle(M, K, at)
     wrist_at(M, K, at, base + spread, seed, angles[0])
@@ -132,7 +133,7 @@ def wrist_angles(M: Array, K: Array, at: int, seed: float, angles: Array) -> tup
 
 @inner
 def _last_angle(M: Array, K: Array, at: int, cx: float, sx: float, cy: float, sy: float) -> float:
-    """Angle z that comes next to M, given those before it as cosines and sines."""
+    """Angle z that comes nearest to M, given x and y as cosines and sines."""
     cosine = sine = 0.0
     for i in range(2):  # columns 0 and 1 of Rz(x) F Rz(y) F'
         f0, f1, f2 = K[at + 12 + i], K[at + 16 + i], K[at + 20 + i]
@@ -149,7 +150,7 @@ def _last_angle(M: Array, K: Array, at: int, cx: float, sx: float, cy: float, sy
 
 @inner
 def _attitude(G: Array, K: Array, arm: Array, M: Array, N: Array) -> None:
-    """Write what an arm leaves to the wrist into N (3, 3); ``M`` is memory."""
+    """Write the rotation that remains for the wrist into N (3, 3); ``M`` is scratch memory."""
     for i in range(3):
         for j in range(3):
             M[i, j] = G[i, j]
@@ -165,10 +166,10 @@ def _attitude(G: Array, K: Array, arm: Array, M: Array, N: Array) -> None:
 def _wrist(G: Array, K: Array, arm: Array, seed: Array, limits: Array, do_both: bool, q: Array) -> tuple[float, float]:
     """Write both branches of an arm into q (2, 7).
 
-    Unless both are wanted, that whose joint 5 moves more is left out where it cannot win.
+    Unless both are wanted, the branch whose joint 5 moves more is left out if it cannot be the better one.
 
     Returns:
-        The wrist's least spread, and with free steps the least cost of both.
+        The wrist's least spread, and with free steps the smaller cost of both.
     """
     M, N, angles = room(4, 7), room(4, 7), room(3)
     is_path, lowest = math.isfinite(limits[2, 0]), math.inf
@@ -207,12 +208,12 @@ def _wrist(G: Array, K: Array, arm: Array, seed: Array, limits: Array, do_both: 
 def _branches(T: Array, geometry: Array, seed: Array, limits: Array, do_all: bool, found: Array) -> tuple[int, float]:
     """Write branches into ``found`` (8, 7), and whether each reaches the pose.
 
-    Unless all are wanted, the arms of the least moves come first, and none that cannot win: with
-    free steps those that move more than a whole branch inside the limits does, in a path all after
-    the first that reaches. What is known of an arm so far says how much it moves at least.
+    Unless all branches are wanted, arms with the least moves come first, and arms that cannot be the best are left
+    out. With free steps these are arms that move more than a complete branch inside the limits. In a path they are all
+    arms after the first that reaches. The known joints of an arm give a lower bound of its move.
 
     Returns:
-        How many, and the least half difference [rad] of a wrist's two angles y.
+        Number of branches, and the least half difference [rad] of a wrist's two angles y.
     """
     K, is_path = geometry[candidates.constants_at(6) :], math.isfinite(limits[2, 0])
     G, M, A, B, h, seeds = room(4, 4), room(4, 4), room(2, 2), room(2, 2), room(2), room(2)
@@ -250,7 +251,7 @@ def _branches(T: Array, geometry: Array, seed: Array, limits: Array, do_all: boo
 
 @inner
 def _held(K: Array, i: int, angle: float, seed: Array, limits: Array, q: Array) -> float:
-    """Write joint i of the closed form as limits and step allow; its angle [rad] then."""
+    """Write joint i of the closed form within limits and step; return its resulting angle [rad]."""
     candidates.set_angle(K, 6, i, angle, q)
     place = candidates.joint_of(K, 6, i)
     turn(q, seed, limits, place, place + 1)
@@ -260,13 +261,13 @@ def _held(K: Array, i: int, angle: float, seed: Array, limits: Array, q: Array) 
 
 @inner
 def _has_no_tool(K: Array) -> bool:
-    """Whether the tip is the wrist centre: then an attitude that lags costs no place."""
+    """Whether the tip is the wrist centre; then a lag in attitude causes no position error."""
     return K[0] > 0.0 and max(abs(K[28]), abs(K[32]), abs(K[36])) < _BARE
 
 
 @kernel
 def _settle(T: Array, seed: Array, limits: Array, geometry: Array, q: Array) -> None:
-    """Keep a branch inside limits and steps; each joint makes the best of those before it."""
+    """Keep a branch inside limits and steps; each joint reduces the error that earlier joints leave."""
     K, arm = geometry[candidates.constants_at(6) :], room(10)
     G, M, N, A, B, h = room(4, 4), room(4, 4), room(4, 7), room(2, 2), room(2, 2), room(2)
     candidates.wanted_motion(T, K, 6, M, G)
@@ -311,9 +312,9 @@ def ik(T: Array, seed: Array, limits: Array, geometry: Array, q: Array, residual
 
 @kernel
 def ik_all(T: Array, geometry: Array, solutions: Array) -> int:
-    """Write the branches (k, 6), at most eight, without regard to limits; how many reach T.
+    """Write the branches (k, 6), at most eight, ignoring limits; return how many reach T.
 
-    On a singularity, where a joint is free, it is zero and branches may coincide.
+    On a singularity a free joint is set to zero, and branches may coincide.
     """
     found, limits, seed = room(8, 7), room(3, 6), room(6)
     candidates.forget(seed, limits)

@@ -1,9 +1,9 @@
 """Subproblems of closed-form inverse kinematics: angles that solve linear equations in sines.
 
-Every arm that decomposes comes down to two kinds of question. *One angle*: a cos x + b sin x = d,
-with two answers (subproblems 1, 3 and 4 of Paden and Kahan). *A pair of angles*: two equations that
-are linear in (cos x, sin x) and in (cos y, sin y), with two to four pairs (subproblems 5 and 6).
-Where nothing solves an equation, the answer is the angle that comes nearest, marked as not exact.
+Every arm that decomposes leads to two kinds of equations. *One angle*: a cos x + b sin x = d, with two solutions
+(subproblems 1, 3 and 4 of Paden and Kahan). *A pair of angles*: two equations that are linear in (cos x, sin x) and in
+(cos y, sin y), with two to four pairs (subproblems 5 and 6). If an equation has no solution, the result is the angle
+that comes nearest, marked as not exact.
 
 Source:
     Murray, Li and Sastry 1994, section 3.3; Elias and Wen 2022, Canonical subproblems for robot
@@ -15,9 +15,9 @@ import math
 from teleop_core.kernels import Array, inner, kernel
 from teleop_core.kernels.room import room
 
-# Relative to its squared amplitude, so much may be missing for an equation to count as solved.
+# Relative to its squared amplitude, an equation with at most this error counts as solved.
 _SLACK = 1e-9
-# Amplitude under which an equation does not fix its angle, which keeps the seed's value then.
+# Amplitude below which an equation does not determine its angle; the angle is then the seed.
 _FREE = 1e-12
 _STEPS = 60  # of a bracketed Newton search
 
@@ -27,8 +27,8 @@ def one_angle(a: float, b: float, d: float, seed: float) -> tuple[float, float, 
     """Base and spread of the two angles x = base ± spread with a cos x + b sin x = d.
 
     Returns:
-        Base [rad], spread [rad] in [0, pi], and 1.0 if they solve the equation, else 0.0: then
-        both are the angle that comes nearest. Without a and b the base is the seed.
+        Base [rad], spread [rad] in [0, pi], and 1.0 if the angles solve the equation. Otherwise the last value is 0.0,
+        and both angles are the one that comes nearest. If a and b are zero, the base is the seed.
     """
     square = a * a + b * b
     if square <= _FREE * _FREE:
@@ -41,7 +41,7 @@ def one_angle(a: float, b: float, d: float, seed: float) -> tuple[float, float, 
 
 @inner
 def turn_between(x0: float, y0: float, x1: float, y1: float, seed: float) -> float:
-    """Angle [rad] that turns the direction of (x0, y0) into that of (x1, y1); seed without one."""
+    """Angle [rad] that rotates the direction of (x0, y0) into that of (x1, y1); the seed if one is zero."""
     if min(x0 * x0 + y0 * y0, x1 * x1 + y1 * y1) <= _FREE * _FREE:
         return seed
     return math.atan2(x0 * y1 - y0 * x1, x0 * x1 + y0 * y1)
@@ -59,7 +59,7 @@ def _value(p: Array, degree: int, t: float) -> tuple[float, float]:
 
 @inner
 def _root(p: Array, degree: int, low: float, high: float) -> float:
-    """Root between two places with values of opposite sign, by Newton steps kept in the bracket."""
+    """Root between two points with values of opposite sign, by Newton steps kept in the bracket."""
     is_rising = _value(p, degree, low)[0] < 0.0
     t = 0.5 * (low + high)
     for _ in range(_STEPS):
@@ -81,8 +81,8 @@ def _root(p: Array, degree: int, low: float, high: float) -> float:
 def _roots(p: Array, work: Array, most: int) -> int:
     """Write real roots of p (5,) in [-1, 1], and its extrema, into rows of ``work`` (6, 7).
 
-    The roots of each derivative bracket those of the one before it (Rolle). Row 0 gets the roots
-    of p, row 1 those of its slope; rows 2 to 5 are memory.
+    The roots of each derivative bracket those of the derivative one order lower (Rolle). Row 0 gets the roots of p,
+    row 1 those of its slope; rows 2 to 5 are scratch memory.
 
     Returns:
         10 times the number of extrema, plus the number of roots.
@@ -150,7 +150,7 @@ def circle_roots(f: Array, work: Array, found: Array) -> int:
 
 @inner
 def _alone(A: Array, h: Array, rule: Array, seed: float) -> tuple[float, float, float]:
-    """Base, spread and exactness of the angle that a null vector of the other's factors leaves."""
+    """Base, spread and exactness of the angle that remains after a null vector eliminates the other angle."""
     n0, n1 = rule[1], rule[2]
     a, b = n0 * A[0, 0] + n1 * A[1, 0], n0 * A[0, 1] + n1 * A[1, 1]
     return one_angle(a, b, n0 * h[0] + n1 * h[1], seed)
@@ -158,7 +158,7 @@ def _alone(A: Array, h: Array, rule: Array, seed: float) -> tuple[float, float, 
 
 @inner
 def _beside(A: Array, B: Array, h: Array, rule: Array, x: float, seed: float) -> tuple[float, float, float]:
-    """Base, spread and exactness of the other angle, of factors B, where that of A is known."""
+    """Base, spread and exactness of the angle with factors B, given the angle ``x`` with factors A."""
     row = int(rule[3])
     d = h[row] - A[row, 0] * math.cos(x) - A[row, 1] * math.sin(x)
     return one_angle(B[row, 0], B[row, 1], d, seed)
@@ -168,21 +168,21 @@ def _beside(A: Array, B: Array, h: Array, rule: Array, x: float, seed: float) ->
 def open_pairs(A: Array, B: Array, h: Array, rule: Array, seeds: Array, pairs: Array) -> int:
     """Begin pairs with A (cos x, sin x) + B (cos y, sin y) = h: rows of ``pairs`` (4, 4 or more).
 
-    A row is x, y, whether the pair solves the equations (1.0), and 1.0 if both angles are there.
-    Else one is, the same in rows 0 and 1 as in rows 2 and 3, and :func:`close_pair` writes the
-    other: who needs one pair alone saves the others.
+    A row is x, y, whether the pair solves the equations (1.0), and 1.0 if both angles are written. Otherwise only one
+    angle is written, with one value in rows 0 and 1 and one in rows 2 and 3. :func:`close_pair` then writes the other
+    angle. So callers that need only one pair save the work for the others.
 
     Args:
         A: Factors of x, (2, 2).
         B: Factors of y, (2, 2).
         h: Right-hand side (2,).
-        rule: How to go (4,): 0 if B has a null vector, 1 if A has, 2 if neither; the null vector,
-            of two numbers; and the row that is left for the second angle.
-        seeds: Values of x and y where the equations leave them free (2,).
+        rule: How to solve (4,): 0 if B has a null vector, 1 if A has one, 2 if neither; the null vector, two numbers;
+            and the row that remains for the second angle.
+        seeds: Values of x and y to use if the equations leave them free (2,).
         pairs: Written.
 
     Returns:
-        How many pairs; all of them nearest only, where none solves the equations.
+        Number of pairs; if none solves the equations, all of them are only nearest.
     """
     if rule[0] > 1.5:
         return _skew(A, B, h, pairs)
@@ -212,7 +212,7 @@ def close_pair(A: Array, B: Array, h: Array, rule: Array, seeds: Array, k: int, 
 
 @kernel
 def _skew(A: Array, B: Array, h: Array, pairs: Array) -> int:
-    """All pairs where neither A nor B has a null vector: an equation of degree four."""
+    """Write all pairs if neither A nor B has a null vector, by an equation of degree four."""
     work, f, found = room(7, 7), room(5), room(4, 3)
     over = 1.0 / (B[0, 0] * B[1, 1] - B[0, 1] * B[1, 0])
     g0, g1 = over * (B[1, 1] * h[0] - B[0, 1] * h[1]), over * (B[0, 0] * h[1] - B[1, 0] * h[0])

@@ -1,13 +1,16 @@
 """Arms of seven turning joints with a spherical shoulder and wrist: closed form over the swivel.
 
-The distance of the wrist centre from the shoulder's fixes joint 4. The arm can then swivel about the line between them:
-the shoulder's rotation is A(psi) = P cos psi + Q sin psi + N. A joint of shoulder or wrist is at a given angle where an
-equation linear in cos psi and sin psi says so. So the limits of all joints cut the circle of psi into arcs, exactly: an
-arc is legal as a whole or not at all, however narrow it is. Of the legal psi the nearest to the seed's posture is taken
-that keeps a margin to the ends of its arc; psi = 0 is the seed's. In a path the arm makes the least move that follows,
-and the swivel goes back to its margin where a joint is near a limit. Where instead the axes of shoulder or wrist come
-to lie in a plane, the swivel goes slowly, with speed that the path leaves, to the side where the manipulability of both
-grows: the volumes that unit axes span.
+The distance between shoulder centre and wrist centre determines joint 4. The arm can then swivel about the line
+between them: the shoulder's rotation is A(psi) = P cos psi + Q sin psi + N. The psi at which a joint of shoulder or
+wrist has
+    a given angle follow from an equation linear in cos psi and sin psi. So the limits of all joints cut the circle of
+    psi exactly into arcs. Each arc, however narrow, is either completely legal or completely illegal. psi = 0 is the
+    seed's posture. The solution is the legal psi nearest to 0 that keeps a margin to the ends of its arc.
+
+In a path the arm makes the least move that follows. The swivel moves back to its margin when a joint is near a limit.
+When instead the axes of shoulder or wrist become coplanar, the swivel moves slowly to the side where the
+manipulability of both grows, with the speed that the path leaves. This manipulability is the volume that the unit axes
+span.
 
 Source:
     Shimizu, Kakuya, Yoon, Kitagaki and Kosuge 2008, IEEE T-RO 24(5), sections on joint limits;
@@ -23,18 +26,18 @@ from teleop_core.kinematics import damped, dh_kernels, is_askable
 from teleop_core.kinematics.branches import BESIDE, cost_of, is_allowed, turn
 from teleop_core.kinematics.closed_form import candidates, spherical_wrist, swivel_arcs, swivel_families
 
-_SPEED = 0.3  # share of a joint's largest step by which psi goes back to its margin in a path
+_SPEED = 0.3  # share of a joint's largest step with which psi moves back to its margin in a path
 _ROUNDS, _MORE_ROUNDS = 8, 40  # of the search for the least move, and if it comes close
-_CLOSE = 1e-4  # squared weighted error: a limit in the way slows a search that would get there
-_FLAT = 0.3  # volume of three unit axes under which manipulability counts
-_ASIDE = 1e-3  # psi [rad] to either side where it is compared
+_CLOSE = 1e-4  # squared weighted error: a limit on the path slows a search that would still converge
+_FLAT = 0.3  # volume of three unit axes below which manipulability counts
+_ASIDE = 1e-3  # psi [rad] to either side at which manipulability is compared
 _GAIN = 200.0  # of the relative difference, up to full speed
-_NONE = 1e-9  # sum of two manipulabilities that counts as none
+_NONE = 1e-9  # sum of two manipulabilities that counts as zero
 
 
 @inner
 def _elbow_cost(fourth: float, K: Array, seed: Array, limits: Array, q: Array) -> float:
-    """:func:`cost_of` joint 4 alone, which no branch of its elbow is under; ``q`` is memory."""
+    """:func:`cost_of` joint 4 alone, a lower bound for all branches of this elbow; ``q`` is scratch memory."""
     candidates.set_angle(K, 7, 3, fourth, q)
     turn(q, seed, limits, 3, 4)
     return cost_of(q, seed, limits, 3, 4, True)
@@ -42,7 +45,7 @@ def _elbow_cost(fourth: float, K: Array, seed: Array, limits: Array, q: Array) -
 
 @inner
 def _write(S: Array, W: Array, psi: float, K: Array, seed: Array, M: Array, angles: Array, q: Array, k: int) -> float:
-    """Write joints of shoulder and wrist of branch k at psi into q (8,); the least spread."""
+    """Write joints of shoulder and wrist of branch k at psi into q (8,); return the least spread."""
     swivel_arcs.blend(S, psi, M)
     spread, is_exact = spherical_wrist.wrist_angles(
         M, K, swivel_families.F1, candidates.angle_of(K, 7, 0, seed), angles
@@ -64,10 +67,10 @@ def _write(S: Array, W: Array, psi: float, K: Array, seed: Array, M: Array, angl
 def _branches(
     T: Array, geometry: Array, seed: Array, limits: Array, is_free: bool, found: Array, work: Array
 ) -> tuple[int, float]:
-    """Write branches into ``found`` (8, 8): at the seed's swivel, or, where free, at legal ones.
+    """Write branches into ``found`` (8, 8): at the seed's swivel or, if ``is_free``, at legal swivels.
 
-    Where free the elbow of the lesser move comes first, and ends it if a branch of it moves less than joint 4 of the
-    other. ``work``, (60, 4), holds the families S and W of both elbows for those who go on from there.
+    If ``is_free``, the elbow of the smaller move comes first. The search ends there if one of its branches moves less
+    than joint 4 of the other elbow. ``work`` (60, 4) gets the families S and W of both elbows, for later use.
 
     Returns:
         Number of branches, and the least spread of a shoulder or wrist [rad].
@@ -112,7 +115,7 @@ def _branches(
 
 @inner
 def _step_to_margin(seed: Array, limits: Array, K: Array, work: Array, found: Array, best: int, q: Array) -> None:
-    """Let the swivel of a branch in a path go back to the margin of its arc, slowly."""
+    """Move the swivel of a branch in a path slowly back to the margin of its arc."""
     elbow, k, trial = best // 4, best % 4, found[8]
     S, W = work[16 + 20 * elbow : 25 + 20 * elbow], work[25 + 20 * elbow : 34 + 20 * elbow]
     M, angles, arcs, step = work[8:12], work[12:14], room(8, 36), math.inf
@@ -132,7 +135,7 @@ def _step_to_margin(seed: Array, limits: Array, K: Array, work: Array, found: Ar
 
 @inner
 def _least_move(T: Array, seed: Array, limits: Array, geometry: Array, q: Array) -> bool:
-    """Write the pose's joints by the least move from the seed; whether a step allows them."""
+    """Write the pose's joints with the least move from the seed; return whether one step allows them."""
     box = room(2, 7)
     candidates.box_around(seed, limits, box)
     for i in range(7):
@@ -164,10 +167,10 @@ def _width(q: Array, K: Array, i: int) -> float:
 
 @inner
 def _urge(q: Array, seed: Array, limits: Array, K: Array) -> float:
-    """How much manipulability counts, from 0 to 1, without a jump at either end.
+    """Weight of the manipulability, from 0 to 1, continuous at both ends.
 
-    Nothing where axes are far from a plane or pass through it, within the margin of a limit, or where a joint needs all
-    of its speed. Of a part of it a hand whose readings are noisy asks all the time.
+    The weight is 0 if the axes are far from coplanar or pass through a plane, within the margin of a limit, or if a
+    joint needs all of its speed. A part of that speed is always needed by a hand with noisy readings.
     """
     left, apart = 1.0, _room(q, limits) / swivel_arcs.MARGIN - 1.0
     for i in range(7):
@@ -179,9 +182,9 @@ def _urge(q: Array, seed: Array, limits: Array, K: Array) -> float:
 
 @inner
 def _step_to_width(T: Array, seed: Array, limits: Array, geometry: Array, urge: float, found: Array, q: Array) -> None:
-    """Let the swivel of a path go to the side where manipulability grows, as fast as ``urge``.
+    """Move the swivel of a path to the side where manipulability grows, with a speed given by ``urge``.
 
-    No joint moves by more than a share of its step for that, nor out of its step from the seed.
+    For this no joint moves by more than a share of its step, and none leaves its step from the seed.
     """
     work, trial, near, K = room(60, 4), found[8], found[9, :7], geometry[candidates.constants_at(7) :]
     _branches(T, geometry, q, limits, False, found, work)
@@ -229,7 +232,7 @@ def ik(T: Array, seed: Array, limits: Array, geometry: Array, q: Array, residual
     reach, best = candidates.choose(found, count, posture, limits, K, least < BESIDE, q)
     if not is_free and reach == 2:
         _step_to_margin(seed, limits, K, work, found, best, q)
-    if is_free and candidates.move_of(q, seed) > most + candidates.BESIDE_SEED:  # a margin is not worth the way
+    if is_free and candidates.move_of(q, seed) > most + candidates.BESIDE_SEED:  # a margin is not worth this move
         reach = 2
         for i in range(7):
             q[i] = near[i]
@@ -238,9 +241,9 @@ def ik(T: Array, seed: Array, limits: Array, geometry: Array, q: Array, residual
 
 @kernel
 def ik_all(T: Array, geometry: Array, solutions: Array) -> int:
-    """Write one joint vector (k, 7) of each branch, at most eight, at the swivel nearest to zero's.
+    """Write one joint vector (k, 7) of each branch, at most eight, at the swivel nearest to that of the zero posture.
 
-    Limits do not count. There are endless many more, by turning the elbow about the line from shoulder to wrist.
+    Limits are ignored. There are infinitely many more, by rotating the elbow about the line from shoulder to wrist.
     """
     found, work, seed, limits = room(8, 8), room(60, 4), room(7), room(3, 7)
     candidates.forget(seed, limits)

@@ -1,8 +1,8 @@
 """Arcs of the swivel: where the limits of shoulder and wrist cut the circle of psi.
 
-A joint of a spherical shoulder is at a given angle where an equation linear in cos psi and sin psi
-says so (:mod:`teleop_core.kinematics.closed_form.swivel`), and likewise of the wrist. Between such cuts
-a branch is legal as a whole or not at all.
+The psi at which a joint of a spherical shoulder or wrist has a given angle follow from an equation linear in cos psi
+and sin psi (:mod:`teleop_core.kinematics.closed_form.swivel`). At the limits these psi are cuts of the circle. Between
+two cuts a branch is either completely legal or completely illegal.
 
 Source:
     Shimizu, Kakuya, Yoon, Kitagaki and Kosuge 2008, IEEE T-RO 24(5), sections on joint limits;
@@ -16,10 +16,10 @@ from teleop_core.kinematics.branches import turned, wrapped
 from teleop_core.kinematics.closed_form import candidates, spherical_wrist, subproblems, swivel_families
 
 MARGIN = 0.1
-"""Angle psi [rad] to the ends of its arc, at most a quarter of the arc."""
+"""Margin of psi [rad] to the ends of its arc; at most a quarter of the arc."""
 ARCS = (8, 36)
-"""Shape of the memory of a cut circle: where pieces begin, which branches are legal in them."""
-_ENOUGH = 4.0 * MARGIN  # length [rad] from which on an arc keeps its whole margin
+"""Shape of the memory of a cut circle: starts of the pieces, and which branches are legal in them."""
+_ENOUGH = 4.0 * MARGIN  # length [rad] from which on an arc has the full margin
 _SLACK = 1e-10  # rounding of a joint on its limit [rad]
 _UNKNOWN = -1.0
 
@@ -35,7 +35,7 @@ def blend(S: Array, psi: float, M: Array) -> None:
 
 @inner
 def _cut(a: float, b: float, d: float, edges: Array, count: int) -> int:
-    """Append the psi where a cos psi + b sin psi = d, if any; the new count."""
+    """Append the psi where a cos psi + b sin psi = d, if any; return the new count."""
     base, spread, is_exact = subproblems.one_angle(a, b, d, 0.0)
     if is_exact > 0.5 and a * a + b * b > 1e-20:
         edges[count], edges[count + 1] = wrapped(base + spread), wrapped(base - spread)
@@ -109,7 +109,7 @@ def cut_circle(S: Array, W: Array, K: Array, limits: Array, arcs: Array) -> None
 
 @inner
 def _edge(arcs: Array, j: int) -> float:
-    """Psi [rad] where piece j begins; numbers of pieces go on, a round to either side."""
+    """Psi [rad] where piece j begins; j may run one full circle beyond either end."""
     count = int(arcs[2, 0])
     if j < 0:
         return arcs[0, j + count] - 2.0 * math.pi
@@ -118,7 +118,7 @@ def _edge(arcs: Array, j: int) -> float:
 
 @inner
 def _is_legal(j: int, branch: int, S: Array, W: Array, K: Array, seed: Array, limits: Array, arcs: Array) -> bool:
-    """Whether a branch of shoulder and wrist is legal in piece j; what is found out is kept."""
+    """Whether a branch of shoulder and wrist is legal in piece j; the result is stored in ``arcs``."""
     count, M, angles = int(arcs[2, 0]), arcs[3:6, :3], arcs[6:8, :3]
     k = j + count if j < 0 else (j if j < count else j - count)
     if arcs[1, k] == _UNKNOWN:
@@ -137,7 +137,7 @@ def _is_legal(j: int, branch: int, S: Array, W: Array, K: Array, seed: Array, li
 
 @inner
 def _nearest(low: float, high: float) -> float:
-    """Angle nearest to 0 in an arc less its margins [rad]."""
+    """Angle nearest to 0 in an arc without its margins [rad]."""
     margin = min(MARGIN, 0.25 * (high - low))
     return min(max(0.0, low + margin), high - margin)
 
@@ -146,8 +146,8 @@ def _nearest(low: float, high: float) -> float:
 def swivel_of(branch: int, S: Array, W: Array, K: Array, seed: Array, limits: Array, arcs: Array) -> float:
     """Psi [rad] of a branch next to 0 in its legal arcs; infinity where no arc is legal.
 
-    ``arcs`` is what :func:`cut_circle` wrote. Pieces are tested from psi = 0 outwards, until all
-    that are left lie farther off than the answer; an arc is followed until its margin is sure.
+    ``arcs`` is what :func:`cut_circle` wrote. Pieces are tested from psi = 0 outwards, until all remaining pieces are
+    farther away than the answer. An arc is followed until its margin is certain.
     """
     count, psi = int(arcs[2, 0]), math.inf
     up = count - 1

@@ -15,12 +15,12 @@ from teleop_core.kernels.room import room
 from teleop_core.kinematics.closed_form.subproblems import one_angle
 
 F1, F2, F3, F4, F5 = (39, 51, 63, 75, 87)
-"""Places, among the constants, of the transforms after joints 1 to 5."""
+"""Indices, in the constants, of the transforms after joints 1 to 5."""
 
 
 @inner
 def turned_about_z(K: Array, at: int, q: float, M: Array, out: Array) -> None:
-    """Write M Rz(q) F for the rotation F at a place among the constants."""
+    """Write M Rz(q) F, where F is the rotation at index ``at`` in the constants."""
     c, s = math.cos(q), math.sin(q)
     for i in range(3):
         x, y, z = c * M[i, 0] + s * M[i, 1], c * M[i, 1] - s * M[i, 0], M[i, 2]
@@ -30,7 +30,7 @@ def turned_about_z(K: Array, at: int, q: float, M: Array, out: Array) -> None:
 
 @inner
 def elbow_of(G: Array, K: Array, seed: float) -> tuple[float, float, float]:
-    """Base and spread of joint 4 [rad], and 1.0 if the arm reaches so far."""
+    """Base and spread of joint 4 [rad], and 1.0 if the arm reaches that far."""
     k0 = K[F3] * K[F3 + 3] + K[F3 + 4] * K[F3 + 7] + K[F3 + 8] * K[F3 + 11]
     k1 = K[F3 + 1] * K[F3 + 3] + K[F3 + 5] * K[F3 + 7] + K[F3 + 9] * K[F3 + 11]
     k2 = K[F3 + 2] * K[F3 + 3] + K[F3 + 6] * K[F3 + 7] + K[F3 + 10] * K[F3 + 11]
@@ -66,7 +66,7 @@ def _least_turn(v: Array, p: Array, A: Array, out: Array) -> None:
 def families(G: Array, K: Array, fourth: float, A: Array, work: Array, S: Array, W: Array) -> None:
     """Write P, Q, N of the shoulder's rotation into S (9, 3), those of the wrist's into W.
 
-    ``A`` is the shoulder's rotation at the seed, ``work`` memory (12, 3).
+    ``A`` is the shoulder's rotation at the seed; ``work`` (12, 3) is scratch memory.
     """
     B, C, D, v, p = work[:3], work[3:6], work[6:9], work[9], work[10]
     c, s, size = math.cos(fourth), math.sin(fourth), 0.0
@@ -101,9 +101,9 @@ def families(G: Array, K: Array, fourth: float, A: Array, work: Array, S: Array,
 
 @inner
 def triple_product(K: Array, at: int, middle: float) -> float:
-    """Volume that three axes which meet span, between -1 and 1; 0 where they lie in a plane.
+    """Volume spanned by three meeting unit axes, between -1 and 1; 0 if they are coplanar.
 
-    ``at`` is the place of the transform after the first of them, ``middle`` the second's angle.
+    ``at`` is the index of the transform after the first axis, ``middle`` the angle of the second.
     """
     r0, r1, a0, a1 = K[at + 8], K[at + 9], K[at + 14], K[at + 18]
     a, b = r0 * a0 + r1 * a1, r1 * a0 - r0 * a1

@@ -14,7 +14,7 @@ from teleop_core.robots.robot import Robot
 
 
 def chain_of(robot: Robot) -> Chain | None:
-    """The robot as a chain; None for one that is none: a parallel robot, or one with followers."""
+    """The robot as a chain; None if it is not a chain: a parallel robot, or one with followers."""
     if "motions" in robot.geometry:
         return None
     if robot.kernels.fk is rcrt1.fk:
@@ -34,14 +34,14 @@ def true_chain(robot: Robot, errors: LinkErrors) -> Array | None:
 
     Args:
         robot: The arm as drawn.
-        errors: What its links are off, n of them.
+        errors: Errors of its n links.
 
     Returns:
-        The row, a new array, on which ``dh_kernels.fk`` takes the robot's own joint vectors; None
-        for robots that are no chain.
+        The row, a new array, on which ``dh_kernels.fk`` takes the robot's own joint vectors; None for robots that are
+        not a chain.
 
     Raises:
-        ParameterError: Errors of another number of links.
+        ParameterError: The errors are for a different number of links.
     """
     if errors.n != robot.n:
         raise ParameterError("errors", f"for {errors.n} links", f"for {robot.n}, as {robot.name}")

@@ -12,11 +12,11 @@ A table is YAML, one row per link, written as in a textbook with ``q`` in the pl
       - {theta: q - 90}
 
 Entries that are left out are 0. A row without ``q`` is a fixed frame, such as a tool. Turning joints without limits
-have ±180 degrees; sliding ones must state theirs. ``home`` is the posture of the published or natural zero; ``start``
-the one at which sessions start, which joints without it start at home; if no row has it, one with room in all
-directions is looked for (:mod:`teleop_core.robots.freedom`).
+have ±180 degrees; sliding ones must state theirs. ``home`` is the posture of the published or natural zero. ``start``
+is the posture at which sessions start; joints without ``start`` use ``home``. If no row has a ``start``, a posture
+with room in all directions is searched (:mod:`teleop_core.robots.freedom`).
 
-Every chain can be a slave. What its drives are stands, joint by joint, in a section of its own::
+Every chain can be a slave. Its drives are described, joint by joint, in a separate section::
 
     drives:
       q1: {inertia: 0.6, speed_limit: 200, effort_limit: 60}
@@ -24,8 +24,8 @@ Every chain can be a slave. What its drives are stands, joint by joint, in a sec
 
 The entries are those of :class:`~teleop_core.robots.drives.Drives`: ``speed_limit``, ``friction_speed`` (per second)
 and ``encoder_step`` of turning joints are in the table's unit of angles, all others in SI units (N·m·s/rad, rad/s).
-What is left out is assumed (:mod:`teleop_core.robots.arms.dh_drives`), and ``Robot.drives.assumed`` names it. Axes do
-not act on each other, and gravity counts as balanced.
+Missing entries are assumed (:mod:`teleop_core.robots.arms.dh_drives`), and ``Robot.drives.assumed`` names them. Axes
+are independent of each other, and gravity counts as balanced.
 
 Source:
     Denavit and Hartenberg 1955 (standard, also distal); Craig 2005 (modified, proximal); Sheth
@@ -66,7 +66,7 @@ def load_table(path: Path | str) -> DhTable:
 
     Raises:
         RecordingError: The file cannot be read, or is not YAML.
-        ParameterError: An entry that is missing or not possible.
+        ParameterError: An entry is missing or impossible.
         UnknownNameError: A convention, direction or entry that does not exist.
     """
     with damage_told(Path(path)):
@@ -74,12 +74,12 @@ def load_table(path: Path | str) -> DhTable:
 
 
 def robot_from_table(content: object) -> Robot:
-    """Robot from what a table's YAML file holds; errors as :func:`load_table`."""
+    """Robot from the content of a table's YAML file; errors as in :func:`load_table`."""
     return parse_table(content).robot()
 
 
 def parse_table(content: object) -> DhTable:
-    """Table from what its YAML file holds; errors as :func:`load_table`."""
+    """Table from the content of its YAML file; errors as in :func:`load_table`."""
     if not isinstance(content, Mapping):
         raise ParameterError("table", content, "a mapping with name, convention and rows")
     _known("entry", content, ("name", "convention", "angles", "task", "rows", "drives"))

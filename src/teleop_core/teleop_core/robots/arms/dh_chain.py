@@ -15,7 +15,7 @@ from teleop_core.robots.drives import Drives
 from teleop_core.robots.dynamics.followers import Followers
 from teleop_core.robots.robot import Robot
 
-# Elementary motions of one row, left to right: what, along or about which axis, by which symbol.
+# Elementary motions of one row, left to right: kind of motion, its axis, and its symbol.
 CONVENTIONS = {
     "standard": (("turn", "z", "theta"), ("slide", "z", "d"), ("slide", "x", "a"), ("turn", "x", "alpha")),
     "modified": (("turn", "x", "alpha"), ("slide", "x", "a"), ("turn", "z", "theta"), ("slide", "z", "d")),
@@ -55,9 +55,9 @@ class DhRow:
 class DhTable:
     """A chain: rows in one convention, from the base to the tip.
 
-    ``task`` names the directions that the arm is to control, in base axes, of
-    :data:`DIRECTIONS`; the others are left to the residual. ``drives`` holds, for each joint, the
-    entries of its drive that are stated [SI]; empty means for none.
+    ``task`` names the directions of :data:`DIRECTIONS` that the arm controls, in base axes; errors in the other
+    directions appear in the residual. ``drives`` contains, for each joint, the given entries of its drive [SI]; it is
+    empty if no joint has any.
     """
 
     name: str
@@ -107,7 +107,7 @@ class DhTable:
         """The chain as a robot, which can be a slave; in closed form if its axes allow it.
 
         Args:
-            geometry: Symbols and values that the robot is to show; none for those of its row.
+            geometry: Symbols and values that the robot shows; none for those of its row.
             drives: Drive table in place of the table's own.
         """
         kinds, fixed, reach = self._frames()
@@ -160,12 +160,12 @@ def chain_robot(
         joints: From the base to the tip; names, limits, home and start count.
         kinds: For each motion 1 for a turn, 2 for a slide; negative against its axis.
         fixed: Transforms (4, 4) before, between and after the motions, one more than motions.
-        reach: Length [m] by which distances count against angles; 1 m where it is 0.
-        task: Directions that the arm is to control, of :data:`DIRECTIONS`.
+        reach: Length [m] that weighs distances against angles; 0 means 1 m.
+        task: Directions that the arm controls, of :data:`DIRECTIONS`.
         drives: Drive table.
         solution: How its inverse kinematics are solved.
-        followers: What the motions do; None where they are the joints.
-        geometry: Symbols and values [m, rad] that the robot is to show; none for those of its row.
+        followers: How the motions follow the joints; None if each motion is a joint.
+        geometry: Symbols and values [m, rad] that the robot shows; none for those of its row.
     """
     weights = {
         "reach": reach if reach > 0.0 else 1.0,

@@ -1,7 +1,7 @@
-"""Drives of a table or file: what it states of each joint, the rest assumed.
+"""Drives of a table or file: the given values of each joint; missing values are assumed.
 
-What a joint does not state is assumed to be of the size of a small laboratory arm, and in
-proportion to its inertia, so that friction stays within what the simulation resolves.
+Missing values of a joint are assumed as for a small laboratory arm, and in proportion to the joint's inertia. So
+friction stays within what the simulation can resolve.
 """
 
 import math
@@ -32,16 +32,16 @@ _UNITS = {
     "slide": {"inertia": "kg", "viscous": "N·s/m", "coulomb": "N", "friction_speed": "m/s",
               "effort_limit": "N", "speed_limit": "m/s", "encoder_step": "m"},
 }  # fmt: skip
-# Of the effort: dry friction, and viscous friction at the largest speed.
+# Shares of the effort: dry friction, and viscous friction at the largest speed.
 _MOST_ASSUMED = {"coulomb": 0.1, "viscous": 0.5}
 _OF_POSITION = ("friction_speed", "speed_limit", "encoder_step")  # in the table's unit of angles
-_FASTEST = {"bandwidth": 500.0}  # [rad/s], what the 1 kHz control can do
-# Friction may stop a joint no faster than this [1/s]: two integration steps a millisecond.
+_FASTEST = {"bandwidth": 500.0}  # [rad/s], the largest that the 1 kHz control allows
+# Largest rate [1/s] at which friction may stop a joint: two integration steps a millisecond can follow it.
 _STIFFEST = 2000.0
 
 
 def assumed_drive(kind: str, stated: Mapping[str, float]) -> dict[str, float]:
-    """Entries of one joint, SI units, with those that are not stated filled in.
+    """All entries of one joint, SI units; missing entries are filled in.
 
     Args:
         kind: "turn" or "slide".
@@ -58,7 +58,7 @@ def assumed_drive(kind: str, stated: Mapping[str, float]) -> dict[str, float]:
 
 
 def drives_of(kinds: Sequence[str], stated: Sequence[Mapping[str, float]]) -> Drives:
-    """Drive table of joints, each "turn" or "slide", from the entries [SI] stated for each."""
+    """Drive table of joints, each "turn" or "slide", from the given entries [SI] of each."""
     joints = [assumed_drive(kind, own) for kind, own in zip(kinds, stated, strict=True)]
     columns = {name: np.array([joint[name] for joint in joints]) for name in ENTRIES}
     assumed = tuple(name for name in ENTRIES if any(name not in own for own in stated))
@@ -70,28 +70,28 @@ def least_inertia(kind: str, viscous: float, coulomb: float) -> float:
 
     Args:
         kind: "turn" or "slide".
-        viscous: Viscous friction [N·m·s/rad or N·s/m]; 0 where it will be assumed.
-        coulomb: Dry friction [N·m or N], at the assumed ``friction_speed``; 0 likewise.
+        viscous: Viscous friction [N·m·s/rad or N·s/m]; 0 if it will be assumed.
+        coulomb: Dry friction [N·m or N], at the assumed ``friction_speed``; 0 if it will be assumed.
     """
     slow, assumed = _SPEEDS[kind]["friction_speed"], _PER_INERTIA[kind]
     rate = (0.0 if viscous else assumed["viscous"]) + (0.0 if coulomb else assumed["coulomb"]) / slow
-    # A little more, for the check of the rate divides by it again.
+    # A little more, because the check of the rate divides by it again.
     return 1.001 * (viscous + coulomb / slow) / (_STIFFEST - rate)
 
 
 def read_drives(path: Path, names: Sequence[str], kinds: Sequence[str]) -> tuple[dict[str, float], ...]:
-    """Stated entries [SI] of each joint, from a YAML file like the ``drives`` section of a table.
+    """Given entries [SI] of each joint, from a YAML file like the ``drives`` section of a table.
 
     Raises:
         RecordingError: The file cannot be read, or is not YAML.
-        TeleopError: As :func:`parse_drives`, but for friction that is too stiff.
+        TeleopError: As in :func:`parse_drives`, except for friction that is too stiff.
     """
     with damage_told(path):
         return _entries(plain_yaml.read(path), names, kinds, 1.0)
 
 
 def parse_drives(content: Any, names: Sequence[str], kinds: Sequence[str], unit: float) -> tuple[dict[str, float], ...]:
-    """Stated entries [SI] of each joint, from the ``drives`` section of a table.
+    """Given entries [SI] of each joint, from the ``drives`` section of a table.
 
     Args:
         content: Mapping of joint names to mappings of entries; None when there is no section.
@@ -139,7 +139,7 @@ def _number(where: str, name: str, value: Any) -> float:
     is_least_zero, most = name in MAY_BE_ZERO, _FASTEST.get(name, math.inf)
     needed = "a finite number" + (" >= 0" if is_least_zero else " > 0")
     needed += f", <= {most:g}" if name in _FASTEST else ""
-    if isinstance(value, str):  # YAML 1.1 takes 1e-4, without a point, for a word
+    if isinstance(value, str):  # YAML 1.1 reads 1e-4, without a decimal point, as a string
         with suppress(ValueError):
             value = float(value)
     if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):

@@ -28,7 +28,7 @@ LOWER = np.array([-80.0, 50.0, 0.0, -170.0, -80.0, -170.0]) * _DEGREES
 UPPER = np.array([80.0, 160.0, 0.0, 170.0, 80.0, 170.0]) * _DEGREES
 UPPER[2] = 0.421
 HOME = np.array([0.0, 113.4 * _DEGREES, 0.421, 0.0, 0.0, 0.0])
-# Answer of :func:`teleop_core.robots.freedom.start_posture` for the published lengths, rounded.
+# Result of :func:`teleop_core.robots.freedom.start_posture` for the published lengths, rounded.
 START = np.array([-0.7622, 1.7058, 0.3445, 1.1233, 0.7795, -1.3396])
 
 # Below this sine the wrist axes 4 and 6 count as one line and joint 4 keeps its value: rounding
@@ -107,9 +107,9 @@ def jacobian(q: Array, geometry: Array, J: Array) -> None:
 
 @inner
 def _arm_branch(T: Array, geometry: Array, is_front: bool, seed: float, arm: Array) -> bool:
-    """Write q1, q2, d3 (3,) of one arm branch; whether the wrist centre can be reached at all.
+    """Write q1, q2, d3 (3,) of one arm branch; return whether the wrist centre can be reached at all.
 
-    On the axis of joint 1, where every q1 will do, the seed's is kept.
+    If the wrist centre is on the axis of joint 1, every q1 is a solution, and the seed's is kept.
     """
     L6, d2 = geometry[0], geometry[1]
     x, y, z = T[0, 3] - L6 * T[0, 2], T[1, 3] - L6 * T[1, 2], T[2, 3] - L6 * T[2, 2]
@@ -128,7 +128,7 @@ def _arm_branch(T: Array, geometry: Array, is_front: bool, seed: float, arm: Arr
 
 @inner
 def _wrist_frame(T: Array, q1: float, q2: float, M: Array) -> None:
-    """Write (Rz(q1) Ry(q2))ᵀ R, the rotation left to the wrist, into the 3x3 corner of M."""
+    """Write (Rz(q1) Ry(q2))ᵀ R, the rotation that remains for the wrist, into the 3x3 corner of M."""
     c1, s1, c2, s2 = math.cos(q1), math.sin(q1), math.cos(q2), math.sin(q2)
     for j in range(3):
         h = c1 * T[0, j] + s1 * T[1, j]
@@ -139,13 +139,13 @@ def _wrist_frame(T: Array, q1: float, q2: float, M: Array) -> None:
 
 @inner
 def _joint5(M: Array, c4: float, s4: float) -> float:
-    """Joint 5 that brings the tool axis next to its wanted direction, given joint 4."""
+    """Joint 5 that brings the tool axis nearest to its wanted direction, given joint 4."""
     return math.atan2(c4 * M[0, 2] + s4 * M[1, 2], M[2, 2])
 
 
 @inner
 def _joint6(M: Array, c4: float, s4: float, c5: float, s5: float) -> float:
-    """Joint 6 that turns the tool next to its wanted attitude, given joints 4 and 5."""
+    """Joint 6 that brings the tool nearest to its wanted attitude, given joints 4 and 5."""
     x0 = c5 * (c4 * M[0, 0] + s4 * M[1, 0]) - s5 * M[2, 0]
     x1 = c5 * (c4 * M[0, 1] + s4 * M[1, 1]) - s5 * M[2, 1]
     y0, y1 = -s4 * M[0, 0] + c4 * M[1, 0], -s4 * M[0, 1] + c4 * M[1, 1]
@@ -166,14 +166,14 @@ def _wrist(M: Array, seed: float, q: Array) -> None:
 
 @inner
 def _share_roll(M: Array, limits: Array, q: Array) -> None:
-    """With axes 4 and 6 in line, let joint 4 do the part of the roll that joint 6 cannot."""
+    """With axes 4 and 6 in line, let joint 4 make the part of the roll that joint 6 cannot make."""
     if M[0, 2] * M[0, 2] + M[1, 2] * M[1, 2] > _COLLINEAR * _COLLINEAR:
         return
     low, high = limits[0, 5], limits[1, 5]
     rest = q[5] - min(max(q[5], low), high)
     is_legal = limits[0, 3] <= q[3] + rest <= limits[1, 3]
     if rest != 0.0 and not is_legal and not math.isfinite(limits[2, 3]):
-        # Then from the other end of joint 6; a path does not go there.
+        # Then try from the other end of joint 6; a path never jumps there.
         rest -= math.copysign(2.0 * math.pi - (high - low), rest)
     q[3] += rest
     q[5] = wrapped(q[5] - rest)
@@ -187,10 +187,10 @@ def _flip(q: Array) -> None:
 
 @inner
 def _choose(T: Array, seed: Array, limits: Array, geometry: Array, M: Array, q: Array) -> bool:
-    """Write the best of the four branches; whether the wrist centre can be reached at all.
+    """Write the best of the four branches; return whether the wrist centre can be reached at all.
 
-    The wrist of the arm behind is solved only if that arm can still win. In a path, which never
-    leads there, the wrist is solved from where the arm can be.
+    The wrist of the rear arm branch is solved only if that branch can still be the best. A path never changes to that
+    branch; there the wrist is solved from the position that the arm can reach.
     """
     best, is_reachable, trial = math.inf, True, room(6)
     is_path = math.isfinite(limits[2, 0])
@@ -219,10 +219,10 @@ def _choose(T: Array, seed: Array, limits: Array, geometry: Array, M: Array, q: 
 
 @inner
 def _settle(T: Array, seed: Array, limits: Array, M: Array, q: Array) -> None:
-    """Keep a branch inside limits and steps; each wrist joint makes the best of those before.
+    """Keep a branch inside limits and steps; each wrist joint reduces the error that earlier joints leave.
 
-    In a path joint 4 slows down towards the wrist singularity, where noise of the pose would
-    turn it at full speed; in line with joint 6 it rests.
+    In a path joint 4 slows down towards the wrist singularity, because noise of the pose would turn it at full speed
+    there. When its axis is in line with that of joint 6, joint 4 rests.
     """
     for i in range(3):
         hold(q, i, seed, limits)
@@ -243,9 +243,10 @@ def _settle(T: Array, seed: Array, limits: Array, M: Array, q: Array) -> None:
 def ik(T: Array, seed: Array, limits: Array, geometry: Array, q: Array, residual: Array) -> int:
     """Write joints (6,) for ``T_base_tip``; see :class:`teleop_core.robots.robot.Kernels`.
 
-    Where a limit or step holds a joint back, the joints after it make the best of it: the wrist turns the tool as
-    wanted from where the arm really is, joint 5 and then 6 from where joint 4 really is. At the wrist singularity joint
-    4 lags, joint 5 passes through zero with its sign, and motion goes on at the other side.
+    If a limit or step holds a joint back, the joints after it reduce the error that results. The wrist turns the tool
+    as wanted from the position that the arm has reached; joints 5 and then 6 use the angle that joint 4 has reached.
+    At the wrist singularity joint 4 lags, joint 5 passes through zero and changes its sign, and motion goes on at the
+    other side.
 
     Source:
         Vongbunyong 2008, eqs. 4.5.1-4.5.9, atan2 throughout, and its rule for q5 = 0.
@@ -266,9 +267,9 @@ def ik(T: Array, seed: Array, limits: Array, geometry: Array, q: Array, residual
 
 @kernel
 def ik_all(T: Array, geometry: Array, solutions: Array) -> int:
-    """Write the four branches (4, 6), arm in front first, wrist not flipped first; their number.
+    """Write the four branches (4, 6), front arm first, wrist not flipped first; return their number.
 
-    On a singularity, where a joint is free, it is zero and branches may coincide.
+    On a singularity a free joint is set to zero, and branches may coincide.
     """
     M = room(3, 3)
     for arm in range(2):

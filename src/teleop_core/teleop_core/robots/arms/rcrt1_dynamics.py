@@ -3,13 +3,12 @@
 The wrist is dominated by its motors: its axes are independent inertias, and link 3 carries it.
 Numbers that the source does not print (friction, motor inertia of the wrist) are marked *assumed*.
 
-Table A.1 prints no convention of the products of inertia, and no single one is possible for all
-links: a body can have the numbers of link 1 only if they are -∫yz dm (the other sign needs a
-principal moment of -0.018 kg·m²). It can have those of link 2 only if they are +∫xz dm (else
--0.0004). Link 3 is printed with its mass 264 mm ahead of the wrist centre, where only the tool is,
-so its axes were turned by 180° about x: its centre of mass lies at -264 mm, and with it Ixz changes
-its sign (else -0.0035). Then +∫xz dm, -3.0e-3, is what a mass in its centre has, -3.06e-3. Of Ixy
-and Iyz of link 2 every sign is possible; they are taken as its Ixz.
+Table A.1 states no sign convention for the products of inertia, and no single convention is possible for all links.
+The numbers of link 1 are possible only as -∫yz dm (the other sign needs a principal moment of -0.018 kg·m²). Those of
+link 2 are possible only as +∫xz dm (else -0.0004). Link 3 is printed with its mass 264 mm ahead of the wrist centre,
+where only the tool is. So its axes were rotated by 180° about x: its centre of mass lies at -264 mm, and Ixz changes
+its sign too (else -0.0035). Then +∫xz dm, -3.0e-3, agrees with that of a point mass at the centre of mass, -3.06e-3.
+For Ixy and Iyz of link 2 both signs are possible; they are taken with the convention of its Ixz.
 
 Source:
     Vongbunyong 2008, section 4.6, appendix A.3 and tables 3.6 and A.1; misprints corrected.
@@ -38,7 +37,7 @@ LINKS = {
     "J4": 6.5e-8 * 141.0**2, "J5": 6.5e-8 * 76.0**2, "J6": 6.5e-8 * 76.0**2,  # assumed rotor
     "g": 9.81,
 }  # fmt: skip
-# What link 1 has beside I1yy does not act, for it turns about its y axis alone; Iyz is -∫yz dm.
+# The other inertias of link 1 have no effect, because it turns about its y axis alone; Iyz is -∫yz dm.
 LINK_1 = {"m1": 2.404, "G1y": -0.142342, "G1z": -0.038193, "I1xx": 0.064, "I1zz": 0.053, "I1yz": -0.011}
 _ORDER = {symbol: index for index, symbol in enumerate(LINKS)}
 _I1YY, _I2XX, _I2YY, _I2ZZ = (_ORDER[s] for s in ("I1yy", "I2xx", "I2yy", "I2zz"))
@@ -54,7 +53,7 @@ def link_row(**symbols: float) -> Array:
 
 
 def link_inertias(symbols: Mapping[str, float] = LINKS) -> tuple[inertias.LinkInertia, ...]:
-    """Links 1 to 3 in their frames, as table A.1 lumps them: 2a rides on 2, the wrist on 3.
+    """Links 1 to 3 in their frames, lumped as in table A.1: link 2 includes 2a, link 3 includes the wrist.
 
     Args:
         symbols: All of :data:`LINKS`, for links 2 and 3 and the I1yy of link 1.

@@ -1,7 +1,7 @@
-"""Hardware of the RCRT-1: what the built arm does beside its model, and the angles of its motors.
+"""Hardware of the RCRT-1: how the built arm differs from its model, and the angles of its motors.
 
-Encoders sit on the motors, so whatever lies behind them is in none of the published errors of
-chapters 7 and 8; the accuracy test, with a ruler at the tip, is the only one that saw it.
+Encoders sit on the motors, so the published errors of chapters 7 and 8 do not contain what lies behind the motors.
+Only the accuracy test, with a ruler at the tip, measured it.
 
 Source:
     Vongbunyong 2008, sections 3.4, 7.3 and appendix E; what is fitted or assumed is marked.
@@ -18,13 +18,13 @@ from teleop_core.robots import hardware, link_errors
 from teleop_core.robots.arms.rcrt1_dynamics import LINKS, link_row
 
 _FIT = "fitted: to tables 7.1-7.6 with the gains of source_pid, by `teleop fit`"
-# What is left of the accuracy test once d3 is mended, 0.352 mm, over the 37 mm from wrist to tip
-# is a play of the tendons of ±9.5 mrad; half of it is taken, for the ruler has its share.
+# After correcting d3, an error of 0.352 mm remains in the accuracy test. Over the 37 mm from wrist to tip this is a
+# tendon play of ±9.5 mrad. Half of it is taken, because the ruler causes a part of it.
 _PLAY = 0.5 * 0.352e-3 / 0.037
 _COUPLING = np.zeros((6, 6))
 _COUPLING[5, 4] = 2.5 / 2.5  # r5 / r6: the tendon of joint 6 runs over the idler of axis 5
-# One draw of the tolerances: ±20 µm of machined lengths (links 1-3), ±100 µm of printed ones
-# (links 4-6), and angles as such steps give them over a bearing 50 mm wide.
+# One random draw of the tolerances: ±20 µm for machined lengths (links 1-3), ±100 µm for printed lengths (links 4-6),
+# and the angles that such errors cause over a bearing 50 mm wide.
 _LENGTH = np.array([20e-6, 20e-6, 20e-6, 100e-6, 100e-6, 100e-6])
 _DRAWN = np.random.default_rng(2008).uniform(-1.0, 1.0, (4, 6)) * np.stack(
     [_LENGTH, _LENGTH / 0.05, _LENGTH, np.zeros(6)]

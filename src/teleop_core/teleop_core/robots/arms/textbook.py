@@ -103,8 +103,8 @@ def planar_3r(**geometry: float | str) -> Robot:
 def five_axis(**geometry: float | str) -> Robot:
     """Five-axis arm; ``d1`` shoulder height, ``a2``, ``a3`` links, ``d5`` tool [m].
 
-    Yaw, three parallel pitches, roll. The tool stays in the vertical plane of joint 1. At home it
-    points down, and the direction that the arm lacks is the turn about x.
+    Its joints are yaw, three parallel pitches, roll. The tool stays in the vertical plane of joint 1. At home the tool
+    points down, and the direction that the arm cannot control is the rotation about x.
     """
     g = geometry_of({"d1": 0.215, "a2": 0.1778, "a3": 0.1778, "d5": 0.1295}, geometry)
     rows: list[dict[str, Any]] = [

@@ -1,8 +1,8 @@
-"""Bodies: the solids of every robot, made from its kinematics, and where they are.
+"""Bodies: the solids of every robot, made from its kinematics, and their poses.
 
-``bodies_of(robot)`` gives the links of any robot as capsules, cylinders and spheres, each in the
-frame of a body; ``bodies_of(robot).poses(q)`` says where they are. The first body is the base,
-the last the tip. ``urdf_of(robot)`` is the same as a URDF.
+``bodies_of(robot)`` returns the links of any robot as capsules, cylinders and spheres, each in the frame of a body;
+``bodies_of(robot).poses(q)`` returns their poses. The first body is the base, the last is the tip. ``urdf_of(robot)``
+returns the same as a URDF.
 """
 
 from teleop_core.robots.bodies.body import Bodies, Body, Joint

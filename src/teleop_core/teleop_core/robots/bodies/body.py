@@ -1,4 +1,4 @@
-"""Bodies of a robot: a tree of rigid bodies on joints, and where it is for joint vectors."""
+"""Bodies of a robot: a tree of rigid bodies on joints, and their poses for joint vectors."""
 
 import math
 from collections.abc import Callable
@@ -50,12 +50,12 @@ def place(
     """Write the poses (N, B, 7) of bodies in the base.
 
     Args:
-        coordinates: What moves the joints (N, m) [rad, m].
+        coordinates: Coordinates that move the joints (N, m) [rad, m].
         free: Poses (N, k, 7) of the free bodies; (1, 0, 7) if there are none.
         parents: Parent of each body (B,), smaller than its own index; -1 for the base.
         kinds: Values of :class:`~teleop_core.robots.bodies.body.Joint` (B,).
         places: Index of each body's coordinate, or of its pose among the free ones (B,).
-        origins: Poses (B, 7) in the parents' frames where the coordinates are zero.
+        origins: Poses (B, 7) in the parents' frames, with all coordinates at zero.
         out: Poses (N, B, 7): x, y, z [m], quaternion w, x, y, z.
     """
     for i in range(out.shape[0]):
@@ -78,7 +78,7 @@ HERE.setflags(write=False)
 
 
 class Joint(IntEnum):
-    """How a body moves against its parent."""
+    """How a body moves relative to its parent."""
 
     FIXED = 0
     REVOLUTE = 1  # about z of its own frame
@@ -93,11 +93,10 @@ class Body:
     Attributes:
         name: Unique in the robot; the first is ``base``, the last ``tip``.
         solids: Its shapes, in its frame.
-        parent: Index of the body that it moves against; -1 for the base.
+        parent: Index of its parent body; -1 for the base.
         joint: How it moves.
-        origin: Its pose (7,) in the parent's frame where the coordinate is zero; unused if free.
-        coordinate: Index of what moves it: of the coordinates of a joint, of the poses of a free
-            body; -1 for a fixed one.
+        origin: Its pose (7,) in the parent's frame, with its coordinate at zero; unused for a free body.
+        coordinate: Index of its coordinate, or of its pose for a free body; -1 for a fixed body.
     """
 
     name: str
@@ -114,8 +113,8 @@ class Bodies:
     Args:
         bodies: The bodies, parents before their children; the base first, the tip last.
         joints: Number of joints of the robot.
-        coordinates: Coordinates of the tree and poses of its free bodies for joint vectors; None
-            where the joints are the coordinates and no body is free.
+        coordinates: Function from joint vectors to coordinates of the tree and poses of its free bodies; None if the
+            joints are the coordinates and no body is free.
         joint_body: Index of the body that each joint moves first, (n,).
         size: Length [m] to which the robot reaches, for cameras and arrows.
     """
@@ -138,17 +137,16 @@ class Bodies:
         self._no_free = np.empty((1, 0, 7))
 
     def poses(self, q: object) -> Array:
-        """Where all bodies are.
+        """Poses of all bodies.
 
-        Joints with which the loops of a robot do not close draw what is known: the bodies come
-        apart where the loop is open.
+        If the loops of a robot do not close at ``q``, the bodies are apart where the loop is open.
 
         Args:
             q: Joint vector (n,) or batch (N, n) [rad, m]; limits are not applied.
 
         Returns:
-            (B, 7) or (N, B, 7) in slave_base: x, y, z [m], quaternion w, x, y, z. The last is that
-            of the tip. Where joints are not finite, neither are the bodies that they move.
+            (B, 7) or (N, B, 7) in slave_base: x, y, z [m], quaternion w, x, y, z. The last pose is that of the tip. If
+            a joint is not finite, neither are the poses of the bodies that it moves.
 
         Raises:
             ShapeError: Another shape.
@@ -163,7 +161,7 @@ class Bodies:
         return out[0] if joints.ndim == 1 else out
 
     def coordinates(self, q: Array) -> tuple[Array, Array]:
-        """What the poses of all bodies follow from, for who places them elsewhere.
+        """Coordinates from which callers can compute the poses of all bodies themselves.
 
         Args:
             q: Joint vectors (N, n) [rad, m].

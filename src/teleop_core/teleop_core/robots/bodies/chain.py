@@ -13,7 +13,7 @@ from teleop_core.robots.bodies.solids import Role, Solid, along, ball, capsule, 
 
 # Sine between two axes under which they count as parallel.
 _PARALLEL = 1e-4
-_UNIT = 1e-6  # how far an axis may be from a unit one, and a turn from a pure one
+_UNIT = 1e-6  # tolerances: of an axis from unit length, and of a motion from a pure rotation
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,9 +31,9 @@ class Place:
 
     Attributes:
         axis: The joint's axis.
-        seat: Where the link before it ends, on the axis.
-        arrive: Where its own link begins: the seat, or the end of the rod that is pushed out.
-        leave: Where its own link leaves the axis.
+        seat: Point on the axis at which the previous link ends.
+        arrive: Point at which its own link begins: the seat, or the end of the extended rod.
+        leave: Point at which its own link leaves the axis.
     """
 
     axis: Axis
@@ -45,11 +45,11 @@ class Place:
 def axes_of(jacobian: Array, tip: Array) -> list[Axis] | None:
     """Axes of joints whose geometric Jacobian (6, m) moves the tip (3,) [m].
 
-    A turn ω with the tip's velocity v has its axis through (ω x v0)/|ω|², v0 the velocity of the
-    point that is in the base's origin.
+    For a rotation ω the axis passes through (ω x v0)/|ω|², where v0 is the velocity of the body point at the base's
+    origin.
 
     Returns:
-        The axes; None if some joint is neither a turn nor a push.
+        The axes; None if some joint is neither a pure rotation nor a slide.
 
     Source:
         Lynch and Park 2017, section 3.3.2.
@@ -71,11 +71,11 @@ def axes_of(jacobian: Array, tip: Array) -> list[Axis] | None:
 
 
 def places(axes: list[Axis], out: Array, tip: Array) -> list[Place]:
-    """Points between which links run: the feet of the common normals of axes beside each other.
+    """Points between which links run: the feet of the common normals of neighbouring axes.
 
     Args:
         axes: Axes of a chain in their order.
-        out: How far each rod is pushed out of its seat (m,) [m].
+        out: Extension of each rod from its seat (m,) [m].
         tip: The tip (3,) [m].
     """
     found: list[Place] = []
@@ -122,9 +122,9 @@ def _foot(axis: Axis, point: Array) -> Array:
 
 
 def _normal(before: Axis | None, end: Array, axis: Axis) -> tuple[Array, Array]:
-    """Ends (3,) of the common normal, on the axis before and on this one.
+    """Ends (3,) of the common normal, on the previous axis and on this axis.
 
-    Parallel axes have many: the one through ``end``, where the link arrived.
+    Parallel axes have many common normals: the one through ``end``, where the link arrived, is taken.
     """
     if before is None or np.isnan(axis.point).any() or _are_parallel(before, axis):
         return end, _foot(axis, end)
@@ -137,7 +137,7 @@ def _normal(before: Axis | None, end: Array, axis: Axis) -> tuple[Array, Array]:
     return leave, _foot(axis, leave)
 
 
-# Radius of links over the reach of the robot, at the base and at the tip.
+# Radius of links, divided by the reach of the robot, at the base and at the tip.
 _THICK, _THIN = 0.03, 0.014
 
 
@@ -152,8 +152,8 @@ def chain(
     """Bodies of a chain, the base first, without the tip; and the length of its skeleton [m].
 
     Args:
-        chained: Where its joints are at the posture of reference.
-        names: Names of the links after them.
+        chained: Its joints at the reference posture.
+        names: Names of the links after these joints.
         coordinates: Index of the coordinate that moves each.
         reference: Values of these coordinates at the posture of reference [rad, m].
         strokes: Length of the rod of each joint that pushes [m].

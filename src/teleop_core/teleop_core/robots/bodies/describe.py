@@ -2,7 +2,8 @@
 
 Serial robots are described from kinematics alone, by the product of exponentials: the Jacobian at home gives every
 joint's screw axis; the placement of link i is the product of the motions of joints 1 to i, exact for every robot whose
-joints are a chain. What is neither serial nor described is a base, a dotted line to the tip, and the tip.
+joints are a chain. A robot that is neither serial nor described is drawn as a base, a dotted line to the tip, and the
+tip.
 
 Source:
     Lynch and Park 2017, chapter 4.
@@ -24,10 +25,10 @@ _KNOWN: "WeakKeyDictionary[Robot, Bodies]" = WeakKeyDictionary()
 
 
 def bodies_of(robot: Robot) -> Bodies:
-    """Bodies of a robot: the same object each time it is asked for the same robot.
+    """Bodies of a robot; later calls for the same robot return the same object.
 
-    A robot may describe itself (``Robot.describe``), as those with loops do; of every other robot whose joints are a
-    chain the axes follow from its kinematics. What is neither is drawn as its base, a dotted line, and its tip.
+    A robot may describe itself (``Robot.describe``), as robots with loops do. For every other robot whose joints are a
+    chain, the axes follow from its kinematics. All other robots are drawn as base, dotted line, and tip.
     """
     if robot not in _KNOWN:
         _KNOWN[robot] = _described(robot)
@@ -41,7 +42,7 @@ def _described(robot: Robot) -> Bodies:
 
 
 _TRIALS = 5
-# How far, over the size of the robot, the tip may be off for joints to count as a chain.
+# Largest error of the tip, divided by the size of the robot, at which its joints count as a chain.
 _EXACT = 1e-6
 
 
@@ -76,7 +77,7 @@ def serial_bodies(robot: Robot) -> Bodies | None:
 
 
 def has_tip_of(bodies: Bodies, robot: Robot) -> bool:
-    """Whether the last body is where the robot's tip is, for joints drawn within the limits."""
+    """Whether the last body has the pose of the robot's tip, for random joints within the limits."""
     draws = np.random.default_rng(0).uniform(robot.lower, robot.upper, (_TRIALS, robot.n))
     tips, expected = bodies.poses(draws)[:, -1], robot.fk(draws)
     off = np.abs(tips[:, :3] - expected[:, :3, 3]).max() / bodies.size

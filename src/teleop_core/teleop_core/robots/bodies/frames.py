@@ -19,8 +19,8 @@ def poses_from_transforms(transforms: geometry.Array, poses: geometry.Array) -> 
 def tips(robot: Robot, q: geometry.Array) -> tuple[geometry.Array, geometry.Array]:
     """Tips of joint vectors (N, n): transforms (N, 4, 4) and poses (N, 7).
 
-    Next to home's assembly; where that does not close, in the nearest that a search finds; where
-    none closes, those of least error. Joints that are not finite give NaN.
+    The tip is that of the assembly next to home's. If this does not close, it is that of the nearest assembly that a
+    search finds. If none closes, it is the pose of least error. Joints that are not finite give NaN.
     """
     is_finite = np.isfinite(q).all(axis=1)
     transforms, poses = np.full((len(q), 4, 4), np.nan), np.empty((len(q), 7))

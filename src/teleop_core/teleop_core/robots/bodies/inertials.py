@@ -1,7 +1,7 @@
-"""Inertias of bodies: those of the robot's own links where its model has them, else assumed ones.
+"""Inertias of bodies: those of the robot's own links if its model has them, else assumed ones.
 
-All are pseudo-inertias (4, 4), which add up where bodies are joined, and go from frame to frame as
-T P Tᵀ (:mod:`teleop_core.robots.inertias`).
+All are pseudo-inertias (4, 4). They add up when bodies are joined, and transform between frames as T P Tᵀ
+(:mod:`teleop_core.robots.inertias`).
 """
 
 from collections.abc import Sequence
@@ -21,7 +21,7 @@ physics engines assume too; motors and hollow links together are of this order."
 
 
 def has_own_links(robot: Robot) -> bool:
-    """Whether the robot's dynamics say where which link has which inertia."""
+    """Whether the robot's dynamics contain the inertia and the frame of each link."""
     model = robot.dynamics
     of_chains = (chain_acceleration, follower_acceleration)
     return model is not None and (model.acceleration in of_chains or bool(model.frames))
@@ -35,9 +35,9 @@ def inertials_of(robot: Robot, bodies: Bodies) -> dict[int, Array]:
         bodies: Its bodies.
 
     Returns:
-        Of a robot with links of its own (:func:`has_own_links`) those that weigh: a link that its
-        source lumps into another has none. Of every other robot all that have solids, uniform and
-        of :data:`DENSITY`; where solids overlap, both count.
+        For a robot with links of its own (:func:`has_own_links`), the inertias of the links with mass; a link that the
+        source lumps into another link has none. For every other robot, those of all bodies with solids, uniform and of
+        :data:`DENSITY`; overlapping solids both count.
     """
     if not has_own_links(robot):
         assumed = {i: sum(map(_uniform, body.solids)) for i, body in enumerate(bodies.bodies)}

@@ -15,10 +15,10 @@ from teleop_core.robots.robot import Robot
 
 
 def looks_of(robot: Robot) -> dict[int, Mesh]:
-    """What bodies of a robot look like, by their index in :func:`bodies_of`.
+    """Meshes of the bodies of a robot, by their index in :func:`bodies_of`.
 
-    A mesh that cannot be read is told by a warning that names its link; a body of which none can be
-    read is not among the keys. Files are read anew at each call.
+    For a mesh that cannot be read, a warning names its link. A body without any readable mesh is not among the keys.
+    Files are read anew at each call.
     """
     bodies = bodies_of(robot)
     frames = bodies.poses(robot.home)
@@ -56,7 +56,7 @@ def _triangles(visual: Visual) -> Mesh:
             scene = scene.convert_units("meters")
         mesh = scene.to_mesh()
         vertices, faces = np.array(mesh.vertices, np.float64), np.array(mesh.faces, np.int64)
-    except Exception as error:  # of a foreign reader, of a file that anybody wrote
+    except Exception as error:  # a third-party reader may raise anything for an arbitrary file
         needed = f"a mesh that can be read ({type(error).__name__}: {error})"
         raise ParameterError("mesh", str(path), needed) from error
     if not (len(faces) and np.isfinite(vertices).all()):

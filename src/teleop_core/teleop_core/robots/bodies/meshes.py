@@ -12,11 +12,11 @@ Faces = NDArray[np.int64]
 Mesh = tuple[Array, Faces]
 """Vertices (V, 3) [m] and the three of each triangle (F, 3), seen from outside anticlockwise."""
 AROUND = 20
-"""Sides of what is round, unless fewer are asked for; a multiple of four."""
+"""Default number of sides of round solids; a multiple of four."""
 
 
 def mesh_of(solid: Solid, around: int = AROUND) -> Mesh:
-    """Triangles of a solid in its body's frame; what is round has so many sides."""
+    """Triangles of a solid in its body's frame; round solids have ``around`` sides."""
     if solid.kind == "box":
         vertices, faces = _box(*solid.size)
     else:
@@ -33,7 +33,7 @@ def merged(meshes: list[Mesh]) -> Mesh:
 
 
 def _box(x: float, y: float, z: float) -> Mesh:
-    """Box around the origin; every face has corners of its own, so that edges are sharp."""
+    """Box around the origin; faces share no corners, so that edges are sharp."""
     quads = []
     for axis in range(3):
         for side in (-1.0, 1.0):
@@ -62,7 +62,7 @@ def _profiles(solid: Solid, arc: int) -> list[Array]:
 
 
 def _revolved(profiles: list[Array], around: int) -> Mesh:
-    """What profiles of radius and height (N, 2), from below upwards, sweep about z."""
+    """Surface that profiles of radius and height (N, 2), from below upwards, sweep about z."""
     angle = 2.0 * math.pi * np.arange(around) / around
     meshes = []
     for profile in profiles:

@@ -24,7 +24,7 @@ class Solid:
         size: All in metres. Capsule and cylinder: radius, and length along z between the centres of
             the capsule's ends or of the cylinder's faces. Box: x, y, z. Sphere: radius.
         pose: Its centre in the body's frame (7,): x, y, z [m], quaternion w, x, y, z.
-        role: What it is part of, for its colour.
+        role: Part of the robot to which it belongs, for its colour.
 
     Raises:
         ShapeError: A kind has another number of sizes, or the pose is not (7,).

@@ -1,9 +1,9 @@
 """URDF: bodies of a robot as the XML that RViz, Foxglove and physics engines read.
 
-Joints that move one body stand there with axis and limits; a body that follows one joint by a factor and an offset has
-a joint with ``mimic``. What the format has no joint for, legs and platforms of robots with loops and links that several
-joints move, hangs on floating joints: it is placed by ``/tf``. A capsule, which the format lacks, is a cylinder with
-two spheres. Each shape is there to see and to collide with.
+Joints that move one body appear with axis and limits. A body that follows one joint by a factor and an offset has a
+joint with ``mimic``. The format has no joints for legs and platforms of robots with loops, and for links that several
+joints move. These bodies have floating joints, and ``/tf`` gives their poses. The format has no capsules: a capsule
+becomes a cylinder with two spheres. Each shape is both visual and collision geometry.
 """
 
 import math
@@ -28,7 +28,7 @@ COLOURS: dict[Role, tuple[float, float, float]] = {
     "tool": (0.80, 0.25, 0.22),
 }
 """Red, green, blue, 0 to 1, of solids by their role."""
-_EXACT = 1e-9  # [rad, m] by which a body that follows a joint may be off
+_EXACT = 1e-9  # [rad, m], largest error of a body that counts as following a joint
 _TYPES = {Joint.FIXED: "fixed", Joint.REVOLUTE: "revolute", Joint.PRISMATIC: "prismatic"}
 
 
@@ -38,14 +38,14 @@ def urdf_of(robot: Robot, name: str = "", prefix: str = "") -> str:
     Args:
         robot: The robot.
         name: Name of the model; empty for the robot's own.
-        prefix: What stands before the names of links and joints, such as ``slave_``, so that
-            the root is ``slave_base``.
+        prefix: Prefix of the names of links and joints, such as ``slave_``, so that the root is ``slave_base``.
 
     Returns:
         The XML. Limits are those of the robot, speeds and efforts those of its drives; 0 where it has none. Inertias
-        are those of the robot's own links where its model has them, else assumed
-        (:mod:`~teleop_core.robots.bodies.inertials`); a comment at the head says which, and what has none. The base has
-        none, since readers warn of a root that has. The format has no place for the inertia of a motor.
+        are those of the robot's own links if its model has them, else assumed
+        (:mod:`~teleop_core.robots.bodies.inertials`). A comment at the top states which, and which bodies have no
+        inertia. The base has none, because readers warn if the root has an inertia. The format cannot contain the
+        inertia of a motor.
     """
     bodies = bodies_of(robot)
     inertials = inertials_of(robot, bodies)
@@ -70,7 +70,7 @@ def urdf_of(robot: Robot, name: str = "", prefix: str = "") -> str:
 
 
 def joints_of(bodies: Bodies) -> dict[int, int]:
-    """Bodies that hang on joints of the robot itself, by index, with the joint of each."""
+    """Bodies that joints of the robot itself move, by index, with the joint of each."""
     found: dict[int, int] = {}
     for index, body in enumerate(bodies.bodies):
         is_joint = body.joint in {Joint.REVOLUTE, Joint.PRISMATIC} and body.coordinate < bodies.n
@@ -83,7 +83,7 @@ def _joint(root: Xml.Element, robot: Robot, bodies: Bodies, body: Body, joint: i
     is_fixed = body.joint is Joint.FIXED
     follows = None if is_fixed or joint is not None else _follows(robot, bodies, body)
     name = f"{body.name}_joint" if joint is None else robot.joint_names[joint]
-    if follows is not None:  # after its leader in the order of names, which pinocchio reads in
+    if follows is not None:  # its name sorts after its leader's, because pinocchio reads joints in the order of names
         name = f"{robot.joint_names[follows[0]]}_{body.name}"
     is_floating = joint is None and follows is None and not is_fixed
     kind = "floating" if is_floating else _TYPES[body.joint]
@@ -116,7 +116,7 @@ def _limit(element: Xml.Element, robot: Robot, joint: int, factor: float, offset
 
 
 def _follows(robot: Robot, bodies: Bodies, body: Body) -> tuple[int, float, float] | None:
-    """Joint of the file that a body follows alone, with factor and offset; None without."""
+    """The one joint of the file that a body follows, with factor and offset; None if there is no such joint."""
     if body.joint not in _TYPES:
         return None
     draws = np.random.default_rng(0).uniform(robot.lower, robot.upper, (5, robot.n))
@@ -135,7 +135,7 @@ def _follows(robot: Robot, bodies: Bodies, body: Body) -> tuple[int, float, floa
 
 
 def _remark(robot: Robot, without: list[str]) -> str:
-    """What a reader of the file must know of its inertias."""
+    """Comment for readers of the file about its inertias."""
     if not has_own_links(robot):
         return (
             f" Inertias are assumed: bodies as drawn, of {DENSITY:g} kg/m3 throughout, for no"
@@ -186,7 +186,7 @@ def _shapes(solid: Solid) -> Iterator[tuple[Array, str, dict[str, str]]]:
 
 
 def _origin(element: Xml.Element, pose: Array) -> None:
-    """Write a pose; beside the pole roll is that of what yaw leaves, so that no digit is lost."""
+    """Write a pose; near the pole, roll is computed from the rotation that yaw leaves, so that no digit is lost."""
     R = rotations_from_quaternions(pose[3:])
     yaw = math.atan2(R[1, 0], R[0, 0])
     R = product(rotation("z", -yaw), R)

@@ -1,10 +1,9 @@
 """Dynamics of a chain of rigid bodies: Newton-Euler efforts, inertia matrix, and accelerations.
 
-All motions and forces are written about the origin of the base and in its axes, so that what the
-links need adds up without a change of frame. The parameter row holds, for n joints: the geometry of
-:mod:`teleop_core.kinematics.dh_kernels`, gravity (3,) [m/s²], for each joint the thirteen
-numbers of the body that it moves (:func:`body_row`), and the inertias (n,) of the motors at the
-joints.
+All motions and forces are written about the origin of the base and in its axes, so that the contributions of the links
+add up without a change of frame. The parameter row contains, for n joints: the geometry of
+:mod:`teleop_core.kinematics.dh_kernels`, gravity (3,) [m/s²], for each joint the thirteen numbers of the body that it
+moves (:func:`body_row`), and the inertias (n,) of the motors at the joints.
 
 Source:
     Luh, Walker and Paul 1980 (recursive Newton-Euler); Walker and Orin 1982 (composite bodies);
@@ -43,7 +42,7 @@ def chain_row(kinds: Sequence[float], fixed: Sequence[Array], bodies: Array, mot
     Args:
         kinds: For each joint 1 for a turn, 2 for a slide; negative against its axis.
         fixed: Transforms (4, 4) before, between and after the joints, one more than joints.
-        bodies: What each joint moves in the frame behind it, (n, 13), see :func:`body_row`.
+        bodies: Body that each joint moves, in the frame after the joint, (n, 13), see :func:`body_row`.
         motors: Inertia of each motor at its joint (n,) [kg·m² or kg].
 
     Returns:
@@ -88,7 +87,7 @@ def _place(q: Array, row: Array, axes: Array, bodies: Array) -> None:
 
 @inner
 def _carry(T: Array, own: Array, R: Array, body: Array) -> None:
-    """Write a body (13,) given in a frame (4, 4) about the origin of the base; R is room."""
+    """Transform a body (13,) from a frame T (4, 4) to the origin of the base; R is scratch memory."""
     mass = body[0] = own[0]
     square = along = 0.0
     for i in range(3):
@@ -109,7 +108,7 @@ def _carry(T: Array, own: Array, R: Array, body: Array) -> None:
 
 @inner
 def _momentum(body: Array, motion: Array, out: Array) -> None:
-    """Write what a body (13,) at a motion (6,) has: angular momentum, then linear (6,)."""
+    """Write the momentum (6,) of a body (13,) with a motion (6,): angular, then linear."""
     for i in range(3):
         a, b = (i + 1) % 3, (i + 2) % 3
         out[i] = body[1 + a] * motion[3 + b] - body[1 + b] * motion[3 + a]
@@ -120,7 +119,7 @@ def _momentum(body: Array, motion: Array, out: Array) -> None:
 
 @inner
 def _efforts(axes: Array, bodies: Array, dq: Array, ddq: Array, row: Array, effort: Array) -> None:
-    """Write the efforts (n,) of the bodies alone, at their places."""
+    """Write the efforts (n,) of the bodies alone, without motors."""
     n = dq.shape[0]
     at = n + 7 + 12 * (n + 1)
     motion, rise, held, felt = np.zeros(6), np.zeros(6), np.empty(6), np.empty(6)
@@ -154,7 +153,7 @@ def _efforts(axes: Array, bodies: Array, dq: Array, ddq: Array, row: Array, effo
 
 @inner
 def _inertias(axes: Array, bodies: Array, row: Array, M: Array) -> None:
-    """Write the inertia (n, n), motors included; the bodies become those of all behind them."""
+    """Write the inertia (n, n), motors included; each row of ``bodies`` becomes the sum of all later bodies."""
     n = M.shape[0]
     at, held = row.shape[0] - n, np.empty(6)
     for k in range(n - 1, -1, -1):
@@ -172,7 +171,7 @@ def _inertias(axes: Array, bodies: Array, row: Array, M: Array) -> None:
 
 @kernel
 def inverse_dynamics(q: Array, dq: Array, ddq: Array, row: Array, effort: Array) -> None:
-    """Write the efforts (n,) [N·m or N] under which the chain moves so; friction is not in them.
+    """Write the efforts (n,) [N·m or N] that cause the given motion of the chain, without friction.
 
     Args:
         q: Joint positions (n,) [rad or m].
@@ -191,9 +190,9 @@ def inverse_dynamics(q: Array, dq: Array, ddq: Array, row: Array, effort: Array)
 
 @kernel
 def tip_efforts(q: Array, wrench: Array, row: Array, effort: Array) -> None:
-    """Write the efforts (n,) [N·m or N] that a wrench from outside on the tip gives the joints.
+    """Write the joint efforts (n,) [N·m or N] that an external wrench on the tip causes.
 
-    Under it the chain moves as :func:`inverse_dynamics` says with the drives' efforts and these.
+    The sum of these and the drives' efforts is the effort of :func:`inverse_dynamics`.
 
     Args:
         q: Joint positions (n,) [rad or m].
@@ -256,12 +255,12 @@ def chain_gravity(q: Array, row: Array, effort: Array) -> None:
 def chain_acceleration(q: Array, dq: Array, effort: Array, row: Array, ddq: Array) -> None:
     """Write joint accelerations (n,) [rad/s² or m/s²] under net efforts (n,) [N·m or N].
 
-    Every joint must move some inertia, of links or of its motor; else they are not finite.
+    Every joint must move some inertia, of links or of its motor; otherwise the accelerations are not finite.
 
     Args:
         q: Joint positions (n,) [rad or m].
         dq: Joint speeds (n,) [rad/s or m/s].
-        effort: Of the drives, less friction.
+        effort: Efforts of the drives, minus friction.
         row: See :func:`chain_row`.
         ddq: Written.
     """

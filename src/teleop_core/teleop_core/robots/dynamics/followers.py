@@ -1,12 +1,12 @@
 """Followers: chains in which one joint moves several motions, each by a factor and an offset.
 
-The ``mimic`` of a URDF. With joints q (n,) and motions p (m,) of the chain, p = A q + b, where each row of A has one
-factor. Then the Jacobian of the joints is J A; by the principle of virtual work their efforts are Aᵀ times those of the
-motions, and their inertia is Aᵀ M A. A is constant, so that accelerations bring no term of their own.
+This is the ``mimic`` of a URDF. With joints q (n,) and motions p (m,) of the chain, p = A q + b, where each row of A
+has one factor. Then the Jacobian of the joints is J A; by the principle of virtual work their efforts are Aᵀ times
+those of the motions, and their inertia is Aᵀ M A. A is constant, so that there is no term with its derivative.
 
-The row of a dynamics here holds m, then leader, factor and offset of each motion (m,), and the
-inertias (n,) of the motors at the joints. Behind them stands the row of
-:mod:`~teleop_core.robots.dynamics.chain_dynamics` of the m motions, with motors of none.
+The parameter row of the dynamics contains m, then leader, factor and offset of each motion (m,), and the inertias (n,)
+of the motors at the joints. Then comes the row of :mod:`~teleop_core.robots.dynamics.chain_dynamics` of the m motions,
+with motor inertias of zero.
 
 Source:
     Featherstone 2008, section 3.2 (implicit and explicit constraints) and equation 3.21.
@@ -34,7 +34,7 @@ class Follower:
 
 @dataclass(frozen=True, kw_only=True)
 class Followers:
-    """What the motions of a chain do, and for each joint 1 if it is a turn, 2 if it is a slide."""
+    """How the motions of a chain follow its joints; and for each joint 1 if it turns, 2 if it slides."""
 
     motions: tuple[Follower, ...]
     kinds: tuple[float, ...]
@@ -58,7 +58,7 @@ class Followers:
 
     @property
     def coordinates(self) -> list[int]:
-        """Places (m,) of the motions among joints, then motions: the joint where it is one."""
+        """Indices (m,) of the motions in the list of joints, then motions; the joint's index if a motion is a joint."""
         n, same = len(self.kinds), [f == Follower(leader=f.leader) for f in self.motions]
         return [f.leader if same[i] else n + i for i, f in enumerate(self.motions)]
 
@@ -74,7 +74,7 @@ class Followers:
 
 
 def followers_of(robot: Robot) -> Followers | None:
-    """What the motions of a robot do; None of a robot whose joints are its motions."""
+    """How the motions of a robot follow its joints; None for a robot whose joints are its motions."""
     if "motions" not in robot.geometry:
         return None
     n, m, row = robot.n, int(robot.geometry["motions"]) - 1, robot.geometry_row
@@ -95,12 +95,12 @@ def dynamics_row(followers: Followers, chain: Array, motors: Array) -> Array:
 
 
 def chain_part(row: Array, followers: Followers) -> Array:
-    """Row of the motions within a row of :func:`dynamics_row`: a copy, the caller's."""
+    """Row of the motions within a row of :func:`dynamics_row`: a copy that the caller may change."""
     return row[1 + 3 * len(followers.motions) + len(followers.kinds) :].copy()
 
 
 def follower_dynamics(row: Array, joints: int) -> Dynamics:
-    """Model of so many joints over a row of :func:`dynamics_row`; all gravity is fed forward."""
+    """Model of ``joints`` joints over a row of :func:`dynamics_row`; all gravity is fed forward."""
     return Dynamics(
         acceleration=follower_acceleration,
         gravity=follower_gravity,
@@ -111,7 +111,7 @@ def follower_dynamics(row: Array, joints: int) -> Dynamics:
 
 @inner
 def _efforts(q: Array, dq: Array, row: Array, effort: Array) -> None:
-    """Write the efforts (n,) of the joints at these places and speeds, without acceleration."""
+    """Write the efforts (n,) of the joints at these positions and speeds, without acceleration."""
     n, m = q.shape[0], int(row[0])
     p, dp, still, felt = np.empty(m), np.empty(m), np.zeros(m), np.empty(m)
     dh_kernels.spread(q, row[1:], p)

@@ -1,4 +1,4 @@
-"""Rigid body: inertia matrix and bias of an arm, from nothing but its forward dynamics."""
+"""Rigid body: inertia matrix and bias of an arm, computed from its forward dynamics alone."""
 
 from typing import Any
 
@@ -9,7 +9,7 @@ from teleop_core.kernels import Array, kernel
 
 @kernel
 def invert_positive(A: Array) -> None:
-    """Put the inverse of a symmetric positive definite matrix (n, n) in its place.
+    """Invert a symmetric positive definite matrix (n, n) in place.
 
     Gauss-Jordan elimination; such matrices need no pivoting (Golub and Van Loan 2013, section 4.2).
     """
@@ -29,10 +29,10 @@ def invert_positive(A: Array) -> None:
 
 @kernel
 def write_model(acceleration: Any, model: Array, q: Array, dq: Array, out: Array) -> None:
-    """Write bias and inertia of ``D(q) ddq + bias(q, dq) = effort``, by n + 1 forward dynamics.
+    """Write bias and inertia of ``D(q) ddq + bias(q, dq) = effort``, by n + 1 calls of the forward dynamics.
 
-    A unit of effort on joint j alone accelerates by column j of the inverse inertia, on top of
-    what the arm does without effort, which is ``-D⁻¹ bias``.
+    Without effort the acceleration is ``-D⁻¹ bias``. A unit effort on joint j alone adds column j of the inverse
+    inertia.
 
     Args:
         acceleration: Kernel or pointer ``acceleration(q, dq, effort, parameters, ddq)``.

@@ -1,1 +1,1 @@
-"""Files of robots: URDF and xacro, how they look, and where the user has fetched them."""
+"""Files of robots: URDF and xacro, their meshes, and descriptions that the user has downloaded."""

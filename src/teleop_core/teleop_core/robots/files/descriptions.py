@@ -1,7 +1,7 @@
-"""Robot descriptions: files of the package ``robot_descriptions``, where the user has fetched them.
+"""Robot descriptions: files of the package ``robot_descriptions``, if the user has downloaded them.
 
-A module of that package clones a repository with git when it is imported. Here it is run with a
-look into its cache in the place of the clone, so that nothing is downloaded.
+A module of that package clones a repository with git when it is imported. Here the clone is replaced by a look into
+the package's cache, so that nothing is downloaded.
 """
 
 import os
@@ -14,14 +14,14 @@ _CACHE = "ROBOT_DESCRIPTIONS_CACHE"
 
 
 def description_file(name: str) -> tuple[Path, dict[str, str]]:
-    """File of a description, and the arguments that it gives to a xacro.
+    """File of a description, and the arguments that it passes to a xacro.
 
     Args:
-        name: Of a module of ``robot_descriptions``, such as ``ur5e_description``.
+        name: Name of a module of ``robot_descriptions``, such as ``ur5e_description``.
 
     Raises:
         UnknownNameError: There is no description of a URDF of this name.
-        ParameterError: It is not in the cache; the message has the command that fetches it.
+        ParameterError: The description is not in the cache; the message contains the command to download it.
         TeleopError: The package is not installed, or cannot be used without git.
     """
     try:

@@ -1,13 +1,13 @@
-"""Robots from URDF: the chain from the root link to a tip, with what the file says of its drives.
+"""Robots from URDF: the chain from the root link to a tip, with the file's data on its drives.
 
-What moves the tip are the joints between root and tip; all others stay at zero, and weigh. A joint between them that
-mimics another moves with it (:mod:`teleop_core.robots.dynamics.followers`). The kinematics are those of
-Denavit-Hartenberg chains (:mod:`teleop_core.kinematics.dh_kernels`), the dynamics those of rigid bodies
-(:mod:`teleop_core.robots.dynamics.chain_dynamics`). Effort and velocity limits, damping and friction are the drives'
-where they stand in the file and are above zero. The inertia of a drive is that of the links at home; that of its motor
-is in no URDF. A file of drives may state it, and what else a URDF leaves out. Whatever is left out there too is assumed
-as for tables (:mod:`teleop_core.robots.arms.dh_drives`), and ``Robot.drives.assumed`` names it. Meshes are read where
-they are drawn (:mod:`teleop_core.robots.bodies.looks`).
+The joints between root and tip move the tip. All other joints stay at zero, but their links have mass. A joint between
+root and tip that mimics another joint moves with it (:mod:`teleop_core.robots.dynamics.followers`). The kinematics are
+those of Denavit-Hartenberg chains (:mod:`teleop_core.kinematics.dh_kernels`), the dynamics those of rigid bodies
+(:mod:`teleop_core.robots.dynamics.chain_dynamics`). Effort and velocity limits, damping and friction of the file are
+used for the drives if they are above zero. The inertia of a drive is that of the links at home; a URDF never contains
+the inertia of its motor. A file of drives may state it, and other missing values. Values that are missing there too
+are assumed as for tables (:mod:`teleop_core.robots.arms.dh_drives`), and ``Robot.drives.assumed`` names them. Meshes
+are read when they are drawn (:mod:`teleop_core.robots.bodies.looks`).
 
 Source:
     The XML specification of URDF, pages joint and link.
@@ -38,10 +38,10 @@ from teleop_core.robots.robot import Robot
 
 MODELS = ("independent", "links")
 """How the arm of a file may move: see :func:`load_urdf`."""
-_ROUNDING = 1e-6  # of an inertia, over its trace: files are written with few digits
-_NO_MASS = 1e-6  # [kg, kg·m²]; simulators want some of every link
+_ROUNDING = 1e-6  # tolerance of an inertia, divided by its trace, because files have few digits
+_NO_MASS = 1e-6  # [kg, kg·m²]; simulators require some mass and inertia of every link
 _NO_INERTIA = 1e-9  # [kg·m² or kg]; below it is rounding of bodies on the axis, and unknown
-_POWERS = {"viscous": 2, "coulomb": 1}  # of a factor, by which friction of a follower counts
+_POWERS = {"viscous": 2, "coulomb": 1}  # least factor at which the friction of a follower counts
 
 
 def load_urdf(
@@ -59,14 +59,14 @@ def load_urdf(
         path: The file; one that ends in ``.xacro`` is expanded by the package ``xacro``.
         arguments: Texts for the ``<xacro:arg>`` of a xacro, by their names.
         tip: Link whose frame is the tip; empty for the only link without a child.
-        task: Directions that the arm is to control, of :data:`DIRECTIONS`, with blanks or commas
-            between them; empty for all, or of an arm that cannot move in all of them at once for
-            those of :func:`~teleop_core.robots.rank.directions_of`.
-        dynamics: Of :data:`MODELS`. independent: axes that do not act on each other, gravity balanced. links: the
-            bodies of the file, which weigh and act on each other; the controller feeds their gravity forward.
-        drives: YAML file of what the drives of the joints are, by their names, in the entries of
-            :class:`~teleop_core.robots.drives.Drives`; it stands above the URDF. Inertia is that
-            of the motor, to which that of the links is added.
+        task: Directions that the arm controls, of :data:`DIRECTIONS`, separated by blanks or commas. Empty means all;
+            for an arm that cannot move in all of them at once, those of
+            :func:`~teleop_core.robots.rank.directions_of`.
+        dynamics: One of :data:`MODELS`. independent: independent axes with balanced gravity. links: the bodies of the
+            file, with mass and dynamic coupling; the controller feeds their gravity forward.
+        drives: YAML file with the drives of the joints, by joint names, with the entries of
+            :class:`~teleop_core.robots.drives.Drives`; its values override those of the URDF. Inertia is that of the
+            motor; that of the links is added.
 
     Returns:
         The robot, its base the root link, with inverse kinematics in closed form if it is of a
@@ -121,7 +121,7 @@ def load_urdf(
     robot = make(task=controlled, solution=solution)
     coordinates = dict(zip((j.name for j in moving), followers.of(home).tolist(), strict=True))
     visuals = tuple(visuals_of(coordinates, links, by_child, Path(path)))
-    # Without its start, for which a second's search would begin here: who needs it asks for it.
+    # The start posture is not computed here, because its search takes a second; callers that need it compute it.
     notes = tuple(urdf_notes.notes_on(chain, links))
     robot = replace(robot, visuals=visuals, notes=notes, home_is_assumed=True, start=None)
     if dynamics == "independent":
@@ -138,7 +138,7 @@ def load_urdf(
 
 @dataclass(frozen=True, kw_only=True)
 class _Geared:
-    """A joint that turns or slides by ``factor`` times what its leader does, plus ``offset``."""
+    """A joint whose coordinate is ``factor`` times that of its leader, plus ``offset``."""
 
     joint: urdf_tree.UrdfJoint
     factor: float = 1.0
@@ -148,7 +148,7 @@ class _Geared:
 def _trains(
     moving: list[urdf_tree.UrdfJoint], named: Mapping[str, urdf_tree.UrdfJoint]
 ) -> tuple[list[list[_Geared]], Followers]:
-    """For each joint of the robot itself and all that follow it to the tip; and the motions."""
+    """For each joint of the robot, the joint and its followers on the path to the tip; and the motions."""
     trains: dict[str, list[_Geared]] = {}
     motions = []
     for joint in moving:
@@ -165,7 +165,7 @@ def _trains(
 def _leader(
     joint: urdf_tree.UrdfJoint, named: Mapping[str, urdf_tree.UrdfJoint]
 ) -> tuple[urdf_tree.UrdfJoint, float, float]:
-    """Joint that a joint follows in the end, itself if none, with factor and offset."""
+    """Last leader that a joint follows, or the joint itself, with factor and offset."""
     factor, offset, passed = 1.0, 0.0, [joint.name]
     while (mimic := joint.element.find("mimic")) is not None:
         where = f"mimic of joint {joint.name}"
@@ -188,7 +188,7 @@ def _leader(
 def _refuse_beside(
     leaders: list[urdf_tree.UrdfJoint], moving: list[urdf_tree.UrdfJoint], joints: list[urdf_tree.UrdfJoint]
 ) -> None:
-    """Refuse what moves with a joint of the robot, but not between root and tip: it would weigh."""
+    """Refuse joints outside the chain from root to tip that follow a joint of the robot: their links have mass."""
     named = {joint.name: joint for joint in joints}
     for joint in joints:
         if joint.axis is not None and joint not in moving and _leader(joint, named)[0] in leaders:
@@ -215,7 +215,7 @@ def _task(task: str) -> tuple[str, ...]:
 
 
 def _narrowed(train: list[_Geared]) -> dh_chain.DhJoint:
-    """Joint with the limits in which it and all that follow it are within theirs."""
+    """Joint with limits narrowed so that it and all its followers stay within their own limits."""
     leader = train[0].joint
     lower, upper = urdf_tree.limits_of(leader)
     for geared in train[1:]:
@@ -244,7 +244,7 @@ def _frames(chain: list[urdf_tree.UrdfJoint]) -> tuple[list[Array], list[float]]
 
 
 def _drives(trains: list[list[_Geared]], inertias: list[float], file: str) -> Drives:
-    """Drives of the leaders, which bear friction and keep speed limits of what follows them."""
+    """Drives of the leaders, with the friction and the speed limits of their followers."""
     kinds, stated = [urdf_tree.KINDS[train[0].joint.kind] for train in trains], {}
     names = [train[0].joint.name for train in trains]
     given = dh_drives.read_drives(Path(file).expanduser(), names, kinds) if file else [{}] * len(trains)
@@ -284,7 +284,7 @@ def _drive_entries(joint: urdf_tree.UrdfJoint) -> dict[str, float]:
         value = float(urdf_tree.numbers_of(where, element, key, (0.0,), unit)[0])
         if value < 0.0:
             raise ParameterError(f"{key} of {where}", value, ">= 0")
-        if value > 0.0:  # a limit of 0 is what files say that do not know it
+        if value > 0.0:  # files with an unknown limit contain 0
             found[entry] = value
     return found
 
@@ -296,9 +296,9 @@ def _bodies(
     joints: list[urdf_tree.UrdfJoint],
     may_be_any: bool,
 ) -> Array:
-    """What each joint moves up to the next, (n, 13), see :func:`body_row`; other joints at zero.
+    """Bodies that each joint moves, up to the next joint, (n, 13), see :func:`body_row`; other joints at zero.
 
-    Files give many an inertia that no body has. It does no harm where nothing moves it, and where ``may_be_any``.
+    Many files contain inertias that no body can have. They do no harm if no joint moves them, or if ``may_be_any``.
     """
     carried: dict[str, list[urdf_tree.UrdfJoint]] = {}
     for joint in joints:
@@ -333,7 +333,7 @@ def _mass(name: str, link: Xml.Element, may_be_any: bool) -> tuple[float, Array,
         for key in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
     )
     inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-    if 0.0 <= mass < _NO_MASS and abs(inertia).max() < _NO_MASS:  # a frame that has to weigh
+    if 0.0 <= mass < _NO_MASS and abs(inertia).max() < _NO_MASS:  # a frame to which the file gives mass
         return 0.0, np.zeros((3, 3)), np.eye(4)
     if mass < 0.0 or not (may_be_any or _is_possible(inertia)):
         needed = "that of a body; dynamics=independent takes any"
@@ -344,7 +344,8 @@ def _mass(name: str, link: Xml.Element, may_be_any: bool) -> tuple[float, Array,
 def _is_possible(inertia: Array) -> bool:
     """Whether some body has this inertia: no principal moment exceeds the sum of the others.
 
-    That is so where half the trace less the inertia has no negative eigenvalue, and so no negative principal minor.
+    This holds if half the trace times I minus the inertia has no negative eigenvalue, and so no negative principal
+    minor.
     """
     spread = 0.5 * float(np.trace(inertia))
     if spread == 0.0:

@@ -1,4 +1,4 @@
-"""Notes on a URDF: what is read of it otherwise than it may be meant."""
+"""Notes on a URDF: what may be read differently from what its author meant."""
 
 from collections.abc import Callable, Iterator, Sequence
 

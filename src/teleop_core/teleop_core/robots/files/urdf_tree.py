@@ -1,4 +1,4 @@
-"""URDF trees: links and joints as a file has them, and what is wrong with it, by element.
+"""URDF trees: links and joints of a file; errors name the wrong element.
 
 Source:
     The XML specification of URDF, pages joint and link.
@@ -17,10 +17,10 @@ from teleop_core.base.ranges import MOST_OF_ARM, RANGES, check
 from teleop_core.kernels import Array, length, product, rotation, transform
 
 KINDS = {"revolute": "turn", "continuous": "turn", "prismatic": "slide"}
-"""What each type of joint that moves does."""
+"""Motion of each movable type of joint."""
 UNITS = {"turn": "rad", "slide": "m"}
-"""Of the coordinate of such a joint."""
-_READ = ("link", "joint", "inertial")  # elements in which a macro would be missed
+"""Unit of the coordinate of such a joint."""
+_READ = ("link", "joint", "inertial")  # elements in which an unexpanded macro must be reported
 _XACRO = "{http://www.ros.org/wiki/xacro}"
 Links = Mapping[str, Xml.Element]
 ASSUMED = {"turn": 2.0 * math.pi, "slide": RANGES["m"].usual}
@@ -41,7 +41,7 @@ class UrdfJoint:
 
 
 class _NoDoctype(Xml.TreeBuilder):
-    """Tree of an XML file without a document type, so that nothing in it can grow."""
+    """Tree of an XML file without a document type, so that no entity can expand."""
 
     def doctype(self, name: str, pubid: str | None, system: str | None) -> None:
         """Refuse the declaration before anything it declares is used."""
@@ -52,12 +52,12 @@ def root_of(path: Path, data: bytes) -> Xml.Element:
     """Root of a URDF.
 
     Args:
-        path: The file, for what is told of it.
-        data: Its XML.
+        path: Path of the file, for messages.
+        data: XML of the file.
 
     Raises:
-        RecordingError: It is not XML.
-        ParameterError: It is another file, or declares a type of document.
+        RecordingError: ``data`` is not XML.
+        ParameterError: The file is not a URDF, or declares a document type.
     """
     with damage_told(path):
         root = tree_of(data)
@@ -100,8 +100,8 @@ def joint_of(name: str, element: Xml.Element, links: Links) -> UrdfJoint:
     """Joint of an element.
 
     Raises:
-        UnknownNameError: Its type does not exist, or a link that it joins.
-        ParameterError: Its axis has no length, or something is no number.
+        UnknownNameError: Its type, or one of its links, does not exist.
+        ParameterError: Its axis has length zero, or a value is not a number.
     """
     kind, axis = element.get("type", ""), None
     if kind not in (*KINDS, "fixed"):
@@ -124,7 +124,7 @@ def joint_of(name: str, element: Xml.Element, links: Links) -> UrdfJoint:
 
 
 def joints_by_child(joints: list[UrdfJoint]) -> dict[str, UrdfJoint]:
-    """The one joint that carries each link but the root."""
+    """The joint that carries each link, for all links except the root."""
     found: dict[str, UrdfJoint] = {}
     for joint in joints:
         if joint.child in found:
@@ -135,7 +135,7 @@ def joints_by_child(joints: list[UrdfJoint]) -> dict[str, UrdfJoint]:
 
 
 def root_link(links: Links, by_child: Mapping[str, UrdfJoint]) -> str:
-    """The one link that nothing carries; refuses circles and several."""
+    """The only link that no joint carries; refuses cycles and several roots."""
     for link in links:
         chain_to(link, by_child)
     roots = [name for name in links if name not in by_child]
@@ -145,7 +145,7 @@ def root_link(links: Links, by_child: Mapping[str, UrdfJoint]) -> str:
 
 
 def tip_of(tip: str, links: Links, joints: list[UrdfJoint]) -> str:
-    """Link that is the tip: the one of that name, or the only one that carries nothing."""
+    """Tip link: the link of the given name, or the only link without a child."""
     if tip:
         if tip not in links:
             raise UnknownNameError("tip", tip, links)
@@ -170,10 +170,10 @@ def chain_to(tip: str, by_child: Mapping[str, UrdfJoint]) -> list[UrdfJoint]:
 
 
 def limits_of(joint: UrdfJoint) -> tuple[float, float]:
-    """Lower and upper limit of a joint [rad, m], narrowed to the soft ones of its controller.
+    """Lower and upper limit of a joint [rad, m], narrowed to the soft limits of its controller.
 
     Raises:
-        ParameterError: It has none and is not continuous, or they cross or are not physical.
+        ParameterError: The joint has no limits and is not continuous, or its limits cross or are not physical.
     """
     most = ASSUMED[KINDS[joint.kind]]
     if is_endless(joint):
@@ -194,7 +194,7 @@ def limits_of(joint: UrdfJoint) -> tuple[float, float]:
 
 
 def is_endless(joint: UrdfJoint) -> bool:
-    """Whether a joint is continuous, or has limits that mean none to both sides."""
+    """Whether a joint is continuous, or has limits so large that they mean no limits."""
     lower, upper = ends_of(joint, "limit", "lower", "upper")
     return joint.kind == "continuous" or min(-lower, upper) > MOST_OF_ARM
 
@@ -245,11 +245,11 @@ def numbers_of(where: str, element: Xml.Element | None, key: str, default: tuple
         where: What has the attribute, for the error.
         element: The element.
         key: Name of the attribute.
-        default: As many numbers as there must be.
-        unit: Theirs, of :data:`~teleop_core.base.ranges.RANGES`, which bounds them.
+        default: Default values; their number is the required number.
+        unit: Unit of the numbers, of :data:`~teleop_core.base.ranges.RANGES`, which gives their bounds.
 
     Raises:
-        ParameterError: There are more or fewer words, one is no number, or one is not physical.
+        ParameterError: The number of words is wrong, a word is not a number, or a value is not physical.
     """
     text = None if element is None else element.get(key)
     if text is None:

@@ -1,4 +1,4 @@
-"""Visuals: what the links of an arm look like, as its file says, and where the meshes are."""
+"""Visuals: shapes of the links in an arm's file, and the paths of their meshes."""
 
 import hashlib
 import os
@@ -34,11 +34,11 @@ class Visual:
 
     Attributes:
         link: Name of the link.
-        joints: Number of joints that move between the base and it.
-        place: Its pose (4, 4) in the base, with the arm at home [m].
-        kind: What it is.
-        size: Scales along x, y and z of a mesh; of a box x, y, z, of a cylinder radius and length,
-            of a sphere its radius [m].
+        joints: Number of movable joints between the base and the link.
+        place: Pose of the shape (4, 4) in the base, with the arm at home [m].
+        kind: Kind of shape.
+        size: For a mesh, scales along x, y and z; for a box x, y, z; for a cylinder radius and length; for a sphere
+            its radius [m].
         file: Name of a mesh as the file gives it; empty for other kinds.
         urdf: The file.
     """
@@ -55,13 +55,13 @@ class Visual:
 def mesh_file(name: str, urdf: Path) -> Path:
     """File of a mesh that a URDF names; :func:`kept_mesh` comes first.
 
-    ``package://NAME/REST`` is looked for in folders called NAME beside and above that of the URDF,
-    in the packages of ``AMENT_PREFIX_PATH`` and ``ROS_PACKAGE_PATH``, and without NAME in the
-    folders above. Any other name starts from the folder of the URDF.
+    ``package://NAME/REST`` is searched in folders called NAME next to and above the URDF's folder, in the packages of
+    ``AMENT_PREFIX_PATH`` and ``ROS_PACKAGE_PATH``, and without NAME in the folders above. Any other name is relative
+    to the folder of the URDF.
 
     Raises:
-        ParameterError: It is nowhere there, is no mesh, or leads elsewhere: out of the package, or
-            out of the fourth folder above the URDF.
+        ParameterError: The file is not found, is not a mesh, or is outside the package, or outside the fourth folder
+            above the URDF.
     """
     if not name.lower().endswith(_ENDINGS):
         raise ParameterError("mesh", name, f"a file with one of the endings {', '.join(_ENDINGS)}")
@@ -75,7 +75,7 @@ def mesh_file(name: str, urdf: Path) -> Path:
 
 
 def kept_mesh(name: str, urdf: Path) -> Path:
-    """Where the copy of a URDF out of a recording has a mesh, whatever name it gives it."""
+    """Path of a mesh that belongs to the copy of a URDF in a recording, for any mesh name."""
     file = hashlib.sha256(name.encode()).hexdigest()[:16] + Path(name).suffix
     return urdf.parent / "kept_meshes" / file
 
@@ -84,11 +84,11 @@ def meshes_of(text: str, urdf: Path) -> dict[str, Path]:
     """Files of the meshes that the visuals of a URDF name, by these names.
 
     Args:
-        text: Its XML; what is none names no meshes.
-        urdf: The file, for what starts from its folder.
+        text: XML of the URDF; text that is not XML names no meshes.
+        urdf: Path of the URDF, for relative names.
 
     Returns:
-        Those that :func:`mesh_file` finds.
+        The files that :func:`mesh_file` finds.
     """
     found: dict[str, Path] = {}
     with suppress(Xml.ParseError, ParameterError):
@@ -114,7 +114,7 @@ def package_folder(name: str, urdf: Path) -> Path:
 
 
 def _candidates(name: str, folder: Path) -> Iterator[tuple[Path, Path]]:
-    """Where a mesh may be, each with the folder that it must be below."""
+    """Possible paths of a mesh, each with the folder in which it must be."""
     above = _above(folder)
     kept = kept_mesh(name, folder / "urdf")
     yield kept.parent, kept
@@ -127,7 +127,7 @@ def _candidates(name: str, folder: Path) -> Iterator[tuple[Path, Path]]:
 
 
 def _packages(name: str, folder: Path) -> Iterator[tuple[Path, Path]]:
-    """Where a package may be, each with the folder that its files must be below."""
+    """Possible folders of a package, each with the folder in which its files must be."""
     yield from ((each, each / name) for each in _above(folder))
     for variable, below in (("AMENT_PREFIX_PATH", "share"), ("ROS_PACKAGE_PATH", "")):
         for place in filter(None, os.environ.get(variable, "").split(os.pathsep)):
@@ -151,7 +151,7 @@ def visuals_of(
         urdf: The file.
 
     Raises:
-        ParameterError: A place or a size is no number.
+        ParameterError: A position or a size is not a number.
     """
     for link, element in links.items():
         T, moved = np.eye(4), 0
@@ -173,7 +173,7 @@ def visuals_of(
 
 
 def _motion(joint: UrdfJoint, value: float) -> Array:
-    """What a joint does (4, 4) at a value [rad, m] about or along its axis."""
+    """Transform (4, 4) of a joint at a value [rad, m] about or along its axis."""
     axis = np.asarray(joint.axis)
     if joint.kind == "prismatic":
         return transform(np.eye(3), value * axis)

@@ -12,9 +12,9 @@ from teleop_core.base import ParameterError, TeleopError, UnknownNameError, dama
 from teleop_core.robots.files import urdf_tree, visuals
 
 EXPANDED = ".expanded.urdf"
-"""Ending of the URDF that a recording keeps of a xacro; arguments may stand, and do nothing."""
+"""Suffix of the expanded URDF that a recording keeps of a xacro; arguments for it are allowed and ignored."""
 _DECLARED = re.compile(r"<xacro:arg\s[^>]*?name=[\"']([^\"']+)")
-_MOST_CHARACTERS = 300  # of what the package says, which may be pages long
+_MOST_CHARACTERS = 300  # characters kept of the package's message, which may be pages long
 
 
 def xml_of(path: Path, arguments: Mapping[str, str]) -> bytes:
@@ -26,7 +26,7 @@ def xml_of(path: Path, arguments: Mapping[str, str]) -> bytes:
 
     Raises:
         RecordingError: The file cannot be read.
-        ParameterError: It cannot be expanded, or is no xacro and there are arguments.
+        ParameterError: The file cannot be expanded, or arguments are given for a file that is not a xacro.
         UnknownNameError: Neither the file nor what it includes declares such an argument.
         TeleopError: The package ``xacro`` is not installed.
     """
@@ -62,14 +62,14 @@ def _expanded(path: Path, arguments: dict[str, str]) -> bytes:
 
 
 def _wrapped(error: BaseException | None) -> TeleopError | None:
-    """Error of ours, as of ``$(find NAME)``, in what the package makes of it; None without."""
+    """TeleopError, such as that of ``$(find NAME)``, that the package's exception wraps; None if there is none."""
     while error is not None and not isinstance(error, TeleopError):
         error = getattr(error, "exc", None) or error.__cause__ or error.__context__
     return error
 
 
 def _refuse_unknown(arguments: Mapping[str, str], files: list[Path]) -> None:
-    """Refuse arguments that no file declares, which the package takes without a word."""
+    """Refuse arguments that no file declares; the package accepts them silently."""
     if arguments:
         texts = [file.read_text(encoding="utf-8", errors="replace") for file in files]
         known = sorted({name for text in texts for name in _DECLARED.findall(text)})
@@ -80,9 +80,9 @@ def _refuse_unknown(arguments: Mapping[str, str], files: list[Path]) -> None:
 
 @contextmanager
 def _our_files(path: Path) -> Iterator[None]:
-    """Let ``$(find NAME)`` find what ``package://NAME`` does, and refuse types of document.
+    """Let ``$(find NAME)`` find the same as ``package://NAME``, and refuse document types.
 
-    The package has no setting for either, so its functions are replaced meanwhile.
+    The package has no setting for either, so its functions are replaced during the expansion.
     """
     import xacro
     from xacro import substitution_args

@@ -1,1 +1,1 @@
-"""Basis: what shapes are computed and drawn with."""
+"""Basis: functions to compute and draw shapes."""

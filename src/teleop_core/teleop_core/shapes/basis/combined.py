@@ -14,10 +14,10 @@ from teleop_core.shapes import SHAPES, Shape
 from teleop_core.shapes.basis.drawing import with_lifts
 
 PARTS = tuple(name for name in SHAPES.builtin if name not in {"intersection", "union"})
-"""Shapes that can be parts; their places here are their numbers in :func:`part_distance`."""
+"""Shapes that can be parts; their indices here are their numbers in :func:`part_distance`."""
 MOST = 8
 """Largest number of parts."""
-_HEAD = 6  # numbers before those of a part: its place in PARTS, how many, its side, its middle [m]
+_HEAD = 6  # numbers before those of a part: its index in PARTS, its count of numbers, its side, its middle [m]
 _SETTING = re.compile(r"(\w+)\s*=\s*(.*?)\s*(?=\s\w+\s*=|$)")
 _NOT = "not "
 
@@ -32,10 +32,10 @@ class Part(NamedTuple):
     """A part of a shape.
 
     Attributes:
-        kind: Its own shape.
-        parameters: Of that.
-        side: 1, or -1 for what is outside of it.
-        at: Its middle, from that of the whole (3,) [m].
+        kind: Shape of the part.
+        parameters: Parameters of that shape.
+        side: 1 for the shape itself, -1 for everything outside it.
+        at: Middle of the part, relative to that of the whole (3,) [m].
     """
 
     kind: Shape
@@ -49,10 +49,10 @@ def parts_of(texts: tuple[str, ...], name: str) -> list[Part]:
 
     Args:
         texts: Such as ``not cylinder radius=0.01 direction=[1.0, 0.0, 0.0] at=[0.0, 0.01, 0.0]``.
-        name: Of the parameter, for messages.
+        name: Name of the parameter, for messages.
 
     Raises:
-        ParameterError: There is none or more than :data:`MOST`, or one is no such text.
+        ParameterError: There is no part or more than :data:`MOST`, or a text does not describe a part.
         UnknownNameError: A part has no such parameter.
     """
     if not 1 <= len(texts) <= MOST:
@@ -86,7 +86,7 @@ def _value(text: str, name: str) -> str | float | tuple[float, ...]:
 
 
 class Combined(Protocol):
-    """Parameters of a shape that is made of others."""
+    """Parameters of a shape that is made of other shapes."""
 
     @property
     def parts(self) -> tuple[str, ...]:
@@ -123,19 +123,19 @@ _distance_of = kernel_from_source(
 
 @inner
 def next_part(numbers: Array, first: int) -> int:
-    """Where the numbers of the part after that at ``first`` begin; the first begins at 1."""
+    """Index at which the numbers of the part after the one at ``first`` begin; the first part begins at 1."""
     return first + _HEAD + int(numbers[first + 1])
 
 
 @inner
 def part_distance(place: Array, numbers: Array, first: int, out: Array) -> float:
-    """Write the way out of a part (3,); returns how far a place (3,) [m] is outside of it.
+    """Write the outward direction of a part (3,); return the distance [m] of a point (3,) outside it.
 
     Args:
-        place: From the middle of the whole, (3,) [m].
-        numbers: Of all parts.
-        first: Where those of this part begin.
-        out: Written, of any length.
+        place: The point, relative to the middle of the whole, (3,) [m].
+        numbers: Numbers of all parts.
+        first: Index at which the numbers of this part begin.
+        out: Written; a vector of any length.
     """
     offset, side = np.empty(3), numbers[first + 2]
     for i in range(3):
@@ -149,18 +149,18 @@ def part_distance(place: Array, numbers: Array, first: int, out: Array) -> float
 
 @inner
 def extreme_part(place: Array, numbers: Array, sign: float, out: Array) -> float:
-    """Write the way out of the part that a place is farthest outside of (sign 1), or least (-1).
+    """Write the outward direction of the part with the largest (sign 1) or smallest (-1) distance.
 
-    Where several are as far, the earliest counts.
+    Of several parts with equal distance the first counts.
 
     Args:
-        place: From the middle of the whole, (3,) [m].
-        numbers: Of all parts.
+        place: The point, relative to the middle of the whole, (3,) [m].
+        numbers: Numbers of all parts.
         sign: 1 or -1.
-        out: Written, of any length.
+        out: Written; a vector of any length.
 
     Returns:
-        How far it is outside of that part [m].
+        Distance of the point outside that part [m].
     """
     way, first, found = np.empty(3), 1, -math.inf * sign
     for _ in range(int(numbers[0])):

@@ -1,4 +1,4 @@
-"""Directions: parts of a vector along and across one, and ways to a point."""
+"""Directions: components of a vector along and across a direction, and nearest points on lines."""
 
 import math
 
@@ -6,11 +6,11 @@ from teleop_core.base import ParameterError
 from teleop_core.kernels import Array, inner
 
 NEAR = 5e-3
-"""A tip that is farther outside of a shape [m] does not get there within a tick."""
+"""A tip farther outside a shape than this [m] does not reach the shape within a tick."""
 MIDDLE = 1e-150
-"""Of ways shorter than this [m] squares underflow, so that they lead nowhere."""
+"""Vectors shorter than this [m] have no direction, because their squares underflow."""
 ON_AXIS = 1e-12
-"""So near to an axis rounding hides which way a point is off it [m]."""
+"""Within this distance of an axis [m], rounding hides the direction of a point from the axis."""
 _SHORTEST = 1e-6  # vector that counts as a direction
 Direction = tuple[float, float, float]
 
@@ -19,7 +19,7 @@ def require_direction(name: str, vector: tuple[float, ...]) -> None:
     """Make sure that a vector (3,) has a direction.
 
     Raises:
-        ParameterError: It is zero or nearly so.
+        ParameterError: The vector is zero or nearly zero.
     """
     if math.hypot(*vector) < _SHORTEST:
         raise ParameterError(name, vector, "a direction: not 0, 0, 0")
@@ -27,7 +27,7 @@ def require_direction(name: str, vector: tuple[float, ...]) -> None:
 
 @inner
 def unit(x: float, y: float, z: float) -> Direction:
-    """Vector of length 1 that looks the same way; the one given is not zero."""
+    """Unit vector in the direction of a given vector, which must not be zero."""
     size = math.sqrt(x * x + y * y + z * z)
     return x / size, y / size, z / size
 
@@ -35,14 +35,14 @@ def unit(x: float, y: float, z: float) -> Direction:
 @inner
 def length_of(vector: Array) -> float:
     """Length of a vector (3,)."""
-    # Products, for powers round otherwise in plain Python.
+    # Products, because powers are rounded differently in plain Python.
     x, y, z = vector[0], vector[1], vector[2]
     return math.sqrt(x * x + y * y + z * z)
 
 
 @inner
 def make_unit(vector: Array) -> None:
-    """Give a vector (3,) the length 1; it is not zero."""
+    """Scale a vector (3,) to length 1 in place; it must not be zero."""
     size = length_of(vector)
     for i in range(3):
         vector[i] /= size
@@ -50,7 +50,7 @@ def make_unit(vector: Array) -> None:
 
 @inner
 def scale_to(vector: Array, wanted: float) -> None:
-    """Give a vector (3,) another length; a negative one turns it round. It is not zero."""
+    """Scale a vector (3,) to another length in place; a negative length reverses it. It must not be zero."""
     share = wanted / length_of(vector)
     for i in range(3):
         vector[i] *= share
@@ -58,14 +58,14 @@ def scale_to(vector: Array, wanted: float) -> None:
 
 @inner
 def part_along(vector: Array, direction: Direction) -> float:
-    """Part of a vector (3,) along a direction of length 1."""
+    """Component of a vector (3,) along a unit vector."""
     x, y, z = direction
     return vector[0] * x + vector[1] * y + vector[2] * z
 
 
 @inner
 def take_along(vector: Array, along: float, direction: Direction) -> float:
-    """Take a part along a direction off a vector (3,); returns the length of what is left."""
+    """Subtract ``along`` times a unit direction from a vector (3,); return the remaining length."""
     square = 0.0
     for i in range(3):
         vector[i] -= along * direction[i]
@@ -75,7 +75,7 @@ def take_along(vector: Array, along: float, direction: Direction) -> float:
 
 @inner
 def look_across(direction: Direction, vector: Array) -> float:
-    """Write a vector (3,) at right angles to a direction of length 1; returns its length."""
+    """Write a vector (3,) perpendicular to a unit direction; return its length."""
     least, square = 0, 0.0
     for i in range(3):
         least = i if abs(direction[i]) < abs(direction[least]) else least
@@ -87,19 +87,19 @@ def look_across(direction: Direction, vector: Array) -> float:
 
 @inner
 def between_ends(along: float, whole: float) -> float:
-    """Nearest place to a place, both from the middle, on a line of a length."""
+    """Point nearest to ``along`` on a line of length ``whole``; both are measured from its middle."""
     half = 0.5 * whole
     return min(max(along, -half), half)
 
 
 @inner
 def nearest_share(offset: Array, start: Array, end: Array) -> float:
-    """Nearest place on a segment, as a share of it from its start, 0 to 1; 0 if it has no length.
+    """Point of a segment nearest to a given point, as a share of the segment, 0 to 1; 0 without length.
 
     Args:
-        offset: The point (3,).
-        start: Of the segment (3,).
-        end: Of the segment (3,).
+        offset: The given point (3,).
+        start: Start of the segment (3,).
+        end: End of the segment (3,).
     """
     along = square = 0.0
     for i in range(3):

@@ -1,7 +1,7 @@
-"""Distance grid: how far places are from a mesh or heights, made once and kept for the user.
+"""Distance grid: distances of points from a mesh or height field, computed once and cached for the user.
 
-What is kept is found by the digest of the file and of all that the grid depends on, so a grid
-serves every session, and a file that changes gets one of its own.
+The key of the cache is the digest of the file and of everything else that the grid depends on. So a grid serves every
+session, and a changed file gets a new grid.
 """
 
 import hashlib
@@ -31,10 +31,10 @@ from teleop_core.shapes.basis.triangles import (
 )
 
 HEADER = 7
-"""Numbers before the spline's: nodes along x, y and z, step [m], place of the first node [m]."""
+"""Numbers before the spline's: nodes along x, y and z, step [m], position of the first node [m]."""
 EDGE = 2
-"""Nodes at each end of the grid where the spline is not read: it is straight there."""
-_MADE = "1"  # changes with what is made of a file
+"""Nodes at each end of the grid where the spline is not used, because it is straight there."""
+_MADE = "1"  # must change when a file is converted differently
 _MOST = 4_000_000  # nodes of a grid, 32 MB
 _SIDES = (1e-3, 2.0)  # of a mesh's longest side [m]
 _THINNEST = 4.0  # steps across the shortest side of a mesh
@@ -46,9 +46,9 @@ class GridRequest(NamedTuple):
 
     Attributes:
         file: Path of the mesh or the heights.
-        scale: Length of a mesh's unit; between heights of a field [m].
-        angles: Of a mesh [rad]; empty for a field of heights.
-        step: Between nodes of the grid [m].
+        scale: Length of a mesh's unit, or distance between heights of a field [m].
+        angles: Rotation angles of a mesh [rad]; empty for a field of heights.
+        step: Distance between nodes of the grid [m].
         kind: Name of the shape.
     """
 
@@ -59,14 +59,14 @@ class GridRequest(NamedTuple):
     kind: str = "mesh"
 
     def error(self, name: str, value: object, text: str) -> ParameterError:
-        """What is said of the file, ``scale`` or ``step``, by the parameter of the shape."""
+        """Error about the file, ``scale`` or ``step``, with the name of the shape's parameter."""
         is_spacing = name == "scale" and self.kind != "mesh"
         full = f"{self.kind}.{'spacing' if is_spacing else name}"
         return ParameterError(full, value, text)
 
 
 class DistanceGrid(NamedTuple):
-    """Distances from a mesh, and how it is drawn.
+    """Distances from a mesh, and its outline.
 
     Attributes:
         numbers: Header, then the coefficients of the cubic spline through the distances [m], along z fastest.
@@ -81,9 +81,8 @@ def distance_grid(request: GridRequest) -> DistanceGrid:
     """Grid of a mesh, from the user's cache if it is there; making it takes seconds.
 
     Raises:
-        ParameterError: There is no such file, it is no closed mesh with a volume or no field of
-            heights, or it does not fit the scale or the step; see :func:`read_triangles` and
-            :func:`read_heights`.
+        ParameterError: There is no such file, it is neither a closed mesh with a volume nor a field of heights, or it
+            does not fit the scale or the step; see :func:`read_triangles` and :func:`read_heights`.
     """
     path = Path(request.file).expanduser()
     try:
@@ -111,19 +110,19 @@ def _found(digest: str, request: GridRequest) -> DistanceGrid:
 
 
 def _loaded(kept: Path) -> DistanceGrid | None:
-    """What a file of the cache holds; None if it is not there, or not whole."""
+    """Content of a file of the cache; None if the file is missing or incomplete."""
     try:
         with np.load(io.BytesIO(kept.read_bytes())) as file:
             grid = DistanceGrid(file["numbers"], file["outline"])
         os.utime(kept)  # it was used, see teleop_core.kernels.store.prune
-    except Exception:  # whatever a damaged archive makes of itself
+    except Exception:  # a damaged archive may raise anything
         return None
     is_whole = len(grid.numbers) == HEADER + grid.numbers[:3].prod()
     return grid if is_whole else None
 
 
 def _keep(kept: Path, grid: DistanceGrid) -> None:
-    """Write a grid to the cache, if the user has one; a reader sees all of it or nothing."""
+    """Write a grid to the cache, if the user has one; readers never see an incomplete file."""
     with suppress(OSError):
         kept.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.NamedTemporaryFile(dir=kept.parent, delete=False) as file:
@@ -132,7 +131,7 @@ def _keep(kept: Path, grid: DistanceGrid) -> None:
 
 
 def _make(request: GridRequest) -> DistanceGrid:
-    """Read a file and make its grid, and tell how far that is."""
+    """Read a file, make its grid, and report the progress."""
     path, step = Path(request.file).expanduser(), request.step
     with told(f"making the distance grid of {path.name}") as tell:
         triangles = _read(request, path)
@@ -168,7 +167,7 @@ def _check_size(request: GridRequest, size: Array) -> None:
     """Make sure that a mesh of a size (3,) [m] fits its scale and its step.
 
     Raises:
-        ParameterError: It is too small, too large or too thin, or its grid would be too large.
+        ParameterError: The mesh is too small, too large or too thin, or its grid would be too large.
     """
     longest = float(size.max())
     if not _SIDES[0] <= longest <= _SIDES[1]:
@@ -195,7 +194,7 @@ def _outline(triangles: Triangles) -> Array:
 
     points, faces = triangles
     edges = np.sort(edges_of(faces), axis=1)
-    order = np.lexsort(edges.T)  # brings together both of each edge
+    order = np.lexsort(edges.T)  # puts both occurrences of each edge next to each other
     normals = np.tile(unit_normals(triangles), (3, 1))[order]
     is_sharp = dot(normals[::2], normals[1::2]) < _SHARP
     lines = [points[edges[order][::2][is_sharp]]]

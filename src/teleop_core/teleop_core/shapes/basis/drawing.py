@@ -1,4 +1,4 @@
-"""Drawing: lines of which outlines of shapes are made."""
+"""Drawing: lines for outlines of shapes."""
 
 import math
 
@@ -7,7 +7,7 @@ import numpy as np
 from teleop_core.kernels import Array, length
 
 DRAWN = 0.1
-"""Length that is drawn of what has no end [m]."""
+"""Length that is drawn of an infinite shape [m]."""
 _LIFT = np.full((1, 3), np.nan)
 # One line along all edges of a unit cube, corner by corner.
 _CORNERS = np.array(
@@ -31,7 +31,7 @@ def great_circles(radius: float) -> Array:
 
 
 def unit_vector(vector: tuple[float, ...]) -> Array:
-    """Vector (3,) of length 1 that looks the same way."""
+    """Unit vector (3,) in the same direction."""
     out: Array = np.array(vector) / length(vector)
     return out
 

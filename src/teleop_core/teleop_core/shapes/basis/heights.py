@@ -18,7 +18,7 @@ from teleop_core.shapes.basis import spline, triangles
 FIELD = "height_field"
 THICKNESS = 0.02
 """Of the block below the lowest height [m]."""
-_LEAST = 4  # heights along x and along y
+_LEAST = 4  # least number of heights along x and along y
 _MOST = 400_000  # places of the surface
 
 
@@ -26,13 +26,13 @@ def read_heights(path: Path, data: bytes, spacing: float, step: float) -> triang
     """Read a table of heights and close it to a block, whose middle is at height 0.
 
     Args:
-        path: Its name, for what is said, and for the format: ``.npy``, or else CSV.
-        data: What the file holds: heights [m], a row for each x, a column for each y.
-        spacing: Between heights [m].
-        step: Of the distance grid [m].
+        path: Path of the file, for messages and for the format: ``.npy``, or else CSV.
+        data: Content of the file: heights [m], a row for each x, a column for each y.
+        spacing: Distance between heights [m].
+        step: Step of the distance grid [m].
 
     Raises:
-        ParameterError: It is no table of finite heights, or too large for the step.
+        ParameterError: The file is not a table of finite heights, or the table is too large for the step.
     """
     heights = _table(path, data)
     parts = math.ceil(2.0 * spacing / step)
@@ -54,7 +54,7 @@ def _table(path: Path, data: bytes) -> Array:
     """Heights (N, M) [m] of a file.
 
     Raises:
-        ParameterError: There are none.
+        ParameterError: The file contains no heights.
     """
     try:
         if path.suffix.lower() == ".npy":
@@ -62,7 +62,7 @@ def _table(path: Path, data: bytes) -> Array:
         else:
             table = np.loadtxt(io.StringIO(data.decode()), delimiter=",", ndmin=2)
         heights = np.array(table, np.float64)
-    except Exception as error:  # of a foreign reader, of a file that anybody wrote
+    except Exception as error:  # a third-party reader may raise anything for an arbitrary file
         reason = str(error).partition("\n")[0]
         text = f"a table of heights [m], CSV or .npy ({type(error).__name__}: {reason})"
         raise ParameterError(f"{FIELD}.file", str(path), text) from error

@@ -9,7 +9,7 @@ from teleop_core.kernels import Array, inner, kernel
 def write_spline(lines: Array) -> None:
     """Write the coefficients of cubic B-splines through values (N, n, M) along the second axis.
 
-    They go on straight beyond their ends. Through nodes with the coefficients c a spline has the
+    The splines are straight beyond their ends. Through nodes with the coefficients c a spline has the
     values (c[i - 1] + 4 c[i] + c[i + 1]) / 6, a tridiagonal system.
     """
     last = lines.shape[1] - 1
@@ -26,7 +26,7 @@ def write_spline(lines: Array) -> None:
 
 @inner
 def weights(t: float) -> tuple[float, float, float, float]:
-    """Weights of the four nodes around a place, a share t of a step behind the second."""
+    """Weights of the four nodes around a point that is a share t of a step after the second node."""
     u = 1.0 - t
     return (
         u * u * u / 6.0,
@@ -38,18 +38,18 @@ def weights(t: float) -> tuple[float, float, float, float]:
 
 @inner
 def slopes(t: float) -> tuple[float, float, float, float]:
-    """Derivatives of the weights over t."""
+    """Derivatives of the weights with respect to t."""
     u = 1.0 - t
     return (-0.5 * u * u, t * (1.5 * t - 2.0), u * (2.0 - 1.5 * u), 0.5 * t * t)
 
 
 @kernel
 def write_between(coefficients: Array, between: Array) -> None:
-    """Write the values of splines at even places from their first to their last node.
+    """Write the values of splines at evenly spaced points from their first to their last node.
 
     Args:
-        coefficients: Of splines along the second axis (N, n, M), as :func:`write_spline` gives.
-        between: Written (N, k (n - 1) + 1, M), k places a step.
+        coefficients: Coefficients of splines along the second axis (N, n, M), from :func:`write_spline`.
+        between: Written (N, k (n - 1) + 1, M), k points per step.
     """
     steps = coefficients.shape[1] - 1
     parts = (between.shape[1] - 1) // steps

@@ -1,4 +1,4 @@
-"""Triangles: the closed surface of a mesh from a file, and the distance of places from it."""
+"""Triangles: the closed surface of a mesh from a file, and the distance of points from it."""
 
 import io
 import math
@@ -31,16 +31,16 @@ class Triangles(NamedTuple):
 def read_triangles(path: Path, data: bytes, placed: Array) -> Triangles:
     """Read a mesh and make sure that it encloses a volume.
 
-    A mesh that is inside out is turned.
+    The triangles of a mesh that is inside out are reversed.
 
     Args:
-        path: Its name, for what is said, and for the format.
-        data: What the file holds.
-        placed: From the file's axes to those of the shape (3, 3), scale included [m].
+        path: Path of the file, for messages and for the format.
+        data: Content of the file.
+        placed: Matrix (3, 3) from the file's axes to those of the shape, scale included [m].
 
     Raises:
-        ParameterError: It is no mesh, has a hole or no volume; a hole is told by the middle of an
-            edge along it, in the units of the file.
+        ParameterError: The file is not a mesh, or the mesh has a hole or no volume. For a hole, the message contains
+            the middle of an edge along it, in the units of the file.
         TeleopError: The library that reads it is not installed.
     """
     name = "mesh.file"
@@ -49,12 +49,12 @@ def read_triangles(path: Path, data: bytes, placed: Array) -> Triangles:
     except ImportError as error:
         raise TeleopError("a mesh needs trimesh: pip install 'teleop_core[mesh]'") from error
     try:
-        with np.errstate(all="ignore"):  # of numbers that are refused below
+        with np.errstate(all="ignore"):  # warnings about numbers that are refused below
             mesh = trimesh.load_mesh(io.BytesIO(data), file_type=path.suffix.lower().lstrip("."))
             mesh.merge_vertices(merge_tex=True, merge_norm=True)
         points, faces = np.array(mesh.vertices, np.float64), np.array(mesh.faces, np.int64)
         faces = faces.reshape(-1, 3)  # without triangles it has no second axis
-    except Exception as error:  # of a foreign reader, of a file that anybody wrote
+    except Exception as error:  # a third-party reader may raise anything for an arbitrary file
         text = f"a mesh that can be read, such as STL or OBJ ({type(error).__name__}: {error})"
         raise ParameterError(name, str(path), text) from error
     faces = faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)]
@@ -71,10 +71,10 @@ def read_triangles(path: Path, data: bytes, placed: Array) -> Triangles:
 
 
 def _check_closed(name: str, path: Path, points: Array, faces: NDArray[np.int64]) -> None:
-    """Make sure that every edge is run through once in each direction.
+    """Make sure that every edge is used once in each direction.
 
     Raises:
-        ParameterError: One is not; says where.
+        ParameterError: An edge is not; the message contains its position.
     """
     edges = edges_of(faces)
     forth = np.sort(edges[:, 0] * len(points) + edges[:, 1])
@@ -111,10 +111,10 @@ def unit_normals(triangles: Triangles) -> Array:
 
 
 def _pseudonormals(triangles: Triangles) -> Array:
-    """Normals (F, 7, 3) that tell the side: of a triangle, its corners, its edges 01, 12, 20.
+    """Normals (F, 7, 3) that determine the side of a point: of a triangle, its corners, its edges 01, 12, 20.
 
     Source:
-        Baerentzen and Aanaes 2005: that of a corner is the sum over its triangles by their angles.
+        Baerentzen and Aanaes 2005: the normal of a corner is the sum over its triangles, weighted by their angles.
     """
     points, faces = triangles
     normals = unit_normals(triangles)
@@ -140,9 +140,9 @@ class Tree(NamedTuple):
     Attributes:
         boxes: Lower and upper corner of each node's box (2 L, 2, 3) [m]; the first is not used.
         begin: First triangle of each of the L leaves, and the number of triangles (L + 1,).
-        corners: Of the triangles (F, 3, 3) [m].
-        normals: As :func:`_pseudonormals` (F, 7, 3).
-        stack: Room for nodes.
+        corners: Corners of the triangles (F, 3, 3) [m].
+        normals: Normals from :func:`_pseudonormals` (F, 7, 3).
+        stack: Scratch memory for nodes.
     """
 
     boxes: Array
@@ -153,7 +153,7 @@ class Tree(NamedTuple):
 
 
 def tree_of(triangles: Triangles) -> Tree:
-    """Sort the triangles of a mesh into a tree; those without area are left to their neighbours."""
+    """Sort the triangles of a mesh into a tree; triangles without area are left out, their neighbours cover them."""
     has_area = unit_normals(triangles).any(axis=1)
     corners = triangles.points[triangles.faces][has_area]
     parts: list[Any] = [np.arange(len(corners))]
@@ -181,7 +181,7 @@ def _halves(part: Any, centers: Array) -> tuple[Any, Any]:
 
 @inner
 def _to_box(box: Array, x: float, y: float, z: float) -> float:
-    """Square of the distance [m²] from a box (2, 3)."""
+    """Squared distance [m²] of a point from a box (2, 3)."""
     dx = max(box[0, 0] - x, 0.0, x - box[1, 0])
     dy = max(box[0, 1] - y, 0.0, y - box[1, 1])
     dz = max(box[0, 2] - z, 0.0, z - box[1, 2])
@@ -190,7 +190,7 @@ def _to_box(box: Array, x: float, y: float, z: float) -> float:
 
 @inner
 def _share(over: float, of: float) -> float:
-    """Part of an edge at which it is nearest."""
+    """Share of an edge at which the edge is nearest."""
     return over / of if of > 0.0 else 0.0
 
 
@@ -198,10 +198,11 @@ def _share(over: float, of: float) -> float:
 def _nearest_on(  # noqa: PLR0911 - seven regions
     t: Array, x: float, y: float, z: float
 ) -> tuple[int, float, float]:
-    """Nearest place of a triangle (3, 3).
+    """Point of a triangle (3, 3) that is nearest to x, y, z.
 
     Returns:
-        What it lies on, as the rows of :func:`_pseudonormals`; shares of the edges from corner 0 to 1 and from 0 to 2.
+        The feature on which the point lies, as an index into the rows of :func:`_pseudonormals`; and the shares of the
+        edges from corner 0 to 1 and from 0 to 2.
 
     Source:
         Ericson 2005, Real-Time Collision Detection, section 5.1.5: regions of corners and edges.
@@ -232,7 +233,7 @@ def _nearest_on(  # noqa: PLR0911 - seven regions
 
 @inner
 def _signed(tree: Tree, x: float, y: float, z: float, most: float) -> float:
-    """Distance [m] of a place that is at most ``most`` [m] from a mesh; negative inside."""
+    """Signed distance [m] of a point that is at most ``most`` [m] from a mesh; negative inside."""
     least, side = most * most, 1.0
     leaves, stack = tree.begin.shape[0] - 1, tree.stack
     stack[0], waiting = 1, 1
@@ -263,12 +264,12 @@ def _signed(tree: Tree, x: float, y: float, z: float, most: float) -> float:
 
 @kernel
 def write_distances(tree: Tree, first: Array, step: float, distances: Array) -> None:
-    """Write the signed distances (N, M) [m] of places that are ``step`` [m] apart along y and z.
+    """Write the signed distances (N, M) [m] of points that are ``step`` [m] apart along y and z.
 
     Args:
-        tree: Of the mesh.
-        first: The place of ``distances[0, 0]`` (3,) [m].
-        step: Between places [m].
+        tree: Tree of the mesh.
+        first: Point of ``distances[0, 0]`` (3,) [m].
+        step: Distance between points [m].
         distances: Written.
     """
     for j in range(distances.shape[0]):
@@ -276,4 +277,4 @@ def write_distances(tree: Tree, first: Array, step: float, distances: Array) -> 
         for k in range(distances.shape[1]):
             found = _signed(tree, first[0], first[1] + j * step, first[2] + k * step, most)
             distances[j, k] = found
-            most = abs(found) + 1.001 * step  # nothing gets farther than one goes
+            most = abs(found) + 1.001 * step  # from one point to the next the distance grows by at most the step

@@ -1,7 +1,7 @@
-"""Bridges: the message by which a real arm's controller takes commands, one file per kind.
+"""Bridges: the ROS messages that controllers of real arms take as commands, one file per kind of controller.
 
-A kind fills one ROS message from the joints that the arm is to hold, in the arm's own names, order and signs. Names,
-checks, the start and every hold are the same for all (:mod:`teleop_core.slave.bridges.arm_bridge`).
+Each kind fills one ROS message from the commanded joints, in the arm's own names, order and signs. All kinds share the
+mapping of names, the checks, the start and the holds (:mod:`teleop_core.slave.bridges.arm_bridge`).
 """
 
 from collections.abc import Callable
@@ -16,12 +16,12 @@ __all__ = ["BRIDGES", "Bridge", "Command", "register_bridge", "write_time"]
 
 @dataclass(frozen=True, eq=False)
 class Command:
-    """What the arm is to do, as its controller counts.
+    """One command to a real arm, in the signs and offsets of its controller.
 
     Attributes:
         names: The arm's joints, in the order of the command.
-        position: Where they are to be, shape (n,) [rad or m].
-        velocity: How fast they go there, shape (n,) [rad/s or m/s].
+        position: Commanded joint positions, shape (n,) [rad or m].
+        velocity: Velocities of this motion, shape (n,) [rad/s or m/s].
         period: Time until the next command [s].
         stamp_ns: Time [ns].
     """
@@ -38,14 +38,14 @@ class Bridge:
     """A kind of controller.
 
     Attributes:
-        name: What ``--set arm_bridge.kind=`` calls it.
+        name: Its name in ``--set arm_bridge.kind=``.
         parameters: Its parameter group.
         message: ROS type of its commands, such as ``std_msgs/msg/Float64MultiArray``.
-        command_topic: Where it takes them, if nothing else is said.
-        state_topic: Where the arm says in a JointState where it is, if nothing else is said.
-        write: ``write(message, command, parameters, make)`` fills an empty message with a
-            :class:`Command`. ``make("trajectory_msgs/msg/JointTrajectoryPoint")`` makes an empty
-            message of that type, for those that hold others.
+        command_topic: Default topic of the commands.
+        state_topic: Default topic of the arm's measured joints, a JointState.
+        write: ``write(message, command, parameters, make)`` fills an empty message with a :class:`Command`.
+            ``make("trajectory_msgs/msg/JointTrajectoryPoint")`` makes an empty message of that type, for messages that
+            contain other messages.
     """
 
     name: str
@@ -67,7 +67,7 @@ BRIDGES: Registry[Bridge] = Registry(
     places("teleop_core.slave.bridges", "joint_state forward_command joint_trajectory crtk"),
     part_check("bridge", Bridge, "write"),
 )
-"""All kinds by name."""
+"""All kinds of bridge by name."""
 
 register_bridge = BRIDGES.register
-"""Adds one of yours under its own name; see :meth:`Registry.register`."""
+"""Adds your bridge under its own name; see :meth:`Registry.register`."""

@@ -1,7 +1,7 @@
 """Arm bridge: the stage that stands between the arm's server and the controller of a real arm.
 
-It reads what ``slave_sim`` reads, and writes where the arm is, in its place. It does not pass on samples that cannot
-be true; the server holds then, and reports ``feedback``.
+It replaces ``slave_sim``: it reads the same setpoints and writes the measured joints of the real arm. It does not pass
+on samples that cannot be true. The server then holds the arm and reports ``feedback``.
 """
 
 from dataclasses import dataclass
@@ -20,7 +20,7 @@ from teleop_core.slave.bridges.names import JointMap
 from teleop_core.slave.operation.states import State
 
 RATES = (100, 125, 200, 250, 500, 1000)
-"""Commands a second that whole milliseconds allow."""
+"""Command rates [Hz] whose period is a whole number of milliseconds."""
 _STATE, _BRAKED = topics.OPERATION.index("state"), topics.OPERATION.index("is_braked")
 
 
@@ -80,7 +80,7 @@ class BridgeParameters:
     )
 
     def __post_init__(self) -> None:
-        """Refuse a rate that is no whole number of milliseconds."""
+        """Refuse a rate whose period is not a whole number of milliseconds."""
         if self.rate not in RATES:
             raise ParameterError("rate", self.rate, f"one of {', '.join(map(str, RATES))}")
 
@@ -113,15 +113,15 @@ class ArmBridgeParameters(RobotParameters, BridgeParameters):
 
 
 class ControllerBridge(RunningStage):
-    """Base of stages that lead a real controller, and say where its joints are.
+    """Base of stages that command a real controller and publish its measured joints.
 
-    Its node calls it: ``hear`` for each message of the controller, ``command`` when one is due.
+    Its node calls ``hear`` for each message of the controller, and ``command`` when a command is due.
 
     Args:
-        stage: What it is: reads setpoints first, and writes what is measured.
+        stage: Description of the stage: setpoints are its first input, measured joints its output.
         parameters: Of the bridge.
-        joints: Which joint is which.
-        lead: What goes to the controller.
+        joints: Map between the robot's joints and those of the controller.
+        lead: Computes the commands to the controller.
         speed_limit: Rated speeds (n,) [rad/s or m/s].
         dt: Length of a tick [s].
     """
@@ -139,10 +139,10 @@ class ControllerBridge(RunningStage):
         self._due_ns, self._left_ns = 0, 0
 
     def hear(self, sample: Sample, now_ns: int) -> bool:
-        """Take what the arm says at ``now_ns`` [ns]; whether ``slave/measured_js`` is new.
+        """Take a sample of the arm that came at ``now_ns`` [ns]; return whether ``slave/measured_js`` is new.
 
-        Nothing is after a jump, or where the server went on without the arm, until the server has
-        left ENABLED: the arm begins anew then.
+        After a jump, or when the server went on without the arm, ``slave/measured_js`` is not updated until the server
+        has left ENABLED. Then the arm begins anew.
         """
         hearing, row = self.hearing, self.signals
         if row["slave_operation"][_STATE] != State.ENABLED:
@@ -157,11 +157,11 @@ class ControllerBridge(RunningStage):
         return True
 
     def _is_left(self, now_ns: int) -> bool:
-        """Whether the server has gone on without the arm for longer than setpoints may fail."""
+        """Whether the server has gone on without the arm for longer than setpoints may be missing."""
         return 0 < self._left_ns < now_ns - round(1e9 * self.parameters.setpoint_timeout)
 
     def is_due(self, now_ns: int) -> bool:
-        """Whether a command is due in the tick of a time [ns]; times missed are left out."""
+        """Whether a command is due in the tick at time ``now_ns`` [ns]; missed commands are not made up for."""
         if now_ns < self._due_ns:
             return False
         late = now_ns - self._due_ns
@@ -169,12 +169,12 @@ class ControllerBridge(RunningStage):
         return True
 
     def command(self, now_ns: int, setpoint_age: float, is_led: bool) -> Command | None:
-        """What the arm is to do now; None if it is to be commanded nothing.
+        """Return the command to send now; None if no command is to be sent.
 
         Args:
             now_ns: Time [ns].
             setpoint_age: Time since the last setpoint came [s]; infinite before the first.
-            is_led: Whether the server has said how it is, in ``slave/operation``.
+            is_led: Whether the server has published its state in ``slave/operation``.
         """
         elapsed, self._sent_ns = 1e-9 * (now_ns - self._sent_ns), now_ns
         is_late = elapsed > self.parameters.setpoint_timeout
@@ -209,7 +209,7 @@ class ControllerBridge(RunningStage):
         return bool(self.signals["slave_operation"][_BRAKED] > 0.0)
 
     def _leads(self, setpoint: Array, now_ns: int, elapsed: float) -> bool:
-        """Go towards the setpoint; where the server went on without the arm, once it is at rest."""
+        """Go towards the setpoint. If the server went on without the arm, wait until the setpoint is at rest."""
         lead = self.lead_arm
         go = lead.rejoin if self._is_left(now_ns) else lead.step
         goes = go(setpoint, self.hearing.position, self.joints.ours, elapsed)
@@ -217,7 +217,7 @@ class ControllerBridge(RunningStage):
         return goes
 
     def trouble(self) -> str:
-        """Why the arm holds, or what it says that is not believed, in one line; empty if well."""
+        """Why the arm holds, or why its samples are rejected, in one line; empty without a problem."""
         if self.hearing.wrong:
             return f"the arm's state is not believed: {self.hearing.wrong}: holds"
         return self.lead_arm.waits
@@ -228,7 +228,7 @@ class ControllerBridge(RunningStage):
 
 
 class ArmBridge(ControllerBridge):
-    """Stage that leads a real arm's controller, and says where the arm is.
+    """Stage that commands a real arm's controller and publishes the arm's measured joints.
 
     Raises:
         TeleopError: The robot has no drives, or the joints do not fit.
@@ -245,7 +245,7 @@ class ArmBridge(ControllerBridge):
 
 
 def _nothing(row: object, dt: float) -> None:
-    """Stand in for a kernel: the node calls the stage."""
+    """Do nothing: placeholder for a kernel, because the node calls the stage directly."""
 
 
 ARM_BRIDGE = Stage(

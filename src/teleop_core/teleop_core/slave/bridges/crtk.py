@@ -1,6 +1,6 @@
 """CRTK arms, such as those of the dVRK: ``servo_jp`` out, ``measured_js`` in.
 
-The arm's own states are not led: power and home it in its own console first.
+The bridge does not change the arm's operating state: power and home the arm in its own console first.
 """
 
 from collections.abc import Callable

@@ -1,4 +1,4 @@
-"""Hearing: samples of an arm's joints, and whether they can be true."""
+"""Hearing: checks whether samples of an arm's joints can be true."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -11,13 +11,13 @@ from teleop_core.kernels.geometry import Array
 from teleop_core.slave.bridges.names import JointMap
 
 _OVERSPEED = 2.0
-"""A sound arm is at most so many times faster than rated; assumed, beyond the server's 1.5."""
+"""Largest plausible joint speed, in rated speeds; assumed, larger than the server's 1.5."""
 _LAG = 0.02
-"""Time constant of a speed that the arm does not tell and is differentiated [s], assumed."""
+"""Time constant [s], assumed, of speeds differentiated from positions, for arms that send no speeds."""
 
 
 class Wrong(Enum):
-    """Why a sample is not believed."""
+    """Reason why a sample is rejected."""
 
     NAMES = "names"
     FORM = "form"
@@ -30,8 +30,8 @@ class Sample:
     """One message of an arm, in its own names and order.
 
     Attributes:
-        names: Joints.
-        position: Of each [rad or m].
+        names: Joint names.
+        position: Position of each joint [rad or m].
         velocity: Of each [rad/s or m/s], or empty; NaN where it is not known.
         effort: Of each [N·m or N], or empty; NaN where it is not known.
         stamp_ns: When it was sampled [ns].
@@ -45,26 +45,26 @@ class Sample:
 
 
 class Hearing:
-    """The newest sound sample of an arm, in our names, order and signs.
+    """The newest valid sample of an arm, in our names, order and signs.
 
-    A jump is remembered: nothing is believed after it until :meth:`begin_anew`.
+    After a jump all samples are rejected until :meth:`begin_anew`.
 
     Args:
-        joints: Which joint is which.
+        joints: Map between our joints and those of the arm.
         speed_limit: Rated speeds (n,) [rad/s or m/s].
-        tolerance: What a joint may be farther than its speed reaches [rad or m].
+        tolerance: Allowed change of a position beyond what the joint's speed explains [rad or m].
         oldest: Largest difference between a stamp and our clock [s]; 0: stamps only have to rise.
 
     Attributes:
         position: Where the arm is, shape (n,) [rad or m].
         velocity: Shape (n,) [rad/s or m/s].
         effort: Shape (n,) [N·m or N].
-        stamp_ns: Of the newest sound sample [ns]; 0 before the first.
-        heard_ns: When it came [ns]; 0 before the first.
-        wrong: What is wrong with the newest sample, in words; empty if it is sound.
-        strange: Names in a message without any of our joints, as a gripper's, since the newest sound sample.
+        stamp_ns: Stamp of the newest valid sample [ns]; 0 before the first.
+        heard_ns: Arrival time of that sample [ns]; 0 before the first.
+        wrong: What is wrong with the newest sample, in words; empty if it is valid.
+        strange: Names in a message that has none of our joints, such as a gripper's, since the newest valid sample.
         has_jumped: Whether a joint jumped.
-        refused: Number of samples that were not believed, by reason.
+        refused: Number of rejected samples, by reason.
     """
 
     def __init__(self, joints: JointMap, speed_limit: Array, tolerance: float, oldest: float) -> None:
@@ -76,13 +76,13 @@ class Hearing:
         self.begin_anew()
 
     def begin_anew(self) -> None:
-        """Forget where the arm was: the next sound sample may be anywhere."""
+        """Forget the last position: the next valid sample may be anywhere."""
         self.stamp_ns = self.heard_ns = 0
         self.wrong, self.strange, self.has_jumped = "", "", False
         self.velocity[:] = 0.0
 
     def hear(self, sample: Sample, now_ns: int) -> bool:
-        """Take a sample that came at ``now_ns`` [ns]; whether it is believed."""
+        """Take a sample that came at ``now_ns`` [ns]; return whether it is accepted."""
         if sample.names and self._joints.is_strange(sample.names):
             self.refused[Wrong.NAMES] += 1
             self.strange = ", ".join(sample.names)
@@ -96,7 +96,7 @@ class Hearing:
         return False
 
     def _wrong(self, sample: Sample, now_ns: int) -> tuple[Wrong, str] | None:
-        """Take a sample, or say why it is not believed."""
+        """Take a sample, or return why it is rejected."""
         if self.has_jumped:
             return Wrong.JUMP, self.wrong
         places = self._joints.places(sample.names)
@@ -144,21 +144,21 @@ class Hearing:
 
 
 def _numbers(values: Sequence[float], names: Sequence[str], places: list[int]) -> Array | None:
-    """Values of our joints, in our order; None unless there is one for each name."""
+    """Values of our joints, in our order; None if the number of values differs from the number of names."""
     if len(values) != len(names):
         return None
     return np.array([values[place] for place in places], dtype=np.float64)
 
 
 def wrong_stamp(stamp_ns: int, newest_ns: int, now_ns: int, oldest: float, option: str) -> str:
-    """Why the stamp of a sample is not believed, in words; empty if it is.
+    """Why the stamp of a sample is rejected, in words; empty if the stamp is valid.
 
     Args:
         stamp_ns: The stamp [ns].
-        newest_ns: That of the newest sound sample [ns].
+        newest_ns: Stamp of the newest valid sample [ns].
         now_ns: Time [ns].
         oldest: Largest difference between a stamp and our clock [s]; 0: stamps only have to rise.
-        option: Parameter that takes the times of sending in place of stamps.
+        option: Name of the parameter that makes the bridge use sending times in place of stamps.
     """
     if stamp_ns == 0:
         return f"its messages have no stamp; {option}: sent takes the time when each was sent"

@@ -1,7 +1,7 @@
 """Jaw bridge: the stage that stands between the jaw's server and a real gripper.
 
-It does for the jaw what ``arm_bridge`` does for the arm, but for two things: brakes of the arm do
-not open the jaw, and fingers that press on something stand short of their setpoint.
+It does for the jaw what ``arm_bridge`` does for the arm, with two differences. Brakes of the arm do not open the jaw.
+Fingers that press on an object stop before their setpoint.
 """
 
 from dataclasses import dataclass
@@ -14,8 +14,8 @@ from teleop_core.graph.topics import JAW, NO_COMMAND_NS, SLAVE_JAW_MEASURED_JS, 
 from teleop_core.slave.bridges import Command, arm_bridge, leading
 from teleop_core.slave.bridges.names import JointMap
 
-_UPPER = 3.0  # more than any jaw opens [rad]; its server has the limit
-_SAME = 1e-3  # a setpoint that moved by less while the gripper was not led stayed [rad]
+_UPPER = 3.0  # larger than the opening of any jaw [rad]; the jaw's server applies the real limit
+_SAME = 1e-3  # a setpoint that moved by less while the gripper was not commanded counts as unchanged [rad]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,18 +41,18 @@ class JawBridgeParameters(arm_bridge.BridgeParameters):
     )
 
     def __post_init__(self) -> None:
-        """Refuse a scale of zero too."""
+        """Refuse a scale of zero as well."""
         super().__post_init__()
         if self.scale == 0.0:
             raise ParameterError("jaw_bridge.scale", self.scale, "another number than 0")
 
 
 class JawBridge(arm_bridge.ControllerBridge):
-    """Stage that leads a real gripper, and says where its fingers are.
+    """Stage that commands a real gripper and publishes the measured angle of its fingers.
 
-    The gripper is commanded nothing before the first command of the hand is followed. Where it was
-    not led for a while, it goes on from the last command if the setpoint is still there, so that it
-    keeps its grip; else from where its fingers are, no faster than rated.
+    The gripper gets no command until the server follows the first command of the hand. After a pause without commands,
+    the gripper continues from the last command if the setpoint has not moved. So it keeps its grip. If the setpoint
+    has moved, the gripper continues from the measured angle, no faster than the rated speed.
     """
 
     def __init__(self, parameters: JawBridgeParameters, dt: float = DT) -> None:
@@ -63,14 +63,14 @@ class JawBridge(arm_bridge.ControllerBridge):
         super().__init__(JAW_BRIDGE, p, joints, lead, speed, dt)
 
     def command(self, now_ns: int, setpoint_age: float, is_led: bool) -> Command | None:
-        """As of every bridge; None too before the first command of the hand is followed."""
+        """Return the command as every bridge does; None also before the first command of the hand is followed."""
         if self.signals["slave_jaw_setpoint_js_ns"] <= NO_COMMAND_NS:
             self.lead_arm.let_go("waits for the hand: no command is in force")
             return None
         return super().command(now_ns, setpoint_age, is_led)
 
     def _is_braked(self) -> bool:
-        """Brakes of the arm do not hold the jaw: its grip stays."""
+        """Return False: brakes of the arm do not stop the jaw, so that it keeps its grip."""
         return False
 
 

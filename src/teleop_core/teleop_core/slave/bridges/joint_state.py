@@ -1,7 +1,7 @@
-"""Joint states out and in: what simulators' bridges and topic-based hardware interfaces speak.
+"""Joint states out and in, as simulator bridges and topic-based hardware interfaces use them.
 
-``joint_state_topic_hardware_interface`` of ros2_control sends nothing on for steps below its
-``trigger_joint_command_threshold``, 1e-5 by default: set it to -1. The topics are its defaults.
+``joint_state_topic_hardware_interface`` of ros2_control does not pass on steps smaller than its
+``trigger_joint_command_threshold``, 1e-5 by default: set it to -1. Our default topics are those of that interface.
 """
 
 from collections.abc import Callable

@@ -1,7 +1,7 @@
 """Joint trajectories of one point: what ``joint_trajectory_controller`` of ros2_control takes.
 
-Each message replaces the trajectory before it. Its point lies at least two periods ahead, so that
-one late message does not let the arm come to the end of its way and stop.
+Each message replaces the trajectory before it. Its point lies at least two periods ahead. So the arm does not reach
+the end of its trajectory and stop when one message is late.
 """
 
 from collections.abc import Callable

@@ -5,28 +5,28 @@ import numpy as np
 from teleop_core.kernels.geometry import Array
 
 _CATCHING_UP = 1.2
-"""Largest speed of commands in rated speeds: setpoints keep 1, the rest makes up for late ones."""
-_SLOWLY = 0.1  # rated speeds, of an arm that catches up with a setpoint that went on without it
-_LONGEST = 2.0  # periods for which one command may make up
+"""Largest speed of commands, in rated speeds. Setpoints need at most 1; the rest makes up for late setpoints."""
+_SLOWLY = 0.1  # speed of an arm that catches up with a setpoint that went on without it, in rated speeds
+_LONGEST = 2.0  # largest number of missed periods that one command makes up for
 
 
 class Lead:
-    """Commands (n,) from setpoints: none before the arm stands at them, and none that jumps.
+    """Turns setpoints (n,) into commands: none until the arm is at its setpoint, and none with a jump.
 
     Args:
-        lower: Limits of the joints (n,) [rad or m].
-        upper: The same at the other end.
+        lower: Lower limits of the joints (n,) [rad or m].
+        upper: Upper limits of the joints (n,) [rad or m].
         speed_limit: Rated speeds (n,) [rad/s or m/s].
-        tolerance: How far a joint may be from its setpoint when the lead begins [rad or m].
+        tolerance: Largest distance of a joint from its setpoint when commands begin [rad or m].
         period: Time from command to command [s].
-        presses: Whether joints may stand short of their setpoints, as fingers on what they hold:
-            they begin anywhere, and go on from the last command if the setpoint is still there.
+        presses: Whether joints may stop before their setpoints, as fingers on an object do. Such joints begin
+            anywhere, and continue from the last command if the setpoint has not moved.
 
     Attributes:
         position: The last command (n,) [rad or m].
-        velocity: How fast it went there (n,) [rad/s or m/s].
-        is_leading: Whether the arm is led to the setpoint.
-        waits: What is commanded in place of that, and why; empty if it is led.
+        velocity: Velocity of the last command (n,) [rad/s or m/s].
+        is_leading: Whether the arm is commanded towards the setpoint.
+        waits: What is commanded instead, and why; empty while ``is_leading``.
     """
 
     def __init__(
@@ -42,23 +42,23 @@ class Lead:
         self.waits = "commands nothing: nothing has come yet"
 
     def let_go(self, reason: str) -> bool:
-        """Command nothing; the controller holds the arm at the last command. False, as `step`."""
+        """Stop commanding; the controller holds the arm at the last command. Returns False for `step`."""
         self.is_leading = self._is_braked = False
         self.waits = f"commands nothing: {reason}"
         return False
 
     def has_lost(self, measured: Array) -> bool:
-        """Whether an arm that is led is not where it was commanded."""
+        """Whether a commanded arm is not at its last command."""
         off = np.abs(measured - self.position)
         return self.is_leading and not self._presses and not bool((off <= self.tolerance).all())
 
     def step(self, setpoint: Array, measured: Array, names: tuple[str, ...], elapsed: float) -> bool:
-        """Go on towards a setpoint (n,); whether there is a command to send.
+        """Go on towards a setpoint (n,); return whether there is a command to send.
 
         Args:
-            setpoint: Where the server wants the joints (n,) [rad or m].
-            measured: Where they are (n,) [rad or m].
-            names: Of the joints, for messages.
+            setpoint: Joint setpoint of the server (n,) [rad or m].
+            measured: Measured joint positions (n,) [rad or m].
+            names: Joint names, for messages.
             elapsed: Time since the last command [s].
         """
         self._is_braked = False
@@ -75,10 +75,10 @@ class Lead:
         return True
 
     def rejoin(self, setpoint: Array, measured: Array, names: tuple[str, ...], elapsed: float) -> bool:
-        """Go on slowly to a setpoint that went on without the arm; otherwise as :meth:`step`.
+        """Go slowly to a setpoint that went on without the arm; arguments and result as in :meth:`step`.
 
-        Only to one that stands still, and only an arm that was led and stands at the last command:
-        one that somebody moved meanwhile is commanded nothing. It is led again when it arrives.
+        The setpoint must stand still. The arm must have been commanded before, and must still be at its last command:
+        an arm that was moved meanwhile gets no command. Normal commands resume when the arm arrives.
         """
         is_still = bool((setpoint == self._setpoint).all())
         self._setpoint[:] = setpoint
@@ -93,7 +93,7 @@ class Lead:
         return True
 
     def brake(self, measured: Array, elapsed: float) -> bool:
-        """Bring the arm to where it is when its brakes close; whether there is a command."""
+        """Command the arm to its measured position at the moment of braking; return whether there is a command."""
         if not self.is_leading and not self._is_braked:
             return False
         if self.is_leading:

@@ -1,4 +1,4 @@
-"""Names: our joints and those of an arm, in order, sign and offset."""
+"""Names: map between our joints and those of an arm, with order, sign and offset."""
 
 from collections.abc import Sequence
 
@@ -9,23 +9,23 @@ from teleop_core.kernels.geometry import Array
 
 
 class JointMap:
-    """Which of the arm's joints is which of ours: ours = sign · the arm's + offset.
+    """Map between the arm's joints and ours: our position = sign · the arm's position + offset.
 
     Args:
         ours: Names of the robot's joints.
-        renamed: ``ours=theirs`` for each joint that the arm calls otherwise.
-        signs: 1 or -1 for each of our joints; empty: 1.
-        offsets: Of each of our joints [rad or m]; empty: 0.
-        order: The arm's joints in the order of its commands; empty: in that of ours.
-        owner: What the names of the parameters begin with, for messages.
-        is_scaled: Whether signs may be other numbers too, as where the other one counts a way.
+        renamed: ``ours=theirs`` for each joint that has another name in the arm.
+        signs: 1 or -1 for each of our joints; if empty, all are 1.
+        offsets: Offset of each of our joints [rad or m]; if empty, all are 0.
+        order: The arm's joints in the order of its commands; if empty, in the order of our joints.
+        owner: Prefix of the parameter names, for messages.
+        is_scaled: Whether signs may also be other numbers, such as for a gripper that counts a distance.
 
     Attributes:
         theirs: The arm's names, in our order.
         order: The arm's names, in the order of its commands.
 
     Raises:
-        ParameterError: One has another form, or names what there is not.
+        ParameterError: A parameter has the wrong form, or names a joint that does not exist.
     """
 
     def __init__(
@@ -56,9 +56,9 @@ class JointMap:
         self._known: tuple[tuple[str, ...], list[int]] = ((), [])
 
     def places(self, names: Sequence[str]) -> list[int] | str:
-        """Where each of our joints stands in a message with these names, or what is wrong.
+        """Index of each of our joints in a message with these names, or what is wrong.
 
-        Further joints, as of a gripper, do no harm.
+        Further joints in the message, such as a gripper's, are ignored.
         """
         names = tuple(names)
         if names != self._known[0]:
@@ -73,27 +73,27 @@ class JointMap:
         return self._known[1]
 
     def is_strange(self, names: Sequence[str]) -> bool:
-        """Whether a message names only other joints, as that of a gripper on the same topic."""
+        """Whether a message names none of our joints, such as that of a gripper on the same topic."""
         return not set(self.theirs) & set(names)
 
     def position(self, theirs: Array) -> Array:
-        """Our joints (n,) of the arm's positions in our order [rad or m]."""
+        """Our joint positions (n,) from the arm's positions in our order [rad or m]."""
         return self._signs * theirs + self._offsets
 
     def rate(self, theirs: Array) -> Array:
-        """Our velocities (n,) of the arm's in our order."""
+        """Our velocities (n,) from the arm's velocities in our order."""
         return self._signs * theirs
 
     def effort(self, theirs: Array) -> Array:
-        """Our efforts (n,) of the arm's in our order, which do the same work."""
+        """Our efforts (n,) from the arm's efforts in our order; both do the same work."""
         return theirs / self._signs
 
     def command(self, ours: Array) -> Array:
-        """The arm's positions (n,), in the order of its commands, of ours [rad or m]."""
+        """The arm's positions (n,), in the order of its commands, from our positions [rad or m]."""
         return ((ours - self._offsets) / self._signs)[self._sent]
 
     def command_rate(self, ours: Array) -> Array:
-        """The arm's velocities (n,), in the order of its commands, of ours [rad/s or m/s]."""
+        """The arm's velocities (n,), in the order of its commands, from our velocities [rad/s or m/s]."""
         return (ours / self._signs)[self._sent]
 
 

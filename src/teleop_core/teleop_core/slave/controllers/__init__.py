@@ -1,8 +1,8 @@
 """Controllers: from setpoint and measurement to drive effort, one file per law.
 
-A controller works on all joints of an arm at once, tick by tick. Its gains are a table with a row
-per joint, which the parameters and the robot's drives give; its memory is another. Gravity that the
-source compensates, limits of the drives and encoders belong to the slave, not to the law.
+A controller works on all joints of an arm at once, tick by tick. Its gains are a table with a row per joint, computed
+from the parameters and the robot's drives. Its memory is another table. Gravity that the source compensates, drive
+limits and encoders belong to the slave, not to the control law.
 """
 
 from collections.abc import Callable
@@ -38,22 +38,22 @@ class Controller:
     """A control law.
 
     Attributes:
-        name: What ``--set controller=`` calls it.
+        name: Its name in ``--set controller=``.
         parameters: Its parameter group.
         gains: ``gains(parameters, robot, viscous)`` gives the table (n, k) that ``control`` takes;
             ``viscous`` (n,) is the friction in force [N·m·s/rad or N·s/m].
-        memory: Numbers that it remembers of each joint, zero at the start.
+        memory: How many numbers it remembers for each joint; they are zero at the start.
         control: ``control(gains, memory, setpoint, measured, feedforward, limit, dt, effort)``, a kernel or a plain
             function over all joints. Setpoint and measured position [rad or m], feedforward and limit [N·m or N] are
             (n,), ``memory`` (n, m) is its own to write, and ``effort`` (n,) gets the drive efforts; they are cut at
             ±limit afterwards. The feedforward is the gravity that is compensated.
         begin: ``begin(memory, measured, effort)`` prepares the memory for an arm at rest at
             ``measured`` that needs ``effort`` to stay there.
-        shift: ``shift(memory, effort)`` lets it give so much more from now on, because the
-            feedforward, or a law with new gains, gives so much less.
+        shift: ``shift(memory, effort)`` makes the law give more by ``effort`` from now on, because the feedforward, or
+            a law with new gains, gives less by that amount.
         uses_model: Whether the feedforward is (2 n + n²,): behind the gravity that is compensated the model's bias,
             Coriolis, centrifugal and all gravity effort (n,) at measured positions and speeds, and its inertia matrix
-            (n, n), row by row. It is the model that is known, not the plant; friction is in neither.
+            (n, n), row by row. These come from the known model, not from the plant; they contain no friction.
     """
 
     name: str
@@ -66,7 +66,7 @@ class Controller:
     uses_model: bool = False
 
     def feedforward(self, n: int) -> int:
-        """Length of the feedforward that it takes, for ``n`` joints."""
+        """Length of the feedforward array of this law, for ``n`` joints."""
         return 2 * n + n * n if self.uses_model else n
 
     control_pointer = cached_property(lambda self: pointer(self.control, CONTROL))
@@ -74,10 +74,10 @@ class Controller:
 
 
 def per_joint(robot: Robot, name: str, values: tuple[float, ...], default: Array) -> Array:
-    """One number per joint (n,): the given ones, or the robot's if none are given.
+    """One number per joint (n,): the given numbers, or the robot's if none are given.
 
     Raises:
-        ParameterError: There are more or fewer than joints.
+        ParameterError: The number of values differs from the number of joints.
     """
     if not values:
         return default
@@ -87,10 +87,10 @@ def per_joint(robot: Robot, name: str, values: tuple[float, ...], default: Array
 
 
 def drives_and_poles(robot: Robot, law: str, bandwidth: tuple[float, ...]) -> tuple[Drives, Array]:
-    """Drive table of a robot, and the closed-loop poles (n,) [rad/s] of a law: given, or its own.
+    """Drive table of a robot, and the closed-loop poles (n,) [rad/s]: the given ones, or the robot's own.
 
     Raises:
-        ParameterError: The poles are more or fewer than joints.
+        ParameterError: The number of poles differs from the number of joints.
     """
     drives = robot.drives
     assert drives is not None
@@ -109,7 +109,7 @@ def _checked(name: str, part: object) -> Controller:
 
 
 def _try(part: Controller) -> None:
-    """Try it once on four joints, so that what cannot work is told before anything runs."""
+    """Try a control law once on four joints, so that errors are reported before anything runs."""
     from teleop_core.robots import load_robot
 
     robot = load_robot("scara")
@@ -130,14 +130,14 @@ def _try(part: Controller) -> None:
 
 
 def _insist_on_table(part: Controller, gains: Array, n: int) -> None:
-    """Refuse gains that are no finite table (n, k)."""
+    """Refuse gains that are not a finite table (n, k)."""
     if gains.ndim != 2 or len(gains) != n or not np.isfinite(gains).all():
         text = f"one whose gains have a row of finite numbers per joint ({n}, k), not {gains.shape}"
         raise PartError("controller", part.name, text)
 
 
 def _tried_effort(part: Controller, gains: Array, home: Array) -> tuple[Array, bool]:
-    """Efforts (n,) at rest at home, and whether it wrote to what is its own alone."""
+    """Efforts (n,) at rest at home, and whether the law wrote only to arrays that it may write."""
     n = len(home)
     memory, fence = fenced(np.zeros((n, max(part.memory, 1))))
     effort, after = fenced(np.zeros(n))
@@ -165,4 +165,4 @@ CONTROLLERS: Registry[Controller] = Registry(
 """All control laws by name."""
 
 register_controller = CONTROLLERS.register
-"""Adds one of yours under its own name; see :meth:`Registry.register`."""
+"""Adds your control law under its own name; see :meth:`Registry.register`."""

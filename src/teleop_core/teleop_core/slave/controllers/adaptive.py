@@ -1,8 +1,8 @@
 """Adaptive control: each joint learns its inertia, friction and load while it follows.
 
-The effort is what a joint with the parameters learned so far needs for a reference motion that
-leads back to the setpoint, and a pull to that motion. What is left of the pull's error changes the
-parameters, each within bounds around what the drive table says.
+The effort has two parts. The first is what a joint with the parameters learned so far needs for a reference motion
+back to the setpoint. The second pulls the joint to that motion. The remaining error from that motion changes the
+parameters, each within bounds around its value in the drive table.
 
 Source:
     Slotine and Li 1987, eqs. 5-9, on each joint by itself; bounds and dead zone as in Slotine and Li 1991, section 8.7.
@@ -20,13 +20,13 @@ from teleop_core.slave.controllers import Controller, drives_and_poles, fields, 
 # Columns of the table of gains.
 _INERTIA, _POLE, _VISCOUS, _FADING, _FRICTION, _TRAVEL, _DEAD_BAND, _RANGE = range(8)
 _RATE, _SPEED_SCALE, _ACCELERATION_SCALE, _SPAN = range(8, 12)
-# What was learned, as differences from what is known at the start: columns of the memory.
+# Learned parameters, as differences from their initial values: columns of the memory.
 _MORE_INERTIA, _MORE_VISCOUS, _MORE_FRICTION, _LOAD = range(motion_estimates.MEMORY, motion_estimates.MEMORY + 4)
 
 
 @dataclass(frozen=True, kw_only=True)
 class AdaptiveParameters:
-    """Poles, rates and bounds; an empty list means: from the robot's drive table."""
+    """Poles, rates and bounds; empty lists are filled from the robot's drive table."""
 
     bandwidth: tuple[float, ...] = fields.bandwidth("triple")
     filter_ratio: float = fields.ratio("filters of motion")
@@ -66,9 +66,9 @@ def adaptive_control(
 ) -> None:
     """Write ``J a_r + viscous v_r + friction + load + 2 w J s + feedforward`` and learn.
 
-    With the error e and its rate: ``v_r = v + w e``, ``a_r = a + w e'``, ``s = e' + w e``; each
-    parameter changes by ``rate w² J s`` times what it acts on, over the square of that's scale.
-    Nothing is learned while the drive is saturated or the setpoint too far for it.
+    With the error e and its rate: ``v_r = v + w e``, ``a_r = a + w e'``, ``s = e' + w e``; each parameter changes by
+    ``rate w² J s`` times the signal that it multiplies, divided by the square of that signal's scale. The law does not
+    learn while the drive is saturated or the setpoint is too far away for the drive.
     """
     for i in range(effort.shape[0]):
         gain, row = gains[i], memory[i]
@@ -99,7 +99,7 @@ def adaptive_control(
 
 
 def adaptive_gains(parameters: AdaptiveParameters, robot: Robot, viscous: Array) -> Array:
-    """Table (n, 12) of what is known of each joint, and of how it learns.
+    """Table (n, 12) of the known parameters of each joint, and of its learning rates and bounds.
 
     Raises:
         ParameterError: The list has another length than the robot has joints.

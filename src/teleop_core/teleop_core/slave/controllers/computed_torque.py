@@ -1,9 +1,9 @@
 """Computed torque: the robot's model turns wanted accelerations into efforts, all joints together.
 
-What is wanted is the setpoint's acceleration and, of its error, what makes three equal poles. The
-model takes inertia and coupling from where the arm is, Coriolis and centrifugal effort, and all of
-its gravity, whatever ``gravity_compensation`` says; it knows no dry friction and no weight that
-the drawing lacks, which the integral must hold.
+The wanted acceleration is that of the setpoint plus a feedback of the error with three equal poles. The model gives
+inertia and coupling at the arm's position, Coriolis and centrifugal effort, and the whole gravity, whatever the value
+of ``gravity_compensation``. It contains neither dry friction nor weights that the drawing lacks; the integral must
+hold those.
 
 Source:
     Luh, Walker and Paul 1980; Craig 2005, eqs. 10.15-10.19, with integral action.
@@ -24,7 +24,7 @@ _INTEGRAL, _WANTED = motion_estimates.MEMORY, motion_estimates.MEMORY + 1  # col
 
 @dataclass(frozen=True, kw_only=True)
 class ComputedTorqueParameters:
-    """Poles; an empty list means: from the robot's drive table."""
+    """Poles; an empty list is filled from the robot's drive table."""
 
     bandwidth: tuple[float, ...] = fields.bandwidth("triple")
     filter_ratio: float = fields.ratio("filters of motion")
@@ -44,8 +44,8 @@ def computed_torque_control(
 ) -> None:
     """Write ``D (a + 3 w (v - v̂) + 3 w² e + w³ ∫e) + viscous v + bias``.
 
-    The integral of a joint is held while its setpoint is too far for the drive, or the drive is
-    saturated and the error would push it further.
+    The integral of a joint stays constant while its setpoint is too far away for the drive. It also stays constant
+    while the drive is saturated and the error would increase the effort further.
     """
     n = effort.shape[0]
     for i in range(n):

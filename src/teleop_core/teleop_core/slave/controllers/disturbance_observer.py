@@ -1,9 +1,9 @@
-"""Disturbance observer: what moves a joint beside its effort is estimated, and cancelled.
+"""Disturbance observer: estimates and cancels everything that moves a joint beside its drive effort.
 
-The nominal joint is a pure inertia with viscous friction. Whatever else acts on it, dry friction,
-weights that nobody knows, coupling, gravity that is not compensated, is one disturbance; it passes
-a third-order filter Q of the observer's pole before it is taken off the effort. A pair of real
-poles is left for the tracking, with the setpoint's speed and acceleration fed forward.
+The nominal joint is a pure inertia with viscous friction. Everything else that acts on the joint is one disturbance:
+dry friction, unknown weights, coupling, gravity that is not compensated. The disturbance passes a third-order filter Q
+with the observer's pole and is then subtracted from the effort. Tracking has a pair of real poles, with the setpoint's
+speed and acceleration fed forward.
 
 Source:
     Ohnishi 1987; Umeno and Hori 1991, eqs. 6-14 (Q-filters of order three); here as an observer
@@ -20,12 +20,12 @@ from teleop_core.slave.controllers import Controller, drives_and_poles, fields, 
 
 # Columns of the table of gains.
 _INERTIA, _POLE, _VISCOUS, _FADING, _FRICTION, _TRAVEL, _DEAD_BAND, _RANGE = range(8)
-_HELD = motion_estimates.MEMORY  # what the arm weighs at the start, beyond what is compensated
+_HELD = motion_estimates.MEMORY  # gravity effort at the start that is not compensated
 
 
 @dataclass(frozen=True, kw_only=True)
 class DisturbanceObserverParameters:
-    """Poles and what is known of friction; an empty list means: from the robot's drive table."""
+    """Poles and known friction; empty lists are filled from the robot's drive table."""
 
     bandwidth: tuple[float, ...] = fields.bandwidth("double")
     observer_ratio: float = fields.ratio("observer")
@@ -47,8 +47,8 @@ def disturbance_observer_control(
 ) -> None:
     """Write ``J (a + 2 w (v - v̂) + w² e - d̂) + viscous v + friction + feedforward``.
 
-    The joint's acceleration that nothing explains is d̂. After an effort at its limit, what is
-    expected of the joint is what the limit left, so the observer does not wind up.
+    d̂ is the acceleration of the joint that the model does not explain. While the effort is at its limit, the observer
+    expects the acceleration of the limited effort, so it does not wind up.
     """
     for i in range(effort.shape[0]):
         gain, row = gains[i], memory[i]

@@ -11,7 +11,7 @@ def bandwidth(poles: str, source: str = "assumed: the drive table's, as of pid")
 
 
 def ratio(what: str) -> Any:
-    """Pole of the observer or of the filters of motion over that of the loop."""
+    """Pole of the observer or of the motion filters, divided by that of the loop."""
     return parameter(
         3.5,
         Within(1.0, 10.0),
@@ -21,7 +21,7 @@ def ratio(what: str) -> Any:
 
 
 def friction_share(use: str) -> Any:
-    """Share of known dry friction, and what is done with it."""
+    """Share of known dry friction that is used; ``use`` says for what."""
     return parameter(
         0.8,
         Within(0.0, 1.5),
@@ -31,7 +31,7 @@ def friction_share(use: str) -> Any:
 
 
 def friction_counts() -> Any:
-    """Travel over which known dry friction turns on [encoder counts]."""
+    """Travel over which the compensation of dry friction builds up [encoder counts]."""
     return parameter(
         4.0,
         Within(0.1, 1000.0),
@@ -41,7 +41,7 @@ def friction_counts() -> Any:
 
 
 def dead_band(use: str) -> Any:
-    """Error [encoder counts] within which a joint is at rest, and what is not done there."""
+    """Error [encoder counts] within which a joint counts as at rest; ``use`` says what stops there."""
     return parameter(
         0.5,
         Within(0.0, 100.0),

@@ -1,9 +1,9 @@
-"""Friction compensation: the PID with the effort fed forward that the setpoint's motion takes.
+"""Friction compensation: a PID that feeds forward the effort needed for the setpoint's motion.
 
-Inertia and viscous friction of the setpoint's acceleration and speed, and dry friction in the
-direction of its motion, smooth over a few encoder counts of its travel. What is fed forward comes
-from the setpoint alone, so it closes no loop that could swing; the integral rests while the error
-is within a dead band, so that dry friction and encoder counts together make no limit cycle.
+That effort is inertia times the setpoint's acceleration, viscous friction times its speed, and dry friction in the
+direction of its motion. Dry friction changes smoothly over a few encoder counts of travel. The feedforward depends on
+the setpoint alone, so it closes no loop that could oscillate. The integral stays constant while the error is within a
+dead band, so that dry friction and encoder counts together cause no limit cycle.
 
 Source:
     Armstrong-Hélouvry, Dupont and Canudas de Wit 1994, sections 5.2 and 5.3 (compensation by the
@@ -26,7 +26,7 @@ _INTEGRAL = motion_estimates.MEMORY
 
 @dataclass(frozen=True, kw_only=True)
 class FrictionCompensationParameters:
-    """Poles and what is known of friction; an empty list means: from the robot's drive table."""
+    """Poles and known friction; empty lists are filled from the robot's drive table."""
 
     bandwidth: tuple[float, ...] = fields.bandwidth("triple")
     filter_ratio: float = fields.ratio("filters of motion")
@@ -48,8 +48,8 @@ def friction_compensation_control(
 ) -> None:
     """Write ``Kp e + Ki ∫e + Kd (v - v̂) + J a + viscous v + friction + feedforward``.
 
-    The integral is held while the setpoint is too far for the drive, or the drive is saturated and
-    the error would push it further.
+    The integral stays constant while the setpoint is too far away for the drive. It also stays constant while the
+    drive is saturated and the error would increase the effort further.
     """
     for i in range(effort.shape[0]):
         gain, row = gains[i], memory[i]
@@ -66,7 +66,7 @@ def friction_compensation_control(
         if share == 1.0 and is_inside:
             row[_INTEGRAL] = integral
         effort[i] = min(max(free + row[_INTEGRAL], -limit[i]), limit[i])
-        # The load that the integral holds is not what accelerates.
+        # The load held by the integral does not accelerate the joint.
         known = friction + feedforward[i] + row[_INTEGRAL]
         row[motion_estimates.EXPECTED] = (effort[i] - known - viscous * row[motion_estimates.SPEED]) / inertia
 

@@ -1,11 +1,11 @@
 """Motion: speeds and accelerations of setpoints and joints, as control laws estimate them.
 
-A law sees positions alone. Its setpoint and its joint each pass a fading-memory filter of the
-second degree, which follows a constant acceleration without lag; that of the joint is told which
-acceleration the law expects of its own effort, and so finds what else accelerates it. Both have the
-same memory, so that their difference is that of motions of the same age.
+A control law gets positions alone. Setpoint and joint position each pass a fading-memory filter of the second degree,
+which follows a constant acceleration without lag. The filter of the joint also gets the acceleration that the law
+expects from its own effort, and so estimates the unexplained acceleration. Both filters have the same memory, so that
+their difference compares motions of the same age.
 
-Every law keeps the first :data:`MEMORY` numbers of a joint for this, by the names below.
+Every law reserves the first :data:`MEMORY` numbers of each joint's memory for this, under the names below.
 
 Source:
     Morrison 1969, Introduction to Sequential Smoothing and Prediction, chapter 13; Brookner 1998,
@@ -25,7 +25,7 @@ from teleop_core.slave.controllers import Begin, Shift
 MEMORY = 9
 """Numbers of each joint that :func:`follow_motion` and :func:`friction_of_setpoint` keep."""
 PLACE, SPEED, UNEXPLAINED = 0, 1, 2
-"""Of the joint: position, speed, and acceleration beside the expected one."""
+"""Of the joint: position, speed, and unexplained acceleration, beyond the expected one."""
 SET_PLACE, SET_SPEED, SET_ACCELERATION = 3, 4, 5
 """Of its setpoint: position, speed, acceleration."""
 EXPECTED = 6
@@ -33,24 +33,24 @@ EXPECTED = 6
 _LAST_SETPOINT, _BENT = 7, 8
 EFFORT_SHARE = 0.02
 FRICTION_SHARE = 0.5
-"""What one encoder count may change of an effort: shares of the drive's limit, of dry friction."""
+"""Largest change of effort by one encoder count, as shares of the drive's limit and of dry friction."""
 APPROACH_SHARE = 0.5
-"""Share of a drive's limit that an error may take before it counts as less, see approach()."""
+"""Share of a drive's limit that an error may use before the error is reduced; see approach()."""
 SLOWEST_RATIO = 2.0
-"""Pole of the filters over that of the loop, at the least."""
+"""Smallest pole of the filters, in poles of the loop."""
 _HALVINGS = 50
 
 
 @kernel
 def follow(memory: Array, at: int, value: float, expected: float, fading: float, dt: float) -> None:
-    """Take the next value of a position into its estimates, ``memory[at:at + 3]``.
+    """Update the estimates of a position, ``memory[at:at + 3]``, with its next value.
 
     Args:
         memory: Numbers of one joint; position, speed and acceleration (beside the expected one) are written.
-        at: Where they begin.
+        at: Index of the first of these three numbers.
         value: Position [rad or m].
         expected: Acceleration since the last value, as far as it is known [rad/s² or m/s²].
-        fading: Share of what is remembered after a tick, 0 to 1: all three poles of the error.
+        fading: Share of the memory that remains after a tick, 0 to 1: all three poles of the error.
         dt: Tick [s], > 0.
     """
     acceleration = memory[at + 2] + expected
@@ -64,7 +64,7 @@ def follow(memory: Array, at: int, value: float, expected: float, fading: float,
 
 @kernel
 def follow_motion(memory: Array, setpoint: float, measured: float, fading: float, dt: float) -> None:
-    """Take the next setpoint and the next measured position of a joint into their estimates."""
+    """Update the estimates of a joint with its next setpoint and its next measured position."""
     follow(memory, PLACE, measured, memory[EXPECTED], fading, dt)
     follow(memory, SET_PLACE, setpoint, 0.0, fading, dt)
 
@@ -73,14 +73,15 @@ def follow_motion(memory: Array, setpoint: float, measured: float, fading: float
 def friction_of_setpoint(memory: Array, setpoint: float, most: float, travel: float) -> float:
     """Dry friction of a joint that moves as its setpoint does, smooth over a small travel.
 
-    A bristle that bends with the setpoint until it carries the friction, and slips then: it keeps its value when the
-    setpoint rests, turns over ``2 travel`` when it turns, and never chatters, whatever is measured.
+    The model is a bristle that bends with the setpoint until it carries the friction, and then slips. The friction
+    keeps its value while the setpoint rests. After the setpoint turns, the friction changes sign over a travel of ``2
+    travel``. It never chatters, because measurements do not affect it.
 
     Args:
         memory: Numbers of one joint, as :func:`follow_motion` has them; written.
         setpoint: Wanted position [rad or m].
         most: Dry friction [N·m or N], >= 0.
-        travel: Way over which it is built up [rad or m], > 0.
+        travel: Travel over which the friction builds up [rad or m], > 0.
 
     Returns:
         Effort along the motion, within ±most.
@@ -95,10 +96,10 @@ def friction_of_setpoint(memory: Array, setpoint: float, most: float, travel: fl
 
 @kernel
 def approach(error: float, linear: float) -> float:
-    """Error to act on: a setpoint too far for the drive counts as nearer, so that it can brake.
+    """Reduced error to act on: a setpoint too far for the drive counts as nearer, so that the drive can brake.
 
-    Beyond ``linear`` [rad or m] the error D counts as ``√(linear (2 D - linear))``; the speed of
-    approach then falls with the root of what is left, as that of a constant deceleration does.
+    Beyond ``linear`` [rad or m] the error D counts as ``√(linear (2 D - linear))``. The speed of approach then falls
+    with the root of the remaining distance, as under a constant deceleration.
     """
     gap = abs(error)
     if gap <= linear:
@@ -108,16 +109,16 @@ def approach(error: float, linear: float) -> float:
 
 @kernel
 def closeness(error: float, linear: float) -> float:
-    """Share of the setpoint's motion to feed forward: 1 where :func:`approach` acts on the error.
+    """Share of the setpoint's motion to feed forward: 1 where :func:`approach` returns the error unchanged.
 
-    It falls to 0 at twice that distance: a joint that is far behind catches up, and follows no motion.
+    The share falls to 0 at twice that distance: a joint far behind its setpoint only catches up, without feedforward.
     """
     return min(max(2.0 - abs(error) / linear, 0.0), 1.0)
 
 
 @kernel
 def beyond(value: float, room: float) -> float:
-    """What a value has beyond ±room; 0 inside."""
+    """Part of a value that lies beyond ±room; 0 inside."""
     return value - min(max(value, -room), room)
 
 
@@ -127,9 +128,10 @@ def begin_motion(memory: Array, measured: Array, _effort: Array) -> None:
 
 
 def holding(column: int) -> tuple[Begin, Shift]:
-    """``begin`` and ``shift`` of a law one column of whose memory holds the arm at rest.
+    """``begin`` and ``shift`` of a law in which one column of the memory is the effort that holds the arm.
 
-    It starts at rest with all the effort that the arm needs there, and takes over what the feedforward no longer gives.
+    ``begin`` sets that column to all the effort that the arm needs at rest. ``shift`` adds what the feedforward no
+    longer gives.
     """
 
     def begin(memory: Array, measured: Array, effort: Array) -> None:
@@ -143,7 +145,7 @@ def holding(column: int) -> tuple[Begin, Shift]:
 
 
 def linear_range(robot: Robot, pole: Array, stiffness: float) -> Array:
-    """Largest error (n,) that :func:`approach` leaves as it is; ``stiffness`` as in fading_of()."""
+    """Largest error (n,) that :func:`approach` leaves unchanged; ``stiffness`` as in fading_of()."""
     drives = robot.drives
     assert drives is not None
     share = APPROACH_SHARE * drives.effort_limit
@@ -151,7 +153,7 @@ def linear_range(robot: Robot, pole: Array, stiffness: float) -> Array:
 
 
 def known_friction(robot: Robot) -> Array:
-    """Dry friction (n,) as it was identified, on average, else that of the drive table."""
+    """Mean identified dry friction (n,); the drive table's dry friction if none was identified."""
     assert robot.drives is not None
     return robot.drives.coulomb if robot.hardware is None else robot.hardware.coulomb
 
@@ -159,20 +161,21 @@ def known_friction(robot: Robot) -> Array:
 def fading_of(
     robot: Robot, pole: Array, ratio: float, *, stiffness: float, damping: float, rejection: float = 0.0
 ) -> Array:
-    """Fading (n,) of the filters of a law, as fast as its own noise allows.
+    """Fading (n,) of the filters of a law, as fast as encoder noise allows.
 
-    The rule: ``ratio`` times as fast as the loop, but so slow that one encoder count changes the effort by no more than
-    :data:`EFFORT_SHARE` of the drive's limit. It also changes it by no more than :data:`FRICTION_SHARE` of known dry
-    friction, so that the noise of an encoder shakes no joint loose. It is :data:`SLOWEST_RATIO` times as fast all the
-    same, without which the loop would not be damped.
+    The filters are ``ratio`` times as fast as the loop, with two upper bounds on their speed. One encoder count
+    changes the effort by at most :data:`EFFORT_SHARE` of the drive's limit. It also changes the effort by at most
+    :data:`FRICTION_SHARE` of known dry friction, so that encoder noise never makes a stuck joint slip. In any case the
+    filters are at least :data:`SLOWEST_RATIO` times as fast as the loop, because a slower filter would leave it
+    undamped.
 
     Args:
         robot: Robot with drives.
-        pole: Of the closed loop (n,) [rad/s].
-        ratio: Pole of the filters over that of the loop, >= 1.
-        stiffness: Proportional action over ``inertia pole²``.
-        damping: Action on the speed over ``inertia pole``.
-        rejection: Action on the unexplained acceleration over ``inertia``.
+        pole: Pole of the closed loop (n,) [rad/s].
+        ratio: Pole of the filters, divided by that of the loop, >= 1.
+        stiffness: Proportional gain, divided by ``inertia pole²``.
+        damping: Gain on the speed, divided by ``inertia pole``.
+        rejection: Gain on the unexplained acceleration, divided by ``inertia``.
 
     Source:
         Franklin, Powell and Emami-Naeini 2002, section 7.7: two to six times as fast.
@@ -193,7 +196,7 @@ def fading_of(
 
 
 def _per_count(bandwidth: Array, pole: Array, stiffness: float, damping: float, rejection: float) -> Array:
-    """Acceleration (n,) asked for when a position jumps by one, at once [1/s²]."""
+    """Acceleration (n,) that the law demands immediately when a position jumps by one unit [1/s²]."""
     fading = exponential(-bandwidth * DT)
     speed = 1.5 * (1.0 - fading) ** 2 * (1.0 + fading) / DT
     unexplained = (1.0 - fading) * (1.0 - fading) ** 2 / DT**2

@@ -1,4 +1,4 @@
-"""PD: proportional and derivative action alone, so the arm rests where friction lets it."""
+"""PD: proportional and derivative action alone, so friction leaves an error at rest."""
 
 from dataclasses import dataclass
 
@@ -11,7 +11,7 @@ from teleop_core.slave.controllers import Controller, drives_and_poles, fields
 
 @dataclass(frozen=True, kw_only=True)
 class PdParameters:
-    """Double closed-loop pole; empty lists mean: from the robot's drive table."""
+    """Double closed-loop pole; empty lists are filled from the robot's drive table."""
 
     bandwidth: tuple[float, ...] = fields.bandwidth("double")
 
@@ -46,7 +46,7 @@ def pd_control(
 
 
 def pd_gains(parameters: PdParameters, robot: Robot, viscous: Array) -> Array:
-    """Kp, Kd of each joint, (n, 2), that make ``inertia (s + bandwidth)²`` of an inertia.
+    """Kp, Kd of each joint, (n, 2), for the characteristic polynomial ``inertia (s + bandwidth)²``.
 
     Raises:
         ParameterError: The list has another length than the robot has joints.

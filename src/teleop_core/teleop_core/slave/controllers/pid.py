@@ -1,4 +1,4 @@
-"""PID: one joint's controller in parallel form, with a clean derivative and no windup."""
+"""PID: one joint's controller in parallel form, with a filtered derivative and no windup."""
 
 from dataclasses import dataclass
 
@@ -15,7 +15,7 @@ THIRD = 1.0 / 3.0
 
 @dataclass(frozen=True, kw_only=True)
 class PidParameters:
-    """Gains; empty lists mean: by the rule of three equal poles, from the robot's drive table."""
+    """Gains; empty lists are filled from the robot's drive table, by the rule of three equal poles."""
 
     bandwidth: tuple[float, ...] = fields.bandwidth("triple", "assumed: the drive table's")
     kp: tuple[float, ...] = parameter((), Within(0.0), "N·m/rad or N/m of each joint")
@@ -33,11 +33,11 @@ def critically_damped_gains(inertia: Array, viscous: Array, bandwidth: Array) ->
     """Gains that put all three closed-loop poles of an inertia with friction at one real place.
 
     The loop ``inertia q'' + viscous q' = Kp (b r - q) + Ki ∫(r - q) - Kd q'`` has the characteristic polynomial
-    ``inertia (s + bandwidth)³``, critically damped: what disturbs it dies away without swinging. Its answer to the
+    ``inertia (s + bandwidth)³``. It is critically damped: disturbances decay without oscillation. Its response to the
     setpoint r is ``bandwidth² (3 b s + bandwidth) / (s + bandwidth)³``. With the whole setpoint in the proportional
-    action, b = 1, the zero makes a step overshoot by 25 % all the same. It is 20 % at 1 kHz, and less where the
-    setpoint moves no faster than the drive. With b = 1/3 it cancels a pole, ``bandwidth² / (s + bandwidth)²`` is left,
-    and no step overshoots.
+    action, b = 1, the zero makes a step overshoot by 25 % in continuous time and by 20 % at 1 kHz. The overshoot is
+    smaller if the setpoint moves no faster than the drive. With b = 1/3 the zero cancels a pole. The response is then
+    ``bandwidth² / (s + bandwidth)²``, and no step overshoots.
 
     Args:
         inertia: Inertias (n,) [kg·m² or kg], > 0.
@@ -45,7 +45,7 @@ def critically_damped_gains(inertia: Array, viscous: Array, bandwidth: Array) ->
         bandwidth: Triple pole (n,) [rad/s], > 0.
 
     Returns:
-        Kp, Ki, Kd, each (n,). Where friction alone damps more than wanted, Kd is 0.
+        Kp, Ki, Kd, each (n,). Kd is 0 where friction alone damps more than wanted.
 
     Source:
         Åström and Hägglund 1995, PID Controllers, section 3.4 (setpoint weighting).
@@ -67,9 +67,9 @@ def pid_step(
 ) -> float:
     """Drive effort for one tick, within ±limit; updates the memory.
 
-    The integral is held while the drive is saturated and the error would push it further
-    (conditional integration). The derivative acts on the measured position alone, through a
-    first-order filter of two ticks: a step of the setpoint gives it no kick.
+    The integral stays constant while the drive is saturated and the error would increase the effort further
+    (conditional integration). The derivative acts on the measured position alone, through a first-order filter of two
+    ticks. So a step of the setpoint causes no derivative kick.
 
     Args:
         setpoint: Wanted position [rad or m].
@@ -98,21 +98,21 @@ def pid_step(
 
 @kernel
 def weighted_setpoint(setpoint: float, measured: float, gains: Array, memory: Array, room: float, dt: float) -> float:
-    """Setpoint that gives a PID on its error the setpoint weight b; at b = 1 that is itself.
+    """Modified setpoint that gives a PID on the error the setpoint weight b; unchanged at b = 1.
 
-    It is ``b r + (1 - b) x``, with x the setpoint r through a lag of Ki / Kp. It makes the same
-    effort at every tick as ``Kp (b r - y) + Ki ∫(r - y)``. But it leaves the integral what holds
-    the load alone, instead of ``Kp (1 - b) r`` besides.
+    It is ``b r + (1 - b) x``, where x is the setpoint r after a first-order lag of rate Ki / Kp. It gives the same
+    effort at every tick as ``Kp (b r - y) + Ki ∫(r - y)``. The difference is in the integral: here it holds the load
+    alone, there it holds ``Kp (1 - b) r`` as well.
 
-    A setpoint farther than ``room / (b Kp)`` counts as nearer, so that the drive can brake: see
+    A setpoint farther away than ``room / (b Kp)`` counts as nearer, so that the drive can brake: see
     :func:`teleop_core.slave.controllers.motion_estimates.approach`.
 
     Args:
         setpoint: Wanted position [rad or m].
         measured: Measured position [rad or m].
         gains: Kp, Ki, Kd, b (4,).
-        memory: Its last number is the lagging setpoint; written.
-        room: What the drive can give beside the feedforward [N·m or N].
+        memory: Memory of the joint; its last number is the lagging setpoint; written.
+        room: Effort that the drive can give in addition to the feedforward [N·m or N].
         dt: Tick [s], > 0.
     """
     pull, weight, near = gains[_KI] * dt, gains[_WEIGHT], setpoint

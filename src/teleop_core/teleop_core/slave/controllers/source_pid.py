@@ -1,12 +1,12 @@
 """Source PID: the published controller, as printed, with gains by a stated rule.
 
-Proportional, integral and differential action on the error alone: no filter of the derivative,
-which feels every encoder count. Only the axes whose gravity nobody feeds forward have integral
-action; that is what the published rest positions show.
+Proportional, integral and differential action on the error alone: the derivative is not filtered, so it reacts to
+every encoder count. Only axes whose gravity is not fed forward have integral action, as the published rest positions
+show.
 
-In one thing it differs from what is printed: the integral ends at what the drive can give. Printed
-without a bound, it winds up at each stop from more than about 50 mm/s of joint 3. The loop, whose
-three poles are at one place, then runs away at a standing setpoint.
+One thing differs from the printed controller: the integral is bounded by the drive's limit. Without this bound the
+integral winds up at each stop of joint 3 from more than about 50 mm/s. The loop, which has three equal poles, then
+becomes unstable although the setpoint stands still.
 
 Source:
     Vongbunyong 2008, eqs. 6.1-6.4, with u_I(k-1) in place of the printed u(k-1).
@@ -26,7 +26,7 @@ from teleop_core.slave.controllers.pid import critically_damped_gains
 
 @dataclass(frozen=True, kw_only=True)
 class SourcePidParameters:
-    """Gains; empty lists mean: by the rule, from the robot's drive table."""
+    """Gains; empty lists are filled by the rule, from the robot's drive table."""
 
     bandwidth: tuple[float, ...] = fields.bandwidth(
         "double, or with integral action triple,",
@@ -59,7 +59,7 @@ def source_pid_control(
     """
     for i in range(effort.shape[0]):
         error = setpoint[i] - measured[i]
-        # Without integral action nothing holds what the arm weighed at the start either.
+        # Without integral action nothing holds the arm's weight at the start either.
         integral = memory[i, _INTEGRAL] + gains[i, _KI] * dt * error if gains[i, _KI] > 0.0 else 0.0
         memory[i, _INTEGRAL] = min(max(integral, -limit[i]), limit[i])
         change = (error - memory[i, _LAST]) / dt
@@ -68,7 +68,7 @@ def source_pid_control(
 
 
 def loaded_axes(robot: Robot) -> NDArray[np.bool_]:
-    """Axes (n,) that gravity loads at home and the published controller does not relieve."""
+    """Axes (n,) that gravity loads at home and whose gravity the published controller does not compensate."""
     assert robot.dynamics is not None
     effort = np.zeros(robot.n)
     robot.dynamics.gravity(robot.home.copy(), robot.dynamics.parameters.copy(), effort)
@@ -78,8 +78,8 @@ def loaded_axes(robot: Robot) -> NDArray[np.bool_]:
 def source_pid_gains(parameters: SourcePidParameters, robot: Robot, viscous: Array) -> Array:
     """Kp, Ki, Kd of each joint, (n, 3): given, or by the rule.
 
-    The rule: ``inertia (s + bandwidth)²`` without integral action, ``inertia (s + bandwidth)³``
-    with it, for :func:`loaded_axes`.
+    The rule gives the characteristic polynomial: ``inertia (s + bandwidth)²`` for axes without integral action, and
+    ``inertia (s + bandwidth)³`` for :func:`loaded_axes`, which have integral action.
 
     Raises:
         ParameterError: A list has another length than the robot has joints.
@@ -98,12 +98,12 @@ def source_pid_gains(parameters: SourcePidParameters, robot: Robot, viscous: Arr
 
 
 def begin(memory: Array, measured: Array, effort: Array) -> None:
-    """Start at rest: what holds the arm is in the integrals, as far as there are any."""
+    """Start at rest: the integrals of axes with integral action hold the arm."""
     memory[:, _INTEGRAL] = effort
 
 
 def shift(memory: Array, effort: Array) -> None:
-    """Leave the integrals: without integral action nothing takes over what gravity feeds less."""
+    """Leave the integrals unchanged: axes without integral action could not take over missing feedforward."""
 
 
 SOURCE_PID = Controller("source_pid", SourcePidParameters, source_pid_gains, source_pid_control, 2, begin, shift)

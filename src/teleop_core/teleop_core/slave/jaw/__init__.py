@@ -1,1 +1,1 @@
-"""Jaw of the slave: a server that leads its angle; a simulated drive, and the object it grips."""
+"""Jaw of the slave: a server that commands its angle, a simulated drive, and the object that the jaw grips."""

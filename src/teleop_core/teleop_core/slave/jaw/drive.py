@@ -1,7 +1,7 @@
 """Drive of the simulated jaw: its control law, and two fingers that close on an object.
 
-The fingers turn apart by the same angle, so that one angle between them says how wide the jaw is:
-their pads are ``2 L sin(angle / 2)`` apart.
+Both fingers turn by the same angle, so one angle between them gives the opening of the jaw: their pads are ``2 L
+sin(angle / 2)`` apart.
 """
 
 import math
@@ -25,7 +25,7 @@ class DriveNumbers(Fields):
 
 
 class DriveState(Fields):
-    """Fields of a state record with where the jaw is."""
+    """Fields of a state record with the position of the jaw."""
 
     setpoint: float  # [rad]
     angle: float  # [rad]
@@ -43,10 +43,10 @@ def width(p: DriveNumbers, angle: float) -> float:
 
 @inner
 def drive(p: DriveNumbers, s: DriveState, setpoint_speed: float, dt: float) -> None:
-    """Move the jaw on by a tick: a PD law within the drive's limit, against the object if it is.
+    """Move the jaw on by a tick: a PD law within the drive's limit, against the object if one is there.
 
-    The law holds its effort for the tick. The object's push is taken at the end of the tick
-    (backward Euler), so that a stiff object gives no energy to the jaw, whatever ``dt`` is.
+    The law's effort is constant during the tick. The object's push is evaluated at the end of the tick (backward
+    Euler), so that a stiff object gives no energy to the jaw, whatever ``dt`` is.
     """
     asked = p.stiffness * (s.setpoint - s.angle) + p.damping * (setpoint_speed - s.velocity)
     s.effort = min(max(asked, -p.effort), p.effort)
@@ -57,7 +57,7 @@ def drive(p: DriveNumbers, s: DriveState, setpoint_speed: float, dt: float) -> N
         lever = p.length * math.cos(0.5 * s.angle)
         depth = p.size - width(p, s.angle)
         pushed = momentum + dt * lever * p.pad_stiffness * depth
-        # The damper works from the first touch on, not before: a tick that begins outside has none.
+        # The damper works only after the first touch: a tick that begins without contact has no damper.
         pad_damping = p.pad_damping if depth > 0.0 else 0.0
         given = (dt * p.pad_stiffness + pad_damping) * lever
         against = pushed / (resisted + dt * lever * given)

@@ -1,11 +1,11 @@
-"""Grip: objects that the fingers hold by dry friction, over a table with pegs.
+"""Grip: objects that the fingers hold by dry friction, above a table with pegs.
 
-An object is one mass. Friction of both pads brings it to the motion of the tip as far as it can;
-what is missing, it slides (Coulomb). Time-stepping in speeds makes both one rule, after Moreau
-1988: the change of speed that sticking needs, or the largest that friction gives in the tick.
+An object is one mass. Friction of both pads brings the object towards the speed of the tip, as far as friction can;
+the remaining difference is sliding (Coulomb). Time-stepping in speeds makes both one rule, after Moreau 1988. The
+speed changes by what sticking needs, or by the largest change that friction gives in the tick.
 
-Two arms share the objects. The first one's simulator keeps them, and is told tip and push of the
-second jaw; that of the second is told where they are.
+Two arms share the objects. The first arm's simulator moves them, and receives tip pose and grip force of the second
+jaw. The second arm's simulator receives the positions of the objects.
 """
 
 import math
@@ -19,43 +19,43 @@ from teleop_core.slave.jaw import drive, sharing
 WEIGHT = 9.81
 """Standard weight per mass [m/s²], along -z of the slave's base."""
 SLIP = 1e-3
-"""What slides by more in one grip has slipped [m]; less is the settling of the fingers."""
+"""An object that slides by more than this in one grip has slipped [m]; less is settling of the fingers."""
 PEGS = 12
-"""Most pegs of a board."""
-_NONE = -1  # peg of an object that is on none
-_LOST = 1e-3  # so far above the table an object that is lost has dropped [m]
-_ROUNDS = 20  # of the equation for the speed that is left where a peg stops the object
-_OPEN = 1e-3  # fingers that are so much wider than the object have let go, others bounce [m]
-_LETS_GO = 0.01  # a setpoint so much wider than the grip's tightest opens the jaw [rad], assumed
+"""Largest number of pegs on a board."""
+_NONE = -1  # peg number of an object that is on no peg
+_LOST = 1e-3  # an object lost higher than this above the table has dropped [m]
+_ROUNDS = 20  # iterations for the remaining speed of an object that a peg stops
+_OPEN = 1e-3  # fingers wider than the object by more than this have let go; smaller gaps are bounces [m]
+_LETS_GO = 0.01  # a setpoint wider than the grip's tightest one by more than this opens the jaw [rad], assumed
 
 
 class GripNumbers(drive.DriveNumbers):
     """Parameter record of the jaw."""
 
     objects: int  # how many there are
-    place: Vector3  # of the first object at first, where it stands on the table [m]
+    place: Vector3  # initial position of the first object on the table [m]
     pegs: int  # how many there are
     axes: Annotated[geometry.Array, 2 * PEGS]  # of the pegs, x and y of each [m]
     peg_height: float  # [m]
-    clearance: float  # of a peg in an object, on each side [m]
+    clearance: float  # clearance of a peg in an object, on each side [m]
     mass: float  # [kg]
     pad_friction: float
     second_base: Vector3  # of the second arm, in the first one's [m]
 
 
 class GripState(drive.DriveState):
-    """State record of the jaw; hands are the own one, and the second arm's."""
+    """State record of the jaw. The two hands are this jaw and the second arm's jaw."""
 
     tip_ns: int
-    tips: Annotated[geometry.Array, 14]  # pose of each hand's tip; of the second arm: own last two
+    tips: Annotated[geometry.Array, 14]  # pose of each hand's tip; second arm: last two of its own tip
     held: Vector3  # of the second arm: the object's middle in the tip's frame as the grip began [m]
-    forces: Annotated[geometry.Array, 2]  # of each hand's fingers on its object [N]
-    numbers: Annotated[Integers, 2]  # of the object that each hand moves, or moved last
+    forces: Annotated[geometry.Array, 2]  # force of each hand's fingers on its object [N]
+    numbers: Annotated[Integers, 2]  # number of the object that each hand moves, or moved last
     objects: Annotated[geometry.Array, 7 * topics.JAW_OBJECTS]  # poses
     motions: Annotated[geometry.Array, 3 * topics.JAW_OBJECTS]  # [m/s]
-    pegs: Annotated[Integers, topics.JAW_OBJECTS]  # that each is on; _NONE without
-    homes: Annotated[Integers, topics.JAW_OBJECTS]  # peg where each rested last; _NONE: it dropped
-    pull: float  # of a peg on a gripped object, across [N]
+    pegs: Annotated[Integers, topics.JAW_OBJECTS]  # peg that each object is on; _NONE without a peg
+    homes: Annotated[Integers, topics.JAW_OBJECTS]  # peg where each object rested last; _NONE: it dropped
+    pull: float  # force of a peg on a gripped object, across the peg [N]
     transferred: int
     dropped: int
     is_gripped: int
@@ -75,7 +75,7 @@ def _tip_motion(
     motion: geometry.Array,
     dt: float,
 ) -> None:
-    """Write a tip's turn (4,) since its last sample, and its speed (3,) at the object's middle."""
+    """Write a tip's rotation (4,) since its last sample, and its velocity (3,) at the object's middle."""
     back, R = room(4), room(3, 3)
     geometry.invert_quaternion(before[3:7], back)
     geometry.multiply_quaternions(now[3:7], back, turn)
@@ -97,14 +97,14 @@ def _most(p: GripNumbers, force: float, dt: float) -> float:
 def _rub(
     p: GripNumbers, s: GripState, motion: geometry.Array, tip: geometry.Array, force: float, cut: float, dt: float
 ) -> float:
-    """Bring an object's speed (3,) to that of the fingers, as far as friction of both can.
+    """Bring an object's speed (3,) towards that of the fingers, as far as friction of both pads can.
 
-    Where a peg stops the pose, the fingers slide on by ``cut`` [m/s] across it, and friction has
-    its largest value, against the whole way of sliding: what is left for the way that is free is
-    less. The speed that is left solves ``left² = cut² + (apart left / (left + most))²``.
+    Where a peg stops the object, the fingers slide on by ``cut`` [m/s] across the peg. Friction then has its largest
+    value, against the whole direction of sliding, so a smaller part of it acts in the free direction. The remaining
+    sliding speed ``left`` solves ``left² = cut² + (apart left / (left + most))²``.
 
     Returns:
-        The speed that is left between them [m/s]; 0 where it sticks.
+        The remaining speed between fingers and object [m/s]; 0 where the object sticks.
     """
     apart, most = sharing.far_from(motion, tip), _most(p, force, dt)
     share = most / apart if apart > most else 1.0
@@ -122,13 +122,13 @@ def _rub(
 
 @inner
 def _is_opened(s: GripState) -> bool:
-    """Whether the hand opens the jaw: what slides or falls then is let go, not lost."""
+    """Whether the hand opens the jaw: an object that slides or falls then is released, not lost."""
     return s.setpoint > s.tightest + _LETS_GO
 
 
 @inner
 def _count(p: GripNumbers, s: GripState, table: float, is_lost: bool) -> None:
-    """Begin and end a grip; it ends where the fingers are wider than the pose, or it is lost."""
+    """Begin or end a grip, and count; a grip ends when the fingers are wider than the object, or lose it."""
     if s.force > 0.0 and s.is_gripped == 0:
         s.is_gripped, s.slid, s.tightest = 1, 0.0, s.setpoint
         s.grips += 1
@@ -142,7 +142,7 @@ def _count(p: GripNumbers, s: GripState, table: float, is_lost: bool) -> None:
 
 @inner
 def _slide(s: GripState, way: float) -> None:
-    """Take note of a way [m] that the object slid between the fingers."""
+    """Record a distance [m] that the object slid between the fingers."""
     before = s.slid
     s.slid += way
     if before <= SLIP < s.slid and not _is_opened(s):
@@ -160,9 +160,9 @@ def _is_near(p: GripNumbers, s: GripState, number: int, tip: geometry.Array) -> 
 
 @inner
 def _find(p: GripNumbers, s: GripState, tip: geometry.Array) -> bool:
-    """Whether the object has just left the fingers; says whether it is between them.
+    """Return whether the object has just left the fingers; write whether it is between them.
 
-    It comes between them where they are wider than it, and stays as long as it is near.
+    It comes between the fingers while they are wider than it, and stays there as long as it is near.
     """
     is_near = _is_near(p, s, s.numbers[0], tip)
     is_lost = bool(s.is_between > 0 and not is_near)
@@ -177,13 +177,13 @@ def _find(p: GripNumbers, s: GripState, tip: geometry.Array) -> bool:
 def _meet_peg(
     p: GripNumbers, peg: int, pose: geometry.Array, motion: geometry.Array, wanted: geometry.Array, dt: float
 ) -> float:
-    """Stop a wanted motion (3,) where the peg is that an object is on, and the object with it.
+    """Stop a wanted motion (3,) and its object at the peg that the object is on.
 
-    The peg is rigid, has no friction, and gives nothing back. It holds the object across its axis
-    alone, no farther away from it than the clearance.
+    The peg is rigid, without friction, and its impacts are inelastic. It constrains the object only across the peg's
+    axis: the object's middle is no farther from the axis than the clearance.
 
     Returns:
-        The speed that it takes from the motion [m/s]; 0 without a peg or a touch.
+        The speed that the peg takes from the motion [m/s]; 0 without a peg or a touch.
     """
     if peg == _NONE:
         return 0.0
@@ -203,7 +203,7 @@ def _meet_peg(
 
 @inner
 def _peg_at(p: GripNumbers, x: float, y: float) -> int:
-    """Number of the peg whose axis is within the clearance of a place; _NONE without."""
+    """Number of the peg whose axis is within the clearance of a point; _NONE if there is no such peg."""
     for k in range(p.pegs):
         if math.hypot(x - p.axes[2 * k], y - p.axes[2 * k + 1]) <= p.clearance:
             return k
@@ -212,15 +212,15 @@ def _peg_at(p: GripNumbers, x: float, y: float) -> int:
 
 @inner
 def _thread(p: GripNumbers, s: GripState, number: int, before: float, is_held: bool) -> None:
-    """Take an object onto a peg or off it, as it passes the peg's top, and count where it rests.
+    """Put an object onto a peg or off it when the object passes the peg's top, and count where it rests.
 
-    A tick along the peg's tangent takes it off the clearance; it is brought back.
+    A straight step along the peg's tangent leaves the clearance; the object is then moved back into it.
 
     Args:
         p: Parameters.
         s: State; written.
-        number: Of the object.
-        before: Its height before this tick [m].
+        number: Number of the object.
+        before: Height of the object before this tick [m].
         is_held: Whether fingers press on it.
     """
     pose, top, peg = s.objects[7 * number : 7 * number + 7], p.place[2] + p.peg_height, _NONE
@@ -244,7 +244,7 @@ def _thread(p: GripNumbers, s: GripState, number: int, before: float, is_held: b
 
 @inner
 def _choose(p: GripNumbers, s: GripState, hand: int, tip: geometry.Array) -> None:
-    """Let a hand that holds nothing take the object that its tip has come to."""
+    """Let an empty hand select the object that its tip has reached."""
     for i in range(p.objects):
         if i != s.numbers[hand] and _is_near(p, s, i, tip):
             s.numbers[hand] = i
@@ -253,7 +253,7 @@ def _choose(p: GripNumbers, s: GripState, hand: int, tip: geometry.Array) -> Non
 
 @inner
 def tell_board(p: GripNumbers, s: GripState, board: geometry.Array) -> None:
-    """Write counts, the peg's pull and the objects' middles as slave/jaw/board has them."""
+    """Write counts, the peg's pull and the objects' middles into ``board``, in the order of slave/jaw/board."""
     board[0], board[1], board[2] = s.transferred, s.dropped, s.pull
     for i in range(p.objects):
         for k in range(3):
@@ -262,7 +262,7 @@ def tell_board(p: GripNumbers, s: GripState, board: geometry.Array) -> None:
 
 @kernel
 def put_objects(p: GripNumbers, s: GripState, places: geometry.Array) -> None:
-    """Put all objects where they stand at first, upright.
+    """Put all objects upright at their initial positions.
 
     Args:
         p: Parameters.
@@ -278,14 +278,14 @@ def put_objects(p: GripNumbers, s: GripState, places: geometry.Array) -> None:
 
 @inner
 def _hold(p: GripNumbers, s: GripState, tips: geometry.Array, number: int, hands: int, dt: float) -> None:
-    """Give an object the speed that fingers make of its own; it turns with those it sticks to.
+    """Change an object's speed by the friction of the fingers; it rotates with fingers that it sticks to.
 
     Args:
         p: Parameters.
         s: State; written.
-        tips: Where both tips are now (2, 7).
-        number: Of the object.
-        hands: Who holds it: 1 the own jaw, 2 the second arm's, 3 both.
+        tips: Present poses of both tips (2, 7).
+        number: Number of the object.
+        hands: Which jaws hold it: 1 this jaw, 2 the second arm's, 3 both.
         dt: Tick [s].
     """
     pose, motion = s.objects[7 * number : 7 * number + 7], s.motions[3 * number : 3 * number + 3]
@@ -314,7 +314,7 @@ def _hold(p: GripNumbers, s: GripState, tips: geometry.Array, number: int, hands
 
 @inner
 def _move(p: GripNumbers, s: GripState, tips: geometry.Array, number: int, dt: float) -> None:
-    """Move an object on by a tick: fingers, weight, table and peg."""
+    """Move an object on by a tick, under fingers, weight, table and peg."""
     pose, motion = s.objects[7 * number : 7 * number + 7], s.motions[3 * number : 3 * number + 3]
     hands = 0
     for hand in range(2):
@@ -342,7 +342,7 @@ def _move(p: GripNumbers, s: GripState, tips: geometry.Array, number: int, dt: f
 
 @inner
 def _take_hands(p: GripNumbers, s: GripState, tips: geometry.Array, row: Row) -> None:
-    """Take where both tips are (2, 7), how hard their jaws press, and on what."""
+    """Read both tip poses (2, 7), the forces of both jaws, and which objects they press on."""
     copy(row.slave_true_cp, tips[0])
     copy(row.second_slave_true_cp, tips[1])
     for i in range(3):
@@ -368,7 +368,7 @@ def move_objects(p: GripNumbers, s: GripState, row: Row) -> None:
         row: Signals.
     """
     elapsed_ns = row.slave_true_cp_ns - s.tip_ns
-    if elapsed_ns <= 0:  # no tip is known yet, or no newer one
+    if elapsed_ns <= 0:  # no tip pose is known yet, or no newer one
         return
     tips = room(2, 7)
     _take_hands(p, s, tips, row)
@@ -383,7 +383,7 @@ def move_objects(p: GripNumbers, s: GripState, row: Row) -> None:
 
 @inner
 def see_objects(p: GripNumbers, s: GripState, row: Row) -> None:
-    """Take where the first arm's simulator says that the objects are, and count own grips of them.
+    """Read the object positions from the first arm's simulator, and count this jaw's grips of them.
 
     Args:
         p: Parameters.
@@ -395,7 +395,7 @@ def see_objects(p: GripNumbers, s: GripState, row: Row) -> None:
     for i in range(p.objects):
         for k in range(3):
             s.objects[7 * i + k] = board[3 + 3 * i + k] - p.second_base[k]
-    # The board is a tick old, and tells what the tip did a tick before that.
+    # The board is a tick old, and its objects follow the tip of the tick before that.
     R, way = room(3, 3), room(3)
     geometry.rotation_from_quaternion(s.tips[10:14], R)
     for i in range(3):

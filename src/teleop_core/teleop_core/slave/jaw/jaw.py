@@ -1,6 +1,6 @@
-"""Stage ``jaw``: the jaw's server, which says where the jaw may go; drives, or a gripper, obey.
+"""Stage ``jaw``: the jaw's server. It writes the setpoint that simulated drives or a real gripper follow.
 
-It leads the jaw's setpoint as ``slave`` leads the arm's. Where the jaw is, it is told.
+It moves the jaw's setpoint as ``slave`` moves the arm's. It receives the jaw's measured angle.
 """
 
 import math
@@ -12,9 +12,9 @@ from teleop_core.kernels import Fields, inner, kernel, record
 from teleop_core.slave.operation.states import State
 
 _STATE, _ENABLED = topics.OPERATION.index("state"), int(State.ENABLED)
-_NEAR = 1e-3  # so near to where the jaw stands a command has come to it [rad]
-_MOVED = 0.05  # a jaw that is so much farther from its setpoint was moved by others [rad]
-_CLOSING = 0.02  # a command that becomes less by so much closes: a hand that rests is not as rough
+_NEAR = 1e-3  # a command this near to the held angle has reached it [rad]
+_MOVED = 0.05  # a jaw farther from its setpoint by more than this was moved by something else [rad]
+_CLOSING = 0.02  # a command that falls by this much closes the jaw; a resting hand varies less
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,19 +51,19 @@ class JawState(Fields):
     heard_ns: int  # when it came
     sampled_ns: int  # stamp of the newest slave/jaw/measured_js
     seen_ns: int  # when it came
-    off: float  # how far the jaw was from its setpoint then [rad]
+    off: float  # distance of the jaw from its setpoint at that time [rad]
     setpoint: float  # [rad]
-    is_led: int  # whether commands lead the jaw since it held last
+    is_led: int  # whether the jaw has followed commands since its last hold
     lowest: float  # command since then [rad]
     highest: float  # [rad]
 
 
 @inner
 def _see(p: JawNumbers, s: JawState, row: Row) -> None:
-    """Take where the jaw says that it is.
+    """Take the jaw's measured angle.
 
-    Before a command leads it the setpoint is there. So it is where the jaw was silent, and stands
-    farther from its setpoint than before: somebody else moved it.
+    The setpoint is set to this angle until the first command is followed. It is also set to this angle if the jaw was
+    silent and is now farther from its setpoint than before, because then something else moved the jaw.
     """
     angle = row.slave_jaw_measured_js[0]
     if row.slave_jaw_measured_js_ns == s.sampled_ns or not math.isfinite(angle):
@@ -78,7 +78,7 @@ def _see(p: JawNumbers, s: JawState, row: Row) -> None:
 
 @inner
 def _may_move(p: JawNumbers, s: JawState, row: Row) -> bool:
-    """Whether the arm may move, and commands and measured angles come."""
+    """Whether the arm may move, and commands and measured angles arrive."""
     if row.slave_jaw_servo_jp_ns != s.told_ns:
         s.told_ns, s.heard_ns = row.slave_jaw_servo_jp_ns, row.now_ns
     is_heard = s.told_ns != 0 and row.now_ns - s.heard_ns <= p.timeout_ns
@@ -89,10 +89,11 @@ def _may_move(p: JawNumbers, s: JawState, row: Row) -> bool:
 
 @inner
 def _is_led(s: JawState, wanted: float) -> bool:
-    """Whether a command leads the jaw; after a hold the operator must take it up again.
+    """Whether the jaw follows its command; after a hold the operator must take control again.
 
-    It opens the jaw once one has asked for the angle held, or less: nothing falls because the hand was opened during a
-    stop. It closes the jaw once one has asked for the angle held, or more, or while it closes.
+    The command can open the jaw only after some command since the hold was at the held angle or below. So no object
+    falls because the hand was opened during a stop. The command can close the jaw after some command was at the held
+    angle or above, or while the commands are closing.
     """
     if s.is_led == 0:
         s.lowest, s.highest = min(s.lowest, wanted), max(s.highest, wanted)
@@ -117,7 +118,7 @@ def jaw_step(p: JawNumbers, s: JawState, row: Row, dt: float) -> None:
     if not _may_move(p, s, row):
         s.is_led, s.lowest, s.highest = 0, math.inf, -math.inf
     else:
-        # Below 0 the fingers press on each other, or harder on what is thin.
+        # Below 0 the fingers press on each other, or press a thin object harder.
         wanted, most = min(max(row.slave_jaw_servo_jp[0], -p.upper), p.upper), p.speed * dt
         if _is_led(s, wanted):
             s.setpoint += min(max(wanted - s.setpoint, -most), most)
@@ -126,7 +127,7 @@ def jaw_step(p: JawNumbers, s: JawState, row: Row, dt: float) -> None:
 
 
 class Jaw(RunningStage):
-    """Stage of the jaw's server; the setpoint begins where the jaw is."""
+    """Stage of the jaw's server; the setpoint begins at the measured angle of the jaw."""
 
     def __init__(self, parameters: JawParameters, dt: float = DT) -> None:
         super().__init__(JAW_STAGE, 0, dt)
@@ -137,7 +138,7 @@ class Jaw(RunningStage):
         self.reset()
 
     def reset(self) -> None:
-        """As before the first tick: no command is in force."""
+        """Go back to the state before the first tick: no command is in force."""
         s, row = self.state, self.signals
         assign(s, 0)
         assign(row, self._begin)
@@ -152,7 +153,7 @@ class Jaw(RunningStage):
         p["timeout_ns"] = round(parameters.command_timeout * 1e9)
 
     def concerns(self) -> list[str]:
-        """A command that has not come yet to where the jaw holds."""
+        """Report a command that has not yet reached the held angle."""
         s = self.state
         if s["is_led"] or s["lowest"] > s["highest"]:
             return []

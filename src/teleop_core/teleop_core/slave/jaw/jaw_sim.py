@@ -16,7 +16,7 @@ _OTHERS = (topics.FIRST_JAW_BOARD, topics.SECOND_TRUE_CP, topics.SECOND_JAW_GRIP
 
 @dataclass(frozen=True, kw_only=True)
 class GripObjectParameters:
-    """Objects that the jaw can grip, as thick from every side; they stand on a flat table."""
+    """Objects that the jaw can grip, equally thick from every side; they stand on a flat table."""
 
     place: tuple[float, ...] = parameter(
         (),
@@ -40,7 +40,7 @@ class GripObjectParameters:
 
 @dataclass(frozen=True, kw_only=True)
 class PegParameters:
-    """Pegs of the table, upright, which go through objects."""
+    """Upright pegs of the table, onto which objects can be put."""
 
     place: tuple[float, ...] = parameter(
         (), Within(-10.0, 10.0, "m"), "x, y of the axis of each, one after the other; empty: none", fixed=True
@@ -103,7 +103,7 @@ class JawSimParameters:
 
 @kernel
 def jaw_sim_step(p: GripNumbers, s: GripState, row: Row, dt: float) -> None:
-    """One tick: take the setpoint, say where the jaw is, and move jaw and object on.
+    """One tick: take the setpoint, write the measured jaw angle, and move jaw and object on.
 
     Args:
         p: Parameter record.
@@ -112,7 +112,7 @@ def jaw_sim_step(p: GripNumbers, s: GripState, row: Row, dt: float) -> None:
         dt: Tick [s].
     """
     before = s.setpoint
-    if row.slave_jaw_setpoint_js_ns > topics.NO_COMMAND_NS:  # else the jaw stays where it begins
+    if row.slave_jaw_setpoint_js_ns > topics.NO_COMMAND_NS:  # without a setpoint the jaw stays where it begins
         s.setpoint = row.slave_jaw_setpoint_js[0]
     row.slave_jaw_measured_js[0], row.slave_jaw_measured_js[1] = s.angle, s.velocity
     drive(p, s, (s.setpoint - before) / dt, dt)
@@ -142,7 +142,7 @@ class JawSim(RunningStage):
         self.reset()
 
     def reset(self) -> None:
-        """Open, at rest; the object stands where it began."""
+        """Open the jaw, at rest, and put the object at its initial position."""
         s, p, row = self.state, self.parameters, self.signals
         assign(s, 0)
         assign(row, self._begin)

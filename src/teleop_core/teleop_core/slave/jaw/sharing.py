@@ -1,8 +1,8 @@
-"""Sharing: the speed of an object that two jaws hold, each by dry friction of its own.
+"""Sharing: the speed of an object that two jaws hold by dry friction.
 
-It is the speed v that makes ``(v - v0)² / 2 + Σ most |v - tip|`` least. Here v0 is the speed
-without friction, ``tip`` that of each jaw, and ``most`` the largest change that its friction gives.
-It is the rule of :mod:`~teleop_core.slave.jaw.grip`, for two frictions at once.
+The speed v minimises ``(v - v0)² / 2 + Σ most |v - tip|``. Here v0 is the speed without friction, ``tip`` the speed of
+each jaw, and ``most`` the largest change by that jaw's friction. This is the rule of
+:mod:`~teleop_core.slave.jaw.grip`, for two frictions at once.
 """
 
 import math
@@ -10,8 +10,8 @@ import math
 from teleop_core.graph.signals import copy
 from teleop_core.kernels import geometry, inner
 
-_ROUNDS = 2000  # at most, where the object sticks to neither
-_ENOUGH = 1e-9  # change of the speed in a round [m/s]
+_ROUNDS = 2000  # most iterations if the object sticks to neither jaw
+_ENOUGH = 1e-9  # the iteration ends at this change of the speed [m/s]
 
 
 @inner
@@ -39,17 +39,17 @@ def _sticks(motion: geometry.Array, tip: geometry.Array, most: float, other: geo
 def share_speed(
     motion: geometry.Array, tip: geometry.Array, most: float, other: geometry.Array, against: float
 ) -> None:
-    """Give an object between two pairs of fingers the speed that both frictions make of its own.
+    """Change the speed of an object between two pairs of fingers by the friction of both.
 
     Args:
-        motion: Its speed (3,) without them [m/s]; written.
-        tip: Speed (3,) of one pair of fingers at its middle [m/s].
-        most: Largest change of its speed by that pair's friction [m/s].
+        motion: Speed of the object (3,) without friction [m/s]; written.
+        tip: Speed (3,) of the first pair of fingers at the object's middle [m/s].
+        most: Largest change of the object's speed by that pair's friction [m/s].
         other: Speed (3,) of the other pair [m/s].
-        against: Largest change by the friction of that one [m/s].
+        against: Largest change of the object's speed by the other pair's friction [m/s].
 
     Source:
-        Moreau 1988 for the rule; where neither sticks, the iteration of Weiszfeld 1937.
+        Moreau 1988 for the rule; the iteration of Weiszfeld 1937 if the object sticks to neither pair.
     """
     if _sticks(motion, tip, most, other, against):
         copy(tip, motion)

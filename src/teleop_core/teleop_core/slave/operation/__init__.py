@@ -1,4 +1,4 @@
-"""Operation: whether an arm may move, what stops it, and what it takes to move again."""
+"""Operation: whether an arm may move, what stops it, and what is needed to move again."""
 
 from teleop_core.slave.operation.faults import FAULTS, Fault, Reaction
 from teleop_core.slave.operation.report import operation_level, operation_text

@@ -1,4 +1,4 @@
-"""Faults: what may go wrong with an arm in operation, what it does then, and how it says so."""
+"""Faults of an arm in operation: how the arm reacts to each, and how it reports it."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -6,7 +6,7 @@ from enum import Enum, IntEnum
 
 
 class Fault(IntEnum):
-    """What went wrong; 0 for nothing."""
+    """Kind of fault; 0 for no fault."""
 
     NONE = 0
     STOP = 1
@@ -31,7 +31,7 @@ class Fault(IntEnum):
 
 
 class Reaction(Enum):
-    """What the arm does."""
+    """Reaction of the arm to a fault."""
 
     HOLD = "FAULT; the setpoint stands still at once, the drives hold the arm there"
     BRAKE = "FAULT; drives off, brakes on: control is not to be trusted"
@@ -66,8 +66,8 @@ FAULTS: Mapping[Fault, FaultKind] = {
         Reaction.HOLD, "no slave/measured_js; its sender, such as arm_bridge, says why in its log", "s"
     ),
 }
-"""What there is, with its reaction; those that a session names as ``reported`` only report."""
+"""All faults with their reactions; faults that a session lists in ``reported`` are only reported."""
 ALWAYS = (Fault.STOP, Fault.HEARTBEAT)
 """Faults that always stop the arm; ``reported`` cannot demote them to a message."""
 NAMES = tuple(fault.word for fault in Fault if fault and fault not in ALWAYS)
-"""Those that a session can name as ``reported``."""
+"""Names of the faults that a session can list in ``reported``."""

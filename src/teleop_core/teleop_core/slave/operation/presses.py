@@ -2,20 +2,20 @@
 
 
 class Presses:
-    """State of every stop button that was heard, and of the stop that all of them share.
+    """State of every stop button that has sent a message, and of the stop that all buttons share.
 
-    The stop is pressed while at least one button holds it. A button holds it from its press to its
-    own release: what another button says releases nothing. :meth:`release` overrides them all.
+    The stop is pressed while at least one button holds it. A button holds the stop from its press to its own release;
+    messages of other buttons do not release it. :meth:`release` overrides all buttons.
 
-    Every button numbers its messages, 1 for the first. A missing number belongs to a message that was lost: by a full
-    queue, by a process that stood still, or on the way. It may have been a press, so it counts as one. What a button
-    said before it is heard for the first time may have been sent to this listener too, so messages before the first one
-    count as missing, unless the listener is idle. A message that arrives twice, through two readers, counts once.
+    Every button numbers its messages, 1 for the first. A missing number means a lost message: lost by a full queue, by
+    a process that stood still, or by the network. A lost message may have been a press, so it counts as a press.
+    Messages before the first received one count as lost too, unless the listener is idle, because they may have been
+    sent to this listener. A message that arrives twice, through two readers, counts once.
 
-    Of a button that says nothing, nobody knows whether it is pressed: it holds the stop (:meth:`doubt`).
+    The state of a button that sends nothing is unknown, so such a button holds the stop (:meth:`doubt`).
 
-    Methods that take a message return what the stop is after it, oldest first: a press alone
-    (True), followed by False where no button holds the stop any more.
+    Methods that take a message return the states of the stop after it, oldest first: True means pressed. A lost
+    message gives True first, followed by False if no button holds the stop.
     """
 
     def __init__(self) -> None:
@@ -27,7 +27,7 @@ class Presses:
 
     @property
     def lost(self) -> int:
-        """Messages that were lost so far, by their numbers or by the middleware's account."""
+        """Number of messages lost so far, found by missing numbers or reported by the middleware."""
         return max(self._missing, self._told)
 
     @property
@@ -37,22 +37,22 @@ class Presses:
 
     @property
     def heard_ns(self) -> int | None:
-        """Time of the last message of the button that is silent longest [ns]; None without one."""
+        """Time of the last message of the button that has been silent longest [ns]; None without a button."""
         return min(self._heard_ns.values(), default=None)
 
     def silent(self, since_ns: int) -> tuple[bytes, ...]:
-        """Buttons that have said nothing since a time [ns]."""
+        """Buttons that have sent no message since the time ``since_ns`` [ns]."""
         return tuple(one for one, heard_ns in self._heard_ns.items() if heard_ns < since_ns)
 
     def lose(self, count: int) -> tuple[bool, ...]:
         """Take the middleware's count of lost messages, whose senders are unknown.
 
         Args:
-            count: Messages that it has lost so far, of all buttons.
+            count: Number of messages that the middleware has lost so far, of all buttons.
 
         Returns:
-            A press, if these are more than at the last call. A loss that the numbers told too may
-            give a second press: subtracting it could hide a loss of another button.
+            A press if ``count`` has grown since the last call. A loss that missing numbers have already shown may give
+            a second press: subtracting it could hide a loss of another button.
         """
         is_new = count > self._told
         self._told = count
@@ -69,11 +69,10 @@ class Presses:
                 does not number messages.
             now_ns: Time [ns], of any clock that never goes back.
             is_pressed: What the message says.
-            is_idle: Whether a press that a person made before this button was heard for the first
-                time stops nothing: the arm is disabled.
+            is_idle: Whether the arm is disabled. Then presses before the first message from this button are ignored.
 
         Returns:
-            Nothing for a message that was taken already.
+            States of the stop, oldest first; empty for a message that was already taken.
         """
         last = self._last.get(sender, number - 1 if is_idle else 0)
         if 0 < number <= last:
@@ -85,22 +84,22 @@ class Presses:
         return (True, *said) if missing else said
 
     def overhear(self, sender: bytes, now_ns: int, *, is_pressed: bool) -> tuple[bool, ...]:
-        """Take a message of a best-effort button, whose losses nobody counts.
+        """Take a message of a best-effort button, whose losses are not counted.
 
         Args:
-            sender: Identity of the button; one that :meth:`take` knows is passed over.
-            now_ns: As there.
+            sender: Identity of the button; messages of a button that :meth:`take` knows are ignored.
+            now_ns: Time [ns], as in :meth:`take`.
             is_pressed: What the message says.
         """
         return () if sender in self._last else self._note(sender, now_ns, is_pressed=is_pressed)
 
     def doubt(self, sender: bytes) -> tuple[bool, ...]:
-        """Have a button that was found and has never been heard hold the stop.
+        """Let a button that was discovered but has sent no message hold the stop.
 
-        It counts as pressed until it says that it is released, or is overridden.
+        The button counts as pressed until it reports its release, or is overridden.
 
         Args:
-            sender: As in :meth:`take`; one that is known, or was doubted before, is passed over.
+            sender: As in :meth:`take`; a button that is known, or was doubted before, is ignored.
         """
         if self.knows(sender) or sender in self._doubted:
             return ()
@@ -109,7 +108,7 @@ class Presses:
         return (True,)
 
     def release(self) -> None:
-        """Override all buttons: none holds the stop, and none is missed before it speaks again."""
+        """Override all buttons: none holds the stop, and none counts as silent before its next message."""
         self._holders.clear()
         self._heard_ns.clear()
 

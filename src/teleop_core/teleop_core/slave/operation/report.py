@@ -36,7 +36,7 @@ def operation_level(values: Mapping[str, float]) -> int:
 
 
 def fault_text(fault: Fault, values: Mapping[str, float], joint_names: tuple[str, ...] = ()) -> str:
-    """What went wrong, with joint, value and bound where there are such."""
+    """Fault in words, with joint, value and bound if the fault has them."""
     kind, joint = FAULTS[fault], int(values["fault_joint"])
     text = kind.text
     if joint >= 0:

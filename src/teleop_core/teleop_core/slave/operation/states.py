@@ -1,7 +1,7 @@
-"""States of an arm and what leads from one to another: one table for all ways to run it.
+"""States of an arm and the transitions between them, in one table that all run modes use.
 
 The states and commands are those of CRTK (Collaborative Robotics Toolkit, robot operating states), with two more
-commands: ``stop``, the emergency stop, which every state takes, and ``reset``, which alone ends it.
+commands. ``stop`` is the emergency stop, which every state accepts. Only ``reset`` ends the emergency stop.
 """
 
 from enum import IntEnum
@@ -23,7 +23,7 @@ class State(IntEnum):
 
 
 class Event(IntEnum):
-    """What may change the state: commands, and what the arm finds itself."""
+    """What may change the state: commands, and events that the arm detects itself."""
 
     ENABLE = 0
     DISABLE = 1
@@ -36,7 +36,7 @@ class Event(IntEnum):
     MOVE = 8  # a move to a goal begins
     ARRIVED = 9  # the move has ended
     FAILED = 10  # a fault that latches
-    LAPSED = 11  # commands were silent for so long that motion is resumed on purpose only
+    LAPSED = 11  # no commands came for so long that only an explicit command resumes motion
 
 
 COMMANDS = topics.STATE_COMMANDS
@@ -44,7 +44,7 @@ COMMANDS = topics.STATE_COMMANDS
 
 
 class Answer(IntEnum):
-    """What became of an event."""
+    """Answer to an event."""
 
     DONE = 0
     ALREADY = 1  # nothing had to change
@@ -86,11 +86,11 @@ class OperatingState(Fields):
     is_homed: int
     is_busy: int
     is_homing: int
-    must_plan: int  # a move is to be planned, to the start where it homes
+    must_plan: int  # a move is to be planned; during homing, to the start position
     is_stopped: int  # an emergency stop is latched
     is_pressed: int  # its cause is still there
     is_moving: int  # the arm is not at rest
-    must_home: int  # a pause interrupted homing, which resume begins anew
+    must_home: int  # a pause interrupted homing; resume restarts homing
     fault: int
     fault_joint: int
     fault_value: float
@@ -125,7 +125,7 @@ def change(s: OperatingState, event: int) -> int:
 
 @inner
 def _take(s: OperatingState, event: int, answer: int) -> int:
-    """What an event does beside the state."""
+    """Apply the effects of an event other than the change of state."""
     if event == _HOME or (event == _RESUME and s.must_home):
         s.is_busy, s.is_homing, s.must_plan, s.is_homed, s.must_home = 1, 1, 1, 0, 0
         return _DONE
@@ -162,20 +162,20 @@ def command_event(name: str) -> Event:
 
 
 AT_REST_ONLY = "the arm is not at rest yet; try again"
-"""End of the answer to a command that an arm takes at rest only."""
+"""End of the answer to a command that an arm accepts only at rest."""
 
 
 STILL_PRESSED = "the emergency stop is still pressed"
-"""Part of the answer to a reset while a stop button is pressed, or missed."""
+"""Part of the answer to a reset while a stop button is pressed or silent."""
 
 
 def answer_text(event: Event, answer: Answer, state: State) -> str:
-    """What became of an event, in words that say what would help.
+    """Answer to an event in words, with advice if the event was refused.
 
     Args:
-        event: What was asked for.
+        event: The event.
         answer: What :func:`change` returned.
-        state: State before.
+        state: State before the event.
     """
     name = event.name.lower()
     if answer is Answer.DONE:

@@ -93,10 +93,10 @@ class OperationParameters:
         self.script()
 
     def script(self) -> list[tuple[float, Event]]:
-        """Times [s] since the first tick, with the events that come then, in order.
+        """Times [s] since the first tick with their scripted events, in order of time.
 
         Raises:
-            ParameterError: One has another form.
+            ParameterError: An entry has the wrong form.
         """
         found = []
         for text in self.events:

@@ -1,4 +1,4 @@
-"""Watch: finds the faults of an arm, plays its script of commands, tells how it is."""
+"""Watch: finds the faults of an arm, plays its script of commands, and reports its state."""
 
 from typing import Annotated
 
@@ -12,7 +12,7 @@ from teleop_core.slave.operation.thresholds import MOST_EVENTS
 
 
 class ServerParameters(Fields):
-    """Fields of the parameter record of an arm's server that commands and faults are judged by."""
+    """Fields of the parameter record of an arm's server, with the bounds for commands and faults."""
 
     lower: PerJoint  # limits of the joints [rad or m]
     upper: PerJoint
@@ -35,13 +35,13 @@ class ServerParameters(Fields):
 
 
 class ServerState(OperatingState):
-    """Fields of its state record that faults are found in."""
+    """Fields of the server's state record that are used to find faults."""
 
-    setpoint: PerJoint  # [rad or m], as the next two
+    setpoint: PerJoint  # [rad or m]; the next two as well
     target: PerJoint
     measured: PerJoint
     speed: PerJoint  # [rad/s or m/s]
-    full_ns: IntegerPerJoint  # for how long a drive has given all
+    full_ns: IntegerPerJoint  # how long a drive has been at its effort limit
     must_brake: int
     told: int
     played: int
@@ -56,7 +56,7 @@ class ServerState(OperatingState):
     travel: float
     sampled_ns: int
     heard_of_ns: int
-    must_join: int  # the setpoint goes to where an arm is that was lost
+    must_join: int  # the setpoint goes to the measured position of an arm whose feedback was lost
 
 
 _REACTIONS = {Reaction.HOLD: 0, Reaction.BRAKE: 1, Reaction.PAUSE: 2, Reaction.REPORT: 3}
@@ -72,15 +72,15 @@ _FEEDBACK = int(Fault.FEEDBACK)
 REST_NS = 50_000_000
 """An arm rests once no joint has moved for so long [ns]: twice as long as a turn of a swinging
 joint, at the bandwidths of 60 to 80 rad/s that drives have, takes."""
-# A joint this close to its limit [rad or m] is at it.
+# A joint this close to its limit [rad or m] counts as at the limit.
 _AT = 1e-9
-# A drive that gives this share of its limit gives all.
+# A drive that gives this share of its effort limit counts as saturated.
 _FULL = 0.999
 
 
 @inner
 def fail(p: ServerParameters, s: ServerState, fault: int, joint: int, value: float, bound: float) -> None:
-    """Take note of a fault, and do what it asks for; a fault in force is not overwritten."""
+    """Record a fault and start its reaction; an active fault is not overwritten."""
     reaction = _REPORT if p.reported[fault] else _REACTION[fault]
     if reaction == _REPORT:
         s.told = fault
@@ -102,7 +102,7 @@ def fail(p: ServerParameters, s: ServerState, fault: int, joint: int, value: flo
 
 @inner
 def begin_tick(p: ServerParameters, s: ServerState, now_ns: int) -> None:
-    """Play the commands whose time has come; a stop button that fell silent is pressed."""
+    """Play the commands whose time has come; a stop button that fell silent counts as pressed."""
     if s.first_ns == 0:
         s.first_ns = now_ns
         s.heard_ns = max(s.heard_ns, now_ns)
@@ -136,8 +136,8 @@ def watch_joints(p: ServerParameters, s: ServerState, effort: Array, passed_ns: 
     Args:
         p: Parameters.
         s: State; written.
-        effort: What the drives gave (n,) [N·m or N].
-        passed_ns: Time since the last time [ns].
+        effort: Efforts that the drives gave (n,) [N·m or N].
+        passed_ns: Time since the last call [ns].
     """
     for i in range(effort.shape[0]):
         off = abs(s.setpoint[i] - s.measured[i])
@@ -154,7 +154,7 @@ def watch_joints(p: ServerParameters, s: ServerState, effort: Array, passed_ns: 
 
 @inner
 def watch_tip(p: ServerParameters, s: ServerState, setpoint: Array, measured: Array) -> None:
-    """Find a tip, poses (7,), that is too far from its setpoint."""
+    """Find a tip that is too far from its setpoint; both are poses (7,)."""
     square = 0.0
     for i in range(3):
         square += (setpoint[i] - measured[i]) ** 2
@@ -164,7 +164,7 @@ def watch_tip(p: ServerParameters, s: ServerState, setpoint: Array, measured: Ar
 
 @inner
 def watch_limits(p: ServerParameters, s: ServerState, now_ns: int) -> None:
-    """Find commands that press a joint into the end of its range."""
+    """Find commands that push a joint against its limit."""
     pressed = -1
     for i in range(s.target.shape[0]):
         if s.target[i] <= p.lower[i] + _AT or s.target[i] >= p.upper[i] - _AT:
@@ -178,7 +178,7 @@ def watch_limits(p: ServerParameters, s: ServerState, now_ns: int) -> None:
 
 @inner
 def measure_rest(s: ServerState, place: Array, now_ns: int) -> None:
-    """Measure how long and how far the tip, at ``place`` (7,), moves after it may move no more."""
+    """Measure for how long and how far the tip, at ``place`` (7,), still moves after the arm had to stop."""
     if s.state == _ENABLED:
         s.left_ns, s.is_resting = 0, 0
         return
@@ -198,9 +198,9 @@ def measure_rest(s: ServerState, place: Array, now_ns: int) -> None:
 
 @inner
 def find_rest(s: ServerState, moves: bool, now_ns: int) -> None:
-    """Take note whether the arm moves; it rests after :data:`REST_NS` without motion.
+    """Record whether the arm moves; it is at rest after :data:`REST_NS` without motion.
 
-    A joint that swings about its place stands still for a moment at each of its turns.
+    The waiting time is needed because an oscillating joint stands still for a moment at each of its turns.
     """
     if moves:
         s.still_ns, s.is_moving = 0, 1
@@ -220,7 +220,7 @@ def watch_feedback(p: ServerParameters, s: ServerState, now_ns: int) -> None:
 
 @inner
 def is_blind(p: ServerParameters, s: ServerState, now_ns: int) -> bool:
-    """Whether the arm has not said lately, within the command timeout, where it is."""
+    """Whether no measured position of the arm came within the command timeout."""
     return bool(now_ns - s.heard_of_ns > p.timeout_ns)
 
 

@@ -1,7 +1,7 @@
-"""Plants: what the slave simulator moves, from the amplifier's input to the true tip.
+"""Plants: the physics that the slave simulator moves, from the amplifier's input to the true tip.
 
-A plant is numbers over one compiled model: rigid bodies, friction, drives, encoders, and what lies
-behind the encoders. Each file says where its numbers come from.
+A plant is a set of numbers for one compiled model: rigid bodies, friction, drives, encoders, and the transmission
+behind the encoders. Each file states the origin of its numbers.
 """
 
 from collections.abc import Callable
@@ -30,23 +30,23 @@ class Physics:
     Args:
         viscous: Viscous friction [N·m·s/rad or N·s/m].
         coulomb: Dry friction [N·m or N].
-        friction_speed: Where dry friction that does not stick has 71 % of its value [rad/s or m/s].
-        bristle: Stiffness of dry friction that sticks [N·m/rad or N/m]; 0 where it does not.
-        wander: Standard deviation of dry friction over its mean.
-        wander_travel: Way that a joint slips while it changes [rad or m], > 0.
+        friction_speed: Speed at which dry friction that does not stick has 71 % of its value [rad/s or m/s].
+        bristle: Stiffness of dry friction that sticks [N·m/rad or N/m]; 0 for friction that does not stick.
+        wander: Standard deviation of dry friction, divided by its mean.
+        wander_travel: Distance of slip over which dry friction changes [rad or m], > 0.
         bias: Effort that the amplifier adds [N·m or N].
-        effort_step: Smallest difference of effort that the drive makes [N·m or N]; 0: none.
-        encoder_step: Smallest difference that is measured [rad or m].
+        effort_step: Resolution of the drive's effort [N·m or N]; 0: continuous.
+        encoder_step: Resolution of the encoder [rad or m].
         play: Half width of the play between encoder and joint [rad or m].
-        coupling: (n, n), below its diagonal: what a joint moves per lag of an earlier one.
+        coupling: Motion of a joint per lag of an earlier joint, (n, n), below the diagonal.
         tip_geometry: Row of :func:`teleop_core.kinematics.dh_kernels.fk` for the true links;
             empty for the robot's own forward kinematics.
-        dynamics: Parameter row of the true dynamics; empty for those that the control law knows.
-        effort_delay: Time from an asked effort to the motor's, beyond the tick [s]: whole ticks.
-        drive_gain: Effort that drives give over the one that is asked of them; None: 1.
+        dynamics: Parameter row of the true dynamics; empty for the dynamics that the control law knows.
+        effort_delay: Delay from commanded effort to motor effort, beyond the tick [s]; whole ticks.
+        drive_gain: Effort that the drives give, divided by the commanded effort; None: 1.
         gear_stiffness: Stiffness of gears that bend [N·m/rad or N/m]; 0, or None, for those that do not.
-        motor_inertia: Inertia of the motors, seen through their gears [kg·m² or kg], which the
-            dynamics contain; of use where gears bend.
+        motor_inertia: Inertia of the motors, seen through their gears [kg·m² or kg]. The dynamics contain it already;
+            it is used only for gears that bend.
     """
 
     viscous: Array
@@ -86,7 +86,7 @@ class Plant:
     """A plant.
 
     Attributes:
-        name: What ``--set plant=`` calls it.
+        name: Its name in ``--set plant=``.
         parameters: Its parameter group.
         physics: ``physics(parameters, robot)`` gives its numbers for a robot with drives.
     """
@@ -97,7 +97,7 @@ class Plant:
 
 
 def _try(part: Plant) -> None:
-    """Try it once, so that what cannot work is told before anything runs."""
+    """Try a plant once, so that errors are reported before anything runs."""
     from teleop_core.robots import load_robot
 
     with tried("plant", part.name, "one with physics(parameters, robot) -> Physics"):
@@ -112,4 +112,4 @@ PLANTS: Registry[Plant] = Registry(
 """All plants by name."""
 
 register_plant = PLANTS.register
-"""Adds one of yours under its own name; see :meth:`Registry.register`."""
+"""Adds your plant under its own name; see :meth:`Registry.register`."""

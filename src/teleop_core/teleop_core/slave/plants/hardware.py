@@ -1,7 +1,7 @@
-"""Hardware plant: friction that sticks, drives in steps, and a tip that encoders do not see.
+"""Hardware plant: sticking friction, quantised drive efforts, and tip errors that encoders do not measure.
 
-What is known of a robot stands in :attr:`Robot.hardware <teleop_core.robots.robot.Robot.hardware>`;
-a robot without it sticks by the dry friction of its drive table and is made as drawn.
+The known faults of a robot are in :attr:`Robot.hardware <teleop_core.robots.robot.Robot.hardware>`. A robot without
+this entry has sticking dry friction from its drive table, and links exactly as drawn.
 """
 
 from dataclasses import dataclass
@@ -20,7 +20,7 @@ from teleop_core.slave.controllers import per_joint
 from teleop_core.slave.plants import Physics, Plant
 
 FASTEST_GEAR = 1500.0
-"""Frequency [rad/s] of a gear on its spring up to which steps of half a tick follow it."""
+"""Largest natural frequency [rad/s] of a gear on its spring that steps of half a tick can integrate."""
 FAULTS = {
     "friction": "dry friction",
     "sticking": "that dry friction sticks, and is not smooth",
@@ -36,7 +36,7 @@ FAULTS = {
 
 @dataclass(frozen=True, kw_only=True)
 class HardwareParameters:
-    """Which faults there are, numbers in place of the robot's, and what no robot states."""
+    """Which faults to simulate, values that replace the robot's, and values that no robot file states."""
 
     without: tuple[str, ...] = parameter(
         (), choices=tuple(FAULTS), fixed=True, doc="faults that are left out, to see what they add"
@@ -74,7 +74,7 @@ class HardwareParameters:
         "of the converter that commands the amplifier, peak to peak",
         source="assumed: usual for cards of analog outputs; the source names no number",
     )
-    # Faults that no source of the RCRT-1 speaks of; `teleop experiment robustness` turns them on.
+    # Faults that no source of the RCRT-1 mentions; `teleop experiment robustness` turns them on.
     effort_delay: float = parameter(
         0.0,
         Within(0.0, 0.03, "s"),
@@ -102,7 +102,7 @@ class HardwareParameters:
 
 
 def faults_of(robot: Robot) -> Hardware:
-    """What is known of the real arm; without anything, the dry friction of its drive table."""
+    """Known faults of the real arm; if none are known, the dry friction of its drive table."""
     if robot.hardware is not None:
         return robot.hardware
     assert robot.drives is not None
@@ -118,10 +118,11 @@ def faults_of(robot: Robot) -> Hardware:
 
 
 def _steps(drives: Drives, bits: int) -> Array:
-    """Steps of the converters over their range [N·m or N].
+    """Resolution of the converters over their range [N·m or N].
 
-    The range ends at the drive's effort, or at the effort that brings the axis to full speed within a tick: some files
-    give links of a few grams drives of 100 N·m, and one step would throw them.
+    The range ends at the drive's effort limit, or at the effort that brings the axis to full speed within a tick. The
+    second bound is needed because some robot files give drives of 100 N·m to links of a few grams. One step of such a
+    drive would throw the link.
     """
     quick = drives.inertia * drives.speed_limit / DT
     return 2.0 * np.minimum(drives.effort_limit, quick) / 2.0**bits
@@ -131,8 +132,8 @@ def hardware_physics(parameters: HardwareParameters, robot: Robot) -> Physics:
     """Numbers of a robot's drive table and of its faults, less those that are left out.
 
     Raises:
-        ParameterError: A list is not of the robot's number of joints, or a weight has no value.
-        UnknownNameError: A weight that the robot's dynamics do not leave open.
+        ParameterError: The length of a list is not the robot's number of joints, or a weight has no value.
+        UnknownNameError: A weight is not one that the robot's dynamics leave open.
     """
     drives, faults, out = robot.drives, faults_of(robot), set(parameters.without)
     assert drives is not None
@@ -166,7 +167,7 @@ def hardware_physics(parameters: HardwareParameters, robot: Robot) -> Physics:
 
 
 def _motors(robot: Robot, parameters: HardwareParameters) -> Array:
-    """Inertias of the motors (n,), seen through their gears: the robot's, or half of the axes'."""
+    """Inertias of the motors (n,), seen through their gears: the robot's values, or half of each axis's inertia."""
     faults, drives = faults_of(robot), robot.drives
     assert drives is not None
     known = faults.motors if len(faults.motors) else 0.5 * drives.inertia
@@ -177,7 +178,7 @@ def _gears(robot: Robot, parameters: HardwareParameters) -> Array:
     """Stiffness of the gears (n,).
 
     Raises:
-        ParameterError: A gear that bends with no inertia of a link behind it, or that swings too fast for the ticks.
+        ParameterError: A gear that bends has no link inertia behind it, or oscillates too fast for the ticks.
     """
     given, n, model = parameters.gear_stiffness, robot.n, robot.dynamics
     stiffness = per_joint(robot, "plant.hardware.gear_stiffness", given, np.zeros(n))
@@ -199,7 +200,7 @@ def _gears(robot: Robot, parameters: HardwareParameters) -> Array:
 
 
 def _dynamics(robot: Robot, faults: Hardware, weights: tuple[str, ...]) -> Array:
-    """Parameter row of the true dynamics; empty where it is the one that the control law knows."""
+    """Parameter row of the true dynamics; empty if it equals the one that the control law knows."""
     model = robot.dynamics
     assert model is not None
     row = (faults.dynamics if len(faults.dynamics) else model.parameters).copy()
@@ -215,7 +216,7 @@ def _dynamics(robot: Robot, faults: Hardware, weights: tuple[str, ...]) -> Array
 
 
 def _tip_geometry(robot: Robot, faults: Hardware) -> Array:
-    """Geometry row of the arm as built; empty where nothing differs, or the robot is no chain."""
+    """Geometry row of the arm as built; empty if nothing differs, or if the robot is not a chain."""
     built = None if faults.links is None else true_chain(robot, faults.links)
     return np.zeros(0) if built is None else built
 

@@ -1,4 +1,4 @@
-"""Ideal plant: smooth friction, drives and links as drawn; what a control law can do at best."""
+"""Ideal plant: smooth friction, and drives and links as drawn; it shows the best that a control law can do."""
 
 import numpy as np
 
@@ -8,7 +8,7 @@ from teleop_core.slave.plants import Physics, Plant
 
 
 def ideal_physics(parameters: NoParameters, robot: Robot) -> Physics:
-    """Numbers of the drive table, and nothing else."""
+    """Numbers of the drive table alone."""
     drives, zero = robot.drives, np.zeros(robot.n)
     assert drives is not None
     return Physics(

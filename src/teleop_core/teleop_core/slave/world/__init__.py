@@ -1,7 +1,7 @@
 """World: what the slave's tool can touch.
 
-An object is a use of a shape (:mod:`teleop_core.shapes`), or one of the few in this folder that are objects alone. What
-it is made of, and how it pushes, is the same for all (:mod:`teleop_core.slave.world.contact`).
+An object has a shape of :mod:`teleop_core.shapes`, or one of the few shapes in this folder that only objects have.
+Material and contact force are the same for all (:mod:`teleop_core.slave.world.contact`).
 """
 
 from teleop_core.base.registry import Registry, part_check, places
@@ -16,4 +16,4 @@ WORLD_OBJECTS: Registry[Shape] = Registry(
     part_check("world object", Shape, "distance", "outline"),
     base=SHAPES,
 )
-"""All objects by name: every shape, and those that are objects alone."""
+"""All objects by name: every shape, and the shapes that only objects have."""

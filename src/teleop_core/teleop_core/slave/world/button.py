@@ -1,8 +1,8 @@
 """Button: an upright post whose surface gives way with a click, over a stiff stop.
 
-Its spring resists more and more up to the click force, then less until it is on its stop, which is
-made of the material of the world. On the way out it pushes less than on the way in: dry friction in
-it, a share of its force, is a second spring that yields at this bound.
+Its spring force grows up to the click force, and then falls until the button is on its stop. The stop has the material
+of the world. On release the button pushes less than on the press, because of dry friction, a share of its force. This
+friction is a second spring that yields at that bound.
 """
 
 from dataclasses import dataclass
@@ -15,12 +15,12 @@ from teleop_core.shapes import Shape
 from teleop_core.shapes.basis import drawing
 from teleop_core.shapes.cylinder import CylinderParameters, cylinder_distance, cylinder_outline
 
-_STIFFER = 10.0  # spring of the friction, over the steepest that the snapping one can be
+_STIFFER = 10.0  # stiffness of the friction's spring, divided by the steepest slope of the click spring
 _LARGEST = 100.0  # click force [N]
 
 
 class ButtonNumbers(Fields):
-    """Fields of a parameter record with the spring of a button; no click force: no button."""
+    """Fields of a parameter record with the spring of a button; a click force of 0 means no button."""
 
     click_force: float  # [N]
     click_travel: float  # [m]
@@ -30,9 +30,9 @@ class ButtonNumbers(Fields):
 
 
 class ButtonState(Fields):
-    """Fields of a state record with what a button does."""
+    """Fields of a state record with the state of a button."""
 
-    gap: float  # of the tip, along the normal in force [m]
+    gap: float  # gap of the tip along the present normal [m]
     is_pressed: int
     presses: int  # so far
     held: float  # bend of the friction's spring, positive inwards [m]
@@ -82,20 +82,21 @@ def _spring(p: ButtonNumbers, depth: float) -> float:
 def _stiffness(p: ButtonNumbers) -> float:
     """Stiffness of the friction's spring [N/m].
 
-    It is more than the slope of the bound, or the bound would lead the spring and give it energy.
+    The stiffness is larger than the slope of the bound. Otherwise the moving bound would drive the spring and add
+    energy.
     """
     return _STIFFER * p.click_force / min(p.click_travel, p.stroke - p.click_travel)
 
 
 @inner
 def follow_button(p: ButtonNumbers, s: ButtonState, before: float) -> None:
-    """Let the friction take up the way of a tick, and count the press.
+    """Update the friction by the motion of a tick, and count a press.
 
-    The button is pressed from the stop on, and until it is back at the click.
+    The button counts as pressed from the moment it reaches the stop until it is back at the click.
 
     Args:
         p: Parameters.
-        s: State, with the gap now; written.
+        s: State with the present gap; written.
         before: Gap a tick ago [m].
     """
     depth = max(-s.gap, 0.0)
@@ -110,9 +111,9 @@ def follow_button(p: ButtonNumbers, s: ButtonState, before: float) -> None:
 
 @inner
 def push_of_button(p: ButtonNumbers, s: ButtonState, depth: float) -> float:
-    """Push of spring and friction [N] at a depth [m]; that of the stop comes on top.
+    """Push of spring and friction [N] at a depth [m]; the push of the stop is added elsewhere.
 
-    Within a tick it is a function of the place alone.
+    Within a tick the push is a function of the position alone.
     """
     spring = _spring(p, depth)
     most = 0.5 * p.hysteresis * spring
@@ -121,15 +122,15 @@ def push_of_button(p: ButtonNumbers, s: ButtonState, depth: float) -> float:
 
 
 def count_presses(depths: Array, parameters: ButtonParameters, *, is_pressed: bool) -> tuple[int, bool]:
-    """Count presses along a way, as :func:`follow_button` does tick by tick.
+    """Count presses along a path, as :func:`follow_button` does tick by tick.
 
     Args:
-        depths: Of the tip behind the surface, shape (N,) [m].
-        parameters: Of the button.
-        is_pressed: Whether it was pressed before the first of them.
+        depths: Depths of the tip behind the surface, shape (N,) [m].
+        parameters: Parameters of the button.
+        is_pressed: Whether the button was pressed before the first depth.
 
     Returns:
-        Number of new presses, and whether it is pressed at the end.
+        Number of new presses, and whether the button is pressed at the end.
     """
     is_down = depths >= parameters.stroke
     is_known = is_down | (depths <= parameters.click_travel)  # in between it stays as it was
@@ -138,7 +139,7 @@ def count_presses(depths: Array, parameters: ButtonParameters, *, is_pressed: bo
 
 
 def button_outline(parameters: ButtonParameters) -> Array:
-    """The post, and its upper end where that is on its stop, (N, 3) [m] around the middle."""
+    """Lines of the post, and of its upper end when pressed to the stop, (N, 3) [m] around the middle."""
     axis = drawing.unit_vector(parameters.direction)
     stop = (0.5 * parameters.length - parameters.stroke) * axis
     end = drawing.ring(stop, axis, parameters.radius)

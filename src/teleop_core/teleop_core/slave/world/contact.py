@@ -1,11 +1,11 @@
 """Contact: how an object pushes the tool, and how the push reaches the joints.
 
-The tool touches with one point, its tip, or with several along its axis. Each has a record of its
-own, with its surface, its bristle, and the Jacobian of the place where it touches.
+The tool touches with one point, its tip, or with several points along its axis. Each point has its own record with its
+surface, its bristle, and the Jacobian at the point of contact.
 
-Where the points are against the object is found once in a tick. Within the tick the surface counts as flat there and
-the Jacobians as constant, so that every Runge-Kutta stage of the arm's motion feels the push of its own place and
-speed: a contact that is steep for the tick is smooth for the integrator.
+The position of the points relative to the object is computed once in a tick. Within the tick the surface counts as
+flat there and the Jacobians as constant. So every Runge-Kutta stage of the arm's motion gets the push at its own
+position and speed: a contact too stiff for one step of a tick is still smooth for the integrator.
 """
 
 import math
@@ -43,7 +43,7 @@ class ContactState(PunctureState, ButtonState):
 
 @inner
 def _bend(p: WorldNumbers, s: ContactState, moved: Array, out: float, force: Array) -> float:
-    """Write what the bristle would carry (3,) [N], across the normal; returns its square."""
+    """Write the force (3,) [N] that the bristle would carry, across the normal; return its square."""
     square = 0.0
     for k in range(3):
         force[k] = -p.world_stiffness * (s.stuck[k] + moved[k] - out * s.normal[k])
@@ -55,10 +55,10 @@ def _bend(p: WorldNumbers, s: ContactState, moved: Array, out: float, force: Arr
 def _push(p: WorldNumbers, s: ContactState, moved: Array, speed: Array, force: Array) -> float:
     """Write the force (3,) [N] on a tip that moved (3,) [m] since the tick began, at a speed (3,).
 
-    Along the normal a spring with the damper of Hunt and Crossley, which pulls nobody back, and
-    pushes with the puncture force at most; in a button it begins at the stop. Across it a
-    bristle as stiff, which holds until it carries the dry friction, and then slips. In a channel
-    the needle's push along it, and across it the bristle, which does not slip there.
+    Along the normal acts a spring with the damper of Hunt and Crossley. It never pulls, and pushes with the puncture
+    force at most; in a button it begins at the stop. Across the normal acts a bristle of the same stiffness. It holds
+    until it carries the dry friction, and then slips. In a channel the needle's push acts along the channel. Across
+    the channel acts the bristle, which does not slip there.
 
     Returns:
         The part along the normal [N].
@@ -96,7 +96,7 @@ def _push(p: WorldNumbers, s: ContactState, moved: Array, speed: Array, force: A
 
 @inner
 def _add_push(p: WorldNumbers, s: ContactState, q: Array, dq: Array, effort: Array) -> None:
-    """Add what the push on one point does to the joints; see :func:`add_push`."""
+    """Add the joint efforts of the push on one point; see :func:`add_push`."""
     moved, speed, force = np.zeros(3), np.zeros(3), room(3)
     for i in range(q.shape[0]):
         for k in range(3):
@@ -110,7 +110,7 @@ def _add_push(p: WorldNumbers, s: ContactState, q: Array, dq: Array, effort: Arr
 
 @inner
 def add_push(p: WorldNumbers, contacts: Any, q: Array, dq: Array, effort: Array) -> None:
-    """Add what the object does to the joints: the transposed Jacobian of each point times its push.
+    """Add the joint efforts caused by the object: the transposed Jacobian of each point times its push.
 
     Args:
         p: Parameters.
@@ -126,7 +126,7 @@ def add_push(p: WorldNumbers, contacts: Any, q: Array, dq: Array, effort: Array)
 
 @inner
 def _slide(s: ContactState, q: Array) -> None:
-    """Take the bristle along with the tip to joints (n,), as far as it went since the last tick."""
+    """Move the bristle with the tip to joints ``q`` (n,), by the tip's motion since the last tick."""
     for k in range(3):
         for i in range(q.shape[0]):
             s.stuck[k] += s.touch_J[k, i] * (q[i] - s.touch_q[i])
@@ -134,7 +134,7 @@ def _slide(s: ContactState, q: Array) -> None:
 
 @inner
 def _lay_flat(s: ContactState) -> None:
-    """Keep of the bristle what lies in the surface."""
+    """Keep only the component of the bristle's bend in the surface."""
     out = 0.0
     for k in range(3):
         out += s.normal[k] * s.stuck[k]
@@ -144,9 +144,9 @@ def _lay_flat(s: ContactState) -> None:
 
 @inner
 def _begin_at(s: ContactState, arm: Arm, lever: Array, q: Array, dq: Array, speed: Array) -> None:
-    """Take surface and Jacobian for the tick where the tool touches, ``lever`` (3,) off its tip.
+    """Store surface and Jacobian of the tick at the point of contact, which is ``lever`` (3,) off the tip.
 
-    Writes the speed (3,) of that place.
+    Writes the speed (3,) of that point.
     """
     for k in range(3):
         s.normal[k] = arm.normal[k]
@@ -160,9 +160,9 @@ def _begin_at(s: ContactState, arm: Arm, lever: Array, q: Array, dq: Array, spee
 
 @inner
 def _keep_bend(p: WorldNumbers, s: ContactState, force: Array) -> None:
-    """Leave the bristle the bend that friction carries of the push (3,) [N]; the rest slipped.
+    """Limit the bend of the bristle to what friction carries of the push (3,) [N]; the rest has slipped.
 
-    Off the object there is no push, and no bend is left.
+    Without contact there is no push, and the bend becomes zero.
     """
     push = 0.0
     for k in range(3):
@@ -175,20 +175,20 @@ def _keep_bend(p: WorldNumbers, s: ContactState, force: Array) -> None:
 def _touch_at(
     p: WorldNumbers, s: ContactState, arm: Arm, has_jacobian: bool, lever: Array, q: Array, dq: Array, force: Array
 ) -> bool:
-    """Find where one point is against the object, and write the push on it (3,) [N].
+    """Find the position of one point relative to the object, and write the push on it (3,) [N].
 
     Args:
         p: Parameters.
         s: State of the point; written.
         arm: As :func:`touch` takes it.
-        has_jacobian: Whether ``arm.J`` is that of this tick already.
-        lever: Point from the tip (3,) [m]; written: where it touches.
+        has_jacobian: Whether ``arm.J`` already belongs to this tick.
+        lever: Point relative to the tip (3,) [m]; overwritten with the point of contact.
         q: Joints of the links (n,).
         dq: Their speeds (n,).
         force: Written.
 
     Returns:
-        Whether ``arm.J`` is that of this tick now.
+        Whether ``arm.J`` now belongs to this tick.
     """
     speed = np.zeros(3)
     for k in range(3):
@@ -220,7 +220,7 @@ def _touch_at(
 
 @inner
 def touch(p: WorldNumbers, contacts: Any, arm: Arm, q: Array, dq: Array, felt: Array) -> None:
-    """Find where the tool is against the object, and write what its tip feels (6,) [N, N·m].
+    """Find the position of the tool relative to the object, and write the wrench on its tip (6,) [N, N·m].
 
     The points are balls of the tool's radius. They lie evenly along its axis, which is z of the
     tip: the first is the tip, the last is ``tool_length`` behind it.
@@ -228,11 +228,11 @@ def touch(p: WorldNumbers, contacts: Any, arm: Arm, q: Array, dq: Array, felt: A
     Args:
         p: Parameters.
         contacts: :class:`ContactState` of each point (N,); written.
-        arm: With ``T`` of the true tip, its joints ``tip``, ``jacobian``, ``distance`` and
-            ``shape``; its rooms ``offset``, ``normal`` and ``J`` are written.
+        arm: With ``T`` of the true tip, its joints ``tip``, ``jacobian``, ``distance`` and ``shape``; its scratch
+            arrays ``offset``, ``normal`` and ``J`` are written.
         q: Joints of the links (n,) [rad or m], which move the tip from here on.
         dq: Their speeds (n,).
-        felt: Sum of the forces along the slave's base, and of their torques about the tip; written.
+        felt: Sum of the forces in axes of the slave's base, and of their torques about the tip; written.
     """
     lever, force, has_jacobian = room(3), room(3), False
     for k in range(6):

@@ -1,4 +1,4 @@
-"""Contents of the world: the object, where it is, and what it is made of."""
+"""Contents of the world: the object, its position and its material."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -12,12 +12,12 @@ from teleop_core.slave.world import WORLD_OBJECTS
 
 
 class Material(NamedTuple):
-    """What an object is made of.
+    """Material of an object.
 
     Attributes:
-        stiffness: Of its surface [N/m].
-        damping: Of Hunt and Crossley's law [s/m]: share of the force per speed.
-        friction: Dry friction over normal force.
+        stiffness: Stiffness of its surface [N/m].
+        damping: Damping of Hunt and Crossley's law [s/m]: share of the force per speed.
+        friction: Dry friction, divided by the normal force.
     """
 
     stiffness: float
@@ -32,14 +32,14 @@ MATERIALS = {
     "wood": Material(20000.0, 0.7, 0.4),
     "steel": Material(50000.0, 0.5, 0.2),
 }
-"""Materials by name. All numbers are assumed: what a tip meets depends on its own size as well."""
+"""Materials by name. All numbers are assumed: the real contact stiffness also depends on the size of the tip."""
 _USUAL: dict[str, Value] = {
     "box.size": (0.06, 0.06, 0.03),
     "cylinder.radius": 0.02,
     "cylinder.direction": (0.0, 0.0, 1.0),
 }
-"""Parameters of objects that are something else where nothing is said than for a fixture."""
-_FARTHEST = 3.0  # below a tip, where an object is looked for [m]
+"""Parameters of objects whose defaults differ from those of a fixture."""
+_FARTHEST = 3.0  # distance below a tip within which an object is looked for [m]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -116,27 +116,27 @@ class WorldParameters:
 
     @property
     def made_of(self) -> Material:
-        """The material, the own one or that of the name."""
+        """The material: the given numbers, or the named material."""
         if self.material == "own":
             return Material(self.stiffness, self.damping, self.friction_coefficient)
         return MATERIALS[self.material]
 
     @cached_property
     def shape(self) -> Array:
-        """Numbers of the object, as its distance takes them; a mesh is read, and may be refused."""
+        """Numbers of the object for its distance function; a mesh file is read, and may be refused."""
         return WORLD_OBJECTS.find(self.kind.kind).numbers(self.kind.parameters)
 
     def tool(self, T_base_tip: Array) -> Array:
-        """Places (N, 3) [m] of the tool's points in the slave's base, of the tip's pose (4, 4)."""
+        """Positions (N, 3) [m] of the tool's points in the slave's base, at a tip pose (4, 4)."""
         behind = np.linspace(0.0, self.tool_length, self.tool_points)
         places: Array = T_base_tip[:3, 3] - behind[:, None] * T_base_tip[:3, 2]
         return places
 
     def distance(self, tool: Array, center: Array) -> float:
-        """How far outside the object the nearest point of a tool is [m].
+        """Distance of the tool's nearest point from the surface of the object [m], positive outside.
 
         Args:
-            tool: Places of its points (N, 3) [m].
+            tool: Positions of the tool's points (N, 3) [m].
             center: Middle of the object (3,) [m].
         """
         part = WORLD_OBJECTS.find(self.kind.kind)
@@ -155,7 +155,7 @@ class WorldParameters:
             raise ParameterError(f"world.{name}", getattr(self, name), text)
 
     def center(self, T_base_tip: Array) -> Array:
-        """Middle of the object (3,) [m] in the arm's base, where its tip begins at a pose (4, 4).
+        """Middle of the object (3,) [m] in the arm's base, for a tip that begins at a pose (4, 4).
 
         Raises:
             ParameterError: As :meth:`below`.
@@ -163,17 +163,17 @@ class WorldParameters:
         return np.array(self.place) - np.array(self.base) if self.place else self.below(T_base_tip)
 
     def below(self, T_base_tip: Array) -> Array:
-        """Middle of the object (3,) [m] that lies straight below a tip's pose (4, 4), a gap apart.
+        """Middle (3,) [m] of an object that lies straight below a tip pose (4, 4), with a gap between them.
 
         Raises:
-            ParameterError: There is none.
+            ParameterError: There is no such position.
         """
         tool, tip = self.tool(T_base_tip), T_base_tip[:3, 3]
         down, near, far = np.array([0.0, 0.0, -1.0]), 0.0, _FARTHEST
         if not self.distance(tool, tip) < self.gap <= self.distance(tool, tip + far * down):
             text = f"given for a {self.kind.kind} that cannot lie straight below the tip"
             raise ParameterError("world.place", self.place, text)
-        for _ in range(60):  # to a rounding of the place
+        for _ in range(60):  # up to rounding of the position
             way = 0.5 * (near + far)
             is_apart = self.distance(tool, tip + way * down) >= self.gap
             near, far = (near, way) if is_apart else (way, far)

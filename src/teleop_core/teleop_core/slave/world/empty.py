@@ -9,7 +9,7 @@ from teleop_core.shapes import Shape
 
 @kernel
 def empty_distance(offset: Array, numbers: Array, out: Array) -> float:
-    """As of a plane far below, which the simulator never asks for."""
+    """Write the distance to a plane far below; the simulator never calls this function."""
     out[0], out[1], out[2] = 0.0, 0.0, 1.0
     return offset[2] + 1e3
 

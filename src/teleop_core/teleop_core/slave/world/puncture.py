@@ -1,9 +1,10 @@
 """Puncture: a surface that gives way to the tip, and the channel of the needle behind it.
 
 Once the push along the normal reaches the puncture force, the surface opens under the tip, and the spring of the
-surface is gone there. The tip then moves in a channel, straight along the normal of that place. In the channel the tip
-meets the cutting force where it goes deeper than before, and the dry friction of the shaft, which grows with depth.
-Both are springs that yield at a bound: they hold at rest, and give back no more than was stored in them.
+surface vanishes there. The tip then moves in a straight channel along the normal at that point. Two forces act in the
+channel: the cutting force when the tip goes deeper than before, and the dry friction of the shaft, which grows with
+    depth. Both are springs that yield at a bound: they hold at rest, and release no more energy than was stored in
+    them.
 
 Source:
     Okamura, Simone and O'Leary 2004: stiffness before the puncture, then friction along the shaft
@@ -14,40 +15,40 @@ from teleop_core.kernels import Array, Fields, Vector3, inner
 
 
 class PunctureNumbers(Fields):
-    """Fields of a parameter record with what a needle meets."""
+    """Fields of a parameter record with the forces on a needle."""
 
-    puncture_force: float  # [N]; 0 where the surface never opens
+    puncture_force: float  # [N]; 0 if the surface never opens
     cutting_force: float  # [N]
-    shaft_friction: float  # largest dry friction over depth [N/m]
+    shaft_friction: float  # largest dry friction per depth [N/m]
     hole_radius: float  # [m]
 
 
 class PunctureState(Fields):
-    """Fields of a state record with the last hole, and what the needle does in it."""
+    """Fields of a state record with the last hole, and the state of the needle in it."""
 
-    gap: float  # of the tip, along the normal in force [m]
+    gap: float  # gap of the tip along the present normal [m]
     normal: Vector3
     stuck: Vector3  # bend of the bristle across the normal [m]
     is_open: int  # the tip is in the channel, or above its hole
     punctures: int  # so far
-    hole: Vector3  # from the middle of the object [m]
-    channel: Vector3  # unit vector out of the object
+    hole: Vector3  # position of the hole, from the middle of the object [m]
+    channel: Vector3  # direction of the channel, a unit vector out of the object
     cut: float  # depth from which tissue ahead of the tip resists [m]
-    drawn: float  # how far the shaft has drawn the tissue along, positive inwards [m]
+    drawn: float  # distance that the shaft has dragged the tissue, positive inwards [m]
 
 
 @inner
 def puncture(p: PunctureNumbers, s: PunctureState, stiffness: float, push: float, offset: Array) -> None:
     """Open the surface under the tip, if the push on it reaches the puncture force.
 
-    What is left of the force at once is the cutting force, as far as the surface has stored it.
+    Immediately after the puncture the force is the cutting force, if the surface has stored that much.
 
     Args:
         p: Parameters.
         s: State; written.
-        stiffness: Of the object [N/m].
-        push: Along the normal [N].
-        offset: Tip from the middle of the object (3,) [m].
+        stiffness: Stiffness of the object [N/m].
+        push: Push along the normal [N].
+        offset: Position of the tip relative to the middle of the object (3,) [m].
     """
     if not 0.0 < p.puncture_force <= push:
         return
@@ -62,16 +63,16 @@ def puncture(p: PunctureNumbers, s: PunctureState, stiffness: float, push: float
 
 @inner
 def _is_open(p: PunctureNumbers, s: PunctureState, before: float, along: float, beside: float) -> bool:
-    """Whether a tip goes on in the channel, or is where it can enter it.
+    """Whether a tip stays in the channel, or is where it can enter the channel.
 
     Args:
         p: Parameters.
-        s: State, open as a tick ago, with the gap to the surface now [m].
+        s: State; ``is_open`` is of a tick ago, the gap to the surface is of now [m].
         before: Gap a tick ago [m].
-        along: Tip from the hole, along the channel [m]; negative inside.
-        beside: The same, across it [m].
+        along: Position of the tip relative to the hole, along the channel [m]; negative inside.
+        beside: Distance of the tip from the channel's axis [m].
     """
-    # A tip that was above the hole went into it, wherever it is now: no spring was bent under it.
+    # A tip that was above the hole has entered it, whatever its position now: no spring was bent under the tip.
     if s.is_open and (s.gap < 0.0 or (along < 0.0 and before < 0.0)):
         return True
     if p.puncture_force <= 0.0 or beside > p.hole_radius:
@@ -84,17 +85,17 @@ def _is_open(p: PunctureNumbers, s: PunctureState, before: float, along: float, 
 def follow_channel(
     p: PunctureNumbers, s: PunctureState, stiffness: float, before: float, offset: Array, normal: Array
 ) -> None:
-    """Measure a tip at the last hole along its channel, and let what yields take up its way.
+    """Measure a tip at the last hole along its channel, and update the yielding springs by its motion.
 
-    Elsewhere nothing changes: there the surface is whole.
+    Away from the hole nothing changes, because the surface is intact there.
 
     Args:
         p: Parameters.
-        s: State; the gap to the surface becomes that along the channel.
+        s: State; written: the gap becomes the one along the channel.
         stiffness: Of the object [N/m].
         before: Gap a tick ago [m].
         offset: Tip from the middle of the object (3,) [m].
-        normal: Out of the object (3,); written.
+        normal: Normal out of the object (3,); written.
     """
     was_open = s.is_open != 0
     was_inside = was_open and before < 0.0
@@ -123,7 +124,7 @@ def follow_channel(
 def push_in_channel(p: PunctureNumbers, s: PunctureState, stiffness: float, out: float) -> float:
     """Push along the channel [N], out of the object, on a tip that moved ``out`` [m] in this tick.
 
-    A function of the place alone, so that no motion within a tick gains energy.
+    The push is a function of the position alone, so that no motion within a tick gains energy.
     """
     depth = max(-(s.gap + out), 0.0)
     most = p.shaft_friction * depth
