@@ -44,7 +44,7 @@ def _line(line: Line, are_compared: Sequence[bool]) -> str:
 
 
 def compact_table(score: "Score") -> str:
-    """Table for a notebook, with inline styles because a notebook has no stylesheet."""
+    """Table for a notebook, without a style sheet."""
     session = score.session
     head = f"<b>{escape(session.place)}</b> · {escape(' · '.join(session.facts))}"
     lines = [f'<tr><th colspan="4" style="text-align:left">{head}<br>{escape(score.verdict.text)}</th></tr>']
