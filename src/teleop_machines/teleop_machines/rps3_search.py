@@ -151,8 +151,7 @@ def closing_angles(q: Array, b: float, a: float, starts: int, found: Array) -> i
 
 @inner
 def _nearest(q: Array, b: float, a: float, starts: int, near: Array, theta: Array) -> bool:
-    """Write leg angles (3,) of the assembly with ball joints nearest to ``near`` (3, 3); return whether one was found.
-    """
+    """Write leg angles (3,) of the assembly with ball joints nearest to ``near`` (3, 3); return whether one was found."""
     found, S = np.empty((MAX_ASSEMBLIES, 3)), np.empty((3, 3))
     best, chosen = math.inf, -1
     for k in range(closing_angles(q, b, a, starts, found)):

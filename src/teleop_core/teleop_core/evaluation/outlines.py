@@ -111,8 +111,7 @@ def _around(fixture: ReportedFixture, gain: float, axes: Array) -> tuple[Array, 
 
 
 def _first_wall(fixture: ReportedFixture, way: Array, gain: float, axes: Array) -> float:
-    """Distance [m] from the middle to the first wall in the direction of a unit vector (3,); NaN if there is no wall.
-    """
+    """Distance [m] from the middle to the first wall in the direction of a unit vector (3,); NaN if there is no wall."""
     low, high = 0.0, _FAR * gain
     for _ in range(_ROUNDS):
         places = np.linspace(low, high, _STEPS)
