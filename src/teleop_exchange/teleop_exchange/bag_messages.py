@@ -52,8 +52,8 @@ class PoseReader:
         frame: Child frame of the wanted poses; empty for any.
         parent: Parent frame of the wanted poses; empty for any.
 
-        Attributes:
-            taken: Parent and child frame of the used poses; None before the first.
+    Attributes:
+        taken: Parent and child frame of the used poses; None before the first.
     """
 
     def __init__(self, typestore: Any, ros_type: str, *, is_ros2: bool, frame: str = "", parent: str = "") -> None:

@@ -29,10 +29,10 @@ class BagSource:
         path: Directory of a rosbag2 recording, ``.mcap`` or ``.db3`` file, or ROS 1 ``.bag``.
         options: Import options.
 
-        Raises:
-            RecordingError: The recording cannot be read, or contains no poses.
-            ParameterError: Several topics contain poses, or an option does not fit.
-            UnknownNameError: The topic or frame does not exist.
+    Raises:
+        RecordingError: The recording cannot be read, or contains no poses.
+        ParameterError: Several topics contain poses, or an option does not fit.
+        UnknownNameError: The topic or frame does not exist.
     """
 
     has_time, time_unit, bad_rows, is_unit_said = True, "ns", 0, True
@@ -227,8 +227,10 @@ class BagSource:
 
 
 def _named(wanted: str, names: Iterable[str]) -> str | None:
-    """The topic with the wanted name, or the only topic that ends with it. For ``a|b``, the first that exists; None if
-    there is no such topic."""
+    """The topic with the wanted name, or the only topic that ends with it.
+
+    For ``a|b``, the first that exists; None if there is no such topic.
+    """
     known = list(names)
     for name in map(plain, wanted.split("|")):
         ends = [one for one in known if name and f"/{one}".endswith(f"/{name}")]

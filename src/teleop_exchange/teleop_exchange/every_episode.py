@@ -56,9 +56,9 @@ def import_episodes(
         say: Called with a line of text after each episode.
         **changes: Options by name.
 
-        Raises:
-            RecordingError: The file is missing or damaged, or contains an episode twice.
-            ParameterError: No column contains the episode numbers, or an option is wrong.
+    Raises:
+        RecordingError: The file is missing or damaged, or contains an episode twice.
+        ParameterError: No column contains the episode numbers, or an option is wrong.
     """
     base, out = options or ImportOptions(), Path(out)
     options_of(base, arms, changes)  # refused here, not once for each episode
@@ -90,9 +90,9 @@ def files_of(path: Path, options: ImportOptions) -> dict[int, Path]:
         path: A single file, or the folder of a data set with Parquet files in ``data``.
         options: Options for reading text files.
 
-        Raises:
-            RecordingError: There is no file, a file is damaged, or two files contain the same episode.
-            ParameterError: A file has no column of episode numbers.
+    Raises:
+        RecordingError: There is no file, a file is damaged, or two files contain the same episode.
+        ParameterError: A file has no column of episode numbers.
     """
     files = sorted((path / "data").rglob("*.parquet")) if path.is_dir() else [path]
     if not files or not path.exists():

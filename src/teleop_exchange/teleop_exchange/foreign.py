@@ -30,9 +30,9 @@ def master_of_others(path: Path, bag: reader.Bag | None, prefixes: Sequence[str]
         bag: The opened recording, if it has this package's format.
         prefixes: Prefix before ``master/measured_cp`` for each of its arms.
 
-        Raises:
-            RecordingError: The file cannot be read, or contains no motion.
-            ParameterError: The file has several topics of poses.
+    Raises:
+        RecordingError: The file cannot be read, or contains no motion.
+        ParameterError: The file has several topics of poses.
     """
     wanted = columns_of(path)
     series: dict[topics.Topic, Series] = {}
@@ -43,8 +43,10 @@ def master_of_others(path: Path, bag: reader.Bag | None, prefixes: Sequence[str]
 
 
 def columns_of(path: Path) -> ImportOptions:
-    """Options for the columns of a table with the names of an operator's file; for other files the columns are
-    guessed."""
+    """Options for the columns of a table with the names of an operator's file.
+
+    For other files the columns are guessed.
+    """
     if path.suffix.lower() != ".csv" or not path.is_file():
         return ImportOptions()
     try:

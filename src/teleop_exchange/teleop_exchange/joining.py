@@ -37,13 +37,13 @@ class Streams:
         recording: Recording that contains them.
         topics: Their names; all topics with numbers if empty.
 
-        Attributes:
-            columns: Names of the columns by topic.
-            start_ns: Start time of the recording [ns].
+    Attributes:
+        columns: Names of the columns by topic.
+        start_ns: Start time of the recording [ns].
 
-        Raises:
-            UnknownNameError: There is no such topic.
-            RecordingError: A topic cannot be read as numbers.
+    Raises:
+        UnknownNameError: There is no such topic.
+        RecordingError: A topic cannot be read as numbers.
     """
 
     def __init__(self, recording: Recording, topics: Iterable[str] = ()) -> None:
@@ -69,8 +69,10 @@ class Streams:
         return found
 
     def joined(self) -> Iterator[Joined]:
-        """Rows with one row for each time at which a stream has a message. Reports keep their values until the next
-        report."""
+        """Rows with one row for each time at which a stream has a message.
+
+        Reports keep their values until the next report.
+        """
         for piece in self._pieces():
             logs = [series.log_ns for series in piece.values()]
             times: Stamps = np.unique(np.concatenate(logs))

@@ -85,7 +85,9 @@ class Attitudes:
 
 @kernel
 def write_quaternions(matrices: Array, quaternions: Array) -> None:
-    """Write the unit quaternions (N, 4) of rotation matrices (N, 3, 3) into ``quaternions``; the matrices may be
-    inexact."""
+    """Write the unit quaternions (N, 4) of rotation matrices (N, 3, 3) into ``quaternions``.
+
+    The matrices may be inexact.
+    """
     for i in range(matrices.shape[0]):
         quaternion_from_rotation(matrices[i], quaternions[i])

@@ -33,9 +33,9 @@ class TableSource:
         table: The table.
         options: Import options.
 
-        Raises:
-            UnknownNameError: A column does not exist.
-            RecordingError: The table has no time and no rate is given, or it has no position.
+    Raises:
+        UnknownNameError: A column does not exist.
+        RecordingError: The table has no time and no rate is given, or it has no position.
         ParameterError: An option does not fit a table.
     """
 

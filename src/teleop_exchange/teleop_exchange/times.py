@@ -99,8 +99,9 @@ class Order:
 
 
 def ordered(stamps: Stamps, *, is_sorted: bool = False) -> Order:
-    """Rows with increasing times: of equal times, the first row is used; otherwise as few rows as possible are left
-    out.
+    """Rows with increasing times: of equal times, the first row is used.
+
+    Otherwise as few rows as possible are left out.
 
     Args:
         stamps: Times (N,) [ns] in the order of the file.

@@ -55,8 +55,10 @@ def finger_jacobian(q: Array, links: Array, J: Array) -> None:
 
 @inner
 def _bent(r: float, z: float, links: Triple, is_positive: bool) -> tuple[float, float, bool]:
-    """Angles psi and phi for a point at distance r in front of joint 2 and z above it; and whether the finger reaches
-    it."""
+    """Angles psi and phi for a point at distance r in front of joint 2 and z above it.
+
+    And whether the finger reaches it.
+    """
     _, l2, l3 = links
     k = (r * r + z * z - l2 * l2 - l3 * l3) / (2.0 * l2 * l3)
     sine, cosine = max(math.sqrt(max(1.0 - k * k, 0.0)), _STRAIGHT), min(max(k, -1.0), 1.0)
@@ -128,8 +130,10 @@ def _nearest_branch(p: Triple, links: Triple, seed: Array, limits: Array, first:
 
 @inner
 def _is_held(angle: float, i: int, seed: Array, limits: Array, q: Array) -> bool:
-    """Write joint i, as near as possible to an angle modulo full turns; return whether limits or the step hold it
-    back."""
+    """Write joint i, as near as possible to an angle modulo full turns.
+
+    Return whether limits or the step hold it back.
+    """
     is_path = math.isfinite(limits[2, i])
     wanted = turned(angle, seed[i], limits[0, i], limits[1, i], is_path)
     q[i] = bounded(wanted, seed[i], limits[0, i], limits[1, i], limits[2, i])

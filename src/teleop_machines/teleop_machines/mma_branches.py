@@ -108,9 +108,9 @@ def branch(T: Array, turn: float, choice: int, geometry: Array, seed: Array, q: 
         seed: Joints (7,) whose values are kept where the pose leaves a joint free.
         q: Output (7,); for a point out of reach, the links are stretched or folded towards it.
 
-        Returns:
-            0 if the joints reach the pose, else the remaining distance of the wrist [m]; infinity if the wrist centre
-            is inside the cylinder of radius a5 about axis 1.
+    Returns:
+        0 if the joints reach the pose, else the remaining distance of the wrist [m]; infinity if the wrist centre
+        is inside the cylinder of radius a5 about axis 1.
     """
     wrist = np.empty((4, 3))
     _wrist_centre(T, turn, geometry, wrist)

@@ -127,8 +127,8 @@ def closing_angles(q: Array, b: float, a: float, starts: int, found: Array) -> i
         starts: Starts of the search, four for each angle of the first leg.
         found: Output array for leg angles (MAX_ASSEMBLIES, 3) [rad].
 
-        Returns:
-            Number of assemblies found.
+    Returns:
+        Number of assemblies found.
     """
     count, pairs, S, theta = 0, np.empty((2, 2)), np.empty((3, 3)), np.empty(3)
     for k in range(4 * (starts // 4)):

@@ -62,8 +62,9 @@ def moved(T: Array, move: Array, out: Array) -> None:
 
 @inner
 def _damped_move(J: Array, gap: Array, damping: float, size: float, A: Array, move: Array) -> float:
-    """Write the damped least-squares move (6,) that closes the gaps (6,); rotations are weighted by the length
-    ``size``.
+    """Write the damped least-squares move (6,) that closes the gaps (6,).
+
+    Rotations are weighted by the length ``size``.
 
     ``A`` (6, 6) is overwritten.
 

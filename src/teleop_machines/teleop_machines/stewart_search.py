@@ -99,8 +99,8 @@ def closing_poses(legs: Array, base: Array, platform: Array, size: float, starts
         starts: Starts of the search.
         found: Output array for poses (MAX_ASSEMBLIES, 4, 4).
 
-        Returns:
-            Number of poses found.
+    Returns:
+        Number of poses found.
     """
     count, reach, T = 0, 0.0, np.empty((4, 4))
     for i in range(6):
@@ -133,8 +133,10 @@ def _nearest(legs: Array, base: Array, platform: Array, size: float, starts: int
 
 @inner
 def _is_singular(T: Array, base: Array, platform: Array, size: float, lengths: Array, J: Array) -> tuple[bool, float]:
-    """Write leg lengths (6,) [m]; return whether the legs hardly fix the pose, and the pose's side of the singular
-    poses."""
+    """Write leg lengths (6,) [m].
+
+    Return whether the legs hardly fix the pose, and the pose's side of the singular poses.
+    """
     leg_system(T, base, platform, lengths, J)
     is_near = bool(is_near_singular(J.T, 1.0 / size, NEAR * 2.0 * size))
     return is_near, side_of(J)

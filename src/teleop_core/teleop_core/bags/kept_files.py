@@ -37,8 +37,10 @@ _MOST = 2**25
 
 
 class KeptFiles:
-    """Files of the arms that a recording stores. Files that are added first are stored first, until the limit is
-    reached."""
+    """Files of the arms that a recording stores.
+
+    Files that are added first are stored first, until the limit is reached.
+    """
 
     def __init__(self) -> None:
         self._texts: dict[str, str] = {}

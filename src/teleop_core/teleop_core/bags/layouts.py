@@ -100,8 +100,10 @@ class Layout:
         return rows
 
     def encode_into(self, rows: Bytes, stamps_ns: Stamps, values: Values) -> None:
-        """The same as :meth:`encode`, but written into ``rows``, shape (N, size); the bytes of each row are
-        contiguous."""
+        """The same as :meth:`encode`, but written into ``rows``, shape (N, size).
+
+        The bytes of each row are contiguous.
+        """
         if values.shape != (len(rows), self.width) or stamps_ns.shape != (len(rows),):
             raise ShapeError("values", (len(rows), self.width), values.shape)
         rows[:] = self.template

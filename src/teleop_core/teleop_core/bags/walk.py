@@ -24,8 +24,10 @@ def _little_endian(data, at, count):  # type: ignore[no-untyped-def]
 
 @kernel
 def _walk(data, at, end, rows):  # type: ignore[no-untyped-def]
-    """Fill ``rows`` with opcode, begin, size, channel, log time. Return the number of filled rows and the end
-    position."""
+    """Fill ``rows`` with opcode, begin, size, channel, log time.
+
+    Return the number of filled rows and the end position.
+    """
     count = 0
     while at + 9 <= end and count < len(rows):
         size = _little_endian(data, at + 1, 8)
@@ -50,8 +52,10 @@ def _walk(data, at, end, rows):  # type: ignore[no-untyped-def]
 
 @kernel
 def _gather(data, begins, template, mask, out):  # type: ignore[no-untyped-def]
-    """Copy pieces of equal size into ``out``. Return whether all pieces are equal to ``template`` where ``mask`` is
-    not zero."""
+    """Copy pieces of equal size into ``out``.
+
+    Return whether all pieces are equal to ``template`` where ``mask`` is not zero.
+    """
     wrong, size = np.uint8(0), out.shape[1]
     for i in range(len(begins)):
         piece = data[begins[i] : begins[i] + size]  # numba does not test the sign of an index into a slice
@@ -86,8 +90,9 @@ def walk(data: Bytes, begin: int, end: int) -> tuple[Rows, int]:
 
 
 def gather(data: Bytes, begins: Stamps, template: Bytes, mask: Bytes) -> Bytes | None:
-    """Pieces of equal size that begin at the given positions, shape (n, size); None if any piece differs from the
-    template.
+    """Pieces of equal size that begin at the given positions, shape (n, size).
+
+    None if any piece differs from the template.
 
     Args:
         data: Read-only bytes.

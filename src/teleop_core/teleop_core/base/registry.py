@@ -105,8 +105,8 @@ class Registry(Generic[Part]):
             replace: Whether it may replace a part that the program added before, for example when a notebook's cell is
                 run again.
 
-            Raises:
-                PartError: The name is already used, or the part is not valid.
+        Raises:
+            PartError: The name is already used, or the part is not valid.
         """
         if not (isinstance(name, str) and _NAME.fullmatch(name)):
             text = "named by letters, digits, _ and -, for it stands in keys and files"
@@ -213,8 +213,8 @@ def tried(kind: str, name: str, needs: str) -> Iterator[None]:
         name: Name of the part.
         needs: Requirement on the part: "one with ...".
 
-        Raises:
-            PartError: The part raised any exception, which is given in one line. A PartError is passed on unchanged.
+    Raises:
+        PartError: The part raised any exception, which is given in one line. A PartError is passed on unchanged.
     """
     try:
         yield

@@ -45,8 +45,10 @@ class Attempts:
         return np.array([row[TASK_STATE.columns.index(name)] for row in self._tried])
 
     def settled(self, name: str) -> Array:
-        """The same as :meth:`column`, but if there are four or more attempts, without the first one. The first attempt
-        begins while the arm is still moved to its start."""
+        """The same as :meth:`column`, but if there are four or more attempts, without the first one.
+
+        The first attempt begins while the arm is still moved to its start.
+        """
         return self.column(name)[int(self.count >= 4) :]
 
 

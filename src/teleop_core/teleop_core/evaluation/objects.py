@@ -20,9 +20,9 @@ def object_of(context: Context, kind: type) -> tuple[WorldParameters, Array] | N
         context: Context of the recording.
         kind: Parameter group of the object.
 
-        Returns:
-            World and middle; None if the object is of another kind, or if a part of it or its robot is no longer
-            available.
+    Returns:
+        World and middle; None if the object is of another kind, or if a part of it or its robot is no longer
+        available.
     """
     with suppress(TeleopError):
         world = build(WorldParameters, dict(context.origin.world))

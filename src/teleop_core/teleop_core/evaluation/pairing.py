@@ -29,9 +29,9 @@ def same_tick(log_ns: Integers, other_log_ns: Integers) -> Integers:
         log_ns: Log times of one topic, shape (N,), in order, [ns].
         other_log_ns: Log times of the other topic, shape (M,).
 
-        Returns:
-            Index into the other topic for each sample, shape (N,); :data:`NONE` if the partner was lost or would be
-            more than 50 ms away.
+    Returns:
+        Index into the other topic for each sample, shape (N,); :data:`NONE` if the partner was lost or would be
+        more than 50 ms away.
     """
     index = np.arange(len(log_ns))
     if np.array_equal(log_ns, other_log_ns):

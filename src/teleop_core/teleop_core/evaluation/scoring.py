@@ -113,8 +113,10 @@ def measure(bag: Bag, keys: Iterable[str], arm: str = "") -> dict[str, float | N
 
 
 def streams_of(keys: Iterable[str]) -> frozenset[str]:
-    """Names of the streams that :func:`measure` reads for some keys, as declared by their metrics. Some metrics read
-    further streams."""
+    """Names of the streams that :func:`measure` reads for some keys, as declared by their metrics.
+
+    Some metrics read further streams.
+    """
     read = {topic.name for maker in _makers(keys) for topic in maker.topics}
     return frozenset(read | {SLAVE_MEASURED_CP.name, TELEOP_STATE.name})
 
@@ -180,8 +182,10 @@ def _feed(context: Context, makers: Sequence[type[Metric]], cut: Cut) -> list[Me
 
 @contextmanager
 def _named(place: str, part: Accumulator | type[Metric]) -> Iterator[None]:
-    """Convert an exception of a metric into a one-line error that names the metric. Errors of the recording are passed
-    on."""
+    """Convert an exception of a metric into a one-line error that names the metric.
+
+    Errors of the recording are passed on.
+    """
     try:
         yield
     except (RecordingError, PartError):
@@ -224,8 +228,10 @@ def _compared(results: tuple[Result, ...]) -> tuple[Result, ...]:
 
 
 def _too_little(share: float | None) -> str:
-    """Text with the share of followed time and the required share; the share is rounded down, so that it is visibly
-    smaller."""
+    """Text with the share of followed time and the required share.
+
+    The share is rounded down, so that it is visibly smaller.
+    """
     if share is None:
         return "not known"
     return f"{math.floor(1000.0 * share) / 10.0:.1f} % < {100.0 * COMPARABLE:.0f} %"

@@ -111,8 +111,10 @@ def _missing(values: Values) -> Iterator[Concern]:
 
 
 def _drift(values: Values) -> Iterator[Concern]:
-    """Concern about the error relative to the hand's asked position. The lag of filters is subtracted, since the
-    command error contains it too."""
+    """Concern about the error relative to the hand's asked position.
+
+    The lag of filters is subtracted, since the command error contains it too.
+    """
     key = "asked_error_mm.max"
     off, lag = _number(values, key), _number(values, "command_error_mm.max") or 0.0
     if off is not None:

@@ -220,8 +220,10 @@ def bound(compiled: Callable[P, R], *arguments: P.args, **_: P.kwargs) -> Callab
 
 
 def _memory(value: Any) -> Any:
-    """Memory of a record, also of records in a tuple. numba looks up a record's attributes at every call, which takes
-    1 µs each."""
+    """Memory of a record, also of records in a tuple.
+
+    Numba looks up a record's attributes at every call, which takes 1 µs each.
+    """
     if isinstance(value, np.void):
         return _Memory(value)
     return tuple(map(_memory, value)) if isinstance(value, tuple) else value

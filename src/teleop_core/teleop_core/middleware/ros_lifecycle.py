@@ -41,8 +41,8 @@ class RosLifecycleNode(RosNode):
         hooks: Functions that it calls in its transitions.
         options: Options of the class in rclpy; ``values`` are parameters that override the command line.
 
-        Raises:
-            ParameterError: The node is configured to use simulated time.
+    Raises:
+        ParameterError: The node is configured to use simulated time.
     """
 
     def __init__(self, name: str, hooks: Hooks, values: Mapping[str, Value] | None = None, **options: Any) -> None:
@@ -111,8 +111,10 @@ class _Own(LifecycleNode):  # type: ignore[misc]
 
     @property
     def subscriptions(self) -> Iterator[Any]:
-        """Subscriptions that the executor serves. Subscriptions that are read without the executor are left out,
-        because any thread may open and close them."""
+        """Subscriptions that the executor serves.
+
+        Subscriptions that are read without the executor are left out, because any thread may open and close them.
+        """
         for entry in tuple(super().subscriptions):
             if not isinstance(entry.callback_group, Unattended):
                 yield entry

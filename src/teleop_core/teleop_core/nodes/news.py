@@ -58,8 +58,9 @@ class Commanders:
 
 
 class Trouble:
-    """Log of the reasons why a bridge holds. Each reason is logged once, even if numbers in it change, and again when
-    it is over.
+    """Log of the reasons why a bridge holds.
+
+    Each reason is logged once, even if numbers in it change, and again when it is over.
 
     Args:
         owner: The node.

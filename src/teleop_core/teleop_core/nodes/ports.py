@@ -35,9 +35,9 @@ class Ports:
         publisher: Opens the publisher of a topic.
         buttons: Indices of clutch, fixture and mode among a message's buttons; -1 if the message lacks a button.
 
-        Attributes:
-            inputs: Inputs of each port, by its name; values of several inputs are added.
-            outputs: Outputs, by the topic in its namespace.
+    Attributes:
+        inputs: Inputs of each port, by its name; values of several inputs are added.
+        outputs: Outputs, by the topic in its namespace.
         row: The signals, by the names of their fields.
     """
 

@@ -131,8 +131,10 @@ class SlaveNode(TickingNode):
             self._fail(Fault.FLOOD)
 
     def _relate_anew(self, offset_ns: int) -> None:
-        """Use the current clock offset if the clock was behind at the start; otherwise commands would seem to come
-        from the future."""
+        """Use the current clock offset if the clock was behind at the start.
+
+        Otherwise commands would seem to come from the future.
+        """
         stamp_ns, now_ns = int(self.row["slave_servo_jp_ns"]), int(self.row["now_ns"])
         behind_ns = offset_ns - self.epoch_ns
         if stamp_ns - now_ns > SECOND_NS > abs(stamp_ns - now_ns - behind_ns):

@@ -85,12 +85,12 @@ class Input:
         delay: Time for which each message is delayed, as on a slow link [s].
         buttons: Indices of clutch, fixture and mode among a message's buttons; -1 if the message lacks a button.
 
-        Attributes:
-            stamp_ns: Stamp of the newest valid message; None before the first.
-            arrival_ns: Monotonic time at which it was read [ns].
-            received: Number of messages read, valid or not.
-            refused: Number of invalid messages, by reason.
-            sender: Data about the sender of the messages.
+    Attributes:
+        stamp_ns: Stamp of the newest valid message; None before the first.
+        arrival_ns: Monotonic time at which it was read [ns].
+        received: Number of messages read, valid or not.
+        refused: Number of invalid messages, by reason.
+        sender: Data about the sender of the messages.
     """
 
     def __init__(

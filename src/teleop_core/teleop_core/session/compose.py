@@ -79,8 +79,8 @@ class Tick:
         dt: Length of a tick [s].
         size: Largest number of ticks per call of the kernel.
 
-        Attributes:
-            source: The generated source, for inspection.
+    Attributes:
+        source: The generated source, for inspection.
     """
 
     def __init__(self, text: _Text, dtype: Any, dt: float, size: int) -> None:
@@ -137,8 +137,10 @@ class Tick:
 
 
 def _bytes(rows: Any) -> Any:
-    """View of the rows as plain bytes. NumPy would copy rows with fields field by field, which takes five times as
-    long."""
+    """View of the rows as plain bytes.
+
+    NumPy would copy rows with fields field by field, which takes five times as long.
+    """
     return np.ndarray.view(rows, np.dtype((np.void, rows.itemsize)))
 
 

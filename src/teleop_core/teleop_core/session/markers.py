@@ -75,16 +75,20 @@ class ArmMarkers:
                       (*color[:3], 1.0), self._edges(fixture, state["gain"]))  # fmt: skip
 
     def _edges(self, fixture: ReportedFixture, gain: float) -> Array:
-        """End points (N, 3) [m] of segments along the fixture's edges, two for each segment; computed only when the
-        fixture or the gain changes."""
+        """End points (N, 3) [m] of segments along the fixture's edges, two for each segment.
+
+        Computed only when the fixture or the gain changes.
+        """
         if self._told != (fixture, gain):
             self._segments = segments_of(fixture.outline(gain, self._axes)).reshape(-1, 3)
             self._told = fixture, gain
         return self._segments
 
     def force(self, stylus: Array, force: Array) -> Marker:
-        """Arrow of the force (3,) [N] on the hand at a stylus pose (7,), in master_base; hidden if the force is near
-        zero."""
+        """Arrow of the force (3,) [N] on the hand at a stylus pose (7,), in master_base.
+
+        Hidden if the force is near zero.
+        """
         ends = np.stack((stylus[:3], stylus[:3] + FORCE_SCALE * force))
         is_shown = float(length(force)) > _TOUCH
         scale = (0.004, 0.009, 0.01)

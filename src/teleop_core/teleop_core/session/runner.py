@@ -143,8 +143,10 @@ def _follows_ns(bag: Bag, state: topics.Topic) -> int | None:
 
 
 def _hold(series: Series, later_ns: int, samples: Any, field: str) -> None:
-    """Write the newest recorded sample and its stamp into ``samples`` at each tick. Ticks before the first sample are
-    not changed."""
+    """Write the newest recorded sample and its stamp into ``samples`` at each tick.
+
+    Ticks before the first sample are not changed.
+    """
     stamps = series.stamp_ns + later_ns
     at = np.searchsorted(stamps, samples["now_ns"], side="right") - 1
     is_known = at >= 0

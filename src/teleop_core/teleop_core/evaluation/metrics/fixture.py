@@ -56,8 +56,10 @@ class FixtureScore:
 
 
 class FixtureMetric(Metric):
-    """Penetration of the slave's tip, and of the hand. The hand's penetration is the command's penetration divided by
-    the gain."""
+    """Penetration of the slave's tip, and of the hand.
+
+    The hand's penetration is the command's penetration divided by the gain.
+    """
 
     name = "fixture"
     keys = keys_of("fixture", FixtureScore)

@@ -89,8 +89,10 @@ class ReachMetric(Metric):
         self._add_stretches(spans, kinds != Limit.NONE)
 
     def _add_stretches(self, spans: Array, is_off: NDArray[np.bool_]) -> None:
-        """Add times [s] in which the slave was limited or not, to find the longest limited stretch. A stretch may have
-        begun before these times."""
+        """Add times [s] in which the slave was limited or not, to find the longest limited stretch.
+
+        A stretch may have begun before these times.
+        """
         if not len(spans):
             return
         stretch = np.cumsum(np.diff(is_off, prepend=True) != 0)

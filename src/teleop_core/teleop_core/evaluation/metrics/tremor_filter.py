@@ -18,8 +18,10 @@ MEANT = 2.0
 
 @dataclass(frozen=True)
 class TremorFilterScore:
-    """Score of a tremor filter; None without a filter, or if the recording's rate is too low or the recording is too
-    short."""
+    """Score of a tremor filter.
+
+    None without a filter, or if the recording's rate is too low or the recording is too short.
+    """
 
     before_um: float | None = figure("um", "RMS of the stylus's motion in 8 to 12 Hz over three axes; null below 60 Hz")
     after_um: float | None = figure("um", "the same of the filtered stylus")
@@ -51,8 +53,8 @@ def passage(before: Array, after: Array) -> tuple[float, float] | None:
         before: Velocities of the first motion (N, 3) at :data:`RATE`.
         after: Velocities of the second motion (N, 3).
 
-        Returns:
-            Delay and gain; None if there is no motion, or less than a second of it.
+    Returns:
+        Delay and gain; None if there is no motion, or less than a second of it.
     """
     size = min(motion_measures.SPECTRUM_SAMPLES, len(before))
     if size < max(motion_measures.SHORTEST, motion_measures.RATE):
