@@ -94,7 +94,7 @@ def _read(path: Path, arm: str, options: ImportOptions) -> dict[topics.Topic, Se
 
 @contextmanager
 def _options_told(path: Path) -> Iterator[None]:
-    """Add to an error that the advised options are options of ``teleop import``, because a replay has no such options."""
+    """Add to an error that the advised options are those of ``teleop import``, because a replay has no options."""
     try:
         yield
     except TeleopError as error:

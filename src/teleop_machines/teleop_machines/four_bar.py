@@ -53,7 +53,11 @@ class Directions(NamedTuple):
 
 @inner
 def _links(theta1: float, g: Array) -> Directions:
-    """Directions of crank, rocker and coupler in the robot's mode; with the smallest gap if the loop does not close."""
+    """Directions of crank, rocker and coupler in the robot's mode; with the smallest gap if the loop is open.
+
+    Seen from the end of the crank, the right pivot is at (x, y) and the coupler's other end at
+    (x, y) + l3 (cos phi1, sin phi1): never nearer than l2.
+    """
     l0, l1, l2, l3 = g[0], g[1], g[2], g[3]
     c1, s1 = math.cos(theta1), math.sin(theta1)
     x, y = l0 - l1 * c1, -l1 * s1

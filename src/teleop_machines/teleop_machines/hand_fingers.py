@@ -150,10 +150,10 @@ def finger_joints(p: Triple, links: Triple, seed: Array, limits: Array, first: i
     Args:
         p: Wanted contact point [m] in F.
         links: l1, l2, l3 [m].
-        seed: Joints (n,) to stay next to [rad].
+        seed: Joints (n,) near which the result should be [rad].
         limits: Rows lower, upper, largest step: (3, n) [rad].
-        first: Place of theta among the joints.
-        q: Joints (n,), inside the limits and a step of the seed.
+        first: Index of theta among the joints.
+        q: Output joints (n,), within the limits and one step of the seed.
     """
     if math.isfinite(limits[2, first]):
         side = _side(seed[first + 1], seed[first + 2], links)

@@ -128,8 +128,7 @@ def branch(T: Array, turn: float, choice: int, geometry: Array, seed: Array, q: 
 
 @kernel
 def moved(angle: float, i: int, seed: Array, limits: Array) -> float:
-    """Equivalent angle of joint ``i``, shifted by full turns to be nearest to the seed, inside the limits if possible
-    [rad]."""
+    """Angle of joint ``i``, shifted by full turns to the value nearest to the seed, within limits if possible [rad]."""
     near = angle + 2.0 * math.pi * round((seed[i] - angle) / (2.0 * math.pi))
     if near < limits[0, i]:
         near += 2.0 * math.pi

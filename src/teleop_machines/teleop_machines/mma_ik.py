@@ -96,7 +96,7 @@ def _approach(T: Array, box: Array, geometry: Array, rounds: int, q: Array) -> f
 
 @inner
 def _cost(T: Array, turn: float, choice: int, seed: Array, limits: Array, geometry: Array, q: Array) -> float:
-    """Write one branch; return its largest joint move, or infinity if it does not reach the pose or violates a limit."""
+    """Write one branch; return its largest joint move, or infinity if it misses the pose or violates a limit."""
     if mma_branches.branch(T, turn, choice, geometry, seed, q) > 0.0:
         return math.inf
     return float(mma_branches.unwrapped(q, seed, limits))

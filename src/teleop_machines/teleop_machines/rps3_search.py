@@ -151,7 +151,7 @@ def closing_angles(q: Array, b: float, a: float, starts: int, found: Array) -> i
 
 @inner
 def _nearest(q: Array, b: float, a: float, starts: int, near: Array, theta: Array) -> bool:
-    """Write leg angles (3,) of the assembly with ball joints nearest to ``near`` (3, 3); return whether one was found."""
+    """Write leg angles (3,) of the assembly with ball joints nearest to ``near`` (3, 3); return whether it exists."""
     found, S = np.empty((MAX_ASSEMBLIES, 3)), np.empty((3, 3))
     best, chosen = math.inf, -1
     for k in range(closing_angles(q, b, a, starts, found)):
@@ -208,8 +208,7 @@ def _at_seed(g: Array, ask: Array, T: Array, first: Array, theta: Array) -> floa
 
 @inner
 def _far(q: Array, first: Array, g: Array, starts: int, side: float, T: Array, seed: Array, theta: Array) -> int:
-    """Replace leg angles (3,) by those at the end of the path from the seed, or, if it fails, by the nearest assembly
-    found."""
+    """Replace leg angles (3,) by those at the end of the path from the seed, else by the nearest assembly found."""
     if _lead(q, first, g[0], g[1], side, seed):
         theta[:] = seed
         return _CLOSED

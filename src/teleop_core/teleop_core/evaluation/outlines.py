@@ -97,8 +97,7 @@ def outlines_of(context: Context) -> list[Outline]:
 
 
 def _around(fixture: ReportedFixture, gain: float, axes: Array) -> tuple[Array, Array]:
-    """Points (N, 3) [m] of a fixture's edges, and positions (3, 2) [m] of its walls on the axes, both relative to its
-    middle."""
+    """Points (N, 3) [m] of a fixture's edges and positions (3, 2) [m] of its walls on the axes, from its middle."""
     points = fixture.outline(gain, axes)
     if fixture.size:  # a box, of which only the size is reported
         return points, np.stack((points.min(axis=0), points.max(axis=0)), axis=1)
@@ -111,7 +110,7 @@ def _around(fixture: ReportedFixture, gain: float, axes: Array) -> tuple[Array, 
 
 
 def _first_wall(fixture: ReportedFixture, way: Array, gain: float, axes: Array) -> float:
-    """Distance [m] from the middle to the first wall in the direction of a unit vector (3,); NaN if there is no wall."""
+    """Distance [m] from the middle to the first wall in the direction of a unit vector (3,); NaN without a wall."""
     low, high = 0.0, _FAR * gain
     for _ in range(_ROUNDS):
         places = np.linspace(low, high, _STEPS)

@@ -102,7 +102,7 @@ def percent(share: float) -> str:
 
 
 def _missing(values: Values) -> Iterator[Concern]:
-    """Concern about unknown parts. It comes first, because values that depend on these parts are missing in the score."""
+    """Concern about unknown parts. It comes first, because values that depend on them are missing."""
     for key, what in (("session.missing", "not known here"), ("fixture.unscored", "not scored")):
         if told := values.get(key):
             text = f"{what}: {told}; give the file that has it: teleop evaluate --parts FILE.py"

@@ -131,8 +131,7 @@ def rotation_angle_between(a: Array, b: Array) -> float:
 
 @kernel
 def rotation_vector_between(a: Array, b: Array, vector: Array) -> None:
-    """Write the rotation vector (3,) [rad], in the base, that turns the rotation of a to the rotation of b into
-    ``vector``.
+    """Write the rotation vector (3,) [rad], in the base, that turns the rotation of a to the rotation of b.
 
     For half a turn, whose axis has two directions, the result may have either direction.
     """

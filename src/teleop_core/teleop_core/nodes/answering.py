@@ -1,4 +1,4 @@
-"""Answering node: makes one step of its stage for every message of its trigger; the outputs have the trigger's stamp."""
+"""Answering node: makes one step of its stage for every message of its trigger, with the trigger's stamp."""
 
 from collections.abc import Callable
 from typing import Any

@@ -124,8 +124,7 @@ class Fed(Protocol):
         """Receive a message; ``lost`` messages before it were lost."""
 
     def join(self, is_inside: bool, since_ns: int) -> None:
-        """Receive messages from the feed, or from the middleware again, beginning with those sent at ``since_ns``
-        [ns]."""
+        """Receive messages sent from ``since_ns`` on [ns] from the feed, or from the middleware again."""
 
 
 class FeedReader:

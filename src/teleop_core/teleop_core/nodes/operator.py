@@ -20,8 +20,7 @@ _SELDOM = 4
 
 
 class HandInput:
-    """Inputs ``operator/servo_cp``, ``buttons`` and ``jaw``, read in every tick, which takes 2 µs and needs no
-    executor.
+    """Inputs ``operator/servo_cp``, ``buttons`` and ``jaw``, read in every tick, in 2 µs and without executor.
 
     The inputs are added to the ports of the node, which reports, resets and closes them.
 

@@ -62,7 +62,7 @@ def signal_pipe() -> int:
 
 @dataclass
 class _Stillness:
-    """Time without progress of a loop: its last count, and the processor time that it could have used since then [s]."""
+    """Time without progress of a loop: its last count, and the processor time it could have used since then [s]."""
 
     chances: Chances
     number: int

@@ -215,7 +215,7 @@ def _say_link(
     dt: float,
     rings: Rings,
 ) -> None:
-    """Add the lines that copy a value to the port of its reader; a delayed value passes through a ring of past values."""
+    """Add the lines that copy a value to its reader's port; a delayed value passes through a ring of past values."""
     reader, port = f"r{places[link.reader.name]}", link.port.field
     writer, plain = places[link.writer.name], _plain_field(link)
     source, stamp = f"r{writer}.{plain}", f"r{writer}.{plain}_ns"

@@ -205,8 +205,7 @@ def held(changed_at: Array, values: Array, times: Array) -> Array:
 
 
 def _in_axes_of(rest: Array, turns: Array) -> Array:
-    """Rotation vectors (N, 3) of ``turns`` (N, 4): converted from the axes of the base to the axes of the attitude
-    ``rest``."""
+    """Rotation vectors (N, 3) of ``turns`` (N, 4), from the axes of the base to the axes of ``rest``."""
     own = quaternion_products(quaternion_products(rest * (1.0, -1.0, -1.0, -1.0), turns), rest)
     sine = length(own[:, 1:])
     angle = 2.0 * arctangent(sine, own[:, 0])

@@ -293,8 +293,7 @@ class NewSamples:
         return stamps[is_new], values[is_new], log_ns[is_new]
 
     def _is_due(self, topic: topics.Topic, values: Array, stamps: NDArray[np.int64]) -> NDArray[np.bool_]:
-        """Mask (N,) of rows of a seldom topic that are recorded: rows whose values change, and the first row of each
-        period."""
+        """Mask (N,) of the recorded rows of a seldom topic: rows that change, and the first row of each period."""
         before = self._values.get(topic.name, np.full((1, values.shape[1]), np.nan))
         self._values[topic.name] = values[-1:].copy()
         changes = (np.concatenate((before, values[:-1])) != values).any(axis=1)

@@ -71,8 +71,7 @@ class VirtualTime:
         return compose(self.graph, self.stages, self._dtype, dt, self._ahead, self._played, self._rings)
 
     def _is_stale(self) -> bool:
-        """Whether a stage has new arguments since the tick was composed, for example after a change of the fixture's
-        kind."""
+        """Whether a stage has new arguments since the tick was composed, for example another kind of fixture."""
         now = (stage.arguments for stage in self.stages.values())
         return any(old is not new for old, new in zip(self._arguments, now, strict=True))
 

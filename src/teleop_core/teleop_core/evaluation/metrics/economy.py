@@ -10,7 +10,7 @@ _ATTEMPTS, _WAY = TASK_STATE.columns.index("attempts"), TASK_STATE.columns.index
 
 
 class EconomyMetric(Metric):
-    """Sum of the straight distances to a task's goals, divided by the length of the tip's path; 1 is a straight path."""
+    """Sum of the straight distances to a task's goals divided by the length of the tip's path; 1 is straight."""
 
     name, topics = "economy", (SLAVE_TRUE_CP, TASK_STATE)
     path_mm = figure("mm", "path of the tip, of places 0.1 s apart")

@@ -48,8 +48,7 @@ class ForceSensingMetric(Metric):
 
 
 def force_errors(window: Window, told: Topic) -> Array:
-    """Distances (N,) [N] of the forces on topic ``told`` from the true force, at all samples of both topics during
-    contact."""
+    """Distances (N,) [N] of the forces on topic ``told`` from the true force, at all samples during contact."""
     true, said = window.around(SLAVE_TRUE_CF), window.around(told)
     own = [window.samples(topic).stamp_ns for topic in (SLAVE_TRUE_CF, told)]
     stamps = np.unique(np.concatenate(own))

@@ -107,7 +107,7 @@ def _first_arrivals(window: Window, topic: Topic) -> tuple[Integers, Integers]:
 
 
 def _arrivals(window: Window, topic: Topic, stamps: Integers) -> Integers:
-    """Log times [ns] of another topic's samples with the given stamps; a missing sample has a time in the far future."""
+    """Log times [ns] of another topic's samples with the given stamps; far in the future if missing."""
     series = window.around(topic)
     if not len(series):
         return np.full(len(stamps), _NEVER)

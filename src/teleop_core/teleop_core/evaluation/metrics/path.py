@@ -122,8 +122,7 @@ class PathMetric(Metric):
         return figure.Figure("Position against time", sentence, traces, layout, 640)
 
     def _interesting(self, outlines: list[Outline]) -> list[float]:
-        """Time interval [s] that is shown first: the time with a fixture on, else the time since the slave began to
-        follow."""
+        """Time [s] that is shown first: the time with a fixture on, else the time since the slave began to follow."""
         bag, history = self._context.bag, self._context.history
         if outlines:
             return [outlines[0].begin_s, outlines[-1].end_s]

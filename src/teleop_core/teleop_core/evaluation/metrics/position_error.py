@@ -1,5 +1,4 @@
-"""Position error: distance of the slave's tip from reference and command, and distance of the true tip from the
-reference.
+"""Position error: distance of the slave's tip from reference and command, and of the true tip from the reference.
 
 The reference is the setpoint of the same tick. The newest command is ahead of the reference by the filters' lag. The
 true tip differs from the tip that the encoders measure.
