@@ -57,7 +57,7 @@ def finger_jacobian(q: Array, links: Array, J: Array) -> None:
 def _bent(r: float, z: float, links: Triple, is_positive: bool) -> tuple[float, float, bool]:
     """Angles psi and phi for a point at distance r in front of joint 2 and z above it.
 
-    And whether the finger reaches it.
+    The third value is whether the finger reaches it.
     """
     _, l2, l3 = links
     k = (r * r + z * z - l2 * l2 - l3 * l3) / (2.0 * l2 * l3)

@@ -186,7 +186,7 @@ def join(parts: list[Series], column: Column) -> Series:
 def in_order(parts: list[Series]) -> Series:
     """One series of all parts, sorted by log time; joint names are those of the first part.
 
-    ``parts`` must not be empty.
+    The argument ``parts`` must not be empty.
     """
     stamps = np.concatenate([part.stamp_ns for part in parts])
     logs = np.concatenate([part.log_ns for part in parts])

@@ -92,7 +92,7 @@ def walk(data: Bytes, begin: int, end: int) -> tuple[Rows, int]:
 def gather(data: Bytes, begins: Stamps, template: Bytes, mask: Bytes) -> Bytes | None:
     """Pieces of equal size that begin at the given positions, shape (n, size).
 
-    None if any piece differs from the template.
+    The result is None if any piece differs from the template.
 
     Args:
         data: Read-only bytes.

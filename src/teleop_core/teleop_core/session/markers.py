@@ -77,7 +77,7 @@ class ArmMarkers:
     def _edges(self, fixture: ReportedFixture, gain: float) -> Array:
         """End points (N, 3) [m] of segments along the fixture's edges, two for each segment.
 
-        Computed only when the fixture or the gain changes.
+        They are computed only when the fixture or the gain changes.
         """
         if self._told != (fixture, gain):
             self._segments = segments_of(fixture.outline(gain, self._axes)).reshape(-1, 3)
@@ -87,7 +87,7 @@ class ArmMarkers:
     def force(self, stylus: Array, force: Array) -> Marker:
         """Arrow of the force (3,) [N] on the hand at a stylus pose (7,), in master_base.
 
-        Hidden if the force is near zero.
+        The arrow is hidden if the force is near zero.
         """
         ends = np.stack((stylus[:3], stylus[:3] + FORCE_SCALE * force))
         is_shown = float(length(force)) > _TOUCH

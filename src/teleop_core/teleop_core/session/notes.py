@@ -71,7 +71,7 @@ def passive_note(device: DeviceParameters, fixture: gains.FixtureParameters, del
 def rendered_note(device: DeviceParameters, fixture: gains.FixtureParameters) -> str:
     """Note on a wall that is stiffer than the device, with the stiffness that the hand feels.
 
-    Empty if it is not stiffer.
+    The text is empty if the wall is not stiffer.
 
     The device bends by force divided by its stiffness, so wall and device are two springs in series.
     """

@@ -193,7 +193,7 @@ def between(samples: Samples, times: Array, longest: float) -> tuple[Array, Arra
 def held(changed_at: Array, values: Array, times: Array) -> Array:
     """Values (N, width) at times (N,) [s], from the latest change at or before each time.
 
-    Zero before the first change.
+    Values are zero before the first change.
 
     Args:
         changed_at: Times (K,) of the changes [s].

@@ -178,7 +178,7 @@ class VirtualTime:
     def _check(self, part: Any) -> None:
         """Make sure that a user's stages wrote finite numbers.
 
-        Called once per block; the time hardly depends on its length.
+        This is called once per block; the time hardly depends on its length.
 
         Raises:
             PartError: A stage wrote NaN or infinity; the error text names topic and time.

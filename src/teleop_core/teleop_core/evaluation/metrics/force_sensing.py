@@ -11,7 +11,7 @@ from teleop_core.kernels.geometry import Array
 class ForceSensingMetric(Metric):
     """Distance of measured and estimated forces from the true force.
 
-    None if there was no contact, or the true force is unknown.
+    Values are None if there was no contact, or the true force is unknown.
 
     All three topics are sent only when they change, so each value is valid until its next sample.
     """

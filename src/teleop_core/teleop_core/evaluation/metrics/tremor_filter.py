@@ -20,7 +20,7 @@ MEANT = 2.0
 class TremorFilterScore:
     """Score of a tremor filter.
 
-    None without a filter, or if the recording's rate is too low or the recording is too short.
+    Values are None without a filter, or if the recording's rate is too low or the recording is too short.
     """
 
     before_um: float | None = figure("um", "RMS of the stylus's motion in 8 to 12 Hz over three axes; null below 60 Hz")
