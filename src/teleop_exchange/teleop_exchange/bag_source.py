@@ -229,7 +229,7 @@ class BagSource:
 def _named(wanted: str, names: Iterable[str]) -> str | None:
     """The topic with the wanted name, or the only topic that ends with it.
 
-    For ``a|b``, the first that exists; None if there is no such topic.
+    For ``a|b``, the result is the first existing topic; None if there is no such topic.
     """
     known = list(names)
     for name in map(plain, wanted.split("|")):
