@@ -1,6 +1,6 @@
-"""Messages of poses and buttons in bags of others, ROS 1 and 2, as rows of numbers.
+"""Messages of poses and buttons in bags of other programs, ROS 1 and 2, as rows of numbers.
 
-Messages are read by the rosbags library, which takes some 6 µs each.
+The rosbags library reads the messages, which takes about 6 µs each.
 """
 
 import struct
@@ -24,14 +24,14 @@ POSES = {
     "geometry_msgs/msg/PoseWithCovariance": ("pose", False),
     "geometry_msgs/msg/Transform": ("", False),
 }
-"""Messages that hold a pose: where it is in them, and whether they have a header."""
+"""Message types with a pose: the field of the pose, and whether the message has a header."""
 TRANSFORMS = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")
 JOY = "sensor_msgs/msg/Joy"
 BATCH = 8192
 Raw = tuple[int, bytes]
 """Time of recording [ns] and bytes of a message."""
 Frames = tuple[str, str]
-"""Parent and child frame of a pose; empty where a message names none."""
+"""Parent and child frame of a pose; empty if a message names no frame."""
 
 
 class Rows(NamedTuple):
@@ -48,12 +48,12 @@ class PoseReader:
     Args:
         typestore: Types of the bag, from rosbags.
         ros_type: Type of the messages.
-        is_ros2: Whether the bytes are CDR, not those of ROS 1.
-        frame: Child frame that is taken; empty for any.
-        parent: Frame in which it is taken; empty for any.
+        is_ros2: Whether the bytes are CDR; False for bytes of ROS 1.
+        frame: Child frame of the wanted poses; empty for any.
+        parent: Parent frame of the wanted poses; empty for any.
 
     Attributes:
-        taken: Parent and child frame of the poses taken; None before the first.
+        taken: Parent and child frame of the used poses; None before the first.
     """
 
     def __init__(self, typestore: Any, ros_type: str, *, is_ros2: bool, frame: str = "", parent: str = "") -> None:
@@ -67,10 +67,10 @@ class PoseReader:
         return read(data, self._type)
 
     def blocks(self, messages: Iterable[Raw]) -> Iterator[Rows]:
-        """Poses, some messages at a time.
+        """Poses, in blocks of some messages.
 
         Raises:
-            UnknownNameError: Poses of several frames, or in several, would be mixed.
+            UnknownNameError: Poses of several child frames, or in several parent frames, would be mixed.
         """
         stream = iter(messages)
         while batch := list(islice(stream, BATCH)):
@@ -89,10 +89,10 @@ class PoseReader:
         return stamp, log_ns, (place.x, place.y, place.z, turn.w, turn.x, turn.y, turn.z)
 
     def _part(self, message: Any) -> tuple[Any, Any, Any] | None:
-        """Header or None, place and turn in a message; None if it lacks the frame.
+        """Header (or None), position and rotation in a message; None if the message lacks the frame.
 
         Raises:
-            UnknownNameError: The pose is of another frame, or in another, than those before.
+            UnknownNameError: The pose has another child or parent frame than earlier poses.
         """
         chosen = None
         for part in self._parts(message):
@@ -119,7 +119,7 @@ class PoseReader:
         return [_Part(header, getattr(message, "child_frame_id", ""), pose)]
 
     def _refuse(self, named: Frames) -> NoReturn:
-        """Refuse a pose of other frames than those before."""
+        """Refuse a pose whose frames differ from those of earlier poses."""
         assert self.taken is not None
         index = 0 if self.taken[0] != named[0] else 1
         option = ("--parent (poses stand in several)", "--frame (poses are of several)")[index]
@@ -132,7 +132,7 @@ def _stamp(header: Any) -> int:
 
 
 def plain(name: str) -> str:
-    """Name of a topic or frame without the slash before it."""
+    """Name of a topic or frame without its leading slash."""
     return name.removeprefix("/")
 
 
@@ -160,7 +160,7 @@ class JoyReader:
     Args:
         typestore: Types of the bag.
         is_ros2: Whether the bytes are CDR.
-        numbers: Number of clutch, fixture and mode among the buttons; -1 for none.
+        numbers: Indices of clutch, fixture and mode among the buttons; -1 if there is no such button.
     """
 
     def __init__(self, typestore: Any, *, is_ros2: bool, numbers: tuple[int, ...]) -> None:
@@ -176,7 +176,7 @@ class JoyReader:
         """Stamps and times of recording (n,) [ns], and pressed or not (n, 3)."""
         stamps, logs, rows = [], [], []
         for log, data in messages:
-            # Both formats begin with four bytes and the stamp; what follows is often the same.
+            # Both formats begin with four bytes and the stamp; the bytes after them are often equal.
             sec, nanosec = struct.unpack_from("<II", data, 4)
             row = self._known.get(data[12:])
             if row is None:

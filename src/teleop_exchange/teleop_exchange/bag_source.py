@@ -18,7 +18,7 @@ from teleop_exchange.options import BUTTONS, ORIENTATIONS, ImportOptions, button
 from teleop_exchange.transform_chain import chain_to, composed
 
 _LOOKED_AT = 1000
-"""Messages of transforms whose frames are listed."""
+"""Number of transform messages that are read to list their frames."""
 _TABLE_OPTIONS = (*ORIENTATIONS, "time", "rate", "position", *BUTTONS)
 
 
@@ -27,12 +27,12 @@ class BagSource:
 
     Args:
         path: Directory of a rosbag2 recording, ``.mcap`` or ``.db3`` file, or ROS 1 ``.bag``.
-        options: What is taken of it.
+        options: Import options.
 
     Raises:
-        RecordingError: It cannot be read, or holds no poses.
-        ParameterError: Several topics hold poses, or an option does not fit.
-        UnknownNameError: The topic or frame is not there.
+        RecordingError: The recording cannot be read, or contains no poses.
+        ParameterError: Several topics contain poses, or an option does not fit.
+        UnknownNameError: The topic or frame does not exist.
     """
 
     has_time, time_unit, bad_rows, is_unit_said = True, "ns", 0, True
@@ -77,7 +77,7 @@ class BagSource:
 
     def _pose_topic(self) -> str:
         found = [n for n, kind in self._types.items() if kind in POSES or kind in TRANSFORMS]
-        if not self._options.topic:  # those that never change belong to the others
+        if not self._options.topic:  # static transforms belong to the other ones
             found = [name for name in found if name not in self._static] or found
         if self._options.topic:
             wanted = _named(self._options.topic, self._types)
@@ -100,12 +100,12 @@ class BagSource:
         raise UnknownNameError("--topic", "", sorted(found))
 
     def _way(self, bag: ros_bags.RosBag) -> list[tuple[str, Frames]]:
-        """Transforms from the frame up to the one in which it is taken, each with its topic.
+        """Chain of transforms from the wanted frame up to the wanted parent frame, each with its topic.
 
-        A parent is named where a frame has several. Empty where the topic holds all that is needed.
+        The parent must be named if a frame has several parents. The result is empty if the topic alone is sufficient.
 
         Raises:
-            UnknownNameError: A frame or its parent is one of several and not said.
+            UnknownNameError: There are several frames or parents, and no option chooses one.
         """
         if self._types[self._topic] not in TRANSFORMS:
             return []
@@ -146,7 +146,7 @@ class BagSource:
         return ""
 
     def _button_numbers(self, bag: ros_bags.RosBag) -> tuple[int, ...]:
-        """Numbers of clutch, fixture and mode among the buttons; -1 for those that are not."""
+        """Indices of clutch, fixture and mode among the buttons; -1 for missing buttons."""
         if not self._joy:
             return ()
         joy = JoyReader(bag.typestore, is_ros2=bag.is_ros2, numbers=())
@@ -184,11 +184,11 @@ class BagSource:
         return found
 
     def blocks(self) -> Iterator[source.Block]:
-        """As of any source.
+        """The same as for any source.
 
         Raises:
             RecordingError: The file is damaged.
-            UnknownNameError: The frames of the poses are several, and none or another is chosen.
+            UnknownNameError: The poses have several frames, and no frame or an unknown frame is chosen.
         """
         with self._opened() as bag:
             if self._chain:
@@ -210,7 +210,7 @@ class BagSource:
         return source.Block(stamps, poses[:, :3], quaternions, log_ns=logs)
 
     def presses(self) -> source.Presses | None:
-        """As of any source."""
+        """The same as for any source."""
         if not self._joy:
             return None
         with self._opened() as bag:
@@ -220,14 +220,17 @@ class BagSource:
         return source.Presses(stamps[order], logs[order], pressed[order])
 
     def check(self, finite: Array) -> None:
-        """As of any source."""
+        """The same as for any source."""
         if not finite.all():
             names = np.array(["x", "y", "z", "orientation"])[finite == 0]
             raise RecordingError(self.path, f"{self._topic}: {', '.join(names)} holds no numbers")
 
 
 def _named(wanted: str, names: Iterable[str]) -> str | None:
-    """The topic that is called so, or alone ends so; of ``a|b`` the first; None without one."""
+    """The topic with the wanted name, or the only topic that ends with it.
+
+    For ``a|b``, the result is the first existing topic; None if there is no such topic.
+    """
     known = list(names)
     for name in map(plain, wanted.split("|")):
         ends = [one for one in known if name and f"/{one}".endswith(f"/{name}")]

@@ -1,4 +1,4 @@
-"""Commands that exchange recordings with others: ``teleop import`` and ``teleop export``."""
+"""Commands that exchange recordings with other programs: ``teleop import`` and ``teleop export``."""
 
 import argparse
 import re
@@ -48,7 +48,7 @@ def add_import(commands: Any) -> None:
 
 
 def _options(parser: argparse.ArgumentParser) -> None:
-    # `--axes +y -x +z`: -x is a value; argparse lets only what looks like a number be one.
+    # In `--axes +y -x +z`, -x is a value; argparse accepts a leading minus only in values that look like numbers.
     parser._negative_number_matcher = re.compile(r"-([xyz]|\d+|\d*\.\d+)$")
     _time(parser.add_argument_group("time"))
     _place(parser.add_argument_group("position and orientation"))

@@ -1,4 +1,4 @@
-"""Episodes: a table of several recordings, of which an import takes one, as data sets have them."""
+"""Episodes: a table of several recordings, as in data sets; an import reads one of them."""
 
 from collections.abc import Iterator
 
@@ -12,14 +12,14 @@ _NEEDED = "left out: no column is called episode_index or the like"
 
 
 class Episodes:
-    """Rows of the episode that is wanted; of all if the table holds one.
+    """Rows of the wanted episode; all rows if the table contains only one episode.
 
     Args:
         table: The table.
-        wanted: Number of the episode; None if there is to be one alone.
+        wanted: Number of the episode; None if the table must contain only one.
 
     Raises:
-        ParameterError: An episode is wanted, and no column says which there are.
+        ParameterError: An episode is wanted, but no column contains the episode numbers.
     """
 
     def __init__(self, table: tables.Table, wanted: int | None) -> None:
@@ -32,8 +32,8 @@ class Episodes:
         """Some columns of the table, block by block.
 
         Raises:
-            RecordingError: There are several episodes, and none is wanted; or the file is damaged.
-            UnknownNameError: There is no episode of the wanted number.
+            RecordingError: There are several episodes, and no number was given; or the file is damaged.
+            UnknownNameError: There is no episode with the wanted number.
         """
         if self._column is None:
             yield from self._table.blocks(columns)
@@ -57,7 +57,7 @@ class Episodes:
             raise RecordingError(self._table.path, f"{reason}; {hint}")
 
     def told(self) -> list[str]:
-        """What was taken, in words."""
+        """Texts about the imported episode."""
         return [f"episode {self._wanted} of {len(self._found)}"] * (self._wanted is not None)
 
 
@@ -65,7 +65,7 @@ def numbers_of(table: tables.Table) -> list[int]:
     """Numbers of the episodes of a table.
 
     Raises:
-        ParameterError: No column says them.
+        ParameterError: No column contains the episode numbers.
     """
     column = _column(table)
     if column is None:

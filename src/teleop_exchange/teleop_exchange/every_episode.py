@@ -1,4 +1,4 @@
-"""Every episode: a table or data set of several recordings becomes a folder with one for each."""
+"""Every episode: converts a table or data set of several recordings to a folder with one recording for each episode."""
 
 import shutil
 from collections.abc import Callable, Mapping
@@ -15,13 +15,13 @@ from teleop_exchange.options import Changes, ImportOptions, Option, options_of
 
 @dataclass(frozen=True)
 class EpisodesReport:
-    """What an import of all episodes made.
+    """Result of an import of all episodes.
 
     Attributes:
         out: Folder of the recordings.
-        made: What was found in each, by the number of the episode.
-        kept: Numbers of those whose recording was there already.
-        refused: Why the others are not there, by the number of the episode.
+        made: Report of each made recording, by the number of the episode.
+        kept: Numbers of the episodes whose recording already existed.
+        refused: Reason for each episode that could not be imported, by its number.
     """
 
     out: Path
@@ -45,20 +45,20 @@ def import_episodes(
 ) -> EpisodesReport:
     """Make a recording of each episode of a table, or of a data set of LeRobot.
 
-    Recordings that are in the folder already are kept, so that an import that was interrupted goes
-    on. An episode that cannot be imported does not keep the others from it.
+    Recordings that already exist in the folder are kept, so that an interrupted import can be continued. An episode
+    that cannot be imported does not stop the import of the others.
 
     Args:
         file: Table with a column ``episode_index`` or the like, or folder of the data set.
-        out: Folder of the recordings ``episode_000000`` and so on; may be there.
-        options: As of :func:`teleop_exchange.import_recording`, without ``episode``.
-        arms: As there.
-        say: Told a line after each episode.
-        **changes: As ``options``.
+        out: Folder of the recordings ``episode_000000`` and so on; may already exist.
+        options: Options of :func:`teleop_exchange.import_recording`, without ``episode``.
+        arms: As in :func:`teleop_exchange.import_recording`.
+        say: Called with a line of text after each episode.
+        **changes: Options by name.
 
     Raises:
-        RecordingError: The file is missing or damaged, or holds an episode twice.
-        ParameterError: No column says which episodes there are, or an option is wrong.
+        RecordingError: The file is missing or damaged, or contains an episode twice.
+        ParameterError: No column contains the episode numbers, or an option is wrong.
     """
     base, out = options or ImportOptions(), Path(out)
     options_of(base, arms, changes)  # refused here, not once for each episode
@@ -87,12 +87,12 @@ def files_of(path: Path, options: ImportOptions) -> dict[int, Path]:
     """File of each episode, by its number.
 
     Args:
-        path: The only file, or the folder of a data set, whose ``data`` holds Parquet.
-        options: How text is read.
+        path: A single file, or the folder of a data set with Parquet files in ``data``.
+        options: Options for reading text files.
 
     Raises:
-        RecordingError: There is no file, one is damaged, or two hold the same episode.
-        ParameterError: No column says which episodes a file holds.
+        RecordingError: There is no file, a file is damaged, or two files contain the same episode.
+        ParameterError: A file has no column of episode numbers.
     """
     files = sorted((path / "data").rglob("*.parquet")) if path.is_dir() else [path]
     if not files or not path.exists():
@@ -108,10 +108,10 @@ def files_of(path: Path, options: ImportOptions) -> dict[int, Path]:
 
 
 def _is_there(target: Path, command: str) -> bool:
-    """Whether a recording was made by a command before; half of one is removed.
+    """Whether the recording was already made by the same command; an incomplete recording is removed.
 
     Raises:
-        RecordingError: It was made by another.
+        RecordingError: The recording was made by another command.
     """
     if not target.exists():
         return False

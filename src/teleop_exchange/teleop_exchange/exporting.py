@@ -1,4 +1,4 @@
-"""Export: recordings become tables, CSV or Parquet, or a data set for learning."""
+"""Export: converts recordings to tables (CSV or Parquet), or to a data set for learning."""
 
 import shutil
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -27,9 +27,9 @@ _BY_COLUMN = {
 
 
 def unit_of(topic: str, column: str) -> str:
-    """Unit of a column of a topic; empty where it has none.
+    """Unit of a column of a topic; empty if it has no unit.
 
-    Joints may turn or slide: their positions are in rad or m.
+    Joints may be revolute or prismatic, so their positions are in rad or m.
     """
     known = next((t for n, t in BY_NAME.items() if topic == n or topic.endswith(f"/{n}")), None)
     if known is not None and known.columns:
@@ -43,7 +43,7 @@ def unit_of(topic: str, column: str) -> str:
 
 
 def _of_number(column: str) -> str:
-    """Unit of a named number, as of a report."""
+    """Unit of a named number, for example in a report."""
     if column.startswith(("fixture_center", "fixture_size")):
         return "m"
     if column == "position_residual" or column in {"cut_x", "cut_y", "cut_z"}:
@@ -60,12 +60,12 @@ OneRecording = Recording | Path | str
 
 @dataclass(frozen=True)
 class ExportReport:
-    """What was exported.
+    """Result of an export.
 
     Attributes:
         out: File or directory made.
-        rows: Rows in it; of a data set its frames.
-        columns: Names of the columns; of a data set its features.
+        rows: Number of rows; for a data set, of frames.
+        columns: Names of the columns; for a data set, of its features.
         episodes: Number of recordings in it.
     """
 
@@ -91,28 +91,28 @@ def export_recording(
     action: str = "joints",
     task: str = "teleoperation",
 ) -> ExportReport:
-    """Write recordings in a format of others.
+    """Write recordings in a format of other programs.
 
-    Tables have the time [s] since the recording began in their first column and then a column for each number of each
-    topic, called as :meth:`teleop_core.Recording.frame` does: ``slave/measured_cp.x``. A row stands wherever a topic
-    has a message; what has none there is empty, but the columns of reports such as ``teleop/state`` keep their values.
-    The columns of Parquet have their units as metadata.
+    The first column of a table is the time [s] since the recording began. Each number of each topic has one further
+    column, named as in :meth:`teleop_core.Recording.frame`: ``slave/measured_cp.x``. There is one row for each time at
+    which any topic has a message. Columns of topics without a message at that time are empty, except columns of
+    reports such as ``teleop/state``, which keep their values. The columns of Parquet have their units as metadata.
 
-    A data set of LeRobot (version 3.0 of its format, without pictures) has one episode per recording:
-    ``observation.state``, the slave's joints and the pose of its tip; ``action``, what they were told.
+    A data set of LeRobot (version 3.0 of its format, without pictures) has one episode per recording.
+    ``observation.state`` contains the slave's joints and the pose of its tip; ``action`` contains the commands.
 
     Args:
-        recording: A recording or where it is; several for a data set.
-        out: File to make, or directory of a data set; nothing is left there after an error.
-        format: ``csv``, ``parquet`` or ``lerobot``; None: as the name of ``out`` ends.
+        recording: A recording or its path; several for a data set.
+        out: File to make, or directory of a data set; removed after an error.
+        format: ``csv``, ``parquet`` or ``lerobot``; None chooses by the extension of ``out``.
         topics: Topics of a table; all if empty.
-        rate: Rows per second [Hz], each with the newest values; None for a row per message, in a data set 50 Hz.
-        units: Whether names of columns end with the unit, as ``slave/measured_cp.x [m]``.
-        action: Of a data set: ``joints`` (``slave/servo_jp``) or ``tip`` (``slave/servo_cp``).
-        task: Of a data set: what is done in it, in words.
+        rate: Rows per second [Hz], each with the newest values; None for one row per message, or 50 Hz for a data set.
+        units: Whether names of columns end with the unit, as in ``slave/measured_cp.x [m]``.
+        action: For a data set: ``joints`` (``slave/servo_jp``) or ``tip`` (``slave/servo_cp``).
+        task: For a data set: description of the task.
 
     Returns:
-        What was written.
+        Report of the export.
 
     Raises:
         RecordingError: A recording cannot be read, or ``out`` exists or cannot be written.
@@ -144,7 +144,7 @@ def export_recording(
 
 
 def _by_name(path: Path) -> str:
-    """Format that the end of a name says; a name without an end is a data set."""
+    """Format by the extension of a name; a name without extension means a data set."""
     name = path.name.lower().removesuffix(".gz")
     for chosen in ("csv", "parquet"):
         if name.endswith(f".{chosen}"):
@@ -173,10 +173,10 @@ def _data_set(recordings: list[Recording], path: Path, rate: float | None, actio
 
 @contextmanager
 def whole(path: Path) -> Iterator[Path]:
-    """Draft beside a path, which takes its place when all is written, and is removed otherwise.
+    """Draft beside a path. The draft replaces the path when everything is written, and is removed after an error.
 
     Raises:
-        RecordingError: It cannot be written.
+        RecordingError: The draft cannot be written.
     """
     draft = path.with_name(f".{path.name}.part")
     try:
@@ -227,5 +227,5 @@ def _table(streams: Streams, piece: Joined, schema: pa.Schema) -> pa.Table:
     columns = [(piece.time_ns - streams.start_ns) * 1e-9]
     for topic in streams.columns:
         columns += list(np.ascontiguousarray(piece.values[topic].T))
-    # What is NaN becomes an empty cell.
+    # NaN becomes an empty cell.
     return pa.Table.from_arrays([pa.array(column, pa.float64(), from_pandas=True) for column in columns], schema=schema)

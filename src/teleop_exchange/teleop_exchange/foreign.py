@@ -1,7 +1,7 @@
-"""Recordings of others as a master: what ``replay`` and the operators ``bag`` and ``file`` follow.
+"""Recordings of other programs as a master, for ``replay`` and for the operators ``bag`` and ``file``.
 
-A copy in memory is made: of another topic or message of the pose, stamps that say nothing, buttons
-of another Joy, damaged rows.
+This module makes a copy in memory if the pose has another topic or message type, the stamps are useless, the buttons
+are in another Joy message, or rows are damaged.
 """
 
 import csv
@@ -27,12 +27,12 @@ def master_of_others(path: Path, bag: reader.Bag | None, prefixes: Sequence[str]
 
     Args:
         path: A recording or table.
-        bag: The same, if it is a recording as ours.
-        prefixes: What stands before ``master/measured_cp`` of each of its arms.
+        bag: The opened recording, if it has this package's format.
+        prefixes: Prefix before ``master/measured_cp`` for each of its arms.
 
     Raises:
-        RecordingError: It cannot be read, or holds no motion.
-        ParameterError: It has several topics of poses.
+        RecordingError: The file cannot be read, or contains no motion.
+        ParameterError: The file has several topics of poses.
     """
     wanted = columns_of(path)
     series: dict[topics.Topic, Series] = {}
@@ -43,13 +43,16 @@ def master_of_others(path: Path, bag: reader.Bag | None, prefixes: Sequence[str]
 
 
 def columns_of(path: Path) -> ImportOptions:
-    """Columns of a table that are called as an operator's file; guessed in other files."""
+    """Options for the columns of a table with the names of an operator's file.
+
+    For other files the columns are guessed.
+    """
     if path.suffix.lower() != ".csv" or not path.is_file():
         return ImportOptions()
     try:
         with damage_told(path), path.open(newline="", encoding="utf-8") as file:
             head = [name.strip() for name in next(csv.reader(file), [])]
-    except RecordingError:  # whoever reads all of it says what is wrong
+    except RecordingError:  # the code that reads the whole file reports the error
         return ImportOptions()
     if not set(COLUMNS[:4]) <= set(head) <= set(COLUMNS):
         return ImportOptions()
@@ -66,7 +69,7 @@ def columns_of(path: Path) -> ImportOptions:
 
 
 def _of_arm(bag: reader.Bag, prefix: str, options: ImportOptions) -> ImportOptions:
-    """Options that take an arm's topics, where it has them and nothing else is wanted."""
+    """Options that choose an arm's topics, if they exist and no option chooses others."""
     poses, buttons = prefix + topics.MASTER_MEASURED_CP.name, prefix + topics.MASTER_BUTTONS.name
     topic = options.topic or (poses if poses in bag.topics else "")
     known = bag.topics.get(buttons)
@@ -91,7 +94,7 @@ def _read(path: Path, arm: str, options: ImportOptions) -> dict[topics.Topic, Se
 
 @contextmanager
 def _options_told(path: Path) -> Iterator[None]:
-    """Say that the options which an error advises are those of ``teleop import``: a replay has none."""
+    """Add to an error that the advised options are those of ``teleop import``, because a replay has no options."""
     try:
         yield
     except TeleopError as error:

@@ -1,4 +1,4 @@
-"""Gathering: all rows of a source, with their times and what is missing."""
+"""Gathering: reads all rows of a source, with their times and a mask of usable rows."""
 
 import math
 from dataclasses import dataclass
@@ -14,14 +14,14 @@ from teleop_exchange.source import Presses, Source
 from teleop_exchange.times import SECOND_NS, Stamps, guessed_unit, is_constant, joined_ns
 
 SAMPLE = 1000
-"""Times of a block, and blocks, from which the unit is guessed."""
+"""Number of times per block, and of blocks, from which the unit is guessed."""
 MOST_STRANGE = 0.01
-"""Share of rows whose orientation may be none before the file is refused."""
+"""Largest share of rows with an invalid orientation; a file with more is refused."""
 TOLD_LENGTH = 1e-3
-"""Difference of a quaternion's length from 1 from which on it is told."""
+"""Difference of a quaternion's length from 1 above which it is reported."""
 _NO_TIME = np.iinfo(np.int64).min
 FARTHEST = 5.0
-"""Coordinate of a hand [m] beyond which somebody must say that it is in metres."""
+"""Largest coordinate of a hand [m]; for larger values an option or the file must state that the unit is metres."""
 
 
 @dataclass(eq=False)
@@ -30,14 +30,14 @@ class Gathered:
 
     Attributes:
         rows: Rows (N, 7): position [m] in the file's axes, quaternion w, x, y, z.
-        stamp_ns: Times (N,) [ns]; rows without one are not usable.
-        is_usable: Which rows are numbers throughout (N,).
-        buttons: Pressed or not (N, 3), in step with the rows; None without such columns.
-        presses: Buttons with times of their own; None without.
-        told: What was taken and guessed, in words.
-        bad_rows: How many rows were left out as damaged before they came here.
-        strange: How many orientations cannot be rotations.
-        order: Rows in the order in which they were recorded (N,); None if it is that of the file.
+        stamp_ns: Times (N,) [ns]; rows without a time are not usable.
+        is_usable: Whether all values of a row are numbers (N,).
+        buttons: Pressed or not (N, 3), one row for each pose; None without such columns.
+        presses: Buttons with their own times; None if there are none.
+        told: Texts about what was used and guessed.
+        bad_rows: Number of damaged rows that the source left out.
+        strange: Number of orientations that are not valid rotations.
+        order: Indices of the rows in the order of recording (N,); None if this is the order of the file.
     """
 
     rows: Array
@@ -53,7 +53,7 @@ class Gathered:
 
 @dataclass(eq=False)
 class _Parts:
-    """What is collected block by block."""
+    """Data that are collected block by block."""
 
     rows: list[Array]
     times: list[NDArray[np.float64] | Stamps]
@@ -68,8 +68,8 @@ def gather(source: Source, options: ImportOptions) -> Gathered:
     """Read all of a source.
 
     Raises:
-        RecordingError: It holds no rows, or a column of nothing, or its orientations are none, or
-            nobody says in which unit places far beyond a hand's reach are.
+        RecordingError: The source contains no rows or an empty column, or its orientations are invalid. Also if
+            positions are far beyond a hand's reach and no unit is stated.
     """
     parts = _Parts([], [], [], [], [], np.zeros(4))
     scale = LENGTHS[source.unit]
@@ -105,9 +105,9 @@ def gather(source: Source, options: ImportOptions) -> Gathered:
 
 
 def _recorded_order(logs: list[Stamps]) -> NDArray[np.int32] | None:
-    """Rows in the order of their times of recording (N,); None if they stand so.
+    """Indices of the rows in the order of their times of recording (N,); None if they already have this order.
 
-    Files of several writers, and splits that are listed in another order, hold them in any.
+    Files of several writers, and splits that are listed in another order, may have any order.
     """
     whole = np.concatenate(logs) if logs else np.zeros(0, np.int64)
     if (whole[1:] >= whole[:-1]).all():
@@ -116,10 +116,10 @@ def _recorded_order(logs: list[Stamps]) -> NDArray[np.int32] | None:
 
 
 def _check(source: Source, parts: _Parts, count: int) -> None:
-    """Refuse what is no motion.
+    """Refuse data that are not a motion.
 
     Raises:
-        RecordingError: Says what it is.
+        RecordingError: The data are not a motion; the error states the problem.
     """
     attitudes = source.attitudes
     if attitudes.strange > MOST_STRANGE * count:
@@ -164,7 +164,7 @@ def _stamps(
     if parts.logs and options.stamps == "log":
         told.append("stamps: time of recording")
         return np.concatenate(parts.logs), usable, True
-    is_bag = bool(parts.logs)  # where a stamp of zero says that there is none
+    is_bag = bool(parts.logs)  # where a stamp of zero means a missing stamp
     known = [part[np.isfinite(part) & ((part != 0) | (not is_bag))] for part in parts.times]
     first = next((float(part[0]) for part in known if len(part)), 0.0 if is_bag else math.nan)
     if math.isnan(first):
@@ -185,10 +185,10 @@ def _stamps(
 
 
 def _without_stamps(source: Source, parts: _Parts, value: float, told: list[str]) -> Stamps:
-    """Times of recording in place of times that are all the same.
+    """Times of recording, used instead of times that are all equal.
 
     Raises:
-        RecordingError: There are none.
+        RecordingError: There are no times of recording.
     """
     if not parts.logs:
         reason = f"the time is {value:g} in every row; choose another --time, or give --rate HZ"

@@ -1,4 +1,4 @@
-"""Import report: what was imported, what became of it, and what looks wrong."""
+"""Import report: the imported motion, the changes made to it, and warnings."""
 
 import math
 from dataclasses import dataclass
@@ -15,36 +15,36 @@ if TYPE_CHECKING:
     from teleop_core.session.recording import Recording
 
 LARGE = 1.0
-"""Motion of a hand [m] from which on the unit is asked for."""
+"""Extent of a motion [m] above which the report asks whether the unit is right."""
 FAST = 5.0
-"""Speed of a hand [m/s] from which on it is asked for."""
+"""Speed of a hand [m/s] above which the report asks whether the unit is right."""
 SLOW_HZ = 20.0
 SPEED_HZ = 30.0
-"""Rate at which speeds are taken, so that the noise of fast devices does not count."""
+"""Rate at which speeds are computed, so that the noise of fast devices does not count."""
 _SHOWN = 5
 
 
 @dataclass(frozen=True)
 class ImportReport:
-    """What an import found and made.
+    """Result of an import.
 
     Attributes:
         file: Name of the file, without its folder.
-        out: The recording made; None if it is in memory alone.
-        counts: What became of the rows.
-        losses: The same in words.
+        out: Path of the recording made; None if it is only in memory.
+        counts: Counts of used, changed and left-out rows.
+        losses: The counts as texts.
         start_ns: First stamp [ns].
-        duration: From the first to the last sample [s].
+        duration: Time from the first to the last sample [s].
         rate: Samples per second [Hz]: one over the median period.
         period_ms: Median, 5 % and 95 % of the periods [ms].
         range: Extent on x, y, z in the master's axes [m].
-        rotation: Largest turn away from the first attitude [rad].
+        rotation: Largest rotation from the first orientation [rad].
         speed: Median and 95 % of the speed [m/s], at 30 Hz or the rate if that is lower.
         fastest: Largest speed between two samples [m/s].
         gaps: Begin and length [s] of each gap, the longest first.
-        told: What was taken, guessed and changed.
-        warnings: What looks wrong.
-        arm: Name of the hand; empty if there is one alone.
+        told: Texts about what was used, guessed and changed.
+        warnings: Texts about possible errors.
+        arm: Name of the hand; empty if there is only one hand.
         others: Reports of the further hands of the same file.
     """
 
@@ -71,7 +71,7 @@ class ImportReport:
         """The recording made.
 
         Raises:
-            RecordingError: It is gone.
+            RecordingError: The recording does not exist any more.
         """
         from teleop_core.session.recording import open_recording
 
@@ -130,7 +130,7 @@ def summary(file: str, out: Path | None, motion: Motion, arm: str = "") -> Impor
 
 
 def speeds(stamps: Stamps, places: Array) -> Array:
-    """Speeds [m/s] between rows; one of zero for a row alone."""
+    """Speeds [m/s] between rows; a single zero if there is only one row."""
     if len(stamps) < 2:
         return np.zeros(1)
     return np.asarray(length(np.diff(places, axis=0)) / (np.diff(stamps) * 1e-9))

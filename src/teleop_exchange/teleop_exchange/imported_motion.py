@@ -16,21 +16,21 @@ if TYPE_CHECKING:
     from teleop_exchange.tables import Table
 
 ROWS = 20_000
-"""Rows that are turned at once."""
+"""Number of rows that are rotated at once."""
 MOST_BACKWARDS = 0.01
-"""Share of rows whose time may go back before the file is refused."""
+"""Largest share of rows whose time goes back; a file with more is refused."""
 MOST_DOUBLED = 0.5
 
 
 @dataclass(frozen=True)
 class Counts:
-    """What became of the rows of a file.
+    """Counts of the rows of a file.
 
     Attributes:
         rows: Rows in the file.
-        samples: Rows that are left.
-        missing: Rows left out because a number is missing or NaN, or the orientation is none.
-        doubled: Rows left out because their time was there already.
+        samples: Rows that are used.
+        missing: Rows left out because a number is missing or NaN, or the orientation is invalid.
+        doubled: Rows left out because an earlier row has the same time.
         backwards: Rows whose time went back; left out or sorted in.
         damaged: Rows left out because they have too few or too many cells.
     """
@@ -48,19 +48,19 @@ class Motion:
 
     Args:
         path: The file.
-        options: What is taken of it, and what becomes of that.
+        options: Import options.
 
     Attributes:
         stamp_ns: Times (N,) [ns], rising.
         poses: Position [m] and quaternion w, x, y, z (N, 7).
-        counts: What became of the rows.
-        told: What was taken, guessed and changed, in words.
-        strange: How many rows were left out because their orientation is none.
+        counts: Counts of the rows.
+        told: Texts about what was used, guessed and changed.
+        strange: Number of rows that were left out because their orientation is invalid.
         gaps: Begin and length [s] of each gap, the longest first.
 
     Raises:
-        RecordingError: The file is missing, damaged or holds no motion; times go back too often
-            or stand still, or fewer than two rows are left.
+        RecordingError: The file is missing, damaged or contains no motion. Also if times go back too often or do not
+            change, or fewer than two rows are left.
         ParameterError: An option does not fit the file.
     """
 
@@ -91,10 +91,10 @@ class Motion:
         gathered.rows = gathered.rows[:0]
 
     def _refuse_several(self, stamps: times.Stamps) -> None:
-        """Refuse several recordings in one table: no policy makes one hand of them.
+        """Refuse several recordings in one table, because they cannot be joined to the motion of one hand.
 
         Raises:
-            RecordingError: Says where they begin.
+            RecordingError: There are several recordings; the error states where they begin.
         """
         if len(rows := times.restarts(stamps)):
             listed = ", ".join(str(row + 1) for row in rows[:5]) + (", …" if len(rows) > 5 else "")
@@ -102,10 +102,10 @@ class Motion:
             raise RecordingError(self._path, f"{reason}; give a file for each, or --stamps log for a bag")
 
     def _check(self) -> None:
-        """Refuse what is no motion.
+        """Refuse data that are not a motion.
 
         Raises:
-            RecordingError: Says what it is.
+            RecordingError: The data are not a motion; the error states the problem.
         """
         c, policy = self.counts, self._options.backwards
         most = {"refuse": 0.0, "auto": MOST_BACKWARDS}.get(policy, 1.0)
@@ -123,7 +123,7 @@ class Motion:
             raise RecordingError(self._path, f"holds {what}")
 
     def begin(self, first_ns: int) -> None:
-        """Move the stamps, once, so that a time [ns] near 0 becomes 1 s; later ones stay."""
+        """Shift the stamps once so that a time [ns] near 0 becomes 1 s; later times are not changed."""
         if first_ns >= times.SECOND_NS:
             return
         self.told.append(f"stamps begin at 1 s (in the file at {first_ns / times.SECOND_NS:g} s)")
@@ -131,7 +131,7 @@ class Motion:
         self.stamp_ns += self._shift_ns
 
     def losses(self) -> list[str]:
-        """Rows that were left out or changed, in words."""
+        """Texts about rows that were left out or changed."""
         c = self.counts
         parts = [
             (c.missing, "with missing numbers left out"),
@@ -142,7 +142,7 @@ class Motion:
         return [f"{count} {text}" for count, text in parts if count]
 
     def _in_axes_of_master(self, rows: geometry.Array) -> geometry.Array:
-        """Poses (N, 7) of the rows that stay, the centre brought to zero."""
+        """Poses (N, 7) of the used rows in the master's axes, with the centre moved to zero."""
         axes, poses = self._options.axis_map(), np.empty((len(self._rows), 7))
         for begin in range(0, len(poses), ROWS):  # an hour at 1 kHz has 200 MB
             part = slice(begin, begin + ROWS)
@@ -160,16 +160,16 @@ class Motion:
         return poses
 
     def _turned(self, quaternions: geometry.Array, axes: geometry.Array) -> geometry.Array:
-        """Attitudes (n, 4) in the master's axes; a mirror turns those of the body as well."""
+        """Orientations (n, 4) in the master's axes; if the axes are mirrored, the body's axes are mirrored too."""
         if self._options.handedness == "right":
             turn = np.empty(4)
             geometry.quaternion_from_rotation(np.ascontiguousarray(axes), turn)
             return geometry.quaternion_products(turn, quaternions)
-        # A turn of the file about an axis is the opposite turn about the mirrored axis.
+        # A rotation in the file about an axis is the opposite rotation about the mirrored axis.
         return np.column_stack((quaternions[:, 0], -product(quaternions[:, 1:], axes.T)))
 
     def presses(self) -> tuple[times.Stamps, NDArray[np.uint8]] | None:
-        """Stamps (n,) [ns] and buttons (n, 3) where they change, the first time; None without."""
+        """Stamps (n,) [ns] and buttons (n, 3) at the first sample and at each change; None without buttons."""
         g = self._gathered
         if g.presses is not None:
             stamps, pressed = g.presses.stamp_ns + self._shift_ns, g.presses.pressed
@@ -191,7 +191,7 @@ _BAGS = {".bag", ".mcap", ".db3"}
 
 
 def is_bag(path: Path) -> bool:
-    """Whether a path is a recording of ROS: a directory of one, or a file of one."""
+    """Whether a path is a recording of ROS: its directory or its file."""
     return path.is_dir() or path.suffix.lower() in _BAGS
 
 
@@ -199,8 +199,8 @@ def open_source(path: Path, options: ImportOptions) -> source.Source:
     """Source that reads a file.
 
     Raises:
-        RecordingError: It is missing, empty, or nothing that can be read.
-        ParameterError: An option does not fit it.
+        RecordingError: The file is missing, empty, or has an unknown format.
+        ParameterError: An option does not fit the file.
     """
     if not path.exists():
         raise RecordingError(path, "does not exist")

@@ -1,4 +1,4 @@
-"""Import: a file of others becomes a recording of ours."""
+"""Import: converts a file of another program to a recording of this package."""
 
 import hashlib
 import json
@@ -33,27 +33,27 @@ def import_recording(
     arms: Mapping[str, Changes] = MappingProxyType({}),
     **changes: Option,
 ) -> ImportReport:
-    """Make a recording of a file: CSV, TSV, Parquet, rosbag2 (MCAP, db3) or a ROS 1 bag.
+    """Make a recording from a file: CSV, TSV, Parquet, rosbag2 (MCAP, db3) or a ROS 1 bag.
 
-    The recording holds ``master/measured_cp`` with every usable sample at its own time, and ``master/buttons`` where
-    buttons were found. :func:`teleop_core.replay` runs it through the graph.
+    The recording contains ``master/measured_cp`` with every usable sample at its own time, and ``master/buttons`` if
+    the file contains buttons. :func:`teleop_core.replay` runs it through the graph.
 
     Args:
-        file: What is imported.
-        out: Directory of the recording, made here; nothing is left there after an error.
-        options: What is taken of the file; what is not said is guessed and told.
-        arms: Several hands of one file, each with options beside those of all: ``{"left":
-            {"position": "1-3"}, "right": {"position": "4-6"}}``. The first is the default arm.
+        file: File to import.
+        out: Directory of the recording, made here; removed after an error.
+        options: Import options; options that are not given are guessed, and the report states the guesses.
+        arms: Several hands of one file, each with options in addition to the common options: ``{"left": {"position":
+            "1-3"}, "right": {"position": "4-6"}}``. The first is the default arm.
         **changes: Options by name: ``position=("x", "y", "z"), unit="mm"``.
 
     Returns:
-        What was found; ``report.recording`` is the recording, ``print(report)`` shows it. Of
-        several hands it is that of the first, and ``report.others`` has the others.
+        Report of the import: ``report.recording`` is the recording, ``print(report)`` shows the report. For several
+        hands, it is the report of the first hand, and ``report.others`` contains the others.
 
     Raises:
-        RecordingError: The file is missing, damaged, empty, or no motion; or ``out`` exists.
+        RecordingError: The file is missing, damaged, empty, or not a motion; or ``out`` exists.
         ParameterError: An option is wrong.
-        UnknownNameError: A column or topic is not there; those that are there are listed.
+        UnknownNameError: A column or topic does not exist; the error lists the existing ones.
     """
     path, out = Path(file), Path(out)
     wanted = options_of(options or ImportOptions(), arms, changes)
@@ -70,7 +70,7 @@ def import_recording(
 
 
 def write(motions: Mapping[str, Motion], out: Path, metadata: dict[str, str]) -> None:
-    """Record the motion of each arm, the default one first; the directory is whole or not there."""
+    """Record the motion of each arm, the default arm first. The directory is complete, or it is not made."""
     streams: dict[Topic, tuple[Stamps, Array]] = {}
     for number, (arm, motion) in enumerate(motions.items()):
         name = arm if number else ""
@@ -83,14 +83,14 @@ def write(motions: Mapping[str, Motion], out: Path, metadata: dict[str, str]) ->
             for block in _blocks(streams):
                 writer.write_block(block)
     except BaseException as error:
-        # A directory that another process made in the meantime is not ours to remove.
+        # A directory that another process made in the meantime must not be removed.
         if not (isinstance(error, RecordingError) and "exists already" in error.reason):
             shutil.rmtree(out, ignore_errors=True)
         raise
 
 
 def _blocks(streams: Mapping[Topic, tuple[Stamps, Array]]) -> Iterator[dict[Topic, tuple[Stamps, Array, Stamps]]]:
-    """Stretches of time, each with the samples of every stream."""
+    """Successive time intervals, each with the samples of every stream."""
     ends = np.sort(np.concatenate([s[ROWS - 1 :: ROWS] for s, _ in streams.values()]))
     written = dict.fromkeys(streams, 0)
     for end in (*ends, np.iinfo(np.int64).max):
@@ -112,7 +112,7 @@ def command_of(path: Path, out: Path, options: Mapping[str, ImportOptions]) -> s
 
 
 def _about(path: Path, out: Path, options: Mapping[str, ImportOptions], report: ImportReport) -> dict[str, str]:
-    """Names and texts by which an import can be repeated."""
+    """Metadata with which an import can be repeated."""
     from teleop_core import __version__
 
     named = {} if "" in options else {ARMS_KEY: " ".join(options)}
@@ -127,7 +127,7 @@ def _about(path: Path, out: Path, options: Mapping[str, ImportOptions], report: 
 
 
 def checksum(path: Path) -> str:
-    """SHA-256 of a file; of a directory over the files of messages in it, by name."""
+    """SHA-256 of a file; for a directory, of the message files in it, in the order of their names."""
     files = [path]
     if path.is_dir():
         files = sorted(f for f in path.iterdir() if f.is_file() and f.suffix != ".yaml")

@@ -1,4 +1,4 @@
-"""Joining: the streams of a recording side by side over the time, a stretch of it at once."""
+"""Joining: the streams of a recording side by side over time, read in successive time intervals."""
 
 import warnings
 from collections.abc import Iterable, Iterator, Mapping
@@ -23,7 +23,7 @@ class Joined:
 
     Attributes:
         time_ns: Times of recording (n,) [ns], rising.
-        values: Per topic its columns (n, width); NaN where it has no message.
+        values: Columns of each topic (n, width); NaN in rows without a message of the topic.
     """
 
     time_ns: Stamps
@@ -34,16 +34,16 @@ class Streams:
     """Some topics of a recording, to be read side by side.
 
     Args:
-        recording: Where they are.
-        topics: Their names; all that hold numbers if empty.
+        recording: Recording that contains them.
+        topics: Their names; all topics with numbers if empty.
 
     Attributes:
         columns: Names of the columns by topic.
-        start_ns: Where the recording begins [ns].
+        start_ns: Start time of the recording [ns].
 
     Raises:
         UnknownNameError: There is no such topic.
-        RecordingError: One cannot be read as numbers.
+        RecordingError: A topic cannot be read as numbers.
     """
 
     def __init__(self, recording: Recording, topics: Iterable[str] = ()) -> None:
@@ -69,7 +69,10 @@ class Streams:
         return found
 
     def joined(self) -> Iterator[Joined]:
-        """A row wherever a stream has a message; reports keep their values until the next one."""
+        """Rows with one row for each time at which a stream has a message.
+
+        Reports keep their values until the next report.
+        """
         for piece in self._pieces():
             logs = [series.log_ns for series in piece.values()]
             times: Stamps = np.unique(np.concatenate(logs))
@@ -80,7 +83,7 @@ class Streams:
         if name in self._reports:
             return self._held_report(name, times)
         rows = np.full((len(times), len(self.columns[name])), np.nan)
-        if name in piece:  # of equal times the last one stays
+        if name in piece:  # if times are equal, the last message is used
             rows[np.searchsorted(times, piece[name].log_ns)] = piece[name].values
         return rows
 
@@ -89,9 +92,9 @@ class Streams:
         return newest(times, stream.log_ns, stream.values)
 
     def sampled(self, rate: float) -> Iterator[Joined]:
-        """Rows at a rate [Hz] from the start on: in each the newest message of every topic.
+        """Rows at a rate [Hz] from the start on, each with the newest message of every topic.
 
-        Where nothing came for more than :data:`LONGEST_GAP_NS` there are no rows.
+        If no message came for more than :data:`LONGEST_GAP_NS`, this gap has no rows.
         """
         step, before = SECOND_NS / rate, np.array([self.start_ns])
         last: dict[str, Series] = {}
@@ -121,7 +124,7 @@ class Streams:
         return newest(times, logs, np.concatenate([series.values for series in known]))
 
     def _pieces(self) -> Iterator[dict[str, Series]]:
-        """Stretches that follow each other, each with the streams that have messages in it."""
+        """Successive time intervals, each with the streams that have messages in it."""
         if not self._names:
             yield {name: _series(stream) for name, stream in self._reports.items()}
             return
@@ -143,7 +146,7 @@ class Streams:
 
 
 def _numbers(since_ns: Stamps, step: float, first: int) -> Stamps:
-    """Numbers of the rows from ``first`` on up to the last message, less those in a gap.
+    """Numbers of the rows from ``first`` to the last message, without rows in a gap.
 
     Args:
         since_ns: Times of all messages since row 0 (N,), rising [ns].
@@ -165,7 +168,7 @@ def _numbers(since_ns: Stamps, step: float, first: int) -> Stamps:
 
 
 def numeric(recording: Recording) -> list[str]:
-    """Topics of a recording that can be read as numbers, as they stand in it."""
+    """Topics of a recording that can be read as numbers, in the order of the recording."""
     found = []
     for name in recording.topics:
         kind = kind_of(name, recording.bag.topics[name].type)
@@ -181,7 +184,7 @@ def has_columns(name: str) -> bool:
 
 
 def is_report(bag: reader.Bag, name: str) -> bool:
-    """Whether a topic carries reports."""
+    """Whether a topic contains reports."""
     return kind_of(name, bag.topics[name].type) is Kind.REPORT
 
 

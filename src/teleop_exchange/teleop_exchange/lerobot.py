@@ -1,6 +1,6 @@
-"""LeRobot data set: recordings as episodes to learn from, in version 3.0 of its format.
+"""LeRobot data set: recordings as episodes for learning, in version 3.0 of the format.
 
-A folder with ``meta/info.json`` (features, rate, counts), ``meta/stats.json``,
+It is a folder with ``meta/info.json`` (features, rate, counts), ``meta/stats.json``,
 ``meta/tasks.parquet``, ``meta/episodes`` (a row per episode) and ``data`` (a row per frame, a group
 of rows per episode). There are no pictures. The format is that of the ``lerobot`` package, version
 0.4, which reads the folder offline: ``LeRobotDataset("name", root=FOLDER)``.
@@ -38,7 +38,7 @@ Statistics = dict[str, dict[str, list[float]]]
 
 @dataclass
 class _Files:
-    """Data files written so far: the present one and how full it is."""
+    """Data files written so far: the current file and its size."""
 
     folder: Path
     number: int = 0
@@ -47,11 +47,11 @@ class _Files:
 
     @property
     def place(self) -> tuple[int, int]:
-        """Folder and file of the present one."""
+        """Numbers of the current folder and file."""
         return divmod(self.number, _FILES)
 
     def write(self, table: pa.Table) -> None:
-        """Write an episode; into the next file if the present one is full."""
+        """Write an episode, into a new file if the current file is full."""
         if self.writer is not None and self.size + table.nbytes > _FILE_BYTES:
             self.close()
             self.number, self.size = self.number + 1, 0
@@ -83,13 +83,13 @@ def write_data_set(
         out: Its folder, made here.
         fps: Frames per second.
         action: ``joints`` or ``tip``.
-        task: What is done, in words.
+        task: Description of the task.
 
     Returns:
         Number of frames, and the features that are not counters.
 
     Raises:
-        RecordingError: A recording lacks what is needed, or has other joints.
+        RecordingError: A recording lacks a needed topic, or has other joints.
     """
     files, episodes, frames = _Files(out / "data"), [], 0
     names: dict[str, list[str]] = {}
@@ -118,7 +118,7 @@ def write_data_set(
 def _episode(recording: Recording, fps: int, action: str) -> tuple[dict[str, list[str]], Numbers]:
     """Names and numbers (frames, columns) of the features of a recording.
 
-    A frame holds the newest messages of its time; frames before the first of them are left out.
+    A frame contains the newest messages at its time; frames before the first message of any topic are left out.
     """
     bag, names, topics = recording.bag, {STATE: list[str](), ACTION: list[str]()}, []
     told = SLAVE_SERVO_JP if action == "joints" else SLAVE_SERVO_CP

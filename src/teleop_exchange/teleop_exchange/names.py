@@ -1,4 +1,4 @@
-"""Names of columns: which of them are the time, a position, an orientation, a button."""
+"""Names of columns: finds the columns of time, position, orientation and buttons by their names."""
 
 import re
 from collections.abc import Sequence
@@ -35,7 +35,7 @@ def plain(name: str) -> str:
 
 
 def without_unit(name: str) -> tuple[str, str]:
-    """Name and unit of what is called ``x [mm]``, ``x (mm)`` or ``x_mm``; the unit may be empty."""
+    """Name and unit of a column such as ``x [mm]``, ``x (mm)`` or ``x_mm``; the unit may be empty."""
     found = re.search(r"[\[(]\s*([^\])]+?)\s*[\])]\s*$", name)
     if found and (unit := _UNITS.get(found[1].lower())):
         return name[: found.start()], unit
@@ -46,7 +46,7 @@ def without_unit(name: str) -> tuple[str, str]:
 
 
 def find_time(names: Sequence[str]) -> tuple[int, ...]:
-    """Column of the time, or those of seconds and nanoseconds; empty if no name says it."""
+    """Column of the time, or columns of seconds and nanoseconds; empty if no name indicates a time."""
     ends = [plain(name).rpartition("_")[2] for name in names]
     for seconds, rest in (("sec", "nanosec"), ("secs", "nsecs"), ("sec", "nsec")):
         raw = [re.sub(r"[^0-9a-z]+", "_", name.lower()).rpartition("_")[2] for name in names]
@@ -72,7 +72,7 @@ def find_positions(names: Sequence[str]) -> list[tuple[int, ...]]:
 
 
 def _after_a_name(names: Sequence[str]) -> list[tuple[int, ...]]:
-    """Columns ``Tool X``, ``Y``, ``Z`` side by side, of which the first alone has the name."""
+    """Adjacent columns ``Tool X``, ``Y``, ``Z``, of which only the first contains the object's name."""
     plain_names = [plain(name) for name in names]
     return [
         (i, i + 1, i + 2)
@@ -82,7 +82,7 @@ def _after_a_name(names: Sequence[str]) -> list[tuple[int, ...]]:
 
 
 def find_quaternion(names: Sequence[str]) -> tuple[int, ...]:
-    """Columns of w, x, y, z of a quaternion, in this order; empty if no names say it."""
+    """Columns of w, x, y, z of a quaternion, in this order; empty if no names indicate one."""
     found = _series(names, "wxyz")
     named = [columns for stem, columns in found.items() if _TURNS.search(stem)]
     return next(iter((*named, *found.values())), ()) or _numbered(names)
@@ -98,7 +98,7 @@ def _numbered(names: Sequence[str]) -> tuple[int, ...]:
 
 
 def find_matrix(names: Sequence[str]) -> tuple[int, ...]:
-    """Columns of a rotation matrix row by row; empty if no names say it."""
+    """Columns of a rotation matrix row by row; empty if no names indicate one."""
     whole = [plain(name) for name in names]
     for start in ("r", "r_", "rot", "rot_", "m", "m_", "rotation_", "matrix_", "rotation_matrix_"):
         for first in (0, 1):
@@ -114,13 +114,13 @@ def _three(first: int) -> range:
 
 
 def find_rotation_vector(names: Sequence[str]) -> tuple[int, ...]:
-    """Columns of a rotation vector; empty if no names say it."""
+    """Columns of a rotation vector; empty if no names indicate one."""
     found = _series(names, "xyz", without="w")
     return next((columns for stem, columns in found.items() if _VECTORS.search(stem)), ())
 
 
 def find_euler(names: Sequence[str]) -> tuple[int, ...]:
-    """Columns of roll, pitch and yaw; empty if no names say it."""
+    """Columns of roll, pitch and yaw; empty if no names indicate them."""
     whole = [plain(name) for name in names]
     out = []
     for wanted in ("roll", "pitch", "yaw"):
@@ -138,7 +138,7 @@ def find_button(names: Sequence[str], button: str) -> int | None:
 
 
 def find_episode(names: Sequence[str]) -> int | None:
-    """Column that says which of several recordings a row is of, as in data sets of LeRobot."""
+    """Column with the number of the recording to which each row belongs, as in data sets of LeRobot."""
     whole = [plain(name) for name in names]
     return next((i for i, name in enumerate(whole) if _EPISODES.fullmatch(name)), None)
 
@@ -150,9 +150,9 @@ def unit_of(names: Sequence[str], columns: Sequence[int]) -> str:
 
 
 def _series(names: Sequence[str], letters: str, without: str = "") -> dict[str, tuple[int, ...]]:
-    """Columns whose names differ in one letter alone, by the name without that letter.
+    """Columns whose names differ only in one letter, by the name without that letter.
 
-    Those that have a column with another letter, ``without``, beside them are left out.
+    Series that also have a column with the letter ``without`` are left out.
 
     ``pose_position_x`` has the stem ``pose_position_``; ``qx`` has ``q_``, so that it is told from a bare ``x``.
     """

@@ -1,4 +1,4 @@
-"""Import options: which columns or topics of a file are the hand, in which units and axes."""
+"""Import options: the columns or topics of a file that contain the hand's motion, with units and axes."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from teleop_core.kernels.geometry import Array
 
 Columns = tuple[str, ...]
-"""Names of columns; or their numbers, counted from 1; ``4-12`` stands for nine of them."""
+"""Names of columns, or their numbers, counted from 1; ``4-12`` means nine columns."""
 Option = str | int | float | bool | None | tuple[str | int, ...] | list[str] | list[int]
 """Value of one option; numbers of columns may be whole numbers."""
 Changes = Mapping[str, Option]
@@ -24,7 +24,7 @@ TIMES_NS = {"s": 1_000_000_000, "ms": 1_000_000, "us": 1000, "ns": 1}
 BUTTONS = ("clutch", "fixture", "mode")
 AXES = ("+x", "-x", "+y", "-y", "+z", "-z")
 ORIENTATIONS = ("quaternion", "matrix", "euler", "rotation_vector")
-"""Options that say where the orientation is."""
+"""Options that name the columns of the orientation."""
 CHOICES = {
     "time_unit": ("auto", *TIMES_NS),
     "stamps": ("header", "log"),
@@ -50,47 +50,47 @@ _TUPLES = (*_COUNTS, "axes")
 
 @dataclass(frozen=True, kw_only=True)
 class ImportOptions:
-    """What an import takes of a file, and what becomes of it.
+    """Options of an import: what is read from a file, and how it is converted.
 
-    Columns are given by name or by number, counted from 1; ``"4-12"`` stands for nine of them. What
-    is left out is guessed from the names, and the report tells it.
+    Columns are given by name or by number, counted from 1; ``"4-12"`` means nine columns. Options that are not given
+    are guessed from the names, and the report states the guesses.
 
     Attributes:
         time: Column of the time; or two, whole seconds and nanoseconds.
         rate: Samples per second [Hz], for tables without a time.
         time_unit: ``auto``, ``s``, ``ms``, ``us`` or ``ns``.
-        stamps: Time of a bag's messages: of the ``header``, or of the ``log``.
+        stamps: Times of a bag's messages: stamps of the ``header``, or times of the ``log``.
         position: Three columns.
-        unit: Of the position: ``auto`` (as the names say, else m), ``m``, ``cm``, ``mm``, ``in``.
+        unit: Unit of the position: ``auto`` (from the names, else m), ``m``, ``cm``, ``mm``, ``in``.
         quaternion: Four columns in the order of ``quaternion_order``.
-        quaternion_order: ``wxyz`` or ``xyzw``; ``auto``: as the names say, else wxyz.
+        quaternion_order: ``wxyz`` or ``xyzw``; ``auto``: from the names, else wxyz.
         matrix: Nine columns of a rotation matrix.
         matrix_order: ``row`` by row, or ``column`` by column.
-        euler: Order of the axes and three columns: ``("xyz", "roll", "pitch", "yaw")``. Small
-            letters turn about fixed axes, capital ones about those that turn along (as in SciPy).
+        euler: Order of the axes and three columns: ``("xyz", "roll", "pitch", "yaw")``. Small letters are rotations
+            about fixed axes, capital letters about the body's axes (as in SciPy).
         rotation_vector: Three columns.
         angles: Unit of Euler angles and rotation vectors: ``auto``, ``rad`` or ``deg``.
-        orientation: ``auto``: guessed if nothing is said; ``none``: constant.
+        orientation: ``auto``: guessed if no columns are given; ``none``: constant.
         clutch: Column of the button, pressed above ``threshold``; empty for none.
         fixture: As ``clutch``.
         mode: As ``clutch``.
         threshold: Above it a button is pressed.
         skip: Lines to leave out at the beginning of a text.
-        episode: Which recording of a table that holds several; None if it is one.
-        topic: Topic of the poses in a bag, or its end; empty if there is only one.
+        episode: Number of the recording in a table that contains several; None if it contains one.
+        topic: Topic of the poses in a bag, or the end of its name; empty if there is only one.
         frame: Child frame, for a topic that has several.
-        parent: Frame in which the poses stand, for a topic that has several.
-        buttons_topic: Topic of the Joy messages, or its end; empty if there is at most one. Of several with ``|``
-            between them the first one there is taken; an empty last one stands for no buttons.
-        buttons: Which button of the Joy is which: ``"clutch=0,mode=2"``; ``none``: no buttons.
+        parent: Parent frame of the poses, for a topic that has several.
+        buttons_topic: Topic of the Joy messages, or the end of its name; empty if there is at most one. If several
+            names are given, separated by ``|``, the first existing topic is used; an empty last name means no buttons.
+        buttons: Indices of the Joy's buttons: ``"clutch=0,mode=2"``; ``none``: no buttons.
         axes: The master's x, y and z as axes of the file: ``("+y", "-x", "+z")``.
-        handedness: Of the file's axes: ``right``; or ``left``, as in game engines: ``axes`` then
-            must mirror, and attitudes are mirrored with them.
-        scale: All positions are multiplied by it.
-        center: What comes to zero: ``mean`` of the positions, ``middle`` of their range, or their
-            ``start``; ``keep``: nothing.
+        handedness: Handedness of the file's axes: ``right``; or ``left``, as in game engines. With ``left``, ``axes``
+            must mirror, and orientations are mirrored too.
+        scale: Factor for all positions.
+        center: Point that is moved to zero: ``mean`` of the positions, ``middle`` of their range, or their ``start``;
+            ``keep``: positions are not moved.
         backwards: Rows whose time goes back: ``refuse``, ``drop``, ``sort``; ``auto``: drop up to 1 %, refuse more.
-        gap: A gap is told that is longer than so many periods.
+        gap: Gaps longer than this number of periods are reported.
     """
 
     time: Columns = ()
@@ -144,12 +144,12 @@ class ImportOptions:
         self.axis_map()
 
     def axis_map(self) -> "Array":
-        """Matrix (3, 3) from the file's axes to the master's; a mirror of left-handed axes.
+        """Matrix (3, 3) from the file's axes to the master's axes; it mirrors left-handed axes.
 
         Raises:
-            ParameterError: An axis is used twice, or the map is a mirror and must not, or must be.
+            ParameterError: An axis is used twice, or the map mirrors but must not, or does not mirror but must.
         """
-        import numpy as np  # and what is compiled: not for `--help`
+        import numpy as np  # this also imports compiled kernels, which `--help` does not need
 
         from teleop_core.kernels.axes import axis_map
 
@@ -195,7 +195,7 @@ class ImportOptions:
         return tuple(axis.lower() if axis[:1] in {"+", "-"} else f"+{axis}" for axis in self.axes)
 
     def changed(self, **changes: Option) -> "ImportOptions":
-        """The same with some values in place of its own.
+        """Copy of the options with some values changed.
 
         Raises:
             UnknownNameError: There is no such option, or a name is not in its list.
@@ -218,16 +218,16 @@ class ImportOptions:
 
 
 def options_of(base: ImportOptions, arms: Mapping[str, Changes], changes: Changes) -> dict[str, ImportOptions]:
-    """Options of each arm, the default one first; ``{"": ...}`` if there is one without a name.
+    """Options of each arm, the default arm first; ``{"": ...}`` if the only arm has no name.
 
     Args:
-        base: Where they start.
-        arms: What is said of each hand beside what is said of all.
-        changes: What is said of all.
+        base: Options that are changed.
+        arms: Additional options of each hand.
+        changes: Changes for all hands.
 
     Raises:
         UnknownNameError: There is no such option.
-        ParameterError: An arm has no name that a topic can have.
+        ParameterError: The name of an arm is not allowed in a topic.
     """
     for name in arms:
         if not name.isidentifier() or not name.isascii():
@@ -237,10 +237,10 @@ def options_of(base: ImportOptions, arms: Mapping[str, Changes], changes: Change
 
 
 def button_map(text: str) -> dict[str, int]:
-    """Numbers of a Joy's buttons by what they are, from ``clutch=0,mode=2``; none for ``none``.
+    """Indices of a Joy's buttons by their function, from ``clutch=0,mode=2``; empty for ``none``.
 
     Raises:
-        ParameterError: The text is something else.
+        ParameterError: The text has another form.
     """
     found: dict[str, int] = {}
     for entry in filter(None, text.replace(" ", "").split(",")) if text != "none" else ():

@@ -1,6 +1,6 @@
-"""Orientation: attitudes in any notation as unit quaternions w, x, y, z, block by block.
+"""Orientation: converts orientations in any notation to unit quaternions w, x, y, z, block by block.
 
-What cannot be a rotation becomes NaN and is counted as strange, what is missing stays NaN.
+Values that are not a valid rotation become NaN and are counted as strange; missing values stay NaN.
 """
 
 import math
@@ -12,21 +12,21 @@ from teleop_core.kernels import Array, dot, kernel, length, product
 from teleop_core.kernels.geometry import quaternion_from_rotation
 
 TOLERANCE = 0.1
-"""How far a quaternion's length, or a matrix from being a rotation, may be off."""
-_MISSING = 1e-6  # shorter quaternions mean that nothing was measured
+"""Largest deviation of a quaternion's length from 1, or of a matrix from a rotation matrix."""
+_MISSING = 1e-6  # shorter quaternions mean that no orientation was measured
 
 
 @dataclass
 class Attitudes:
-    """Rows of one notation, one block after the other.
+    """Converts rows of one notation, block by block.
 
     Attributes:
         kind: ``quaternion``, ``matrix``, ``euler``, ``rotation_vector`` or ``none``.
         order: ``wxyz`` or ``xyzw``; ``row`` or ``column``; or the order of Euler angles.
         degrees: Whether angles are in degrees.
-        strange: How many rows cannot be rotations.
-        mirrored: How many of these are mirrors.
-        longest: By how much the length of a quaternion taken differed from 1, at most.
+        strange: Number of rows that are not valid rotations.
+        mirrored: Number of these rows that are mirrored.
+        longest: Largest difference of a used quaternion's length from 1.
     """
 
     kind: str
@@ -42,7 +42,7 @@ class Attitudes:
         return {"quaternion": 4, "matrix": 9, "none": 0}.get(self.kind, 3)
 
     def quaternions(self, rows: Array) -> Array:
-        """Unit quaternions (N, 4) of the next rows (N, width); NaN where there is none."""
+        """Unit quaternions (N, 4) of the next rows (N, width); NaN for rows without a valid orientation."""
         if self.kind == "none":
             return np.tile([1.0, 0.0, 0.0, 0.0], (len(rows), 1))
         if self.kind == "quaternion":
@@ -85,6 +85,9 @@ class Attitudes:
 
 @kernel
 def write_quaternions(matrices: Array, quaternions: Array) -> None:
-    """Write the unit quaternions (N, 4) of rotation matrices (N, 3, 3), which may be off a bit."""
+    """Write the unit quaternions (N, 4) of rotation matrices (N, 3, 3) into ``quaternions``.
+
+    The matrices may be inexact.
+    """
     for i in range(matrices.shape[0]):
         quaternion_from_rotation(matrices[i], quaternions[i])

@@ -1,7 +1,7 @@
-"""ROS bags message by message: MCAP by our own reader, the other storages by the rosbags library.
+"""ROS bags message by message: this package's reader reads MCAP, the rosbags library reads other storages.
 
-Our reader is the faster one, and no length in a file leads it beyond the file's end. The library's
-reader of ROS 1 is handed a file that keeps it to that too.
+This package's reader is faster, and no wrong length in a file leads it beyond the file's end. The library's reader of
+ROS 1 gets a file object that prevents such reads too.
 """
 
 import io
@@ -21,7 +21,7 @@ from teleop_core.base.errors import RecordingError, TeleopWarning
 from teleop_exchange.bag_messages import Raw, plain
 
 _SHORT = re.compile(r"^(\w+)/(\w+)$")
-_TRANSFORMS = "geometry_msgs/TransformStamped[] transforms"  # of tf2_msgs, which that store lacks
+_TRANSFORMS = "geometry_msgs/TransformStamped[] transforms"  # types of tf2_msgs, which that store lacks
 
 
 class RosBag(Protocol):
@@ -30,7 +30,7 @@ class RosBag(Protocol):
     Attributes:
         types: Topics with at least one message, to their message types.
         typestore: Message types as rosbags knows them.
-        is_ros2: Whether messages are CDR, not those of ROS 1.
+        is_ros2: Whether messages are CDR; False for messages of ROS 1.
     """
 
     types: dict[str, str]
@@ -54,7 +54,7 @@ class OurBag:
             self.typestore.register(get_types_from_msg(_TRANSFORMS, "tf2_msgs/msg/TFMessage"))
 
     def raw(self, topic: str) -> Iterator[Raw]:
-        """As of any recording."""
+        """The same as for any recording."""
         yield from self._bag.stored(topic)
 
 
@@ -67,10 +67,10 @@ class ForeignBag:
         self.types = {plain(name): str(info.msgtype) for name, info in topics if info.msgcount}
 
     def raw(self, topic: str) -> Iterator[Raw]:
-        """As of any recording."""
+        """The same as for any recording."""
         chosen = [c for c in self._reader.connections if plain(c.topic) == topic]
         count, listed = 0, sum(connection.msgcount for connection in chosen)
-        # There is one file: its own reader need not be merged with others.
+        # There is only one file, so its reader need not be merged with others.
         for _, log_ns, data in self._reader.readers[0].messages(connections=chosen):
             count += 1
             yield log_ns, data
@@ -79,10 +79,10 @@ class ForeignBag:
 
 
 def is_plain_mcap(path: Path) -> bool:
-    """Whether a path is MCAP that our reader takes: not packed file by file or message by message.
+    """Whether a path is MCAP that this package's reader accepts: without compression of whole files or messages.
 
     Raises:
-        RecordingError: Its ``metadata.yaml`` is not what it must be.
+        RecordingError: Its ``metadata.yaml`` is malformed.
     """
     if not path.is_dir():
         return path.suffix.lower() == ".mcap"
@@ -114,20 +114,20 @@ def _refuse_unmerged(file: Path) -> None:
 
 
 class _BoundedFile(io.BufferedReader):
-    """File that is asked for no more than it has: a reader may believe any length."""
+    """File that limits each read to its remaining bytes, because a reader may trust any length."""
 
     def __init__(self, path: Path) -> None:
         super().__init__(io.FileIO(path))
         self._size = path.stat().st_size
 
     def read(self, size: int | None = -1, /) -> bytes:
-        """At most as many bytes as are left."""
+        """Read at most the remaining bytes."""
         left = max(0, self._size - self.tell())
         return super().read(left if size is None or size < 0 else min(size, left))
 
 
 class _BoundedPath(type(Path())):  # type: ignore[misc]
-    """Path that opens such a file; rosbags takes any path of this interface."""
+    """Path that opens a :class:`_BoundedFile`; rosbags accepts any path with this interface."""
 
     def open(self, mode: str = "r", *arguments: Any, **named: Any) -> Any:
         """Open for reading bytes, or as any path does."""

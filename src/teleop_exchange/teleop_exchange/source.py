@@ -1,4 +1,4 @@
-"""Source: what an import reads, poses and buttons of a hand block by block."""
+"""Source: file from which an import reads poses and buttons of a hand, block by block."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -14,12 +14,12 @@ from teleop_exchange import orientation, times
 
 @dataclass(frozen=True, eq=False)
 class Block:
-    """Rows as they stand in a file.
+    """Rows of a file without conversion of units and axes.
 
     Attributes:
-        time: Times (n,) in the file's unit; NaN where there is none.
-        position: Rows (n, 3) in the file's unit and axes.
-        quaternion: Attitudes (n, 4), w, x, y, z; NaN where there is none.
+        time: Times (n,) in the file's unit; NaN if missing.
+        position: Positions (n, 3) in the file's unit and axes.
+        quaternion: Orientations (n, 4), w, x, y, z; NaN if missing.
         buttons: Pressed or not (n, 3): clutch, fixture, mode; None if there are no columns of them.
         log_ns: Times of recording (n,) [ns], for bags.
     """
@@ -33,7 +33,7 @@ class Block:
 
 @dataclass(frozen=True, eq=False)
 class Presses:
-    """Buttons that have a stream of their own.
+    """Buttons with their own stream.
 
     Attributes:
         stamp_ns: Stamps (n,) [ns].
@@ -50,12 +50,12 @@ class Source(Protocol):
     """A file being imported.
 
     Attributes:
-        path: Where it is.
-        told: What was taken, in words.
-        time_unit: Unit of the times: ``auto`` if it is to be guessed.
+        path: Path of the file.
+        told: Texts about what was used.
+        time_unit: Unit of the times: ``auto`` if it must be guessed.
         unit: Unit of the positions.
-        is_unit_said: Whether the file or an option says it; else it is taken for metres.
-        attitudes: How orientations are read; counts those that are none.
+        is_unit_said: Whether the file or an option states the unit; otherwise metres are assumed.
+        attitudes: Converter of the orientations; counts invalid orientations.
         has_time: Whether blocks have times.
     """
 
@@ -71,18 +71,18 @@ class Source(Protocol):
         """All rows in the order of the file."""
 
     def presses(self) -> Presses | None:
-        """Buttons beside the rows; None if there are none. Asked after the blocks."""
+        """Buttons with their own stream; None if there are none. Must be called after the blocks were read."""
 
     def check(self, finite: Array) -> None:
-        """Refuse columns that hold no number at all.
+        """Refuse columns without any number.
 
         Args:
-            finite: How many numbers x, y, z and the orientation have (4,).
+            finite: Number of finite values of x, y, z and the orientation (4,).
 
         Raises:
-            RecordingError: Names them.
+            RecordingError: A column contains no number; the error names the columns.
         """
 
     @property
     def bad_rows(self) -> int:
-        """Rows that were left out because they are damaged."""
+        """Number of rows that were left out because they are damaged."""

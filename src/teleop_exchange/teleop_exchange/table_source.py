@@ -13,12 +13,12 @@ from teleop_exchange import episodes, names, source, tables, times
 from teleop_exchange.options import BUTTONS, CHOICES, ImportOptions, option
 from teleop_exchange.orientation import TOLERANCE, Attitudes
 
-_TOLD = 8  # columns that are told by name
+_TOLD = 8  # largest number of columns that a message lists by name
 
 
 @dataclass(frozen=True)
 class Columns:
-    """Which columns of a table are what; empty or None where there is none."""
+    """Columns of a table by their meaning; empty or None for missing ones."""
 
     time: tuple[int, ...]
     position: tuple[int, ...]
@@ -31,11 +31,11 @@ class TableSource:
 
     Args:
         table: The table.
-        options: What is taken of it.
+        options: Import options.
 
     Raises:
-        UnknownNameError: A column is not there.
-        RecordingError: It has no time and no rate is given, or no position.
+        UnknownNameError: A column does not exist.
+        RecordingError: The table has no time and no rate is given, or it has no position.
         ParameterError: An option does not fit a table.
     """
 
@@ -83,10 +83,10 @@ class TableSource:
         return self._told("x, y, z", found, more)
 
     def _position_by_place(self) -> tuple[int, ...]:
-        """Columns of a table without names that is like others of its width.
+        """Columns of a table without names, chosen by the usual layout for its number of columns.
 
-        Three: x, y, z. Four: a time and these. Eight: the time, x, y, z and a quaternion, as in
-        the benchmark of Sturm and others 2012. Seven: the same without time.
+        Three: x, y, z. Four: time, x, y, z. Eight: time, x, y, z and a quaternion, as in the benchmark of Sturm and
+        others 2012. Seven: x, y, z and a quaternion.
         """
         width = len(self._table.names)
         if width in {3, 7}:
@@ -133,7 +133,7 @@ class TableSource:
         """Order of the columns of a quaternion.
 
         Raises:
-            ParameterError: Their names say another one than the option.
+            ParameterError: The names of the columns indicate another order than the option.
         """
         wanted = self._options.quaternion_order
         letters = [names.plain(self._table.names[column])[-1:] for column in columns]
@@ -233,17 +233,17 @@ class TableSource:
         return self._agreed("time_unit", time) or "auto"
 
     def _unit(self, position: tuple[int, ...]) -> tuple[str, bool]:
-        """Unit of the position, and whether anybody says it."""
+        """Unit of the position, and whether the file or an option states it."""
         unit = self._agreed("unit", position)
         if self._options.unit == "auto" and unit not in {"", "m"}:
             self.told.append(f"positions in {unit}, as the names say")
         return unit or "m", bool(unit)
 
     def _agreed(self, name: str, columns: Sequence[int]) -> str:
-        """Unit that an option or the names of columns say; empty if neither does.
+        """Unit that an option or the names of columns state; empty if neither does.
 
         Raises:
-            ParameterError: They differ.
+            ParameterError: The option and the names state different units.
         """
         wanted, choices = getattr(self._options, name), CHOICES[name]
         named = names.unit_of(self._table.names, columns)
@@ -262,11 +262,11 @@ class TableSource:
         return self._table.bad_rows
 
     def presses(self) -> source.Presses | None:
-        """None: buttons stand in the rows."""
+        """None, because the buttons are in the rows."""
         return None
 
     def blocks(self) -> Iterator[source.Block]:
-        """As of any source.
+        """The same as for any source.
 
         Raises:
             RecordingError: A cell is no number, or the file is damaged.
@@ -291,19 +291,19 @@ class TableSource:
             return None
         pressed = np.zeros((count, len(BUTTONS)), np.uint8)
         for button, column in zip(self._columns.buttons, columns, strict=True):
-            # What was guessed is 0 or 1; the threshold is for columns that were named.
+            # Guessed columns contain 0 or 1; the threshold applies only to columns named by an option.
             threshold = self._options.threshold if getattr(self._options, button) else 0.5
             pressed[:, BUTTONS.index(button)] = column > threshold
         return pressed
 
     def check(self, finite: Array) -> None:
-        """Refuse columns that hold no number at all.
+        """Refuse columns without any number.
 
         Args:
-            finite: How many numbers x, y, z and the orientation have (4,).
+            finite: Number of finite values of x, y, z and the orientation (4,).
 
         Raises:
-            RecordingError: Names them.
+            RecordingError: A column contains no number; the error names the columns.
         """
         at = [self._table.names[column] for column in self._columns.position]
         if empty := [name for name, count in zip(at, finite[:3], strict=True) if not count]:
@@ -315,7 +315,7 @@ class TableSource:
 
 
 def _time(columns: Sequence[tables.Numbers], count: int) -> tables.Numbers:
-    """Times of one column, or [ns] of one of seconds and one of nanoseconds; of none zeros."""
+    """Times of one column, or times [ns] of a column of seconds and a column of nanoseconds; zeros without a column."""
     if not columns:
         return np.zeros(count)
     if len(columns) == 1:

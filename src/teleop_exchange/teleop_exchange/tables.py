@@ -1,4 +1,4 @@
-"""Tables: files of rows and columns, CSV and Parquet, read a block of rows at a time."""
+"""Tables: files of rows and columns, CSV and Parquet, read in blocks of rows."""
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -12,21 +12,21 @@ from numpy.typing import NDArray
 from teleop_core.base import RecordingError, UnknownNameError, damage_told
 
 Numbers = NDArray[np.float64] | NDArray[np.int64]
-"""A column; whole numbers where the file has them, such as times in nanoseconds."""
+"""A column; whole numbers if the file contains whole numbers, such as times in nanoseconds."""
 ROWS = 65_536
-"""Rows of a block, about."""
+"""Approximate number of rows of a block."""
 SAMPLE = 1000
-"""Rows that are looked at before reading."""
+"""Number of rows that are examined before reading."""
 
 
 class Table(Protocol):
     """A file of rows and columns.
 
     Attributes:
-        path: Where it is.
-        names: Names of the columns; those without one are ``column 4``, counted from 1.
-        is_named: Whether the names stand in the file.
-        bad_rows: How many rows were left out so far, because they have too few or too many cells.
+        path: Path of the file.
+        names: Names of the columns; columns without a name are called ``column 4``, counted from 1.
+        is_named: Whether the file contains the names.
+        bad_rows: Number of rows left out so far because they have too few or too many cells.
     """
 
     path: Path
@@ -35,10 +35,10 @@ class Table(Protocol):
     bad_rows: int
 
     def sample(self, column: int) -> Numbers:
-        """The first numbers of a column, up to :data:`SAMPLE`; NaN for what is none."""
+        """The first values of a column, up to :data:`SAMPLE`; NaN for values that are not numbers."""
 
     def is_clock(self, column: int) -> bool:
-        """Whether a column holds dates, which are read as nanoseconds since 1970."""
+        """Whether a column contains dates, which are read as nanoseconds since 1970."""
 
     def blocks(self, columns: Sequence[int]) -> Iterator[list[Numbers]]:
         """Some columns, block by block.
@@ -52,7 +52,7 @@ def column_of(table: Table, name: str, option: str) -> int:
     """Column by its name or, counted from 1, by its number.
 
     Raises:
-        UnknownNameError: There is none; those that there are are listed.
+        UnknownNameError: There is no such column; the error lists the existing columns.
     """
     if name in table.names:
         return table.names.index(name)
@@ -66,7 +66,7 @@ def column_of(table: Table, name: str, option: str) -> int:
 
 
 def unique(names: Sequence[str]) -> tuple[str, ...]:
-    """Names without blanks around them; those that come again get a number, empty ones too."""
+    """Names without surrounding blanks; repeated names and empty names get a number."""
     seen: dict[str, int] = {}
     out = []
     for number, name in enumerate(names, start=1):
@@ -77,7 +77,7 @@ def unique(names: Sequence[str]) -> tuple[str, ...]:
 
 
 def numbers(column: "pa.ChunkedArray | pa.Array") -> Numbers:
-    """Column of Arrow as numbers; what is missing is NaN."""
+    """Column of Arrow as numbers; missing values are NaN."""
     kind = column.type
     if pa.types.is_timestamp(kind):
         column = column.cast(pa.timestamp("ns", tz=kind.tz)).cast(pa.int64())
@@ -99,7 +99,7 @@ class ParquetTable:
     def __init__(self, path: Path) -> None:
         self.path, self.is_named, self.bad_rows = path, True, 0
         with damage_told(path, "is no sound Parquet file: {}"):
-            # Read as it is asked for: a file may be one single group of rows.
+            # Read on demand, because a file may consist of one single group of rows.
             self._file = pq.ParquetFile(path, pre_buffer=False, buffer_size=1 << 20)
             self._first = self._head()
             self.names = unique(self._first.schema.names)
@@ -110,18 +110,18 @@ class ParquetTable:
         raise RecordingError(self.path, "holds no rows")
 
     def sample(self, column: int) -> Numbers:
-        """As of any table."""
+        """The same as for any table."""
         try:
             return numbers(self._first.column(column))
         except (pa.ArrowInvalid, pa.ArrowNotImplementedError, ValueError, TypeError):
             return np.full(self._first.num_rows, np.nan)
 
     def is_clock(self, column: int) -> bool:
-        """As of any table."""
+        """The same as for any table."""
         return bool(pa.types.is_timestamp(self._first.schema.types[column]))
 
     def blocks(self, columns: Sequence[int]) -> Iterator[list[Numbers]]:
-        """As of any table."""
+        """The same as for any table."""
         wanted = {self._first.schema.names[column].partition(".")[0] for column in columns}
         kept = [name for name in self._file.schema_arrow.names if name.partition(".")[0] in wanted]
         names = [self._first.schema.names[column] for column in columns]
@@ -132,7 +132,7 @@ class ParquetTable:
 
 
 def flat(batch: pa.RecordBatch) -> pa.RecordBatch:
-    """Batch without nested columns: parts of structures and lists of one length stand alone."""
+    """Batch without nested columns: each part of a structure, and of lists of one length, becomes a column."""
     names: list[str] = []
     columns: list[pa.Array] = []
     for name, column in zip(batch.schema.names, batch.columns, strict=True):

@@ -1,4 +1,4 @@
-"""Text tables: CSV and its kin; separator, head, decimal sign and compression are recognised."""
+"""Text tables: CSV and similar files; separator, head, decimal sign and compression are detected."""
 
 import csv
 import re
@@ -23,15 +23,15 @@ _MISSING = ("", "nan", "NaN", "NAN", "-nan", "NA", "N/A", "n/a", "null", "NULL",
 _NUMBER = re.compile(r"[+-]?(\d+[.,]?\d*|[.,]\d+)([eE][+-]?\d+)?")
 _NAN = re.compile(r"[+-]?(nan|inf|infinity|null|none|n/?a)", re.I)
 _CLOCK = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d[\d:.]*\s?(Z|[+-]\d\d:?\d\d)?")
-_EXACT = 1 << 53  # whole numbers up to here are exact as floating-point numbers, too
+_EXACT = 1 << 53  # whole numbers up to this one are also exact as floating-point numbers
 _BLANK = r"\s+"
 
 
 class Form(NamedTuple):
-    """How a text is to be read.
+    """Format of a text table.
 
     Attributes:
-        separator: One sign, or the pattern of blanks.
+        separator: One character, or the pattern of blanks.
         decimal: Sign before the decimals.
         head: Lines before the first row of numbers.
         names: Names of the columns; empty if there is no head.
@@ -55,7 +55,7 @@ class TextTable:
         skip: Lines to leave out at the beginning.
 
     Raises:
-        RecordingError: It is empty, or no table of text.
+        RecordingError: The file is empty, or is not a text table.
     """
 
     def __init__(self, path: Path, skip: int = 0) -> None:
@@ -80,7 +80,7 @@ class TextTable:
         return pa.BufferReader(b"\n".join(b" ".join(line.split()) for line in lines))
 
     def _beginning(self) -> tuple[str, str]:
-        """The first lines, and how letters are encoded."""
+        """The first lines, and the encoding of the text."""
         with self._stream() as stream:
             data = stream.read(_HEAD_BYTES)
         if not data.strip():
@@ -95,7 +95,7 @@ class TextTable:
             return data.decode("latin-1"), "latin-1"
 
     def sample(self, column: int) -> Numbers:
-        """As of any table."""
+        """The same as for any table."""
         cells = [row[column] if column < len(row) else "" for row in self._form.rows]
         if self._is_truth(column):
             return np.array([cell.strip().lower() == "true" for cell in cells], np.int64)
@@ -106,21 +106,21 @@ class TextTable:
         return np.array([number(cell, self._form.decimal) for cell in cells], np.float64)
 
     def is_clock(self, column: int) -> bool:
-        """As of any table."""
+        """The same as for any table."""
         return self._clock(column) is not None
 
     def _clock(self, column: int) -> re.Match[str] | None:
-        """How the first cell of a column is a date, with its zone; None if it is none."""
+        """Date format of the first cell of a column, and its time zone; None if the cell is not a date."""
         rows = self._form.rows
         return _CLOCK.match(rows[0][column].strip()) if rows and column < len(rows[0]) else None
 
     def _is_truth(self, column: int) -> bool:
-        """Whether a column holds ``True`` and ``False``, as pandas and Unity write them."""
+        """Whether a column contains ``True`` and ``False``, as pandas and Unity write them."""
         cells = {row[column].strip().lower() for row in self._form.rows if column < len(row)}
         return bool(cells) and cells <= {"true", "false"}
 
     def blocks(self, columns: Sequence[int]) -> Iterator[list[Numbers]]:
-        """As of any table."""
+        """The same as for any table."""
         self.bad_rows = 0
         with damage_told(self.path):
             try:
@@ -153,7 +153,7 @@ class TextTable:
             return pa.timestamp("ns", tz="UTC" if clock[1] else None)
         if self._is_truth(column):
             return pa.bool_()
-        # Whole numbers at the beginning say nothing of the rest, unless they need all digits.
+        # Whole numbers at the beginning do not mean that all numbers are whole, unless they need all digits.
         sample = self.sample(column)
         is_long = sample.dtype.kind == "i" and np.abs(sample).max() > _EXACT
         return pa.int64() if is_long else pa.float64()
@@ -163,10 +163,10 @@ class TextTable:
         return "skip"
 
     def _refuse_cell(self, error: ValueError) -> None:
-        """Say which column holds what, if a library's error tells it.
+        """Raise an error with the column and its bad cell, if a library's error names them.
 
         Raises:
-            RecordingError: It does.
+            RecordingError: The library's error names them.
         """
         text = " ".join(str(error).split())
         for pattern in (r"column #(\d+).*?invalid value '([^']*)'", r"to float.*?(): '([^']*)'"):
@@ -185,10 +185,10 @@ def _clock_ns(column: "pd.Series[str]") -> Numbers:
 
 
 def recognised(path: Path, text: str, skip: int = 0) -> Form:
-    """How a text is to be read, from its beginning.
+    """Format of a text table, detected from its beginning.
 
     Raises:
-        RecordingError: It has no row of numbers.
+        RecordingError: The text has no row of numbers.
     """
     lines = text.splitlines()
     first, comment = skip, ""
@@ -202,7 +202,7 @@ def recognised(path: Path, text: str, skip: int = 0) -> Form:
     rows = [cells(line, separator) for line in body]
     with_numbers = [row for row in rows if _has_numbers(row)]
     width = Counter(map(len, with_numbers)).most_common(1)[0][0] if with_numbers else 0
-    # Lines before the table may hold numbers too, as `NO_OF_FRAMES 720` does, but not as many.
+    # Lines before the table may contain numbers too, like `NO_OF_FRAMES 720`, but fewer numbers than a row.
     begin = next((i for i, row in enumerate(rows) if len(row) == width and _has_numbers(row)), None)
     if begin is None:
         reason = "holds no rows of numbers" if len(rows) < 3 else "holds text, not numbers"
@@ -226,9 +226,10 @@ def _lines_before(lines: list[str], first: int, count: int) -> int:
 
 
 def _head(rows: list[list[str]], width: int) -> tuple[str, ...]:
-    """Names of the columns from the lines before the numbers; units of a second line behind them.
+    """Names of the columns from the lines before the numbers; units from a second line are appended to the names.
 
-    The line of names is the last one that has as many cells as there are columns, except for a line of units below it.
+    The line of names is the last line that has as many cells as there are columns, except for a line of units below
+    it.
     """
     padded = [[*row, ""] if len(row) == width - 1 else _cut(row, width) for row in rows]
     fitting = [row for row in padded if len(row) == width and any(cell.strip() for cell in row)]
@@ -242,7 +243,7 @@ def _head(rows: list[list[str]], width: int) -> tuple[str, ...]:
 
 
 def _cut(row: list[str], width: int) -> list[str]:
-    """Row without empty cells beyond so many, as of a line that ends in a separator."""
+    """Row without empty cells after the first ``width`` cells, for example of a line that ends with a separator."""
     return row if any(cell.strip() for cell in row[width:]) else row[:width]
 
 
@@ -264,7 +265,7 @@ def _separator(lines: list[str]) -> str:
 
 
 def _has_numbers(row: list[str]) -> bool:
-    """Whether a row has numbers, also missing ones, and at most some texts beside them."""
+    """Whether a row consists of numbers, some of which may be missing, and at most a few texts."""
     texts = [text for cell in row if (text := cell.strip())]
     found = sum(bool(_NUMBER.fullmatch(text) or _NAN.fullmatch(text)) for text in texts)
     return found >= 1 and 2 * found >= len(texts)

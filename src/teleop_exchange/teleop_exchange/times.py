@@ -1,4 +1,4 @@
-"""Times of an import: their unit, and which rows stay where they are doubled or go back."""
+"""Times of an import: their unit, and the choice of rows if times are repeated or go back."""
 
 from bisect import bisect_right
 from dataclasses import dataclass
@@ -15,21 +15,21 @@ from teleop_exchange.options import TIMES_NS
 Stamps = NDArray[np.int64]
 SECOND_NS = 1_000_000_000
 RATES_HZ = (5.0, 3000.0)
-"""Rates that a recording of a hand may have; the unit of its times follows from them."""
+"""Smallest and largest plausible rate of a hand's recording; the unit of the times is guessed from them."""
 _EPOCH_S = 3e8  # 1979: later times are seconds since 1970
 _LONGEST_S = 60.0  # between two samples
-_STRETCH = 10  # rows; shorter ones are no recording of their own
+_STRETCH = 10  # rows; shorter parts do not count as a separate recording
 
 
 class Unit(NamedTuple):
-    """A unit of time, and why it is taken."""
+    """A unit of time, and the reason for choosing it."""
 
     name: str
     reason: str
 
 
 def guessed_unit(raw: NDArray[np.float64] | Stamps) -> Unit:
-    """Unit of times from their size, if they are times of the clock, else from their steps.
+    """Unit of times, guessed from their size if they are clock times, else from their steps.
 
     Args:
         raw: Times (N,) in the file's unit, finite.
@@ -56,9 +56,9 @@ def guessed_unit(raw: NDArray[np.float64] | Stamps) -> Unit:
 
 
 def joined_ns(parts: list[NDArray[np.float64] | Stamps], unit: str, without: int) -> Stamps:
-    """Times of all blocks [ns], with a number for those that are none; empties the list.
+    """Times of all blocks [ns], with the number ``without`` for invalid times. This empties the list ``parts``.
 
-    Times later than 2096 are none: their nanoseconds would not fit into 64 bits for long.
+    Times later than 2096 are invalid, because their nanoseconds may not fit into 64 bits.
     """
     latest = LATEST_S * SECOND_NS / TIMES_NS[unit]
     out = np.empty(sum(map(len, parts)), np.int64)
@@ -85,12 +85,12 @@ def nanoseconds(raw: NDArray[np.float64] | Stamps, unit: str) -> Stamps:
 
 @dataclass(frozen=True, eq=False)
 class Order:
-    """Which rows stay, in which order.
+    """Used rows and their order.
 
     Attributes:
-        rows: Numbers of the rows that stay (M,).
-        doubled: How many were left out because their time was there already.
-        backwards: How many had a time before that of an earlier row.
+        rows: Indices of the used rows (M,).
+        doubled: Number of rows that were left out because an earlier row has the same time.
+        backwards: Number of rows with a time before the time of an earlier row.
     """
 
     rows: NDArray[np.int32]
@@ -99,7 +99,9 @@ class Order:
 
 
 def ordered(stamps: Stamps, *, is_sorted: bool = False) -> Order:
-    """Rows with rising times: of equal ones the first; of the others the fewest are left out.
+    """Rows with increasing times: of equal times, the first row is used.
+
+    Otherwise as few rows as possible are left out.
 
     Args:
         stamps: Times (N,) [ns] in the order of the file.
@@ -116,15 +118,15 @@ def ordered(stamps: Stamps, *, is_sorted: bool = False) -> Order:
 
 
 def _longest_rising(stamps: Stamps) -> NDArray[np.int64]:
-    """Most rows of which none has a time before that of an earlier one (Fredman 1975).
+    """Largest set of rows in which no time is before the time of an earlier row (Fredman 1975).
 
-    So one stamp from the future costs its own row, not all rows until that time has come.
+    Thus a stamp from the future removes only its own row, not all rows until that time.
     """
     newest, oldest = np.maximum.accumulate(stamps), np.minimum.accumulate(stamps[::-1])[::-1]
     is_kept = (stamps == newest) & (stamps == oldest)  # no other row contradicts these
     others = np.flatnonzero(~is_kept)
     before = np.empty(len(others), np.int64)
-    ends: list[int] = []  # least last time of so many rows, and which row that is
+    ends: list[int] = []  # smallest last time of each number of rows, and the index of that row
     last: list[int] = []
     for row, stamp in enumerate(stamps[others].tolist()):
         count = bisect_right(ends, stamp)
@@ -138,10 +140,10 @@ def _longest_rising(stamps: Stamps) -> NDArray[np.int64]:
 
 
 def restarts(stamps: Stamps) -> NDArray[np.int64]:
-    """Rows at which another recording begins: the time falls back to run once more.
+    """Rows at which another recording begins: the time jumps back and then increases again.
 
-    It falls back by more than half of the stretch before, and runs on into it: rows that are only
-    stored late do not. Single rows of another time do not count.
+    The time must jump back by more than half of the preceding stretch, and then continue within it. Rows that are only
+    stored late do not do this. Single rows with another time do not count.
 
     Args:
         stamps: Times (N,) [ns] in the order of the file.
@@ -159,7 +161,7 @@ def restarts(stamps: Stamps) -> NDArray[np.int64]:
 
 
 def gaps(stamps: Stamps, periods: float) -> tuple[tuple[float, float], ...]:
-    """Where nothing was recorded for more than so many median periods.
+    """Gaps: intervals without a sample that are longer than ``periods`` median periods.
 
     Returns:
         Begin [s] since the first stamp and length [s], the longest first.
@@ -180,5 +182,5 @@ def spread_ms(stamps: Stamps) -> tuple[float, float, float]:
 
 
 def is_constant(stamps: Array | Stamps) -> bool:
-    """Whether stamps say nothing: all the same, such as zero."""
+    """Whether all stamps are equal, such as zero, so that they contain no information."""
     return len(stamps) > 1 and bool((stamps == stamps[0]).all())

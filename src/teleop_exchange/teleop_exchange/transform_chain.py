@@ -1,4 +1,4 @@
-"""Transform chain: poses of a frame in one that others carry, composed of those between them."""
+"""Transform chain: poses of a frame in an indirect parent frame, composed of the transforms between them."""
 
 from collections.abc import Collection, Mapping, Sequence
 
@@ -12,16 +12,16 @@ from teleop_exchange.times import Stamps
 
 
 def chain_to(top: str, frame: str, parents: Mapping[str, Collection[str]]) -> list[Frames]:
-    """Parent and child of each transform from a frame up to another; at least one.
+    """Parent and child of each transform from a frame up to the frame ``top``; at least one transform.
 
     Args:
-        top: The other frame; empty for the one that nothing carries.
+        top: The upper frame; empty for the frame without a parent.
         frame: The frame.
-        parents: All frames in which each frame is told.
+        parents: All parent frames of each frame.
 
     Raises:
-        UnknownNameError: No other frame is said, and one on the way is told in several.
-        ParameterError: A frame carries itself.
+        UnknownNameError: No upper frame is named, and a frame of the chain has several parents.
+        ParameterError: A frame is its own ancestor.
     """
     ways: dict[str, list[Frames]] = {frame: []}
     for name in (queue := [frame]):
@@ -38,15 +38,15 @@ def chain_to(top: str, frame: str, parents: Mapping[str, Collection[str]]) -> li
 
 
 def composed(edges: Sequence[Rows], *, by_log: bool) -> Rows:
-    """Poses of the first transform's child in the last one's parent.
+    """Poses of the first transform's child in the last transform's parent.
 
-    They have the times of the transform with most poses. Of each other one the newest pose that is
-    not later counts, and a single one at all times. Poses before the first of any are left out.
+    The result has the times of the transform with the most poses. Of each other transform, the newest pose that is not
+    later is used; a single pose is used at all times. Times before the first pose of any transform are left out.
 
     Args:
-        edges: Poses of each transform, that of the frame itself first; the child of each is the
-            parent of the one before.
-        by_log: Whether the time of a pose is that of recording; it is so too where the stamps of a
+        edges: Poses of each transform, the transform of the frame itself first; the child of each transform is the
+            parent of the previous one.
+        by_log: Whether the time of recording is used as the time of a pose; it is always used if the stamps of a
             transform never change.
     """
     moving = [edge for edge in edges if len(edge.poses) > 1]
@@ -74,7 +74,7 @@ def _times(rows: Rows, is_log: bool) -> Stamps:
 
 
 def _carried(carriers: Array, poses: Array) -> Array:
-    """Poses (n, 7) in frames that have poses themselves (n, 7); NaN where a carrier has no turn."""
+    """Poses (n, 7), given in frames whose own poses are ``carriers`` (n, 7); NaN if a carrier has no valid rotation."""
     size = length(carriers[:, 3:])[:, None]
     turns = carriers[:, 3:] / np.where(size > 0.0, size, np.nan)
     moved = (rotations_from_quaternions(turns) * poses[:, None, :3]).sum(axis=-1)

@@ -1,4 +1,4 @@
-"""Drives that are assumed, for sources that name none."""
+"""Assumed drives for robots whose sources publish none."""
 
 import numpy as np
 

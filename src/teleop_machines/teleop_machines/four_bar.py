@@ -1,10 +1,10 @@
 """Four-bar: a crank that moves a point of the coupler along a plane curve.
 
-q is the crank angle theta1 alone; the tip is the point of the coupler at distance ``a`` from the crank, with x along
-the coupler. ``ik`` takes the point of its curve nearest to the wanted x and y, and everything else is residual.
-``mode``, 1 or -1, is the sign in front of the arc cosine of the closure. Outside its range :meth:`Robot.fk` refuses a
-crank, and :meth:`Robot.solve_fk` says NOT_CLOSED and gives the loop torn as little as possible; :class:`FourBar`
-answers for both modes and in all forms of the closure.
+q is the crank angle theta1 only; the tip is the point of the coupler at distance ``a`` from the crank, with x along
+the coupler. ``ik`` finds the point of the coupler curve nearest to the wanted x and y; the rest of the pose error is
+the residual. ``mode``, 1 or -1, is the sign of the arc cosine in the closure. For a crank angle outside of its range,
+:meth:`Robot.fk` raises an error. :meth:`Robot.solve_fk` then returns NOT_CLOSED and the loop with the smallest gap.
+:class:`FourBar` computes both modes and all forms of the closure.
 
 Source:
     Ghosal 2020, lecture 11, section on the planar 4-bar; Freudenstein 1954.
@@ -28,12 +28,12 @@ __all__ = ["GEOMETRY", "Assembly", "Closure", "FourBar", "make"]
 
 # No lengths are published; these are a crank-rocker.
 GEOMETRY = {"l0": 0.4, "l1": 0.1, "l2": 0.35, "l3": 0.25, "a": 0.175, "mode": 1.0}
-_TURNS = 4.0 * math.pi  # assumed cable limit of a crank that turns all around
-_SAMPLES = 90  # of the coupler curve, in the search for its nearest point
+_TURNS = 4.0 * math.pi  # assumed cable limit of a crank that can rotate fully
+_SAMPLES = 90  # samples of the coupler curve in the search for its nearest point
 # Sine between coupler and rocker under which the crank hardly determines the coupler.
 _NEAR = 0.02
 _ROUNDING = 1e-12
-_CLOSE = 1e-15  # m, where going further down makes no difference
+_CLOSE = 1e-15  # m; smaller improvements of the distance do not matter
 _FOLLOWED, _LIMITED = int(kinematics.IkStatus.FOLLOWED), int(kinematics.IkStatus.LIMITED)
 _CLOSED, _NOT_CLOSED = int(kinematics.FkStatus.CLOSED), int(kinematics.FkStatus.NOT_CLOSED)
 _NEAR_SINGULAR_FK = int(kinematics.FkStatus.NEAR_SINGULAR)
@@ -53,7 +53,7 @@ class Directions(NamedTuple):
 
 @inner
 def _links(theta1: float, g: Array) -> Directions:
-    """Directions of crank, rocker and coupler in the robot's mode; of least gap when open.
+    """Directions of crank, rocker and coupler in the robot's mode; with the smallest gap if the loop is open.
 
     Seen from the end of the crank, the right pivot is at (x, y) and the coupler's other end at
     (x, y) + l3 (cos phi1, sin phi1): never nearer than l2.
@@ -87,8 +87,8 @@ def fk(q: Array, geometry: Array, T: Array) -> None:
 def assemble(q: Array, geometry: Array, ask: Array, T: Array, out: Array) -> int:
     """Write ``T_base_tip`` of theta1 (1,); see :class:`kinematics.Kernels`.
 
-    From a seed it is the mode whose point is nearer to the seed's; both have one angle at the end
-    of the range. Two modes need no search.
+    With a seed, it is the mode whose point is nearer to the seed's point. At the end of the range both modes have the
+    same angle. Two modes need no search.
     """
     g = geometry.copy()
     if ask[1] > 0.0:
@@ -144,7 +144,7 @@ def jacobian(q: Array, geometry: Array, J: Array) -> None:
 
 @inner
 def _gap(theta1: float, T: Array, g: Array) -> tuple[float, float]:
-    """Way [m] from the coupler point to T's, in x and y."""
+    """Vector [m] from the coupler point to the position of T, in x and y."""
     links = _links(theta1, g)
     x = T[0, 3] - g[1] * links.crank_x - g[4] * links.coupler_x
     return x, T[1, 3] - g[1] * links.crank_y - g[4] * links.coupler_y
@@ -152,14 +152,14 @@ def _gap(theta1: float, T: Array, g: Array) -> tuple[float, float]:
 
 @inner
 def _distance(theta1: float, T: Array, g: Array) -> float:
-    """Distance [m] of the coupler point from T's."""
+    """Distance [m] of the coupler point from the position of T."""
     x, y = _gap(theta1, T, g)
     return math.sqrt(x * x + y * y)
 
 
 @inner
 def _refined(theta1: float, lower: float, upper: float, T: Array, g: Array) -> float:
-    """Crank angle in [lower, upper] whose coupler point is, going down, nearest to T's."""
+    """Crank angle in [lower, upper] with the locally smallest distance of the coupler point from T."""
     best = _distance(theta1, T, g)
     for _ in range(60):
         if best <= _CLOSE:
@@ -183,7 +183,7 @@ def _refined(theta1: float, lower: float, upper: float, T: Array, g: Array) -> f
 
 @inner
 def _candidates(T: Array, g: Array) -> tuple[float, float]:
-    """Middle and half the difference of the two crank angles whose end is ``a`` from T's point."""
+    """Mean and half the difference of the two crank angles at which the crank's end is at distance ``a`` from T."""
     x, y, l1, a = T[0, 3], T[1, 3], g[1], g[4]
     radius = math.sqrt(x * x + y * y)
     cosine = (radius * radius + l1 * l1 - a * a) / max(2.0 * l1 * radius, 1e-300)
@@ -192,7 +192,7 @@ def _candidates(T: Array, g: Array) -> tuple[float, float]:
 
 @inner
 def _nearest(T: Array, seed: float, limits: Array, g: Array) -> float:
-    """Crank angle of the nearest point of the whole curve; of equal ones next to the seed."""
+    """Crank angle of the nearest point of the whole curve; of equally near points, the one nearest to the seed."""
     lower, upper = limits[0, 0], limits[1, 0]
     best, cost = seed, math.inf
     middle, half = _candidates(T, g)
@@ -216,8 +216,8 @@ def _nearest(T: Array, seed: float, limits: Array, g: Array) -> float:
 def ik(T: Array, seed: Array, limits: Array, geometry: Array, q: Array, residual: Array) -> int:
     """Write theta1 (1,); see :class:`teleop_core.robots.robot.Kernels`.
 
-    In a path the crank goes down the distance from where it is, so it stays on its part of the
-    curve; otherwise the whole curve is searched.
+    In a path, the crank moves from its current angle towards smaller distance, so it stays on its part of the curve;
+    otherwise the whole curve is searched.
     """
     if not kinematics.is_askable(T, seed):
         return -1

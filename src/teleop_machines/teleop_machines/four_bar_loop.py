@@ -1,7 +1,8 @@
 """Planar four-bar loop: all four forms of its closure and its two assembly modes.
 
-Ground ``l0`` lies along x from the left to the right pivot, crank ``l1`` turns by theta1 at the left one, rocker ``l3``
-by phi1 at the right one, coupler ``l2`` joins their ends. phi2 is the angle from crank to coupler, phi3 from coupler to
+Ground ``l0`` is along x from the left to the right pivot. Crank ``l1`` rotates by theta1 about the left pivot, rocker
+``l3`` by phi1 about the right pivot. Coupler ``l2`` connects their ends. phi2 is the angle from crank to coupler, phi3
+from coupler to
 rocker, taken from the coupler's end downward to the right pivot.
 
 Source:
@@ -25,7 +26,7 @@ class Assembly(IntEnum):
     """Whether a loop can be put together."""
 
     CLOSED = 0  # both assembly modes exist (they coincide at the end of the range)
-    CANNOT_ASSEMBLE = 1  # the links do not meet; angles are those of the smallest gap
+    CANNOT_ASSEMBLE = 1  # the loop does not close; angles are those of the smallest gap
 
 
 class Closure(NamedTuple):
@@ -74,7 +75,7 @@ class FourBar:
     def crank_ranges(self) -> tuple[tuple[float, float], ...]:
         """Intervals of theta1 [rad] in which the loop closes; none, one or two (mirror images).
 
-        The ends of the crank and of the ground must be between |l2 - l3| and l2 + l3 apart.
+        The distance between the crank's end and the right pivot must be between |l2 - l3| and l2 + l3.
         """
         product, squares = 2.0 * self.l0 * self.l1, self.l0**2 + self.l1**2
         least = (squares - (self.l2 + self.l3) ** 2) / product

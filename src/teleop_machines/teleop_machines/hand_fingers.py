@@ -1,7 +1,7 @@
 """Fingers of the three-fingered hand: contact point and joints of one R-R-R finger, as kernels.
 
-A finger stands at the origin of its frame F: theta turns it about z, psi lifts the second link,
-phi bends the third. ``links`` are l1, l2, l3 [m]. Points are three numbers: they need no memory.
+A finger's base is at the origin of its frame F: theta rotates the finger about z, psi lifts the second link, phi bends
+the third link. ``links`` are l1, l2, l3 [m]. Points are passed as three numbers, which need no memory.
 
 Source:
     Ghosal 2020, lecture 6, table and F_p of the hand (after Salisbury 1982); the inverse and its
@@ -14,15 +14,15 @@ from typing import NamedTuple
 from teleop_core.kernels import Array, inner, kernel
 from teleop_core.kinematics.branches import bounded, turned, wrapped
 
-# Sine of phi of a straight finger: shortens it by less than rounding, and has a sign, so that a
-# path through it remembers its side.
+# Sine of phi of a straight finger. It shortens the finger by less than rounding, and has a sign, so that a path
+# through the straight position keeps its branch.
 _STRAIGHT = 1e-8
 _HELD = 1e-12
 Triple = tuple[float, float, float]
 
 
 class Branch(NamedTuple):
-    """A branch of a finger: its number, its angles [rad], whether the finger reaches at all."""
+    """A branch of a finger: its number, its angles [rad], and whether the finger reaches the point."""
 
     number: int
     theta: float
@@ -55,7 +55,10 @@ def finger_jacobian(q: Array, links: Array, J: Array) -> None:
 
 @inner
 def _bent(r: float, z: float, links: Triple, is_positive: bool) -> tuple[float, float, bool]:
-    """Angles psi and phi for a point r ahead of, z above joint 2; whether the finger reaches."""
+    """Angles psi and phi for a point at distance r in front of joint 2 and z above it.
+
+    The third value is whether the finger reaches it.
+    """
     _, l2, l3 = links
     k = (r * r + z * z - l2 * l2 - l3 * l3) / (2.0 * l2 * l3)
     sine, cosine = max(math.sqrt(max(1.0 - k * k, 0.0)), _STRAIGHT), min(max(k, -1.0), 1.0)
@@ -67,10 +70,10 @@ def _bent(r: float, z: float, links: Triple, is_positive: bool) -> tuple[float, 
 
 @kernel
 def finger_branch(p: Triple, links: Triple, branch: int, seed: float) -> tuple[float, float, float, bool]:
-    """Angles theta, psi, phi of one of four branches; whether the finger reaches p at all.
+    """Angles theta, psi, phi of one of four branches; and whether the finger reaches p.
 
-    Branches 0 and 1 turn towards p, 2 and 3 away from it; even ones bend with phi > 0. On the
-    axis of joint 1, where every theta will do, the seed's is kept.
+    In branches 0 and 1 the finger is turned towards p, in 2 and 3 away from it; even branches have phi > 0. On the
+    axis of joint 1, where every theta is possible, the seed's theta is kept.
     """
     x, y, z = p
     theta, reach, turn = seed, math.sqrt(x * x + y * y), 0.0
@@ -84,14 +87,14 @@ def finger_branch(p: Triple, links: Triple, branch: int, seed: float) -> tuple[f
 
 @inner
 def _side(psi: float, phi: float, links: Triple) -> int:
-    """Branch that a finger is on."""
+    """Current branch of a finger."""
     reach = links[0] + links[1] * math.cos(psi) + links[2] * math.cos(psi + phi)
     return (2 if reach < 0.0 else 0) + (0 if math.sin(phi) >= 0.0 else 1)
 
 
 @inner
 def _cost(angles: Triple, seed: Array, limits: Array, first: int) -> float:
-    """Largest joint move from the seed, and 100 for each joint outside its limits."""
+    """Largest joint move from the seed, plus 100 for each joint outside its limits."""
     worst, outside = 0.0, 0.0
     for i in range(3):
         j = first + i
@@ -104,10 +107,10 @@ def _cost(angles: Triple, seed: Array, limits: Array, first: int) -> float:
 
 @inner
 def _nearest_branch(p: Triple, links: Triple, seed: Array, limits: Array, first: int) -> Branch:
-    """Branch nearest to the seed by the largest joint move, inside the limits if one is.
+    """Branch nearest to the seed by the largest joint move; a branch inside the limits is preferred.
 
-    It begins where the seed bends and where theta turns less than a quarter turn. The other bend
-    and the other turn are looked at only where phi or theta alone is not too large a move.
+    The search begins with the seed's sign of phi and the theta that is less than a quarter turn away. The other sign
+    and the other theta are examined only if the move of phi or theta alone is not too large.
     """
     theta, phi = seed[first], seed[first + 2]
     is_away = p[0] * math.cos(theta) + p[1] * math.sin(theta) < 0.0
@@ -127,7 +130,10 @@ def _nearest_branch(p: Triple, links: Triple, seed: Array, limits: Array, first:
 
 @inner
 def _is_held(angle: float, i: int, seed: Array, limits: Array, q: Array) -> bool:
-    """Write joint i, next to an angle given up to turns; whether limits or step hold it back."""
+    """Write joint i, as near as possible to an angle modulo full turns.
+
+    Return whether limits or the step hold it back.
+    """
     is_path = math.isfinite(limits[2, i])
     wanted = turned(angle, seed[i], limits[0, i], limits[1, i], is_path)
     q[i] = bounded(wanted, seed[i], limits[0, i], limits[1, i], limits[2, i])
@@ -136,18 +142,18 @@ def _is_held(angle: float, i: int, seed: Array, limits: Array, q: Array) -> bool
 
 @inner
 def finger_joints(p: Triple, links: Triple, seed: Array, limits: Array, first: int, q: Array) -> bool:
-    """Write theta, psi, phi for a contact point; whether the finger reaches it at all.
+    """Write theta, psi, phi for a contact point; return whether the finger reaches it.
 
-    In a path (finite steps) the finger stays on its branch. Where a joint is held back, the
-    joints after it make the best of it: psi and phi from where theta really is, phi from psi.
+    In a path (finite steps) the finger stays on its branch. If a joint is held back, the joints after it are computed
+    for its real angle: psi and phi for the real theta, phi for the real psi.
 
     Args:
         p: Wanted contact point [m] in F.
         links: l1, l2, l3 [m].
-        seed: Joints (n,) to stay next to [rad].
+        seed: Joints (n,) near which the result should be [rad].
         limits: Rows lower, upper, largest step: (3, n) [rad].
-        first: Place of theta among the joints.
-        q: Joints (n,), inside the limits and a step of the seed.
+        first: Index of theta among the joints.
+        q: Output joints (n,), within the limits and one step of the seed.
     """
     if math.isfinite(limits[2, first]):
         side = _side(seed[first + 1], seed[first + 2], links)

@@ -1,7 +1,7 @@
 """Grasp of the three-fingered hand: contact points, object pose, and joints that hold the object.
 
-Finger 1 stands at (0, -d, h), finger 2 at (0, d, h), the thumb at the origin, its frame turned by
-gamma about y. The object is the equilateral triangle of the contact points with side ``side``:
+The base of finger 1 is at (0, -d, h), of finger 2 at (0, d, h), of the thumb at the origin; the thumb's frame is
+rotated by gamma about y. The object is the equilateral triangle of the contact points with side ``side``:
 origin at its centre, x towards contact 1, z normal.
 
 Source:
@@ -24,7 +24,7 @@ from teleop_machines.hand_fingers import Triple, finger_branch, finger_jacobian,
 from teleop_machines.rps3_loop import COSINES, SINES, frame
 
 FINGERS = 3
-# No lengths are published: those of a hand that holds an object of 5 cm.
+# No lengths are published; these are lengths of a hand that holds an object of 5 cm.
 GEOMETRY = {
     "l11": 0.03, "l12": 0.05, "l13": 0.04,
     "l21": 0.03, "l22": 0.05, "l23": 0.04,
@@ -45,7 +45,7 @@ def _turned(i: int, g: Array, sign: float, x: float, y: float, z: float) -> Trip
 
 @inner
 def _base(i: int, g: Array) -> tuple[float, float]:
-    """Where finger i stands: y, z [m]."""
+    """Base position of finger i: y, z [m]."""
     if i == FINGERS - 1:
         return 0.0, 0.0
     return (g[_D] if i == 1 else -g[_D]), g[_H]
@@ -59,7 +59,7 @@ def links_of(i: int, g: Array) -> Triple:
 
 @kernel
 def contacts(q: Array, g: Array, points: Array) -> None:
-    """Write the contact points (3, 3) [m] of nine joints, one finger a row."""
+    """Write the contact points (3, 3) [m] of nine joints, one row per finger."""
     for i in range(FINGERS):
         x, y, z = finger_point(q[3 * i], q[3 * i + 1], q[3 * i + 2], links_of(i, g))
         x, y, z = _turned(i, g, 1.0, x, y, z)
@@ -69,7 +69,7 @@ def contacts(q: Array, g: Array, points: Array) -> None:
 
 @kernel
 def wanted_contact(i: int, T: Array, g: Array) -> Triple:
-    """Where contact i of the object at T is [m], in base coordinates."""
+    """Position of contact i of the object at T [m], in base coordinates."""
     radius = g[SIDE] / math.sqrt(3.0)
     x, y = radius * COSINES[i], radius * SINES[i]
     return (
@@ -102,11 +102,11 @@ class Grasp(IntEnum):
     """Whether six actuated joints hold the object."""
 
     HELD = 0  # the contacts keep their distances
-    CANNOT_HOLD = 1  # from the seed they could not; the joints of least error found are returned
+    CANNOT_HOLD = 1  # from the seed no solution was found; the joints of least error are returned
 
 
 class GraspResult(NamedTuple):
-    """Answer of :meth:`Hand.hold`."""
+    """Result of :meth:`Hand.hold`."""
 
     q: Array
     """All nine joints [rad]."""
@@ -117,7 +117,7 @@ class GraspResult(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Hand:
-    """Questions about a hand with a robot's ``geometry``; points in base coordinates [m]."""
+    """Computations for a hand with a robot's ``geometry``; points are in base coordinates [m]."""
 
     geometry: Mapping[str, float]
     _row: Array = field(init=False, repr=False)
@@ -127,7 +127,7 @@ class Hand:
         object.__setattr__(self, "_row", np.array(list(row.values())))
 
     def contact_points(self, q: object) -> Array:
-        """Contact points (3, 3), one finger a row, of nine joints [rad]."""
+        """Contact points (3, 3), one row per finger, of nine joints [rad]."""
         points = np.empty((3, 3))
         contacts(_shaped("q", q, (9,)), self._row, points)
         return points
@@ -161,7 +161,7 @@ class Hand:
         return found[found[:, 3] > 0.0, :3]
 
     def slip(self, q: object) -> Array:
-        """How far each two contacts are apart beyond the object's side: 12, 23, 31, (3,) [m]."""
+        """Distances between the contacts minus the object's side: pairs 12, 23, 31, (3,) [m]."""
         points = self.contact_points(q)
         ends = np.roll(points, -1, axis=0)
         return np.linalg.norm(ends - points, axis=1) - self._row[SIDE]
@@ -210,7 +210,7 @@ def _shaped(name: str, value: object, shape: tuple[int, ...]) -> Array:
 
 
 def checked_geometry(given: Mapping[str, float | str]) -> dict[str, float]:
-    """Default geometry with the given symbols in its place; refuses lengths that are not > 0."""
+    """Default geometry with the given symbols replaced; refuses lengths that are not > 0."""
     row = geometry_of(GEOMETRY, given)
     for symbol, value in row.items():
         is_link = symbol[0] == "l" and symbol[2] != "1"

@@ -1,12 +1,12 @@
-"""MMA: the seven-joint hybrid handle, open chain plus one parallelogram, that a surgeon moves.
+"""MMA: the hybrid handle with seven joints that a surgeon moves, an open chain plus one parallelogram.
 
-Joint readings q = (θ1, θ2, θ3, θ3', θ6, θ8, θ10). Links 3, 3a, 3b and 4 form the parallelogram:
-θ3 and θ3' both count from link 2, and link 4 stays parallel to link 3a. Three ways to describe it:
+Joint readings q = (θ1, θ2, θ3, θ3', θ6, θ8, θ10). Links 3, 3a, 3b and 4 form the parallelogram: θ3 and θ3' are both
+measured from link 2, and link 4 stays parallel to link 3a. There are three models:
 
-- ``model="C"``: with the loop; ``model="B"``: as a serial arm with dummy frames. They are one and
-  the same for joint readings, and the default.
-- ``model="A"``: the conventional table, kept for comparison. It loses four offsets (the tool is
-  127 mm off at home) and turns the tool frame by 90°.
+- ``model="C"``: with the loop; ``model="B"``: as a serial arm with dummy frames. Both give the same results for joint
+  readings, and are the default.
+- ``model="A"``: the conventional table, kept for comparison. It loses four offsets (the error of the tool at home is
+  127 mm) and rotates the tool frame by 90°.
 
 The source gives no joint limits, sensors, drives or rates: one turn about home and the drive table are *assumed*. As a
 master it needs only :meth:`Robot.fk`; :func:`holding_torques` is for force feedback.
@@ -29,7 +29,7 @@ from teleop_machines.bodies.mma_bodies import mma_bodies
 
 JOINTS = ("theta1", "theta2", "theta3", "theta3_prime", "theta6", "theta8", "theta10")
 HOME = np.radians([0.0, -90.0, 0.0, 90.0, 90.0, 0.0, 0.0])
-# Answer of :func:`teleop_core.robots.freedom.start_posture` for the published lengths, rounded.
+# Result of :func:`teleop_core.robots.freedom.start_posture` for the published lengths, rounded.
 START = np.array([1.2611, -0.5588, -1.012, 1.6884, 0.3097, 0.0, 0.0])
 
 # All assumed. Inertia: 0.3 kg spread over the arm's 0.2 m, and small motors at the wrist.
@@ -58,7 +58,7 @@ def make(model: str = "C", **geometry: float) -> Robot:
 
     Raises:
         UnknownNameError: No such model or symbol.
-        ParameterError: A length is not possible.
+        ParameterError: A length is impossible.
     """
     if model not in mma_models.MODELS:
         raise UnknownNameError("model", model, mma_models.MODELS)
@@ -82,16 +82,17 @@ def make(model: str = "C", **geometry: float) -> Robot:
 
 
 def holding_torques(robot: Robot, q: object, wrench: object, spring: mma_balance.ShoulderSpring | None = None) -> Array:
-    """Joint torques with which the handle stands still and pushes on the hand.
+    """Joint torques with which the handle is at rest and applies a wrench to the hand.
 
-    Gravity is known for joint 2 only (the source weighs the links but prints no mass centres), in poses whose links
-    beyond the shoulder keep the attitude of home; all other joints count as balanced.
+    The gravity torque is known only for joint 2 (the source gives masses of the links but no mass centres), and only
+    in poses in which the links after the shoulder have the same orientation as at home. All other joints count as
+    balanced.
 
     Args:
         robot: The MMA.
         q: Joint readings (7,) [rad].
         wrench: Force on the hand [N], then moment about the tip [N·m], (6,) in base axes.
-        spring: Spring at joint 2; None for the published one.
+        spring: Spring at joint 2; None for the published spring.
 
     Returns:
         Torques (7,) [N·m].

@@ -1,8 +1,8 @@
-"""Balance of the MMA's shoulder: the published joint-2 spring, and the load that it leaves.
+"""Balance of the MMA's shoulder: the published spring at joint 2, and the load that it does not balance.
 
-The design matches only the *difference* of the gravity torque between two poses, 0.16 N·m. The
-spring is slack in the first pose, where gravity asks for 1.03 N·m, and gives 0.18 of 1.19 N·m in
-the worst one: 1.01 N·m stay with the operator. :func:`shoulder_load` states that residual.
+The design balances only the *difference* of the gravity torque between two poses, 0.16 N·m. The spring is slack in the
+first pose, where the gravity torque is 1.03 N·m. In the worst pose it gives 0.18 of 1.19 N·m, so the operator has to
+hold 1.01 N·m. :func:`shoulder_load` returns this residual.
 
 Source:
     Singh 2014, chapter 5, misprints corrected; torques about joint 2, positive downwards.
@@ -17,7 +17,7 @@ import numpy as np
 from teleop_core.base.errors import ParameterError
 from teleop_core.kernels.geometry import Array
 
-STANDARD_GRAVITY = 9.8  # [m/s²], as the source takes it
+STANDARD_GRAVITY = 9.8  # [m/s²], the value of the source
 # Table 5.1 [kg]; the printed total, 310.36 g, is not the sum of its rows.
 MASSES = {
     "L2": 0.03773, "L3": 0.02587, "L3a": 0.00746, "L3b": 0.02587, "L4": 0.02557, "L5": 0.01693,
@@ -76,7 +76,7 @@ class ShoulderLoad(NamedTuple):
     gravity: Array
     spring: Array
     residual: Array
-    """What gravity asks for and the spring does not give; positive pulls link 2 down."""
+    """Gravity torque that the spring does not balance; positive pulls link 2 down."""
 
 
 def gravity_torque(mass: float, arm: float | Array) -> Array:
@@ -88,9 +88,9 @@ def matching_rate(torque_difference: float, deflection: float, lever: float) -> 
     """Rate [N/m] of a spring, slack in the first pose, that gives a torque difference [N·m].
 
     Args:
-        torque_difference: Second less first gravity torque [N·m].
-        deflection: Of the spring in the second pose [m], > 0.
-        lever: Of the spring in the second pose [m], > 0.
+        torque_difference: Second minus first gravity torque [N·m].
+        deflection: Deflection of the spring in the second pose [m], > 0.
+        lever: Lever arm of the spring in the second pose [m], > 0.
 
     Returns:
         Rate without safety factor [N/m].
@@ -125,7 +125,7 @@ def coil(
         shear_modulus: [Pa], > 0.
 
     Raises:
-        ParameterError: A value is not positive, or the spring comes out with fewer than two turns.
+        ParameterError: A value is not positive, or the spring would have fewer than two turns.
 
     Source:
         Singh 2014, table 5.2: N = G d⁴ / (8 D³ k).
@@ -146,15 +146,15 @@ def coil(
 
 
 def shoulder_load(theta2: float | Array, spring: ShoulderSpring | None = None) -> ShoulderLoad:
-    """Gravity, spring and what is left at joint 2, for θ2 [rad] (-90° upright, 0 level).
+    """Torques of gravity and spring at joint 2, and their difference, for θ2 [rad] (-90° upright, 0 level).
 
-    The source gives the arm of the mass centre in two poses. Between them the links beyond the
-    shoulder keep their attitude, as at home, so the arm is a constant plus a cosine, here drawn
-    through both values. The enclosed angle of links 1 and 2 is 90° - θ2.
+    The source gives the lever arm of the mass centre in two poses. Between them the links after the shoulder keep
+    their orientation, as at home, so the lever arm is a constant plus a cosine, fitted to both values. The enclosed
+    angle of links 1 and 2 is 90° - θ2.
 
     Args:
         theta2: θ2 [rad], any shape.
-        spring: None for the published one.
+        spring: Spring at joint 2; None for the published spring.
 
     Returns:
         :class:`ShoulderLoad`.

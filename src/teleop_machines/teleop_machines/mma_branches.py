@@ -1,7 +1,7 @@
 """Closed-form family of the MMA: all joint vectors that reach a pose, by θ10 and branch.
 
-Once θ10 is chosen the other six joints follow, in eight branches: shoulder in front or behind,
-wrist flipped or not, and the two elbows.
+A given θ10 determines the other six joints, in eight branches: shoulder in front or behind, wrist flipped or not, and
+two elbows.
 
 Source:
     The thesis has no inverse kinematics; derived here from Singh 2014, eq. 4.81 corrected.
@@ -15,7 +15,7 @@ from teleop_core.kernels import Array, inner, kernel
 from teleop_machines.mma_forward import groups
 
 BRANCHES = 8
-_ROUNDING = 1e-12  # a point this far out of reach [m] still counts as on the edge
+_ROUNDING = 1e-12  # a point out of reach by less than this [m] counts as reached
 
 
 @inner
@@ -35,9 +35,9 @@ def _wrist_centre(T: Array, turn: float, geometry: Array, out: Array) -> None:
 
 @inner
 def _shoulder(wrist: Array, is_back: bool, geometry: Array, seed: Array, q: Array) -> float:
-    """Write θ1; the radius of the arm in its plane [m], NaN when axis 6 cannot pass the centre.
+    """Write θ1. Return the radius of the arm in its plane [m]; NaN if axis 6 cannot pass through the wrist centre.
 
-    The plane of the arm passes the base axis at distance a5; on that axis θ1 keeps the seed.
+    The distance of the arm's plane from the base axis is a5; on that axis θ1 keeps the value of the seed.
     """
     x, y, a5 = wrist[0, 0], wrist[0, 1], geometry[4]
     square = x * x + y * y - a5 * a5
@@ -56,7 +56,7 @@ def _shoulder(wrist: Array, is_back: bool, geometry: Array, seed: Array, q: Arra
 def _wrist(wrist: Array, is_flipped: bool, seed: Array, q: Array) -> float:
     """Write θ6 and θ8 for a given θ1; returns θ23.
 
-    Where axis 8 is square to the plane of the arm every θ23 will do: the seed's is kept.
+    If axis 8 is normal to the plane of the arm, every θ23 is possible, and the seed's value is kept.
     """
     c1, s1 = math.cos(q[0]), math.sin(q[0])
     K, column1, X = wrist[1], wrist[2], wrist[3]
@@ -74,7 +74,7 @@ def _wrist(wrist: Array, is_flipped: bool, seed: Array, q: Array) -> float:
 
 @inner
 def _miss(radius: float, height: float, geometry: Array) -> float:
-    """How far a point in the plane of the arm is out of reach of the two long links [m]."""
+    """Distance [m] by which a point in the plane of the arm is out of reach of the two long links."""
     a2, a3 = geometry[1], geometry[2]
     distance = math.hypot(radius, height)
     miss = max(distance - a2 - a3, abs(a2 - a3) - distance)
@@ -105,12 +105,12 @@ def branch(T: Array, turn: float, choice: int, geometry: Array, seed: Array, q: 
         turn: θ10 [rad].
         choice: 0 to 7; bit 0 shoulder behind, bit 1 wrist flipped, bit 2 other elbow.
         geometry: Row of the robot.
-        seed: Joints (7,) that stay where the pose leaves them free.
-        q: Result (7,); links stretched or folded towards a point out of reach.
+        seed: Joints (7,) whose values are kept where the pose leaves a joint free.
+        q: Output (7,); for a point out of reach, the links are stretched or folded towards it.
 
     Returns:
-        0 if the joints reach the pose, else how far the wrist stays away [m], infinity when the
-        wrist centre lies inside the cylinder of radius a5 about axis 1.
+        0 if the joints reach the pose, else the remaining distance of the wrist [m]; infinity if the wrist centre
+        is inside the cylinder of radius a5 about axis 1.
     """
     wrist = np.empty((4, 3))
     _wrist_centre(T, turn, geometry, wrist)
@@ -128,7 +128,7 @@ def branch(T: Array, turn: float, choice: int, geometry: Array, seed: Array, q: 
 
 @kernel
 def moved(angle: float, i: int, seed: Array, limits: Array) -> float:
-    """Same angle of joint ``i`` next to the seed, inside the limits where possible [rad]."""
+    """Angle of joint ``i``, shifted by full turns to the value nearest to the seed, within limits if possible [rad]."""
     near = angle + 2.0 * math.pi * round((seed[i] - angle) / (2.0 * math.pi))
     if near < limits[0, i]:
         near += 2.0 * math.pi
@@ -139,10 +139,10 @@ def moved(angle: float, i: int, seed: Array, limits: Array) -> float:
 
 @kernel
 def unwrapped(q: Array, seed: Array, limits: Array) -> float:
-    """Move angles (7,) by full turns next to the seed, inside the limits where possible.
+    """Shift angles (7,) by full turns to be nearest to the seed, inside the limits if possible.
 
     Returns:
-        Largest joint move from the seed [rad], infinity when a joint is outside its limits.
+        Largest joint move from the seed [rad]; infinity if a joint is outside its limits.
     """
     worst = 0.0
     for i in range(7):
@@ -157,7 +157,7 @@ def unwrapped(q: Array, seed: Array, limits: Array) -> float:
 def nearest_branch(
     T: Array, turn: float, seed: Array, limits: Array, geometry: Array, best: float, found: Array
 ) -> float:
-    """Look at the branches with θ10 = ``turn`` for one nearer to the seed than ``best``.
+    """Search the branches with θ10 = ``turn`` for a branch nearer to the seed than ``best``.
 
     Returns:
         Largest joint move of the branch written as (θ10, choice) to ``found``; else ``best``.
@@ -186,7 +186,7 @@ def nearest_branch(
 
 @inner
 def least_miss(T: Array, turn: float, seed: Array, geometry: Array, least: float, found: Array) -> float:
-    """Look at the branches with θ10 = ``turn`` for one that stays away less than ``least`` [m].
+    """Search the branches with θ10 = ``turn`` for a branch whose remaining distance is less than ``least`` [m].
 
     Returns:
         Distance of the branch written as (θ10, choice) to ``found``; else ``least``.

@@ -84,7 +84,7 @@ def fk(q: Array, geometry: Array, T: Array) -> None:
 
 @inner
 def _turn(J: Array, column: int, axis: tuple[float, float, float], x: float, y: float, z: float) -> None:
-    """Write the column of a joint that turns about ``axis``, the tip at lever x, y, z [m]."""
+    """Write the column of a joint that rotates about ``axis``; the lever arm to the tip is x, y, z [m]."""
     a, b, c = axis
     J[0, column], J[1, column], J[2, column] = b * z - c * y, c * x - a * z, a * y - b * x
     J[3, column], J[4, column], J[5, column] = a, b, c
@@ -92,7 +92,7 @@ def _turn(J: Array, column: int, axis: tuple[float, float, float], x: float, y: 
 
 @inner
 def jacobian_at(q: Array, geometry: Array, T: Array, J: Array) -> None:
-    """Write the geometric Jacobian (6, 7) where the tip is known to be at T: :func:`jacobian`.
+    """Write the geometric Jacobian (6, 7) for a known tip pose T; see :func:`jacobian`.
 
     The axes of the wrist are read from T: before θ10 and the fixed turn θ12 its columns are col1, K and X.
     """
@@ -125,8 +125,8 @@ def jacobian_at(q: Array, geometry: Array, T: Array, J: Array) -> None:
 def jacobian(q: Array, geometry: Array, J: Array) -> None:
     """Write the geometric Jacobian (6, 7): rows linear, then angular, in base axes.
 
-    θ3' moves the tip without turning it, because the parallelogram keeps link 4 parallel to
-    link 3a. The rank falls to five where θ6 and θ8 are both ±90°, whatever the arm does.
+    θ3' moves the tip without rotating it, because the parallelogram keeps link 4 parallel to link 3a. The rank is five
+    if θ6 and θ8 are both ±90°, for any posture of the arm.
     """
     T = np.empty((4, 4))
     fk(q, geometry, T)

@@ -1,12 +1,12 @@
-"""Inverse kinematics of the MMA: seven joints for six directions, on the branch next to the seed.
+"""Inverse kinematics of the MMA: seven joints for six degrees of freedom, on the branch nearest to the seed.
 
-Locally the redundancy is resolved by damped least squares inside the joint limits: of all joint
-moves that bring the tool to the pose, the smallest. The closed-form family then finds branches
-that lie nearer, and the poses that a local search misses.
+The local search resolves the redundancy by damped least squares inside the joint limits: it finds the smallest joint
+move that brings the tool to the pose. The closed-form family then finds branches that are nearer, and solutions that a
+local search misses.
 
 Source:
     The thesis gives none; least squares on (position / 100 mm, rotation vector) as in the notes
-    that check Singh 2014. The search over branches is ours.
+    that check Singh 2014. The search over branches is not from a source.
 """
 
 import math
@@ -20,11 +20,11 @@ from teleop_machines import mma_branches, mma_forward
 
 LENGTH = 0.1  # distance [m] that weighs as much as one radian
 _ROUNDS, _PATH_ROUNDS = 60, 12  # of the local search
-_STALLED = 1e-5  # share of the squared error that a round must take off
+_STALLED = 1e-5  # share of the squared error by which a round must reduce it
 # Damping per squared error: at the start, at least, and where no step helps any more.
 _DAMPING, _LEAST_DAMPING, _HOPELESS = 1e-2, 1e-6, 1e10
-_KICK = 0.02  # joint move that leaves a singular stand-still [rad]
-_STEP = math.radians(5.0)  # of θ10 between two looks at the branches
+_KICK = 0.02  # joint move that leaves a singular pose in which the search stops [rad]
+_STEP = math.radians(5.0)  # step of θ10 in the search of the branches
 _NEAR = 0.02  # singular value under which one radian of tool takes more than 50 of joints
 _FOLLOWED, _LIMITED = int(IkStatus.FOLLOWED), int(IkStatus.LIMITED)
 _NEAR_SINGULAR, _UNREACHABLE = int(IkStatus.NEAR_SINGULAR), int(IkStatus.UNREACHABLE)
@@ -38,7 +38,7 @@ def _descend(T: Array, box: Array, geometry: Array, rounds: int, q: Array) -> fl
         T: Wanted ``T_base_tip`` (4, 4).
         box: Lower and upper joint positions, then rows that do not matter (2 or more, 7).
         geometry: Row of the robot.
-        rounds: Most evaluations.
+        rounds: Largest number of evaluations.
         q: Start inside the box (7,), then the result.
 
     Returns:
@@ -72,10 +72,10 @@ def _descend(T: Array, box: Array, geometry: Array, rounds: int, q: Array) -> fl
 
 @inner
 def _approach(T: Array, box: Array, geometry: Array, rounds: int, q: Array) -> float:
-    """Move ``q`` (7,) inside a box to the pose T, or as near as a neighbourhood allows.
+    """Move ``q`` (7,) inside a box to the pose T, or to the local minimum of the error.
 
-    Where the error points along a direction that the arm has just lost, no step lowers it at first order; a small move
-    of all joints then leaves the stand-still, and is kept only if the error becomes less.
+    At a singular pose the error may be in the direction that the arm has lost, so that no step lowers it at first
+    order. Then all joints are moved a little; this move is kept only if the error decreases.
 
     Returns:
         Squared weighted error that is left.
@@ -96,7 +96,7 @@ def _approach(T: Array, box: Array, geometry: Array, rounds: int, q: Array) -> f
 
 @inner
 def _cost(T: Array, turn: float, choice: int, seed: Array, limits: Array, geometry: Array, q: Array) -> float:
-    """Write one branch; its largest joint move, infinity when it does not reach or is outside."""
+    """Write one branch; return its largest joint move, or infinity if it misses the pose or violates a limit."""
     if mma_branches.branch(T, turn, choice, geometry, seed, q) > 0.0:
         return math.inf
     return float(mma_branches.unwrapped(q, seed, limits))
@@ -104,9 +104,10 @@ def _cost(T: Array, turn: float, choice: int, seed: Array, limits: Array, geomet
 
 @kernel
 def _scan(T: Array, seed: Array, limits: Array, geometry: Array, bound: float, found: Array) -> float:
-    """Look for branches nearer to the seed than ``bound``, in steps of θ10 away from it.
+    """Search for branches nearer to the seed than ``bound``, in steps of θ10 away from the seed.
 
-    No joint moves less than θ10, so the search ends where θ10 alone has moved by the best so far.
+    The largest joint move is at least the move of θ10. The search therefore ends when θ10 alone has moved by the best
+    result so far.
 
     Returns:
         Largest joint move of the branch written as (θ10, choice) to ``found``; else ``bound``.
@@ -122,7 +123,7 @@ def _scan(T: Array, seed: Array, limits: Array, geometry: Array, bound: float, f
 
 @inner
 def _refine(T: Array, seed: Array, limits: Array, geometry: Array, found: Array, q: Array) -> float:
-    """Write the joints at the θ10 within one step where the largest joint move is least."""
+    """Within one step of θ10, find the value with the smallest largest joint move, and write its joints."""
     choice, turn, width = int(found[1]), found[0], 0.5 * _STEP
     trial = np.empty(7)
     best = _cost(T, turn, choice, seed, limits, geometry, q)
@@ -140,7 +141,7 @@ def _refine(T: Array, seed: Array, limits: Array, geometry: Array, found: Array,
 
 @inner
 def _nearest_miss(T: Array, seed: Array, geometry: Array, q: Array) -> float:
-    """Write the branch whose wrist stays away least over a full turn of θ10; that distance [m]."""
+    """Write the branch with the smallest remaining wrist distance over a full turn of θ10; return that distance [m]."""
     found, least, width = np.empty(2), math.inf, 2.0 * _STEP
     found[0], found[1] = seed[6], 0.0
     for k in range(36):
@@ -158,7 +159,7 @@ def _nearest_miss(T: Array, seed: Array, geometry: Array, q: Array) -> float:
 
 @inner
 def _can_reach(T: Array, q: Array, geometry: Array) -> bool:
-    """Whether any joint vector reaches a pose, limits or not, searched from θ10 of ``q``."""
+    """Whether any joint vector reaches a pose, ignoring limits; the search begins at θ10 of ``q``."""
     H, S, F, G = mma_forward.groups(geometry)
     arm = math.hypot(geometry[1] + geometry[2] + H, geometry[4]) + math.hypot(F, S + G)
     square = T[0, 3] * T[0, 3] + T[1, 3] * T[1, 3] + (T[2, 3] - geometry[0]) ** 2
@@ -169,7 +170,7 @@ def _can_reach(T: Array, q: Array, geometry: Array) -> bool:
 
 @inner
 def _search_branches(T: Array, seed: Array, limits: Array, geometry: Array, left: float, q: Array) -> None:
-    """Replace ``q`` by joints that reach the pose and lie nearer to the seed, where there are any.
+    """Replace ``q`` by joints that reach the pose and are nearer to the seed, if such joints exist.
 
     Args:
         T: Wanted ``T_base_tip`` (4, 4).
@@ -195,8 +196,8 @@ def _search_branches(T: Array, seed: Array, limits: Array, geometry: Array, left
 def ik(T: Array, seed: Array, limits: Array, geometry: Array, q: Array, residual: Array) -> int:
     """Write joints (7,) for ``T_base_tip``; see :class:`teleop_core.robots.robot.Kernels`.
 
-    Along a path (finite steps) only the local search is used, inside one step around the seed:
-    the branch cannot change, and at a singularity the arm lags and goes on.
+    Along a path (finite steps) only the local search is used, within one step around the seed. The branch cannot
+    change, and at a singularity the arm lags behind and continues.
     """
     if not is_askable(T, seed):
         return -1
@@ -220,8 +221,8 @@ def ik(T: Array, seed: Array, limits: Array, geometry: Array, q: Array, residual
 def ik_all(T: Array, geometry: Array, solutions: Array) -> int:
     """Write one joint vector per branch (up to 8, 7), with θ10 as near to zero as it can be.
 
-    The arm has one joint more than a pose needs, so each branch stands for a curve of joint
-    vectors; :func:`branch` gives the others. Angles lie within half a turn of home.
+    The arm has one joint more than a pose needs, so each branch is a curve of joint vectors; :func:`branch` gives the
+    other vectors. Angles are within half a turn of home.
     """
     count, home, free = 0, np.zeros(7), np.empty((2, 7))
     home[1], home[3], home[4] = -0.5 * math.pi, 0.5 * math.pi, 0.5 * math.pi

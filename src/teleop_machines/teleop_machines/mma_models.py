@@ -1,6 +1,6 @@
 """The MMA's three tables: conventional (A), with dummy frames (B), with parallelogram (C).
 
-They show how the closed form comes about and check it; the kernels never need them. Modified
+They show the derivation of the closed form and check it; the kernels never need them. Modified
 Denavit-Hartenberg throughout, with signed d; joint vectors, in the order of their tables:
 
 - A: θ1, θ2, θ3, θ4, θ5, θ6, θ7. Loses the offsets a5, a7, a9, a11; same attitude up to a turn.
@@ -37,7 +37,7 @@ MODELS = tuple(FRAMES)
 
 
 class LoopEnds(NamedTuple):
-    """Where the two branches of the parallelogram meet; equal points and angles close it."""
+    """End points of the two branches of the parallelogram; the loop is closed if points and angles are equal."""
 
     along_link_3a: Array
     """Point reached over links 3a and 3b (3,) [m]."""
@@ -53,7 +53,7 @@ def _check_model(model: str) -> None:
 
 
 def vector(name: str, value: object, size: int) -> Array:
-    """One finite vector of a size.
+    """One finite vector of length ``size``.
 
     Raises:
         ShapeError: Another shape.
@@ -151,8 +151,8 @@ def frames(table: DhTable, joints: object) -> dict[str, Array]:
 def passive_angles(q: object) -> Array:
     """θ3'' = θ3' - θ3 and θ4' = pi - θ3'' [rad] that close the loop, (2,) or (N, 2), of readings.
 
-    Where θ3'' is 0 or pi the four links lie on one line and a real parallelogram could fold over;
-    the formula stays on the side where opposite links are parallel.
+    If θ3'' is 0 or pi, the four links are on one line, and a real parallelogram could fold over. The formula stays in
+    the mode in which opposite links are parallel.
     """
     joints = checked_array("q", q, (7,))
     knee = joints[..., 3] - joints[..., 2]
@@ -177,7 +177,7 @@ def joints_of_model(q: object, model: str) -> Array:
 
 
 def loop_closure(q: object, g: Mapping[str, float], short_side: float = SHORT_SIDE) -> LoopEnds:
-    """Both ways round the parallelogram for joint readings q (7,) [rad].
+    """End points of both branches of the parallelogram for joint readings q (7,) [rad].
 
     Source:
         Singh 2014, eqs. 4.45-a, 4.53-a (sign corrected) and 4.66.

@@ -1,4 +1,4 @@
-"""Mobility: how many freedoms and independent loops a mechanism of links and joints has."""
+"""Mobility: the degrees of freedom and independent loops of a mechanism of links and joints."""
 
 from teleop_core.base.errors import ParameterError
 
@@ -8,8 +8,8 @@ SPATIAL, PLANAR = 6, 3
 def degrees_of_freedom(links: int, joints: int, joint_freedoms: int, *, space: int = SPATIAL) -> int:
     """Mobility by counting: ``space (links - joints - 1) + joint_freedoms``.
 
-    It assumes constraints in general position: mechanisms with special geometry, such as parallel axes counted in
-    space, can move although the count says no. A negative count means overconstrained.
+    The formula assumes constraints in general position. Mechanisms with special geometry, such as parallel axes
+    counted in space, can move although the count is zero or negative. A negative count means overconstrained.
 
     Args:
         links: Number of links, the fixed one included.

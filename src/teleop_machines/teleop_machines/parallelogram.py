@@ -1,8 +1,8 @@
 """Parallelogram: the four-bar with equal opposite sides, whose coupler never turns.
 
-q is the crank angle theta1; the tip is the coupler point at distance ``a`` from the crank. The
-rocker is taken parallel to the crank, in place of a sign of the general closure. That keeps the
-loop in one mode where all links lie in one line (theta1 = 0 and 180°) and the general modes cross.
+q is the crank angle theta1; the tip is the coupler point at distance ``a`` from the crank. Instead of choosing a sign
+of the general closure, the rocker is always parallel to the crank. This keeps the loop in one mode at theta1 = 0 and
+180°, where all links are on one line and the general modes cross.
 
 Source:
     Ghosal 2020, lecture 11, eq. 3 with l0 = l2, l1 = l3 and phi1 = theta1.
@@ -29,7 +29,7 @@ _UNREACHABLE = int(IkStatus.UNREACHABLE)
 
 @kernel
 def fk(q: Array, geometry: Array, T: Array) -> None:
-    """Write ``T_base_tip``, (4, 4): a circle of radius l1 about (a, 0), without any turn."""
+    """Write ``T_base_tip``, (4, 4): the tip moves on a circle of radius l1 about (a, 0), without rotation."""
     T[:] = 0.0
     T[0, 0] = T[1, 1] = T[2, 2] = T[3, 3] = 1.0
     T[0, 3] = geometry[1] * math.cos(q[0]) + geometry[2]
@@ -48,7 +48,7 @@ def jacobian(q: Array, geometry: Array, J: Array) -> None:
 def ik(T: Array, seed: Array, limits: Array, geometry: Array, q: Array, residual: Array) -> int:
     """Write theta1 (1,) of the nearest point; see :class:`teleop_core.robots.robot.Kernels`.
 
-    At the centre of the circle, where every point is nearest, the crank stays.
+    At the centre of the circle, where all points are equally near, the crank angle is kept.
     """
     if not is_askable(T, seed):
         return -1

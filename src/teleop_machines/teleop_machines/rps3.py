@@ -1,18 +1,18 @@
-"""3-RPS: a platform on three legs, each a hinge, an actuated slide and a ball joint.
+"""3-RPS: a platform on three legs; each leg has a hinge, an actuated slide and a ball joint.
 
 Hinges R_i are at distance ``b`` from the base centre, ball joints S_i at distance ``a`` from the
 platform centre, both at 0, 120 and 240°; theta_i is the leg's angle above the base, measured from
 the direction to the centre. The tip is the platform centre, with x towards S1.
 
-The three slides set the height and the direction of the platform's normal; each leg stays in its plane, which makes the
-turn about the normal nothing (zero torsion) and moves the centre sideways: with R12 = R21, x = a/2 (R11 - R22) and y =
--a R21. So ``task_mask`` is z and two tilts, and ``ik`` leaves the rest as residual.
+The three slides set the height and the direction of the platform's normal. Each leg stays in its plane, so there is no
+rotation about the normal (zero torsion), and the centre moves sideways: with R12 = R21, x = a/2 (R11 - R22) and y = -a
+R21. Therefore ``task_mask`` is z and two tilts, and ``ik`` leaves the rest as residual.
 
 Direct kinematics has up to 16 assembly modes, in pairs above and below the base:
-:func:`assembly_modes` and :meth:`Robot.fk_all` find all. ``fk`` takes the one next to legs that
-lean in to the platform; half of the legal leg triples have that, tilted by up to 70 degrees. All
-others that were tried (20 000) have modes on the other side of the singular poses, tilted by 64
-degrees and more: :meth:`Robot.fk` searches for the nearest to home.
+:func:`assembly_modes` and :meth:`Robot.fk_all` find all modes. ``fk`` uses the mode nearest to legs that lean in
+towards the platform. Half of the legal leg triples have this mode, with tilts up to 70 degrees. All other tested
+triples (20 000) have modes on the other side of the singular poses, with tilts of 64 degrees and more. For these,
+:meth:`Robot.fk` searches the mode nearest to home.
 
 Source:
     Lee and Shah 1988; Ghosal 2020, lectures 6 and 11; inverse and modes derived from them.
@@ -44,18 +44,18 @@ _NEAR_SINGULAR, _UNREACHABLE = (int(kinematics.IkStatus.NEAR_SINGULAR), int(kine
 
 @inner
 def _close(q: Array, geometry: Array, theta: Array) -> None:
-    """Write leg angles (3,) of the assembly next to legs that lean in by b - a."""
+    """Write leg angles (3,) of the assembly nearest to legs that lean in by b - a."""
     lean(q, geometry, theta)
     settle(q, geometry[0], geometry[1], theta)
 
 
 @kernel
 def fk(q: Array, geometry: Array, T: Array) -> None:
-    """Write ``T_base_tip`` (4, 4) of leg lengths (3,) [m], found from the legs' even lean.
+    """Write ``T_base_tip`` (4, 4) of leg lengths (3,) [m], found from equally leaning legs.
 
-    It closes for half of the legal leg triples, and for all whose legs are within 30 % of their
-    strokes of home. For the others, whose modes are all far from there, it is the frame on the
-    ball joints of least error: :func:`assemble` says so.
+    The loop closes for half of the legal leg triples, and for all triples within 30 % of the strokes around home. For
+    the other triples, whose modes are all far away, the result is the frame on the ball joints with the smallest
+    error; :func:`assemble` reports this.
     """
     theta, S = np.empty(3), np.empty((3, 3))
     _close(q, geometry, theta)

@@ -1,4 +1,4 @@
-"""Loop equations of the 3-RPS: ball joints of leg coordinates, and leg angles that close the loop.
+"""Loop equations of the 3-RPS: ball joints from leg coordinates, and leg angles that close the loop.
 
 Source:
     Ghosal 2020, lectures 6 (ball joints) and 11 (distances of ball joints stay the same).
@@ -20,7 +20,7 @@ SINES = (0.0, math.sqrt(0.75), -math.sqrt(0.75))
 
 @kernel
 def points(lengths: Array, theta: Array, b: float, S: Array) -> None:
-    """Write ball joints (3, 3) [m], one a row."""
+    """Write ball joints (3, 3) [m], one per row."""
     for i in range(3):
         out = b - lengths[i] * math.cos(theta[i])
         S[i, 0], S[i, 1] = out * COSINES[i], out * SINES[i]
@@ -101,9 +101,9 @@ def constraints(lengths: Array, theta: Array, b: float, a: float, gap: Array, G:
 
 @inner
 def _damped_turn(G: Array, gap: Array, damping: float, turn: Array) -> None:
-    """Write the change (3,) of the leg angles that lessens the errors, damped.
+    """Write the damped change (3,) of the leg angles that reduces the errors.
 
-    Row k of G has no slope along angle k + 2. Elimination of Gᵀ G + damping I, by hand.
+    Row k of G has no slope along angle k + 2. The system Gᵀ G + damping I is solved by explicit elimination.
     """
     g00, g01, g11, g12 = G[0, 0], G[0, 1], G[1, 1], G[1, 2]
     g22, g20 = G[2, 2], G[2, 0]
@@ -124,13 +124,13 @@ def _damped_turn(G: Array, gap: Array, damping: float, turn: Array) -> None:
 
 @kernel
 def settle(lengths: Array, b: float, a: float, theta: Array) -> float:
-    """Move leg angles (3,) from where they are to where the loop closes.
+    """Move leg angles (3,) from their current values to values at which the loop closes.
 
-    Damping shrinks with success, so that convergence ends quadratic; lengths that do not close
-    near the start end in the least sum of squared errors.
+    The damping decreases after each successful step, so that the final convergence is quadratic. If the lengths do not
+    close near the start, the result has the smallest sum of squared errors.
 
     Returns:
-        Largest error that is left [m²].
+        Largest remaining error [m²].
 
     Source:
         Levenberg 1944, Marquardt 1963.

@@ -15,11 +15,11 @@ from teleop_core.base.errors import ParameterError, ShapeError
 from teleop_core.kernels.geometry import Array, checked_array
 from teleop_machines.rps3_loop import frame, points, settle
 
-_CLOSED = 1e-10  # what is left of the loop equations in an assembly mode, over a²
+_CLOSED = 1e-10  # largest remaining error of the loop equations in an assembly mode, divided by a²
 
 
 class Assembly(IntEnum):
-    """Whether three leg lengths can be put together."""
+    """Whether three leg lengths can be assembled."""
 
     CLOSED = 0
     CANNOT_ASSEMBLE = 1
@@ -30,13 +30,13 @@ class AssemblyModes(NamedTuple):
 
     status: Assembly
     angles: Array
-    """Leg angles theta (k, 3) [rad], those with the first leg above the base first."""
+    """Leg angles theta (k, 3) [rad]; assemblies with the first leg above the base come first."""
     transforms: Array
     """``T_base_platform`` (k, 4, 4)."""
 
 
 def joint_points(lengths: object, angles: object, *, b: float) -> Array:
-    """Ball joints (3, 3) [m], one a row, of leg lengths [m] and angles [rad], (3,) each.
+    """Ball joints (3, 3) [m], one per row, from leg lengths [m] and angles [rad], (3,) each.
 
     Source:
         Ghosal 2020, lecture 6, Base_S1 to Base_S3.
@@ -143,7 +143,7 @@ def _starts(x: float, legs: Array, b: float, a: float) -> list[Array]:
 
 
 def _collect(found: list[Array], start: Array, legs: Array, b: float, a: float) -> None:
-    """Polish leg angles and add them, theta1 >= 0, unless they are known or not a solution."""
+    """Refine leg angles and add them with theta1 >= 0, unless they are already known or not a solution."""
     theta = start.copy()
     if settle(legs, b, a, theta) > _CLOSED * a * a:
         return

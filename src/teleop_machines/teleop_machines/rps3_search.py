@@ -1,7 +1,8 @@
-"""Assemblies of the 3-RPS: the one next to a seed, and the search for others, as kernels.
+"""Assemblies of the 3-RPS: the assembly nearest to a seed, and the search for others, as kernels.
 
-Given theta1, two loop equations give theta2 and theta3 with two signs each. From these four, at angles theta1 spread
-over half a turn, leg angles are moved to where the loop closes; the other half is the mirror image below the base.
+Given theta1, two loop equations give theta2 and theta3 with two signs each, which makes four starts. For values of
+theta1 spread over half a turn, leg angles are moved from these starts to values at which the loop closes. The other
+half turn is the mirror image below the base.
 
 Source:
     Lee and Shah 1988; Ghosal 2020, lectures 6 and 11; search derived from them.
@@ -16,12 +17,12 @@ from teleop_core.kernels.geometry import Array, rotation_angle_between
 from teleop_core.kinematics import MAX_ASSEMBLIES, REACHED, SEARCH_ALL, FkStatus
 from teleop_machines.rps3_loop import COSINES, SINES, frame, loop, points, settle
 
-# Volume of the three unit rows of the loop equations under which the legs hardly fix the platform.
+# Volume of the three unit rows of the loop equations below which the legs hardly fix the platform.
 _NEAR = 1e-3
-# Steps of the way from a seed, and the turn [rad] from which on it is gone: of 7300 random triples
-# with a pose of least squares nearer than 0.6 rad, all had it at the way's end.
+# Steps of the path from a seed, and the rotation [rad] above which the path is followed. Of 7300 random triples with a
+# least-squares pose nearer than 0.6 rad, all had this pose at the path's end.
 WAY, FAR = 48, 0.5
-_SAME = 1e-6  # rad, by which two assemblies differ
+_SAME = 1e-6  # rad, smallest difference of two assemblies
 _CLOSED, _NEAR_SINGULAR = int(FkStatus.CLOSED), int(FkStatus.NEAR_SINGULAR)
 _OTHER_MODE, _NOT_CLOSED = int(FkStatus.OTHER_MODE), int(FkStatus.NOT_CLOSED)
 
@@ -38,27 +39,27 @@ def lean(q: Array, geometry: Array, theta: Array) -> None:
 def volume(q: Array, theta: Array, b: float, a: float) -> float:
     """Determinant of the unit rows of the loop equations' slopes, -1 to 1; 0 where singular.
 
-    At home and wherever it is above 0 the platform is on home's side of the singular poses.
+    The platform is on the same side of the singular poses as home if the value is above 0.
     """
     gap, G = np.empty(3), np.empty((3, 3))
     loop(q, theta, b, a, gap, G)
     scale = 1.0
     for k in range(3):
         scale *= math.sqrt(G[k, k] ** 2 + G[k, (k + 1) % 3] ** 2)
-    # Row k has no slope along angle k + 2: two products are left of the determinant's six.
+    # Row k has no slope along angle k + 2, so only two of the determinant's six products remain.
     determinant = G[0, 0] * G[1, 1] * G[2, 2] + G[0, 1] * G[1, 2] * G[2, 0]
     return float(determinant / max(scale, 1e-300))
 
 
 @inner
 def is_near_singular(q: Array, theta: Array, b: float, a: float) -> bool:
-    """Whether the legs hardly fix the platform: unit rows of the loop equations span little."""
+    """Whether the legs hardly fix the platform: the unit rows of the loop equations span a small volume."""
     return bool(abs(volume(q, theta, b, a)) < _NEAR)
 
 
 @inner
 def open_by(q: Array, theta: Array, b: float, a: float, S: Array) -> float:
-    """Write the ball joints (3, 3) [m]; the largest error of a distance between them [m]."""
+    """Write the ball joints (3, 3) [m]; return the largest error of a distance between them [m]."""
     points(q, theta, b, S)
     worst = 0.0
     for i in range(3):
@@ -90,9 +91,9 @@ def angles_of(T: Array, b: float, a: float, q: Array, theta: Array) -> None:
 
 @inner
 def _others(q: Array, b: float, a: float, theta1: float, pairs: Array) -> None:
-    """Write both angles of legs 2 and 3 (2, 2) [rad] that the first leg's angle leaves.
+    """Write both possible angles of legs 2 and 3 (2, 2) [rad] for the first leg's angle.
 
-    P cos + Q sin + R = 0 for each; where it has no root, the angle of least error twice.
+    They are the roots of P cos + Q sin + R = 0; if there is no root, the angle of least error is written twice.
     """
     c, s = math.cos(theta1), math.sin(theta1)
     for leg in range(2):
@@ -117,17 +118,17 @@ def _is_known(found: Array, count: int, theta: Array) -> bool:
 
 @kernel
 def closing_angles(q: Array, b: float, a: float, starts: int, found: Array) -> int:
-    """Write leg angles of all assemblies that are found, above and below the base.
+    """Write leg angles of all assemblies that the search finds, above and below the base.
 
     Args:
         q: Leg lengths (3,) [m].
         b: Distance of the hinges from the base centre [m].
         a: Distance of the ball joints from the platform centre [m].
         starts: Starts of the search, four for each angle of the first leg.
-        found: Room for leg angles (MAX_ASSEMBLIES, 3) [rad].
+        found: Output array for leg angles (MAX_ASSEMBLIES, 3) [rad].
 
     Returns:
-        How many.
+        Number of assemblies found.
     """
     count, pairs, S, theta = 0, np.empty((2, 2)), np.empty((3, 3)), np.empty(3)
     for k in range(4 * (starts // 4)):
@@ -150,7 +151,7 @@ def closing_angles(q: Array, b: float, a: float, starts: int, found: Array) -> i
 
 @inner
 def _nearest(q: Array, b: float, a: float, starts: int, near: Array, theta: Array) -> bool:
-    """Write leg angles (3,) of the assembly with ball joints nearest to (3, 3); whether found."""
+    """Write leg angles (3,) of the assembly with ball joints nearest to ``near`` (3, 3); return whether it exists."""
     found, S = np.empty((MAX_ASSEMBLIES, 3)), np.empty((3, 3))
     best, chosen = math.inf, -1
     for k in range(closing_angles(q, b, a, starts, found)):
@@ -169,10 +170,10 @@ def _nearest(q: Array, b: float, a: float, starts: int, near: Array, theta: Arra
 
 @inner
 def _lead(q: Array, first: Array, b: float, a: float, side: float, theta: Array) -> bool:
-    """Move leg angles (3,) of an assembly with legs ``first`` along the straight way to legs q.
+    """Move leg angles (3,) of an assembly with legs ``first`` along the straight path to legs q.
 
     Returns:
-        Whether they arrived: the loop closes on all the way, on one side of the singular poses.
+        Whether the end was reached: the loop closes on the whole path, on one side of the singular poses.
     """
     now, before, S = np.empty(3), np.empty(3), np.empty((3, 3))
     for k in range(1, WAY + 1):
@@ -189,9 +190,9 @@ def _lead(q: Array, first: Array, b: float, a: float, side: float, theta: Array)
 
 @inner
 def _at_seed(g: Array, ask: Array, T: Array, first: Array, theta: Array) -> float:
-    """Write legs (3,) and angles (3,) of the seed or of home, and T of home; the side they are on.
+    """Write legs (3,) and angles (3,) of the seed or of home, and T of home. Return their side of the singular poses.
 
-    Home's side is where :func:`volume` is above 0.
+    On home's side, :func:`volume` is above 0.
     """
     if ask[1] > 0.0:
         angles_of(T, g[0], g[1], first, theta)
@@ -207,7 +208,7 @@ def _at_seed(g: Array, ask: Array, T: Array, first: Array, theta: Array) -> floa
 
 @inner
 def _far(q: Array, first: Array, g: Array, starts: int, side: float, T: Array, seed: Array, theta: Array) -> int:
-    """Replace leg angles (3,) by the end of the way from the seed, else by the nearest found."""
+    """Replace leg angles (3,) by those at the end of the path from the seed, else by the nearest assembly found."""
     if _lead(q, first, g[0], g[1], side, seed):
         theta[:] = seed
         return _CLOSED

@@ -3,13 +3,13 @@
 q is theta1, theta2, d3 (up), then six leg lengths. The legs hold the platform's centre ``w_z``
 above the Stewart base, so position and orientation decouple: R = Rx(alpha) Ry(beta) Rz(gamma), tip
 = s + (0, 0, w_z) + e_eff R z with s the SCARA tip. ``heading="fixed"`` is the published model, in
-which the Stewart base does not turn; ``"carried"`` bolts it to link 2, so the SCARA is solved
-first and the legs make up for its turn theta1 + theta2.
+which the Stewart base does not rotate. With ``"carried"`` it is fixed to link 2, so the SCARA is solved first, and the
+legs compensate its rotation theta1 + theta2.
 
-The published leg layout is architecturally singular: its legs alone do not hold the platform, and
-a level platform hides its turn about the vertical, left or right (``ik`` says NEAR_SINGULAR
-there). ``fk`` takes the published assumption of a held centre. With ``sigma_b`` and ``sigma_m``,
-such as 15° each, the joints stand in pairs, and ``fk`` uses all that the legs say.
+The published leg layout is architecturally singular: the legs alone do not hold the platform. For a level platform,
+the leg lengths do not show whether it is rotated left or right about the vertical (``ik`` then returns NEAR_SINGULAR).
+``fk`` uses the published assumption that the centre is held. With ``sigma_b`` and ``sigma_m``, such as 15° each, the
+joints are arranged in pairs, and ``fk`` uses the full information of the legs.
 
 Source:
     Kucuk and Gungor 2016, eqs. 1-25, corrected; carried mode and way back derived from them.
@@ -28,7 +28,7 @@ from teleop_machines import scara_stewart_drives, scara_stewart_legs, stewart_le
 from teleop_machines.bodies.hybrid_bodies import scara_stewart_bodies
 
 JOINTS = ("theta1", "theta2", "d3", "leg1", "leg2", "leg3", "leg4", "leg5", "leg6")
-# r_b to sigma_m are handed to the leg kernels as they stand here.
+# r_b to sigma_m are passed to the leg kernels in this order.
 GEOMETRY = {
     "l1": 0.5, "l2": 0.5, "h1": 0.0, "e_eff": 0.1,
     "r_b": 0.2, "r_m": 0.1, "w_z": 0.2, "sigma_b": 0.0, "sigma_m": 0.0,
@@ -39,10 +39,10 @@ _L1, _L2, _H1, _E, _LEGS, _W, _CARRIED = 0, 1, 2, 3, 4, 6, 9
 _TURN = math.radians(175.0)
 _STROKES = 0.45, 1.6  # of the leg length on a level platform
 HOME_JOINTS = -math.pi / 4.0, math.pi / 2.0, 0.25
-# Answer of :func:`teleop_core.robots.freedom.start_posture` for the published lengths, rounded.
+# Result of :func:`teleop_core.robots.freedom.start_posture` for the published lengths, rounded.
 START = np.array([-0.0032, 2.145, 0.2651, 0.2327, 0.3012, 0.1801, 0.1219, 0.1221, 0.1767])
-HOME_TILT = math.radians(30.0)  # alpha of the published example; level would hide the turn
-_NEAR = 0.02  # sine of the elbow under which small moves need large joint moves
+HOME_TILT = math.radians(30.0)  # alpha of the published example; a level platform would hide the rotation
+_NEAR = 0.02  # sine of the elbow below which small moves need large joint moves
 _SWING = 1.25 * math.pi  # rad, of a joint that a path sends round the other way
 # Sine of the elbow of a straight arm: shortens it by less than rounding, and has a sign.
 _STRAIGHT = 1e-8
@@ -83,8 +83,8 @@ def fk(q: Array, geometry: Array, T: Array) -> None:
 def assemble(q: Array, geometry: Array, ask: Array, T: Array, out: Array) -> int:
     """Write ``T_base_tip``, (4, 4), of joints (9,); see :class:`kinematics.Kernels`.
 
-    Similar hexagons: the turn about the held centre, which six legs may contradict by
-    :data:`AGREED`. Other layouts: all six freedoms, from the seed if there is one.
+    For similar hexagons, the rotation about the held centre is computed; the six legs may differ from it by
+    :data:`AGREED`. For other layouts, all six degrees of freedom are computed, from the seed if there is one.
     """
     g, platform = geometry[_LEGS:_CARRIED], np.empty((4, 4))
     if ask[1] > 0.0:
@@ -98,7 +98,7 @@ def assemble(q: Array, geometry: Array, ask: Array, T: Array, out: Array) -> int
 def assemblies(q: Array, geometry: Array, found: Array) -> int:
     """Write all ``T_base_tip`` of joints (9,); see :class:`kinematics.Kernels`.
 
-    One at most with similar hexagons, whose centre is held.
+    With similar hexagons, whose centre is held, there is at most one.
     """
     g, joints, out = geometry[_LEGS:_CARRIED], np.empty((2, 6, 3)), np.empty(2)
     if scara_stewart_legs.is_similar(g[3], g[4]):
@@ -130,7 +130,7 @@ def _platform_of(q: Array, g: Array, T: Array, platform: Array) -> None:
 def _twists(platform: Array, g: Array, twists: Array) -> None:
     """Write the platform's twist (6, 6) in the Stewart base per leg speed.
 
-    Similar hexagons: least-squares turn about the held centre; hidden turns do not show.
+    For similar hexagons: least-squares rotation about the held centre; hidden rotations do not appear.
     """
     J = np.empty((6, 6))
     scara_stewart_legs.leg_slopes(platform, g, J)
@@ -160,7 +160,7 @@ def jacobian(q: Array, geometry: Array, J: Array) -> None:
     _place(q, geometry, platform, T)
     _twists(platform, g, twists)
     carried = geometry[_CARRIED]
-    # Lever arms of joints 1 and 2: to the tip if the platform turns along, else to the SCARA tip.
+    # Lever arms of joints 1 and 2: to the tip if the platform rotates with link 2, else to the SCARA tip.
     x2, y2 = geometry[_L2] * math.cos(q[0] + q[1]), geometry[_L2] * math.sin(q[0] + q[1])
     x1, y1 = x2 + geometry[_L1] * math.cos(q[0]), y2 + geometry[_L1] * math.sin(q[0])
     dx, dy = carried * (T[0, 3] - x1), carried * (T[1, 3] - y1)
@@ -184,7 +184,7 @@ def jacobian(q: Array, geometry: Array, J: Array) -> None:
 
 @inner
 def _arm(T: Array, g: Array, is_left: bool, seed: float, arm: Array) -> bool:
-    """Write theta1 (up to a turn), theta2, d3 (3,) of one elbow; whether the SCARA reaches.
+    """Write theta1 (modulo a full turn), theta2, d3 (3,) of one elbow; return whether the SCARA reaches the point.
 
     theta1 = atan2(y, x) - atan2(l2 sin(theta2), l1 + l2 cos(theta2)) needs no choice of sign. On
     the axis of joint 1, where a folded arm has every theta1, the seed's is kept. A straight arm
@@ -220,10 +220,10 @@ def _cost(T: Array, seed: Array, limits: Array, g: Array, q: Array) -> float:
 
 @inner
 def _choose(T: Array, seed: Array, limits: Array, g: Array, q: Array) -> bool:
-    """Write theta1, theta2, d3 of the elbow to take; whether the SCARA reaches at all.
+    """Write theta1, theta2, d3 of the chosen elbow; return whether the SCARA reaches the point.
 
-    A path keeps the seed's elbow; else it is the nearer one inside the limits. The two differ in
-    the sign of theta2 at least.
+    A path keeps the seed's elbow; otherwise the nearer elbow inside the limits is chosen. The two elbows differ at
+    least in the sign of theta2.
     """
     sine = math.sin(seed[1])
     is_reachable = _arm(T, g, sine >= 0.0, seed[0], q)
@@ -240,10 +240,10 @@ def _choose(T: Array, seed: Array, limits: Array, g: Array, q: Array) -> bool:
 
 @inner
 def _swung(angle: float, seed: float, lower: float, upper: float, is_path: bool) -> float:
-    """Joint 1 or 2 at an angle given up to turns, next to the seed.
+    """Joint 1 or 2 at an angle modulo full turns, as near as possible to the seed.
 
-    A path over the axis of joint 1 asks for half a turn either way; the way that an end stop does
-    not bar is taken then. At its end stop a joint waits until the target is within such a swing.
+    A path over the axis of joint 1 needs half a turn in either direction; the direction without an end stop is chosen.
+    At its end stop a joint waits until the target is within such a swing.
     """
     near = branches.turned(angle, seed, lower, upper, is_path)
     if is_path and not lower <= near <= upper:
@@ -255,9 +255,9 @@ def _swung(angle: float, seed: float, lower: float, upper: float, is_path: bool)
 
 @inner
 def _held_arm(T: Array, seed: Array, limits: Array, g: Array, q: Array) -> bool:
-    """Write theta1, theta2, d3 of q that are allowed; whether the SCARA reaches at all.
+    """Write theta1, theta2, d3 of q within limits and step; return whether the SCARA reaches the point.
 
-    Where joint 1 is held back, joint 2 points the second link at the wanted point.
+    If joint 1 is held back, joint 2 points the second link at the wanted point.
     """
     is_reachable = _choose(T, seed, limits, g, q)
     is_path = math.isfinite(limits[2, 0])
@@ -278,8 +278,8 @@ def _held_arm(T: Array, seed: Array, limits: Array, g: Array, q: Array) -> bool:
 def ik(T: Array, seed: Array, limits: Array, geometry: Array, q: Array, residual: Array) -> int:
     """Write joints (9,) for ``T_base_tip``; see :class:`teleop_core.robots.robot.Kernels`.
 
-    The legs turn the tool as wanted from where the arm really is; where they are held back, all
-    are slowed by one factor.
+    The legs orient the tool as wanted, computed for the arm's real position. If the legs are held back, all legs are
+    slowed by the same factor.
 
     Source:
         Kucuk and Gungor 2016, eqs. 14-25, corrected; carried mode derived from them.

@@ -1,9 +1,9 @@
-"""Orientation of the hybrid's platform: its leg layout, and the turn that six legs stand for.
+"""Orientation of the hybrid's platform: its leg layout, and the orientation that belongs to six leg lengths.
 
 Legs i = 1..6 stand at 60° (i - 1), base joints shifted by ∓sigma_b and platform joints by ±sigma_m
 (upper sign for odd i). The published layout has no shifts: two similar hexagons in line, which is
-architecturally singular. Its legs give the orientation only because the hybrid holds the
-platform's centre at (0, 0, w_z), and never whether a level platform has turned left or right.
+architecturally singular. Its legs determine the orientation only because the hybrid holds the platform's centre at (0,
+0, w_z). They never show whether a level platform is rotated left or right.
 
 With the centre held, squared leg lengths are linear in the upper left block and the third row of
 R. The layout's symmetry splits the six equations into sums that are solved by hand.
@@ -20,12 +20,12 @@ from teleop_core.kernels import Array, inner, kernel
 from teleop_core.kinematics import AGREED, FkStatus
 from teleop_machines import stewart_legs, stewart_search
 
-# Sine of sigma_b + sigma_m under which the layout counts as similar hexagons.
+# Sine of sigma_b + sigma_m below which the layout counts as similar hexagons.
 _SIMILAR = 1e-9
 # Of 60° (i - 1).
 _COSINES = (1.0, 0.5, -0.5, -1.0, -0.5, 0.5)
 _SINES = (0.0, math.sqrt(0.75), math.sqrt(0.75), 0.0, -math.sqrt(0.75), -math.sqrt(0.75))
-# Sum of squared leg errors, over r_m², of legs that agree: rounding.
+# Largest sum of squared leg errors, divided by r_m², of consistent legs: rounding errors.
 _AGREED = 1e-29
 # Sine of the largest tilt of the platform, 75°: its ball joints' assumed limit.
 TILT = math.sin(math.radians(75.0))
@@ -41,7 +41,7 @@ def is_similar(sigma_b: float, sigma_m: float) -> bool:
 
 @inner
 def _joint(i: int, radius: float, c: float, s: float) -> tuple[float, float]:
-    """Place of a leg's joint on its circle [m]; shifted back by the angle of c, s for odd legs."""
+    """Position of a leg's joint on its circle [m]; for odd legs shifted back by the angle with cosine c and sine s."""
     sign = 1.0 if i % 2 == 0 else -1.0
     return (radius * (_COSINES[i] * c + sign * _SINES[i] * s), radius * (_SINES[i] * c - sign * _COSINES[i] * s))
 
@@ -51,7 +51,7 @@ def leg_lengths(T: Array, g: Array, legs: Array) -> float:
     """Write leg lengths (6,) [m] of a platform pose (4, 4).
 
     Returns:
-        Root mean square of the leg speeds per turn of the platform about the vertical [m].
+        Root mean square of the leg speeds per angular speed of the platform about the vertical [m].
     """
     cb, sb, cm, sm = math.cos(g[3]), math.sin(g[3]), math.cos(g[4]), math.sin(g[4])
     turning = 0.0
@@ -110,17 +110,17 @@ def wanted_platform(T: Array, heading: float, w_z: float, platform: Array) -> No
     if T[2, 2] > 0.0 and sine <= TILT:
         return
     turn = math.atan2(platform[1, 0] - platform[0, 1], platform[0, 0] + platform[1, 1])
-    if sine < 1e-9:  # upside down, every direction is as near
+    if sine < 1e-9:  # upside down, all directions are equally near
         x, y, sine = 1.0, 0.0, 1.0
     turned_and_tilted(turn, TILT / sine * x, TILT / sine * y, platform)
 
 
 @inner
 def _turn_of_hexagons(cosine: float, z1: complex, tilt: complex, up: float) -> float:
-    """Turn of a platform of similar hexagons, from its cosine and from where the tilt shows.
+    """Rotation of a platform of similar hexagons, from its cosine and from the direction of the tilt.
 
-    z1 = -e^(i turn) tilt² / (2 (1 + up)) tells the sign, and the sine where it is small beside
-    the square of the tilt. On a level platform the sign is not there: plus is taken.
+    z1 = -e^(i turn) tilt² / (2 (1 + up)) gives the sign, and the sine if it is small relative to the square of the
+    tilt. On a level platform the sign is unknown, and plus is used.
     """
     square = tilt.real * tilt.real + tilt.imag * tilt.imag
     seen = (-2.0 * (1.0 + up) * z1 * (tilt * tilt).conjugate()).imag
@@ -143,10 +143,10 @@ def _sums(legs: Array, constant: float, half: int) -> tuple[float, complex]:
 
 @kernel
 def orientation(legs: Array, g: Array, T: Array) -> None:
-    """Write the platform pose that legs (6,) [m] stand for when its centre is at (0, 0, w_z).
+    """Write the platform pose for legs (6,) [m] if its centre is at (0, 0, w_z).
 
     Args:
-        legs: Leg lengths (6,) [m]; of legs that contradict each other a turn close to them.
+        legs: Leg lengths (6,) [m]; for inconsistent legs, an approximate orientation is written.
         g: r_b, r_m, w_z [m], sigma_b, sigma_m [rad].
         T: Platform in the Stewart base (4, 4); its z points up.
     """
@@ -177,10 +177,10 @@ def orientation(legs: Array, g: Array, T: Array) -> None:
 
 @inner
 def platform_pose(legs: Array, g: Array, T: Array) -> None:
-    """Write the platform pose (4, 4) in the Stewart base that six legs hold best.
+    """Write the platform pose (4, 4) in the Stewart base that fits six leg lengths best.
 
-    Similar hexagons: the turn of least squared leg errors about the held centre. Other layouts:
-    the pose with all six freedoms, found from the one with the centre held.
+    For similar hexagons: the rotation about the held centre with the smallest squared leg errors. For other layouts:
+    the pose with all six degrees of freedom, found from the pose with the centre held.
     """
     orientation(legs, g, T)
     found, square = np.empty(6), 0.0
@@ -212,7 +212,7 @@ def close_platform(legs: Array, g: Array, ask: Array, T: Array, out: Array) -> i
     Args:
         legs: Leg lengths (6,) [m].
         g: r_b, r_m, w_z [m], sigma_b, sigma_m [rad].
-        ask: Starts of the search where no pose closes next to the seed, and whether T is a seed.
+        ask: Number of starts of the search if no pose closes near the seed, and whether T is a seed.
         T: Seed, and platform in the Stewart base (4, 4).
         out: Largest error of a leg [m], side of the singular poses (2,).
 
@@ -238,7 +238,7 @@ def close_platform(legs: Array, g: Array, ask: Array, T: Array, out: Array) -> i
 
 @inner
 def is_blind(T: Array, turning: float, g: Array) -> bool:
-    """Whether the legs hardly tell the platform's turn; ``turning`` from :func:`leg_lengths`."""
+    """Whether the legs hardly determine the platform's rotation; ``turning`` is from :func:`leg_lengths`."""
     square = T[2, 0] ** 2 + T[2, 1] ** 2
     is_level = is_similar(g[3], g[4]) and square < 1e-4
     return bool(is_level or turning < 0.02 * g[1])

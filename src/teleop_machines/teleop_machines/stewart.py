@@ -1,14 +1,14 @@
 """Stewart-Gough platform: a body on six legs of any layout (6-UPS).
 
-A :class:`Layout` holds the twelve joint points and answers: leg lengths of a pose, the pose of leg lengths from a seed,
-leg Jacobian and rank. On an architecturally singular layout, such as two similar hexagons one above the other, the legs
-never fix the platform, whatever the pose; direct kinematics is refused there with a status.
+A :class:`Layout` contains the twelve joint points and computes leg lengths of a pose, the pose of leg lengths from a
+seed, the leg Jacobian and its rank. On an architecturally singular layout, such as two similar hexagons one above the
+other, the legs fix the platform in no pose; direct kinematics then returns a status instead.
 
-As a robot, q is the six leg lengths, the tip is the platform frame, and ``fk`` is direct kinematics from the home pose:
-the level platform ``z0`` above the base. Where the wanted pose belongs to another assembly than the one next to home,
-``ik`` gives its legs and says UNREACHABLE. Where none is next to home, :meth:`Robot.fk` searches, and
-:meth:`Robot.fk_all` finds up to 40. On an architecturally singular layout legs fix no pose: :meth:`Robot.solve_fk` says
-UNDETERMINED, ``fk`` and ``jacobian`` refuse, their kernels write NaN, and ``ik`` says NEAR_SINGULAR.
+As a robot, q is the six leg lengths, the tip is the platform frame, and ``fk`` is direct kinematics from the home
+pose: the level platform ``z0`` above the base. If the wanted pose belongs to another assembly than the one nearest to
+home, ``ik`` returns its legs and UNREACHABLE. If there is no assembly near home, :meth:`Robot.fk` searches, and
+:meth:`Robot.fk_all` finds up to 40. On an architecturally singular layout the legs fix no pose: :meth:`Robot.solve_fk`
+returns UNDETERMINED, ``fk`` and ``jacobian`` raise errors, their kernels write NaN, and ``ik`` returns NEAR_SINGULAR.
 ``load_robot("stewart", **layout.symbols())`` takes any layout.
 
 Source:
@@ -40,16 +40,16 @@ _NEAR_SINGULAR, _UNREACHABLE = (int(kinematics.IkStatus.NEAR_SINGULAR), int(kine
 
 
 class DirectStatus(IntEnum):
-    """What became of a question for the pose of six leg lengths."""
+    """Status of direct kinematics."""
 
     SOLVED = 0  # the pose has these leg lengths
-    NEAR_SINGULAR = 1  # it has, but the legs hardly fix it
-    CANNOT_ASSEMBLE = 2  # from this seed no pose was found; the one of least error is returned
-    ARCHITECTURALLY_SINGULAR = 3  # refused, the legs fix no pose in this layout; seed returned
+    NEAR_SINGULAR = 1  # the pose has these leg lengths, but the legs hardly fix it
+    CANNOT_ASSEMBLE = 2  # no pose was found from this seed; the pose of least error is returned
+    ARCHITECTURALLY_SINGULAR = 3  # refused, because the legs fix no pose in this layout; the seed is returned
 
 
 class DirectResult(NamedTuple):
-    """Answer of :meth:`Layout.direct`."""
+    """Result of :meth:`Layout.direct`."""
 
     T: Array
     """``T_base_platform`` (4, 4)."""
@@ -98,7 +98,7 @@ class Layout:
         return self._system(T)[1]
 
     def singular_values(self, T: object) -> Array:
-        """Singular values (6,) of the leg Jacobian, largest first, turns weighed by the size."""
+        """Singular values (6,) of the leg Jacobian, largest first; rotations are weighted by the size."""
         weight = np.repeat([1.0, 1.0 / self.size], 3)
         return np.linalg.svd(self.leg_jacobian(T) * weight, compute_uv=False)
 
@@ -194,8 +194,9 @@ def _at_home(geometry: Array, T: Array) -> None:
 def fk(q: Array, geometry: Array, T: Array) -> None:
     """Write ``T_base_tip`` (4, 4) of leg lengths (6,) [m], found from the home pose.
 
-    Of least error where nothing closes next to home: with the joints in pairs none of the poses that are turned by up
-    to 1 rad, 0.2 % up to 1.3 rad, 8 % up to half a turn, as measured over legal legs. :func:`assemble` says so.
+    If no pose closes near home, the pose of least error is written; :func:`assemble` reports this. Measured over legal
+    legs with joints in pairs, this happens for no pose that is rotated by up to 1 rad, 0.2 % up to 1.3 rad, and 8 % up
+    to half a turn.
     """
     _at_home(geometry, T)
     base, platform = geometry[:18].reshape((6, 3)), geometry[18:36].reshape((6, 3))
@@ -233,7 +234,7 @@ def assemblies(q: Array, geometry: Array, found: Array) -> int:
 
 @kernel
 def jacobian(q: Array, geometry: Array, J: Array) -> None:
-    """Write the Jacobian (6, 6): that of the legs, inverted, at the pose of :func:`assemble`."""
+    """Write the Jacobian (6, 6): the inverse of the leg Jacobian at the pose of :func:`assemble`."""
     T, legs, lengths = np.empty((4, 4)), np.empty((6, 6)), np.empty(6)
     assemble(q, geometry, np.array((float(kinematics.SEARCH), 0.0)), T, np.empty(2))
     base, platform = geometry[:18].reshape((6, 3)), geometry[18:36].reshape((6, 3))
@@ -256,7 +257,7 @@ def ik(T: Array, seed: Array, limits: Array, geometry: Array, q: Array, residual
     leg_system(T, base, platform, q, legs)
     is_there = branches.slowed(q, seed, limits, q)
     if geometry[_SINGULAR] > 0.0:
-        # The legs of the pose, though they do not hold it; a pose next to it if they fell short.
+        # The legs of the pose, although they do not fix it; if the limits held the legs back, legs of a nearby pose.
         reached[:] = T
         direct(q, base, platform, size, False, reached)
         kinematics.pose_residual(reached, T, residual)

@@ -62,7 +62,9 @@ def moved(T: Array, move: Array, out: Array) -> None:
 
 @inner
 def _damped_move(J: Array, gap: Array, damping: float, size: float, A: Array, move: Array) -> float:
-    """Write the least-squares move (6,) that closes the gaps (6,), damped per length ``size``.
+    """Write the damped least-squares move (6,) that closes the gaps (6,).
+
+    Rotations are weighted by the length ``size``.
 
     ``A`` (6, 6) is overwritten.
 
@@ -93,10 +95,10 @@ def _damped_move(J: Array, gap: Array, damping: float, size: float, A: Array, mo
 def _gaps(
     T: Array, wanted: Array, base: Array, platform: Array, is_pinned: bool, gap: Array, J: Array
 ) -> tuple[float, float]:
-    """Write what the legs lack (6,) [m] and the leg Jacobian (6, 6), of a held origin if pinned.
+    """Write the leg errors (6,) [m] and the leg Jacobian (6, 6); if pinned, the platform's origin is held.
 
     Returns:
-        Sum of squares and largest of what they lack.
+        Sum of squares and largest magnitude of the leg errors.
     """
     leg_system(T, base, platform, gap, J)
     square = largest = 0.0
@@ -111,21 +113,21 @@ def _gaps(
 
 @kernel
 def direct(wanted: Array, base: Array, platform: Array, size: float, is_pinned: bool, T: Array) -> float:
-    """Move T from where it is to the platform pose with these leg lengths.
+    """Move T from its current pose to the platform pose with the wanted leg lengths.
 
-    Damping shrinks with success, so that convergence ends quadratic; lengths that no pose near
-    the start has end in the least sum of squared errors.
+    The damping decreases after each successful step, so that the final convergence is quadratic. If no pose near the
+    start has these lengths, the result has the smallest sum of squared errors.
 
     Args:
         wanted: Leg lengths (6,) [m].
         base: Base joints (6, 3) [m].
         platform: Platform joints (6, 3) [m].
         size: Length [m] at which one metre weighs as one radian.
-        is_pinned: Whether the platform's origin stays where it is, so that T only turns.
+        is_pinned: Whether the platform's origin is fixed, so that T only rotates.
         T: Start, and result (4, 4).
 
     Returns:
-        Largest error of a leg length that is left [m].
+        Largest remaining error of a leg length [m].
     """
     gap, J = np.empty(6), np.empty((6, 6))
     cost, worst = _gaps(T, wanted, base, platform, is_pinned, gap, J)
@@ -160,9 +162,9 @@ def _identity(A: Array) -> None:
 
 @inner
 def invert(A: Array, inverse: Array) -> float:
-    """Write the inverse (n, n) of A, which is destroyed; the product of the pivots' signs.
+    """Write the inverse (n, n) of A into ``inverse``; A is overwritten. Return the product of the pivots' signs.
 
-    Partial pivoting; a pivot of nothing counts as 1e-12, so that the result stays finite.
+    Uses partial pivoting; a pivot of zero is replaced by 1e-12, so that the result stays finite.
     """
     n, sign = A.shape[0], 1.0
     _identity(inverse)

@@ -1,8 +1,8 @@
-"""Assemblies of six legs: the one next to a seed, and the search for others, as kernels.
+"""Assemblies of six legs: the assembly nearest to a seed, and the search for others, as kernels.
 
-The search moves a platform from starts spread evenly over attitudes and places to where the legs
-close. Of leg lengths that have an assembly at all, a quarter of the starts and more end in one, so
-that 64 starts, none of which does, are a chance of 1e-8.
+The search moves a platform from starts, which are spread evenly over orientations and positions, to poses at which the
+legs close. If leg lengths have an assembly, at least a quarter of the starts end in one. The probability that all of
+64 starts miss is therefore 1e-8.
 
 Source:
     Roberts 2018 (even spread, the R sequence); Shoemake 1992 (even attitudes).
@@ -18,14 +18,14 @@ from teleop_core.kinematics import MAX_ASSEMBLIES, REACHED, FkStatus
 from teleop_core.kinematics.damped import is_near_singular
 from teleop_machines.stewart_legs import direct, leg_system
 
-# Smallest over largest singular value of the leg Jacobian under which a pose is close to singular.
+# Smallest divided by largest singular value of the leg Jacobian below which a pose is close to singular.
 NEAR = 1e-3
 # Root of x^6 = x + 1: its powers spread points evenly in five dimensions.
 _ROOT = 1.1347241384015194
-# Steps of the way from a seed, and the turn [rad] from which on it is gone: of 4300 random leg sets
-# with a pose of least squares nearer than 0.6 rad, all had it at the way's end.
+# Steps of the path from a seed, and the rotation [rad] above which the path is followed. Of 4300 random leg sets with
+# a least-squares pose nearer than 0.6 rad, all had this pose at the path's end.
 WAY, FAR = 48, 0.5
-_SAME = 1e-6  # rad, and of the platform's size, by which two assemblies differ
+_SAME = 1e-6  # smallest difference of two assemblies [rad, share of the platform's size]
 _CLOSED, _NEAR_SINGULAR = int(FkStatus.CLOSED), int(FkStatus.NEAR_SINGULAR)
 _OTHER_MODE, _NOT_CLOSED = int(FkStatus.OTHER_MODE), int(FkStatus.NOT_CLOSED)
 
@@ -97,10 +97,10 @@ def closing_poses(legs: Array, base: Array, platform: Array, size: float, starts
         platform: Platform joints (6, 3) [m].
         size: Length [m] at which one metre weighs as one radian.
         starts: Starts of the search.
-        found: Room for poses (MAX_ASSEMBLIES, 4, 4).
+        found: Output array for poses (MAX_ASSEMBLIES, 4, 4).
 
     Returns:
-        How many.
+        Number of poses found.
     """
     count, reach, T = 0, 0.0, np.empty((4, 4))
     for i in range(6):
@@ -120,7 +120,7 @@ def closing_poses(legs: Array, base: Array, platform: Array, size: float, starts
 
 @inner
 def _nearest(legs: Array, base: Array, platform: Array, size: float, starts: int, T: Array) -> bool:
-    """Replace a pose by the nearest to it of those that the search finds; whether it does."""
+    """Replace a pose by the nearest pose that the search finds; return whether it finds one."""
     found, best, chosen = np.empty((MAX_ASSEMBLIES, 4, 4)), math.inf, -1
     for k in range(closing_poses(legs, base, platform, size, starts, found)):
         far = _away(T, found[k], size)
@@ -133,7 +133,10 @@ def _nearest(legs: Array, base: Array, platform: Array, size: float, starts: int
 
 @inner
 def _is_singular(T: Array, base: Array, platform: Array, size: float, lengths: Array, J: Array) -> tuple[bool, float]:
-    """Write leg lengths (6,) [m]; whether legs hardly fix the pose, and the pose's side."""
+    """Write leg lengths (6,) [m].
+
+    Return whether the legs hardly fix the pose, and the pose's side of the singular poses.
+    """
     leg_system(T, base, platform, lengths, J)
     is_near = bool(is_near_singular(J.T, 1.0 / size, NEAR * 2.0 * size))
     return is_near, side_of(J)
@@ -141,10 +144,10 @@ def _is_singular(T: Array, base: Array, platform: Array, size: float, lengths: A
 
 @inner
 def _lead(legs: Array, base: Array, platform: Array, size: float, side: float, T: Array) -> bool:
-    """Move a closed pose (4, 4) along the straight way of its legs to others (6,).
+    """Move a closed pose (4, 4) along the straight path of its leg lengths to other lengths (6,).
 
     Returns:
-        Whether it arrived: the legs close on all the way, on one side of the singular poses.
+        Whether the end was reached: the legs close on the whole path, on one side of the singular poses.
     """
     first, now, J, before = np.empty(6), np.empty(6), np.empty((6, 6)), np.empty((4, 4))
     leg_system(T, base, platform, first, J)
@@ -166,19 +169,19 @@ def _lead(legs: Array, base: Array, platform: Array, size: float, side: float, T
 def close_legs(
     legs: Array, base: Array, platform: Array, size: float, starts: int, side: float, T: Array, out: Array
 ) -> int:
-    """Move a pose from where it is to the assembly with these leg lengths next to it.
+    """Move a pose to the nearest assembly with the given leg lengths.
 
-    That is the one at the end of the straight way of the legs, if they close all along it: the
-    pose of least squares, where that is near, or the way is gone in :data:`WAY` steps.
+    This is the assembly at the end of the straight path of the leg lengths, if the legs close on the whole path. If
+    the least-squares pose is near, it is used; otherwise the path is followed in :data:`WAY` steps.
 
     Args:
         legs: Leg lengths (6,) [m].
         base: Base joints (6, 3) [m].
         platform: Platform joints (6, 3) [m].
         size: Length [m] at which one metre weighs as one radian.
-        starts: Starts of the search that follows where that does not close.
+        starts: Number of starts of the search that follows if the path does not close.
         side: Sign of the leg Jacobian's determinant at the seed; 0 to find it.
-        T: Seed, and pose (4, 4); of least error where nothing closes.
+        T: Seed, then result (4, 4); the pose of least error if no pose closes.
         out: Largest error of a leg [m], sign of the leg Jacobian's determinant (2,).
 
     Returns:

@@ -1,10 +1,10 @@
 """Three-fingered hand: three R-R-R fingers that hold a triangle, contacts as ball joints.
 
-The hand has six freedoms (nine joints less three distances between contacts). As a robot, q is all nine joints, theta,
-psi, phi of each finger; ``fk`` is the object's frame at the three contact points, if the joints hold the object to 0.1
-mm; ``ik`` keeps every finger on the contact point of the wanted object pose, so it only returns joints that hold the
-object unless a finger cannot follow. :class:`Hand` answers for contact points, single fingers, and the three joints
-that follow from six actuated ones.
+The hand has six degrees of freedom (nine joints minus three distances between contacts). As a robot, q is all nine
+joints, theta, psi, phi of each finger. ``fk`` is the object's frame at the three contact points, if the joints hold
+the object to 0.1 mm. ``ik`` puts every finger on the contact point of the wanted object pose, so the returned joints
+hold the object unless a finger cannot follow. :class:`Hand` computes contact points, single fingers, and the three
+joints that follow from six actuated joints.
 
 Source:
     Ghosal 2020, lectures 6 and 11, after Salisbury 1982; six freedoms, not three as spoken.
@@ -39,7 +39,7 @@ from teleop_machines.hand_grasp import (
 __all__ = ["GEOMETRY", "Grasp", "GraspResult", "Hand", "make"]
 
 _LIMITS = np.radians([80.0, 110.0, 150.0])  # assumed, either way
-_NEAR = 0.02  # sine of phi, and reach over full reach, that count as near singular
+_NEAR = 0.02  # limits of a near-singular finger: sine of phi, and reach divided by full reach
 _CLOSED, _NOT_CLOSED = int(kinematics.FkStatus.CLOSED), int(kinematics.FkStatus.NOT_CLOSED)
 _FOLLOWED, _LIMITED = int(kinematics.IkStatus.FOLLOWED), int(kinematics.IkStatus.LIMITED)
 _NEAR_SINGULAR, _UNREACHABLE = (int(kinematics.IkStatus.NEAR_SINGULAR), int(kinematics.IkStatus.UNREACHABLE))
@@ -57,8 +57,8 @@ def fk(q: Array, geometry: Array, T: Array) -> None:
 def assemble(q: Array, geometry: Array, ask: Array, T: Array, out: Array) -> int:
     """Write ``T_base_object`` of nine joints; see :class:`kinematics.Kernels`.
 
-    The pose is that of the contact points, whatever the seed; the residual is the largest slip
-    between two of them, which may be :data:`AGREED`.
+    The pose is the pose of the contact points, for any seed. The residual is the largest slip between two of them,
+    which may be up to :data:`AGREED`.
     """
     points = np.empty((3, 3))
     contacts(q, geometry, points)

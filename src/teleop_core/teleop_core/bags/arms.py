@@ -5,11 +5,12 @@ The metadata name the arms under ``arms``, with blanks between them and the defa
 and seed of a further arm are in ``left/robot`` and ``left/seed``. All arms share ``diagnostics``,
 in which the nodes of an arm are called ``left/slave``.
 
-What a recorder records in a namespace is below that as well, which the metadata tell under
-``namespace``: arms keep their names, and ``left`` of ``/lab`` is below ``lab/left/``.
+If the recorder ran in a namespace, all topics are below that namespace, which the metadata contain under
+``namespace``. The arms keep their names: topics of the arm ``left`` in ``/lab`` are below ``lab/left/``.
 
-Where no metadata name the arms, as in what a recorder records alone in a namespace, an arm is whatever measures a
-slave's pose: ``left/slave/measured_cp``. Then there may be no default arm with plain topics.
+If no metadata name the arms, for example because a recorder ran alone in a namespace, each topic of a slave's measured
+pose is one arm: ``left/slave/measured_cp`` is the arm ``left``. Such a recording may have no default arm with plain
+topics.
 """
 
 from collections.abc import Iterable, Iterator
@@ -22,12 +23,12 @@ from teleop_core.graph.topics import DIAGNOSTICS, SLAVE_MEASURED_CP, Topic
 ARMS_KEY = "arms"
 NAMESPACE_KEY = "namespace"
 PLAYED_KEY = "played"
-"""Entry with the stage up to which topics were taken from a file, as a replay does."""
+"""Metadata entry: the last stage whose topics a replay took from a file instead of simulating them."""
 _OF_ONE_ARM = {"robot", "robot_file", "robot_meshes", "seed", "mesh", "mesh_file", "drives", "drives_file"}
 
 
 def arm_names(bag: Bag) -> tuple[str, ...]:
-    """Arms of a recording, the default one first; ``("",)`` if there is one without a name.
+    """Names of a recording's arms, the default arm first; ``("",)`` if the only arm has no name.
 
     Raises:
         RecordingError: Its metadata name an arm twice.
@@ -43,7 +44,7 @@ def _named(bag: Bag) -> tuple[str, ...]:
 
 
 def _measured_arms(bag: Bag) -> tuple[str, ...]:
-    """Namespaces with a measured pose of a slave; the one of plain topics is empty and first."""
+    """Namespaces with a measured pose of a slave; the namespace of plain topics is empty and comes first."""
     names = [name for name, info in bag.topics.items() if info.count]
     end = f"/{SLAVE_MEASURED_CP.name}"
     found = [name.removesuffix(end) for name in names if name.endswith(end)]
@@ -70,7 +71,7 @@ def of_arm(bag: Bag, arm: str = "") -> Bag:
 
 
 def topic_prefix(bag: Bag, arm: str = "") -> str:
-    """What stands before the names of an arm's topics in a recording; raises as :func:`of_arm`."""
+    """Prefix of the names of an arm's topics in a recording. Raises the same errors as :func:`of_arm`."""
     return _prefix(bag, arm, _prefixes(bag))
 
 
@@ -82,7 +83,7 @@ def _prefix(bag: Bag, arm: str, prefixes: dict[str, str]) -> str:
 
 
 def _prefixes(bag: Bag) -> dict[str, str]:
-    """What stands before the names of each arm's topics; the default arm is the first."""
+    """Prefix of the topic names of each arm; the default arm is the first."""
     arms = arm_names(bag)
     base = _base(bag) if _named(bag) else ""
     prefixes = {arm: f"{base}{arm}/" for arm in arms}
@@ -102,14 +103,14 @@ class _ArmBag(Bag):
 
     Args:
         bag: The whole recording.
-        prefix: What stands before the names of the arm; empty for the default one.
-        prefixes: What stands before the names of each arm.
-        base: What stands before all of them, but not before names of texts.
+        prefix: Prefix of the arm's topic names; empty for the default arm.
+        prefixes: Prefix of the topic names of each arm.
+        base: Common prefix of all topics. Names of metadata texts do not have this prefix.
     """
 
     def __init__(self, bag: Bag, prefix: str, prefixes: tuple[str, ...], base: str) -> None:
         self._bag, self._prefix, self._prefixes, self._base = bag, prefix, prefixes, base
-        # Texts without an arm are about the default arm, if there is one.
+        # Texts whose name has no arm belong to the default arm, if there is a default arm.
         self._foreign = _OF_ONE_ARM if base in prefixes else set[str]()
         self.path, self.start_ns, self.end_ns = bag.path, bag.start_ns, bag.end_ns
         self.topics: dict[str, TopicInfo] = {}
@@ -120,7 +121,7 @@ class _ArmBag(Bag):
         self.metadata = self._metadata(bag.metadata)
 
     def _metadata(self, texts: dict[str, str]) -> dict[str, str]:
-        """Texts about this arm over those about all arms."""
+        """Metadata of this arm; texts of the arm itself replace texts for all arms."""
         common = texts if self._prefix != self._base else {}
         own = {self._plain(f"{self._base}{name}"): text for name, text in texts.items()}
         return {
@@ -129,7 +130,7 @@ class _ArmBag(Bag):
         }
 
     def _plain(self, name: str) -> str | None:
-        """Name below the arm; None if it is of another arm."""
+        """Name without the arm's prefix; None if the name belongs to another arm."""
         below = tuple(p for p in self._prefixes if p != self._prefix and p.startswith(self._prefix))
         is_own = name.startswith(self._prefix) and not name.startswith(below)
         return name.removeprefix(self._prefix) if is_own else None
@@ -139,7 +140,7 @@ class _ArmBag(Bag):
         return name if name == DIAGNOSTICS.name else self._prefix + name
 
     def require(self, topics: Iterable[Topic | str]) -> None:
-        """As for the whole recording; the message names the arm."""
+        """The same as for the whole recording; the error message names the arm."""
         try:
             super().require(topics)
         except RecordingError as error:
@@ -147,17 +148,17 @@ class _ArmBag(Bag):
             raise RecordingError(self.path, f"{arm} {error.reason}") from None
 
     def read_many(self, topics: Iterable[Topic | str], joint_names: tuple[str, ...] | None = None) -> dict[str, Series]:
-        """As for the whole recording."""
+        """The same as for the whole recording."""
         return self._renamed(self._bag.read_many(self._wanted(topics), joint_names))
 
     def blocks(
         self, topics: Iterable[Topic | str], joint_names: tuple[str, ...] | None = None
     ) -> Iterator[dict[str, Series]]:
-        """As for the whole recording."""
+        """The same as for the whole recording."""
         yield from map(self._renamed, self._bag.blocks(self._wanted(topics), joint_names))
 
     def reports(self, topic: Topic | str) -> list[Report]:
-        """As for the whole recording; of ``diagnostics`` those of the arm's own nodes."""
+        """The same as for the whole recording, but ``diagnostics`` gives only reports of the arm's own nodes."""
         self.require([topic])
         found = self._bag.reports(self._recorded(topic))
         if self._recorded(topic) != DIAGNOSTICS.name:
@@ -166,7 +167,7 @@ class _ArmBag(Bag):
         return [report._replace(name=name) for name, report in named if name is not None]
 
     def raw(self, topics: Iterable[Topic | str] | None = None) -> Iterator[tuple[str, str, int, bytes]]:
-        """As for the whole recording."""
+        """The same as for the whole recording."""
         if topics is None:
             topics = [name for name, info in self.topics.items() if info.count]
         for name, ros_type, log_ns, data in self._bag.raw(self._wanted(topics)):

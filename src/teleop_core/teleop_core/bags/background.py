@@ -11,13 +11,13 @@ class Jobs(Protocol):
     """Queue between two threads."""
 
     def put(self, job: Any) -> None:
-        """Append, as soon as there is room."""
+        """Append a job; wait while the queue is full."""
 
     def get(self) -> Any:
-        """Take the oldest, as soon as there is one."""
+        """Remove and return the oldest job; wait while the queue is empty."""
 
     def empty(self) -> bool:
-        """Whether nothing waits."""
+        """Whether no job waits in the queue."""
 
 
 class Worker(Protocol):
@@ -27,34 +27,34 @@ class Worker(Protocol):
         """Begin."""
 
     def join(self) -> None:
-        """Wait for its end."""
+        """Wait until the thread has ended."""
 
 
 class Background(Protocol):
-    """What a writer asks of the system."""
+    """Operating-system functions that a writer of recordings uses."""
 
     def queue(self, size: int) -> Jobs:
-        """Queue of so many jobs."""
+        """Queue of at most ``size`` jobs."""
 
     def thread(self, name: str, work: Callable[[], None]) -> Worker:
-        """Thread that does something, once it is started."""
+        """Thread that calls ``work`` when it is started."""
 
     def write(self, file: BinaryIO, data: bytes | memoryview) -> int:
-        """Write to a file without a buffer; how much was taken.
+        """Write to an unbuffered file; return the number of bytes written.
 
         Raises:
-            OSError: The disk takes no more.
+            OSError: Nothing more can be written to the disk.
         """
 
     def cut(self, file: BinaryIO, size: int) -> None:
-        """Let a file end after so many bytes, and go on to write there.
+        """Truncate a file to ``size`` bytes; later writes go to its new end.
 
         Raises:
-            OSError: The disk does not.
+            OSError: The file cannot be truncated.
         """
 
     def sync(self, file: BinaryIO) -> None:
-        """Wait until what was written is on the disk.
+        """Wait until all written data are on the disk.
 
         Raises:
             OSError: The disk refuses it.
@@ -62,29 +62,29 @@ class Background(Protocol):
 
 
 class System:
-    """Threads and files as they are."""
+    """Threads and files of the operating system."""
 
     def queue(self, size: int) -> Jobs:
-        """Queue of so many jobs."""
+        """Queue of at most ``size`` jobs."""
         return queue.Queue(maxsize=size)
 
     def thread(self, name: str, work: Callable[[], None]) -> Worker:
-        """Thread that does something, once it is started."""
+        """Thread that calls ``work`` when it is started."""
         return threading.Thread(target=work, name=name, daemon=True)
 
     def write(self, file: BinaryIO, data: bytes | memoryview) -> int:
-        """Write to a file without a buffer; how much was taken."""
+        """Write to an unbuffered file; return the number of bytes written."""
         return file.write(data)
 
     def cut(self, file: BinaryIO, size: int) -> None:
-        """Let a file end after so many bytes, and go on to write there."""
+        """Truncate a file to ``size`` bytes; later writes go to its new end."""
         file.seek(size)
         file.truncate()
 
     def sync(self, file: BinaryIO) -> None:
-        """Wait until what was written is on the disk."""
+        """Wait until all written data are on the disk."""
         os.fdatasync(file.fileno())
 
 
 SYSTEM = System()
-"""The background of all who name none."""
+"""Default background: used if the caller passes none."""

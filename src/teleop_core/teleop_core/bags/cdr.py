@@ -11,9 +11,9 @@ _ENCAPSULATION = b"\x00\x01"  # plain CDR, little-endian; two bytes of options f
 
 @dataclass
 class Template:
-    """A message as it grows: constant bytes, and gaps for numbers.
+    """A message under construction: constant bytes, and gaps for numbers.
 
-    Alignment counts from after the four bytes of the encapsulation header (XCDR1).
+    Alignment is counted from the end of the four-byte encapsulation header (XCDR1).
     """
 
     template: bytearray = field(default_factory=lambda: bytearray(_ENCAPSULATION + b"\0\0"))
@@ -48,7 +48,7 @@ class Template:
         self._extend(data, b"\xff")
 
     def gap(self, code: str, columns: slice) -> None:
-        """Append numbers of one struct code that vary: these columns of the values."""
+        """Append a gap for numbers of one struct code that differ in each message: the given columns of the values."""
         self._align(struct.calcsize(code))
         count = columns.stop - columns.start
         self.gaps.append((len(self.template), code, count, columns))

@@ -1,10 +1,10 @@
 """Chunks: messages of one stretch of time as the bytes of MCAP chunks, with their index.
 
-Messages stand in the order of their log times, whatever topic they belong to; of equal times, in
-the order of the streams. So readers that ignore the index see them in the right order too.
+Messages of all topics are sorted by log time; messages with equal log times are in the order of the streams. Readers
+that ignore the index therefore also read the messages in the right order.
 
-Most streams of a session have one message in every tick. These *streams in step* are laid out as a
-table, with one row of bytes for each tick; the records of all other messages are put in between.
+Most streams of a session have one message in every tick. These *streams in step* form a table with one row of bytes
+for each tick. The records of all other messages are inserted between the records of the table.
 """
 
 import struct
@@ -20,7 +20,7 @@ from teleop_core.bags.layouts import Bytes, Layout, Stamps, Values
 
 HEADER = struct.Struct("<BQHIQQ")  # opcode, length, channel, sequence, log time, publish time
 _FOREVER = 2**62
-_LENGTH_OF_REST = HEADER.size - 9  # of the header, counted by the record's length
+_LENGTH_OF_REST = HEADER.size - 9  # bytes of the header that the record's length includes
 _HEADER = np.dtype(
     {
         "names": ["sequence", "log", "publish"],
@@ -36,7 +36,7 @@ Entries = np.ndarray[tuple[int, int], np.dtype[np.uint64]]
 
 @dataclass(frozen=True, eq=False)
 class Chunk:
-    """Uncompressed records, and per channel where its messages are.
+    """Uncompressed records, and the positions of the messages of each channel.
 
     ``index`` maps a channel to rows of (log time [ns], offset in ``data`` [bytes]), shape (n, 2).
     """
@@ -47,7 +47,7 @@ class Chunk:
     index: dict[int, Entries]
 
 
-# One message of any size on its way into a chunk: channel, sequence, log and publish time [ns],
+# One message of any size that will be written into a chunk: channel, sequence, log and publish time [ns],
 # CDR. A plain tuple, since one is made for every live message.
 Single = tuple[int, int, int, int, bytes]
 
@@ -59,7 +59,7 @@ def _record(channel: int, sequence: int, log_ns: int, publish_ns: int, data: byt
 
 
 class _Loose(NamedTuple):
-    """A record that is in no table; ``begin`` is the byte of a row where it would stand."""
+    """A record outside the table. ``begin`` is the byte of a table row at which this record would be inserted."""
 
     log_ns: int
     begin: int
@@ -71,7 +71,7 @@ _order = itemgetter(0, 1)
 
 
 class Stretch(NamedTuple):
-    """Samples of one stream on their way into a chunk."""
+    """Samples of one stream that will be written into a chunk."""
 
     channel: int
     sequence: int  # of the first sample
@@ -86,7 +86,7 @@ class Stretch(NamedTuple):
         return HEADER.size + self.layout.size
 
     def fill(self, rows: Bytes) -> None:
-        """Write the records into rows, shape (n, size), whose bytes follow each other."""
+        """Write the records into ``rows``, shape (n, size); the bytes of each row are contiguous."""
         length = _LENGTH_OF_REST + self.layout.size
         head = HEADER.pack(Opcode.MESSAGE, length, self.channel, 0, 0, 0)
         rows[:, : HEADER.size] = np.frombuffer(head, np.uint8)
@@ -96,7 +96,7 @@ class Stretch(NamedTuple):
         self.layout.encode_into(rows[:, HEADER.size :], self.stamp_ns, self.values)
 
     def loose(self, begin: int) -> "list[_Loose]":
-        """The records one by one, each with the byte of a row where it would stand."""
+        """The records as single records; all get ``begin`` as the byte of a table row at which they are inserted."""
         rows = np.empty((len(self.log_ns), self.size), np.uint8)
         self.fill(rows)
         return [
@@ -109,13 +109,13 @@ Messages = tuple[list[Stretch], list[Single]]
 
 
 class _Scratch:
-    """Memory that is used again: to get fresh memory takes longer than to fill it."""
+    """Memory that is reused, because to allocate memory takes longer than to fill it."""
 
     def __init__(self) -> None:
         self._bytes: Bytes = np.empty(0, np.uint8)
 
     def take(self, size: int) -> Bytes:
-        """Bytes (size,), the same ones each time."""
+        """Bytes (size,) of the same memory in each call."""
         if len(self._bytes) < size:
             self._bytes = np.empty(size, np.uint8)
         return self._bytes[:size]
@@ -125,16 +125,16 @@ class Assembly:
     """Maker of the chunks of one file.
 
     Args:
-        size: Bytes of a chunk, about.
+        size: Approximate size of a chunk [bytes].
     """
 
     def __init__(self, size: int) -> None:
         self._size, self._table, self._data = size, _Scratch(), _Scratch()
 
     def chunks(self, stretches: Sequence[Stretch], singles: Sequence[Single]) -> Iterator[Chunk]:
-        """All these messages as chunks that follow each other in time.
+        """All given messages as chunks in the order of time.
 
-        Their bytes hold until the next ones are made.
+        The bytes of these chunks are valid until the next call.
         """
         stretches = [stretch for stretch in stretches if len(stretch.log_ns)]
         if not stretches and not singles:
@@ -142,7 +142,7 @@ class Assembly:
         data, index = self._merged(_Table(stretches, self._table), singles)
         first, begin = dict.fromkeys(index, 0), 0
         for cut_ns in (*_cuts(stretches, len(data), self._size), _FOREVER):
-            cut = np.uint64(cut_ns)  # of another type, all times would be converted
+            cut = np.uint64(cut_ns)  # with another type, NumPy would convert all times
             last = {c: int(np.searchsorted(rows[:, 0], cut)) for c, rows in index.items()}
             nexts = [int(rows[last[c], 1]) for c, rows in index.items() if last[c] < len(rows)]
             end = min(nexts, default=len(data))
@@ -152,7 +152,7 @@ class Assembly:
             first, begin = last, end
 
     def _merged(self, table: "_Table", singles: Sequence[Single]) -> tuple[Bytes, dict[int, Entries]]:
-        """Records of all messages in their order, and for each channel where its own are."""
+        """Records of all messages in their order, and the positions of the records of each channel."""
         loose = table.loose + [_Loose(s[2], table.width, s[0], _record(*s)) for s in singles]
         loose.sort(key=_order)
         places = table.places(loose)
@@ -169,7 +169,7 @@ class Assembly:
         return self._joined(table, loose, places.tolist()), index
 
     def _joined(self, table: "_Table", loose: Sequence[_Loose], places: Sequence[int]) -> Bytes:
-        """Bytes of the table with each record at its place."""
+        """Bytes of the table with each loose record inserted at its position."""
         rows = table.rows.reshape(-1)
         if not loose:
             return rows
@@ -185,7 +185,7 @@ class Assembly:
 
 
 def _cuts(stretches: Sequence[Stretch], total: int, size: int) -> list[int]:
-    """Log times [ns] at which ``total`` bytes are cut; none for up to two chunks."""
+    """Log times [ns] at which ``total`` bytes are cut into chunks; empty if they fit into two chunks."""
     if total <= 2 * size or not stretches:
         return []
     logs = max((stretch.log_ns for stretch in stretches), key=len)
@@ -207,7 +207,7 @@ class _Table:
         times: Log times of the rows, shape (n,), [ns]; they increase.
         width: Bytes of a row.
         rows: Records of the streams in step, shape (n, width).
-        begins: Channel of each stream in step, to the byte of the row where it stands.
+        begins: Maps the channel of each stream in step to the byte of the row at which its record begins.
         loose: Records of the other streams.
     """
 
@@ -230,7 +230,7 @@ class _Table:
                 self.loose += stretch.loose(begin)
 
     def places(self, loose: Sequence[_Loose]) -> Stamps:
-        """Byte of the table before which each record stands, shape (n,)."""
+        """Byte of the table before which each loose record is inserted, shape (n,)."""
         logs = np.array([one.log_ns for one in loose], np.int64)
         begins = np.array([one.begin for one in loose], np.int64)
         rows = np.searchsorted(self.times, logs)
@@ -239,11 +239,12 @@ class _Table:
         return places
 
     def index(self, places: Stamps, before: Stamps) -> dict[int, Entries]:
-        """Where the records of the streams in step are, for each channel.
+        """Positions of the records of each stream in step, by channel.
 
         Args:
-            places: Bytes of the table before which other records stand, shape (n,).
-            before: Bytes of those that stand before each of them, and of all, shape (n + 1,).
+            places: Bytes of the table before which loose records are inserted, shape (n,).
+            before: Total size of the loose records before each loose record, then of all of them, shape (n + 1,)
+                [bytes].
         """
         rows, index = np.arange(len(self.times)) * self.width, {}
         for channel, begin in self.begins.items():

@@ -9,13 +9,13 @@ from teleop_core.base.texts import shown
 
 NAMES = ("zstd", "lz4", "none")
 LARGEST = 128 << 20
-"""Bytes of a chunk that is unpacked: a hundred times what ``ros2 bag`` and the mcap tools make, and
-three of them, which are unpacked ahead, still fit into any machine."""
+"""Largest size of an unpacked chunk [bytes]. Chunks of ``ros2 bag`` and of the mcap tools are a hundred times smaller.
+Three chunks are unpacked ahead; even three chunks of this size fit into the memory of any machine."""
 DamagedError = (zstandard.ZstdError, RuntimeError, ValueError, EOFError)
 
 
 def compressor(name: str, level: int) -> Callable[[bytes], bytes]:
-    """Function that compresses one chunk; the same bytes give the same result."""
+    """Function that compresses one chunk; equal bytes give equal results."""
     if name == "zstd":
         return zstandard.ZstdCompressor(level=level).compress
     if name == "lz4":
@@ -24,17 +24,18 @@ def compressor(name: str, level: int) -> Callable[[bytes], bytes]:
 
 
 def decompress(name: str, data: bytes, size: int) -> bytes:
-    """Chunk of ``size`` bytes as it was before.
+    """Chunk of ``size`` bytes, as it was before compression.
 
-    Nothing larger than :data:`LARGEST` is unpacked, whatever the chunk says of itself.
+    A chunk larger than :data:`LARGEST` is not unpacked, whatever size its record states.
 
     Args:
         name: As in the chunk's record; empty for none.
         data: Compressed bytes.
-        size: Bytes it must have, [bytes].
+        size: Size that the unpacked chunk must have, [bytes].
 
     Raises:
-        ValueError: Another size, too large, or an unknown compression. Damage raises one of DamagedError.
+        ValueError: The unpacked chunk has another size or is too large, or the compression is unknown. Damaged data
+            raise one of DamagedError.
     """
     if name not in {"zstd", "lz4", ""}:
         raise ValueError(f"compressed with {shown(name)}, must be zstd, lz4 or none")
@@ -47,7 +48,7 @@ def decompress(name: str, data: bytes, size: int) -> bytes:
 
 
 def _unzstd(data: bytes, size: int) -> bytes:
-    """At most ``size`` bytes; what a frame says of its size is checked, since it is believed."""
+    """Unpack at most ``size`` bytes. The size that a frame states is checked first, since the library trusts it."""
     told = zstandard.frame_content_size(data)
     if told not in {-1, size}:  # -1: not told
         raise ValueError(f"a frame of {told} bytes, must be {size}")
@@ -55,5 +56,5 @@ def _unzstd(data: bytes, size: int) -> bytes:
 
 
 def _unlz4(data: bytes, size: int) -> bytes:
-    """At most one byte more than ``size``."""
+    """Unpack at most ``size + 1`` bytes."""
     return bytes(lz4.frame.LZ4FrameDecompressor().decompress(data, max_length=size + 1))

@@ -1,4 +1,4 @@
-"""Ending of a recording: index and metadata, for which recorded messages are never given up."""
+"""Ending of a recording: index and metadata. A failure to write them never deletes recorded messages."""
 
 from pathlib import Path
 
@@ -9,17 +9,17 @@ from teleop_core.base.errors import RecordingError
 
 
 def end(path: Path, file: McapFile, start_ns: int, stopped: OSError | None, given: int = 0) -> Exception | None:
-    """Finish file and directory, wherever they are now.
+    """Finish a recording's file and directory, even if they were moved while it was written.
 
     Args:
-        path: Directory as it was made.
-        file: What was written to it, whole chunk by whole chunk.
+        path: Path at which the directory was made.
+        file: The file in it, which contains whole chunks only.
         start_ns: Log time at which the session started, [ns].
-        stopped: What kept a chunk from being written; None if all were.
-        given: Messages that were to be written.
+        stopped: Error that prevented the writing of a chunk; None if all chunks were written.
+        given: Number of messages that should have been written.
 
     Returns:
-        What to tell who recorded; None if all is where it should be.
+        Error to raise to the caller that recorded; None if the recording is complete and at ``path``.
     """
     found = file.statistics()
     if stopped is None:
@@ -45,10 +45,10 @@ def end(path: Path, file: McapFile, start_ns: int, stopped: OSError | None, give
 
 
 def _finished(path: Path, file: McapFile, start_ns: int) -> Path | None:
-    """Write what ends a recording; where it is, unless it was where it was made all the time.
+    """Write index and metadata. Return the directory that holds them if the recording was moved or removed, else None.
 
     Raises:
-        OSError: Something could not be written; every chunk is still there.
+        OSError: Index or metadata could not be written; all chunks are kept.
     """
     file.finish()
     place = file.place
@@ -61,10 +61,10 @@ def _finished(path: Path, file: McapFile, start_ns: int) -> Path | None:
 
 
 def _made_again(path: Path, file: McapFile) -> Path:
-    """Copy of a file that was removed while it is still open for writing.
+    """Path of a new copy of a file that was removed while it was still open for writing.
 
     Raises:
-        OSError: It cannot be written, neither where it was nor beside it.
+        OSError: The copy can be written neither at the old path nor beside it.
     """
     try:
         return _copy(file, path)

@@ -1,4 +1,4 @@
-"""Finding the files of a recording: those that its ``metadata.yaml`` lists, beside it."""
+"""Finding the files of a recording: files that its ``metadata.yaml`` lists, in the same directory."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -15,7 +15,7 @@ def mcap_files(path: Path) -> list[Path]:
         path: Directory of a recording, or one ``.mcap`` file.
 
     Raises:
-        RecordingError: There are none, or ``metadata.yaml`` is missing or not what it must be.
+        RecordingError: There are no such files, or ``metadata.yaml`` is missing or malformed.
     """
     if not path.exists():
         raise RecordingError(path, "does not exist; give a recording's directory or .mcap file")
@@ -34,7 +34,7 @@ def mcap_files(path: Path) -> list[Path]:
 
 
 def _listed(path: Path, index: Path) -> list[Path]:
-    """Files that the index lists; they are beside it, whatever folder it names."""
+    """Files that the index lists. They are searched beside the index; folders in the listed names are ignored."""
     information, mode = _information(index), compression_mode(index)
     if mode != "none":
         reason = f"is compressed by {shown(mode)}; `ros2 bag convert` it to plain mcap"
@@ -55,7 +55,7 @@ def compression_mode(index: Path) -> str:
     """What a recording's metadata says is compressed: ``none``, ``file`` or ``message``.
 
     Raises:
-        RecordingError: The metadata is not what it must be.
+        RecordingError: The metadata is malformed.
     """
     return str(_information(index).get("compression_mode") or "none").lower()
 

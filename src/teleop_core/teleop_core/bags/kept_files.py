@@ -1,11 +1,16 @@
-"""Kept files: what is replayed, scored and drawn is what was recorded.
+"""Kept files: copies of robot and mesh files in a recording, so that it is replayed, scored and drawn with them.
 
-A recording holds the text of a robot's file (a URDF, a table of links) under ``robot_file`` beside ``robot``. All other
-files stand there by their digests: a mesh or field of heights that is touched under ``mesh_file`` beside ``mesh``; the
-mesh of a fixture under ``fixture_mesh_file``; drives of a URDF under ``drives_file``; the meshes that a robot's links
-look like under ``robot_meshes``, in a line of digest and name each. Under each digest are the packed bytes, once for
-all arms, as long as there is room for them. Where a file is gone or says something else by now, what was recorded is
-written to a temporary folder and takes its place.
+A recording contains the text of a robot's file (a URDF, a table of links) under ``robot_file``, beside ``robot``. Of
+all other files the metadata contain the digest:
+
+- ``mesh_file``, beside ``mesh``: a touched mesh or height field;
+- ``fixture_mesh_file``: the mesh of a fixture;
+- ``drives_file``: the drives of a URDF;
+- ``robot_meshes``: the visual meshes of a robot's links, one line of digest and name for each mesh.
+
+The entry named like a digest contains the packed bytes. It is stored once for all arms, up to a total size of all
+files. If a file is missing or has changed since the recording, its recorded bytes are written to a temporary folder,
+and that copy is used instead.
 """
 
 import base64
@@ -26,25 +31,28 @@ TOUCHED, FIXTURE = "mesh", "fixture_mesh"
 _PLACES = range(8)  # of a shape that is made of several: they are called mesh, mesh1, mesh2
 _ROBOT, _DRIVES, _FILE, _MESHES = "robot", "drives", "_file", "_meshes"
 _PACKED, _DIGEST = "zlib, base64: ", "sha256:"
-_LEVEL = 4  # 27 MB of meshes of an arm take 0.4 s; at 6 they take 1.5 s, and 5 % less room
+_LEVEL = 4  # 27 MB of an arm's meshes take 0.4 s; level 6 takes 1.5 s for 5 % less size
 _MOST = 2**25
-"""Bytes of files that a recording keeps beside texts, before they are packed."""
+"""Largest total size of the kept files before packing, robot texts not counted [bytes]."""
 
 
 class KeptFiles:
-    """What a recording stores of the files of its arms; what is added first is kept first."""
+    """Files of the arms that a recording stores.
+
+    Files that are added first are stored first, until the limit is reached.
+    """
 
     def __init__(self) -> None:
         self._texts: dict[str, str] = {}
         self._room, self._left_out = _MOST, dict[str, Path]()
 
     def add_mesh(self, name: str, prefix: str = "", kind: str = TOUCHED) -> None:
-        """Add a mesh, or a field of heights; one that cannot be read is none.
+        """Add a mesh or a height field; a file that cannot be read is ignored.
 
         Args:
             name: Its path.
             prefix: What stands before the names of its arm.
-            kind: :data:`TOUCHED` or :data:`FIXTURE`, with its number behind it beyond the first.
+            kind: :data:`TOUCHED` or :data:`FIXTURE`; from the second mesh of a kind on with its number appended.
         """
         self._name(f"{prefix}{kind}", name)
 
@@ -53,7 +61,8 @@ class KeptFiles:
 
         Args:
             name: The robot's name or path.
-            settings: Its geometry; arguments among them have expanded a xacro, of which the URDF is stored.
+            settings: Its geometry. If the file is a xacro, it is expanded with the arguments in it, and the URDF is
+                stored.
             prefix: What stands before the names of its arm.
         """
         found = file_of(name)
@@ -75,7 +84,7 @@ class KeptFiles:
             self._texts[f"{prefix}{_ROBOT}{_MESHES}"] = "\n".join(lines)
 
     def texts(self) -> dict[str, str]:
-        """Names and texts for the recording; files that exceed its room give a warning."""
+        """Names and texts for the recording. Warns of files that were left out because the size limit was reached."""
         if self._left_out:
             names = ", ".join(path.name for path in self._left_out.values())
             limit = f"keeps {_MOST / 2**20:g} MiB of files"
@@ -83,12 +92,12 @@ class KeptFiles:
         return dict(self._texts)
 
     def _name(self, key: str, name: str) -> None:
-        """Keep a file under a path of its own."""
+        """Keep a file that the metadata name by its path."""
         if digest := self._add(Path(name).expanduser()):
             self._texts |= {key: name, f"{key}{_FILE}": digest}
 
     def _add(self, path: Path) -> str:
-        """Digest of a file, whose packed bytes are kept if there is room; empty if unreadable."""
+        """Digest of a file; empty if unreadable. Keeps the file's packed bytes unless they would exceed the limit."""
         data = _bytes(path)
         if data is None:
             return ""
@@ -104,17 +113,17 @@ class KeptFiles:
 
 
 def recorded_files(metadata: Mapping[str, str], arm: str = "") -> dict[str, str]:
-    """Path of each recorded file of an arm, by the path under which it was recorded.
+    """Current path of each recorded file of an arm, by the path in the recording.
 
-    A file of which only the digest was kept gives a warning if it is gone or has changed.
+    If only the digest of a file was kept, and the file is missing or has changed, this gives a warning.
 
     Args:
         metadata: Names and texts of a recording.
-        arm: What stands before the names of the arm, without the slash.
+        arm: Prefix of the arm's names, without the slash.
 
     Returns:
-        The same path where the file still says what it said; else that of a copy of what was
-        recorded, which is there until the program ends.
+        The same path if the file has not changed; else the path of a temporary copy of the recorded file, which exists
+        until the program ends.
     """
     prefix, found = f"{arm}/" if arm else "", {}
     meshes = (f"{kind}{place or ''}" for kind in (TOUCHED, FIXTURE) for place in _PLACES)
@@ -139,11 +148,11 @@ def recorded_files(metadata: Mapping[str, str], arm: str = "") -> dict[str, str]
 
 
 def recorded_geometry(settings: Iterable[str], files: Mapping[str, str]) -> tuple[str, ...]:
-    """Geometry of a robot as texts, with the drives in it that were recorded.
+    """Geometry of a robot as texts, with the path of the recorded drives in it.
 
     Args:
         settings: Its geometry.
-        files: Those of its arm, as of :func:`recorded_files`.
+        files: Files of its arm, from :func:`recorded_files`.
     """
     found = []
     for text in settings:
@@ -154,7 +163,7 @@ def recorded_geometry(settings: Iterable[str], files: Mapping[str, str]) -> tupl
 
 
 def _robot_now(name: str, text: str, digests: Mapping[str, str], metadata: Mapping[str, str]) -> str:
-    """Path of a robot's file, with the meshes of its links as they were recorded."""
+    """Path of a robot's file whose text and link meshes are as recorded; a temporary copy if they have changed."""
     path = Path(name).expanduser()
     files = visuals.meshes_of(text, path)
     same = {mesh for mesh, digest in digests.items() if _digest_now(files.get(mesh)) == digest}
@@ -181,7 +190,7 @@ def _tell(name: str, path: Path | None) -> None:
 
 
 def _text(path: Path) -> str | None:
-    """Text of a file as recordings give it back; None for what cannot be read as text."""
+    """Printable text of a file, as read back from a recording; None if the file cannot be read as text."""
     try:
         return printable(path.read_text(encoding="utf-8")) if path.is_file() else None
     except (OSError, UnicodeDecodeError):
@@ -189,7 +198,7 @@ def _text(path: Path) -> str | None:
 
 
 def _bytes(path: Path) -> bytes | None:
-    """Bytes of a file; None for what cannot be read, or is no file, as a pipe."""
+    """Bytes of a file; None if the path cannot be read or is not a regular file, such as a pipe."""
     try:
         return path.read_bytes() if path.is_file() else None
     except OSError:
@@ -201,7 +210,7 @@ def _digest(data: bytes) -> str:
 
 
 def _digest_now(path: Path | None) -> str:
-    """Digest of a file; empty for what cannot be read."""
+    """Digest of a file; empty if the file cannot be read."""
     data = None if path is None else _bytes(path)
     return "" if data is None else _digest(data)
 

@@ -4,8 +4,8 @@ All messages of a stream have the same frame and the same joint names, hence the
 bytes are one constant template with a stamp and some numbers in it. Batches are therefore built
 and read as packed numpy records, single messages with one ``struct`` call.
 
-Padding between fields is zero in what is written here and ignored in what is read: rclpy leaves
-it uninitialised, and pads the end of some messages too.
+This module writes zeros as padding between fields and ignores padding when it reads: rclpy leaves padding
+uninitialised, and also pads the end of some messages.
 """
 
 import struct
@@ -35,7 +35,7 @@ class Layout:
         size: Bytes of one message.
         width: Numbers in one message, the columns of its values.
         template: One message whose numbers are zero, shape (size,).
-        mask: Its bits that all messages share, shape (size,).
+        mask: Bits that are equal in all messages, shape (size,).
     """
 
     def __init__(self, kind: Kind, joint_names: tuple[str, ...], frame_id: str) -> None:
@@ -63,7 +63,7 @@ class Layout:
         self._prepare_single(cdr)
 
     def _prepare_single(self, cdr: Template) -> None:
-        """Struct of one message; every run of constant bytes is one string of it."""
+        """Prepare the struct of one message; every run of constant bytes is one string in the struct."""
         form, fixed, index = "<", [], 0
         gaps = {at: (code, count) for at, code, count, _ in cdr.gaps}
         for begin, end in cdr.constants():
@@ -77,7 +77,7 @@ class Layout:
         self._pack, self._unpack = single.pack, single.unpack_from
         self._head, self._frame = fixed[0][1], fixed[1][1]
         self._fixed = fixed
-        # Strings between or after the numbers: index among the arguments that follow the frame.
+        # Strings between or after the numbers: each one's index among the arguments that follow the frame.
         self._inner = [(at - 4, data) for at, data, _ in fixed[2:]]
 
     # -- batches ---------------------------------------------------------------------------------
@@ -93,14 +93,17 @@ class Layout:
             Shape (N, size).
 
         Raises:
-            ShapeError: The values have another shape.
+            ShapeError: ``values`` does not have the shape (N, width).
         """
         rows = np.empty((len(stamps_ns), self.size), np.uint8)
         self.encode_into(rows, stamps_ns, values)
         return rows
 
     def encode_into(self, rows: Bytes, stamps_ns: Stamps, values: Values) -> None:
-        """As :meth:`encode`, into rows of shape (N, size) whose bytes follow each other."""
+        """The same as :meth:`encode`, but written into ``rows``, shape (N, size).
+
+        The bytes of each row are contiguous.
+        """
         if values.shape != (len(rows), self.width) or stamps_ns.shape != (len(rows),):
             raise ShapeError("values", (len(rows), self.width), values.shape)
         rows[:] = self.template
@@ -115,7 +118,7 @@ class Layout:
         """Stamps, shape (N,), [ns], and values, shape (N, width), of messages that match.
 
         Args:
-            rows: Whole messages, shape (N, size) or longer by padding at the end.
+            rows: Whole messages, shape (N, size), or wider if there is padding at the end.
         """
         records = rows[:, : self.size].view(self._dtype)[:, 0]
         values = np.empty((len(rows), self.width))
@@ -124,7 +127,7 @@ class Layout:
         return records["sec"].astype(np.int64) * SECOND_NS + records["nanosec"], values
 
     def matches(self, rows: Bytes) -> bool:
-        """Whether messages, shape (N, size or more), differ from the template in numbers only."""
+        """Whether all messages, shape (N, size or more), are equal to the template except for the numbers."""
         if rows.shape[1] < self.size:
             return False
         return not ((rows[:, : self.size] ^ self.template) & self.mask).any()
@@ -164,7 +167,7 @@ class Layout:
 
 
 def layout_of(kind: Kind, joint_names: tuple[str, ...], frame_id: str) -> Layout:
-    """Layout of a kind of message, with the names if it has joints; made once."""
+    """Layout of a kind of message, with the joint names if it has joints. Equal layouts are built once and shared."""
     return _make(kind, joint_names if kind.has_names else (), frame_id)
 
 
@@ -179,7 +182,7 @@ def layout(topic: Topic, joint_names: tuple[str, ...], frame_id: str | None = No
     Args:
         topic: A stream; reports have no fixed layout.
         joint_names: Joints of the robot, in the order of the columns.
-        frame_id: Frame to write in place of the topic's own.
+        frame_id: Frame to write instead of the topic's own frame.
 
     Raises:
         ValueError: The topic carries reports.
@@ -191,10 +194,10 @@ def layout(topic: Topic, joint_names: tuple[str, ...], frame_id: str | None = No
 
 
 def discover(kind: Kind, data: bytes) -> Layout | None:
-    """Layout of the stream that a message comes from; None if it fits none.
+    """Layout of the stream that a message comes from; None if the message fits no layout.
 
     Args:
-        kind: What the values are; for joints the message says whether it has velocity and effort.
+        kind: What the values are. For joints, the message itself decides whether it has velocity and effort.
         data: CDR of the stream's first message.
     """
     try:
@@ -212,7 +215,7 @@ def discover(kind: Kind, data: bytes) -> Layout | None:
 
 
 def frame_of(data: bytes) -> str:
-    """Frame in the header of a message; empty if there is none."""
+    """Frame in the header of a message; empty if the message has no frame."""
     try:
         return _read_string(data, 12)[0]
     except (struct.error, UnicodeDecodeError):

@@ -1,7 +1,7 @@
 """Markers: shapes that RViz and Foxglove draw beside a robot, as bytes, without ROS.
 
-They are built by hand, since a path of hundreds of points is one block of bytes here and hundreds
-of objects in the messages of rclpy: a running session has no time for these.
+This module builds the bytes itself: a path of hundreds of points is one block of bytes here. The messages of rclpy
+need hundreds of objects for the same path, which takes too long in a running session.
 """
 
 from collections.abc import Iterable
@@ -37,15 +37,15 @@ class Marker:
     """One shape.
 
     Attributes:
-        name: Its namespace, which tells it from the others of its topic.
+        name: Its namespace, which is different for each marker of a topic.
         frame: Frame that it is in.
-        shape: What it is; a cube or sphere fills the box of its scale.
-        pose: Its place (7,): x, y, z [m], quaternion w, x, y, z.
-        scale: Size along x, y, z [m]; a line's width comes first, an arrow between two points has
-            the diameters of shaft and head, and the length of the head.
+        shape: Type of the shape; a cube or sphere fills the box of size ``scale``.
+        pose: Its pose (7,): x, y, z [m], quaternion w, x, y, z.
+        scale: Size along x, y, z [m]. For a line, the first value is its width. For an arrow between two points, the
+            values are the shaft diameter, the head diameter and the head length.
         color: Its colour.
-        points: Of a line, or from where to where an arrow points (N, 3) [m].
-        is_shown: Whether it is there; false takes it away.
+        points: Points of a line, or start and tip of an arrow (N, 3) [m].
+        is_shown: Whether the marker is drawn; False removes it.
     """
 
     name: str

@@ -1,7 +1,7 @@
 """MCAP file being written: whole chunks behind each other, an index at the end.
 
-Nothing is buffered: what :meth:`McapFile.append` has accepted is with the operating system. A
-chunk that could not be written whole is cut off again; whole chunks are never given up.
+Nothing is buffered: when :meth:`McapFile.append` returns, the operating system has the data. A chunk that could not be
+written completely is cut off again; complete chunks are always kept.
 """
 
 import os
@@ -39,7 +39,7 @@ _FOOTER_HEAD = struct.Struct("<BQQQ")  # opcode, length, summary start, summary 
 
 
 def encode(*records: McapRecord) -> bytes:
-    """Bytes of records behind each other."""
+    """Concatenated bytes of some records."""
     builder = RecordBuilder()
     for record in records:
         record.write(builder)
@@ -52,11 +52,11 @@ class McapFile:
     Args:
         path: New file.
         schemas: Message types.
-        channels: Topics; every channel that messages name.
-        metadata: Name of a metadata record to its entries.
+        channels: Topics. Every channel number in a message must be one of them.
+        metadata: Maps the name of each metadata record to its entries.
         compression: Name in the chunk's record: ``zstd``, ``lz4`` or empty.
-        compress: Function that does it.
-        background: Who writes.
+        compress: Function that compresses a chunk.
+        background: Functions that write to the disk.
 
     Raises:
         OSError: The file cannot be created or written.
@@ -75,7 +75,7 @@ class McapFile:
         self._background = background
         self.path, self.schemas, self.channels = path, schemas, channels
         self._compression, self._compress = compression.encode(), compress
-        # Of a long recording there are many chunks: their index is kept as the bytes it will be.
+        # A long recording has many chunks, so their index is kept as the bytes that will be written.
         self._index, self._chunk_count = bytearray(), 0
         self._counts = {channel.id: 0 for channel in channels}
         self._start_ns, self._end_ns = 0, 0
@@ -102,15 +102,15 @@ class McapFile:
         """Compress and write a chunk and its message indexes.
 
         Raises:
-            OSError: Not written; whole chunks before it are unharmed.
+            OSError: The chunk was not written; all chunks before it are intact.
         """
-        # The cast makes bytes of what zlib and the compressors take as a buffer.
+        # zlib and the compressors accept any buffer, though their type hints require bytes.
         data = self._compress(chunk.data.data)  # type: ignore[arg-type]
         crc = zlib.crc32(chunk.data.data)
         self.append_compressed(chunk, data, crc)
 
     def append_compressed(self, chunk: Chunk, data: bytes, crc: int) -> None:
-        """As :meth:`append`, of a chunk compressed before."""
+        """The same as :meth:`append` for a chunk that is already compressed: ``data`` and its checksum ``crc``."""
         begin, name = self._end, self._compression
         tail = struct.pack("<I", len(name)) + name + struct.pack("<Q", len(data))
         length = _CHUNK_HEAD.size - 9 + len(tail) + len(data)
@@ -140,7 +140,7 @@ class McapFile:
         self._chunk_count += 1
 
     def sync(self) -> None:
-        """Wait until what was appended is on the disk: it outlasts a loss of power then.
+        """Wait until all appended chunks are on the disk, where they survive a loss of power.
 
         Raises:
             OSError: The disk refuses it.
@@ -165,7 +165,7 @@ class McapFile:
         """Write index and footer behind the last whole chunk.
 
         Raises:
-            OSError: There is no room for them; the file ends behind its last whole chunk.
+            OSError: The disk has no space for index and footer; the file ends after its last whole chunk.
         """
         try:
             self._cut()
@@ -177,12 +177,12 @@ class McapFile:
             raise
 
     def _cut(self) -> None:
-        """Take away what stands behind the last whole chunk."""
+        """Remove all bytes after the last whole chunk."""
         self._background.cut(self._file, self._end)
 
     @property
     def place(self) -> Path | None:
-        """Where the file is now, also if somebody moved it; None if it was removed."""
+        """Current path of the file, even if it was moved; None if it was removed."""
         own = os.fstat(self._file.fileno())
         with suppress(OSError):
             if os.path.samestat(own, self.path.stat()):
@@ -194,10 +194,10 @@ class McapFile:
         return self.path
 
     def copy_to(self, path: Path) -> None:
-        """Write all that is in the file to a new one, as after its removal.
+        """Copy the whole content of the file to a new file; this works even after the file was removed.
 
         Raises:
-            OSError: The new one exists already or cannot be written.
+            OSError: The new file exists already or cannot be written.
         """
         self._file.seek(0)
         with path.open("xb") as copy:

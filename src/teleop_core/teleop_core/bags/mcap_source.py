@@ -1,4 +1,4 @@
-"""One MCAP file being read: its topics, and its messages as tables of where they are."""
+"""One MCAP file being read: its topics, and tables of the positions of its messages."""
 
 import struct
 import zlib
@@ -37,18 +37,18 @@ class Records(NamedTuple):
 
 @dataclass(frozen=True)
 class Place:
-    """Where messages are: a chunk at ``offset``, or records that stand outside of chunks."""
+    """Part of a file that contains messages: a chunk at ``offset``, or records outside of chunks."""
 
     offset: int
     start_ns: int
     end_ns: int
     channels: frozenset[int] | None = None  # None if unknown
-    end: int = 0  # of records outside of chunks
+    end: int = 0  # end of the records outside of chunks; 0 for a chunk
 
 
 @dataclass
 class Contents:
-    """What a file says about itself; ``end`` is where its last whole record ends."""
+    """Contents of a file; ``end`` is the position at which its last whole record ends."""
 
     schemas: dict[int, Schema] = field(default_factory=dict)
     channels: dict[int, Channel] = field(default_factory=dict)
@@ -63,10 +63,10 @@ class McapSource:
 
     Args:
         path: The file.
-        is_whole: Whether to refuse a file without an end; False reads what there is of it.
+        is_whole: True refuses a file that was cut off; False reads the part that exists.
 
     Raises:
-        RecordingError: It is missing, no MCAP file, cut off or damaged.
+        RecordingError: The file is missing, is no MCAP file, was cut off or is damaged.
     """
 
     def __init__(self, path: Path, *, is_whole: bool = True) -> None:
@@ -90,9 +90,10 @@ class McapSource:
             raise RecordingError(self.path, CUT_OFF.format(path=self.path))
 
     def _summary(self) -> Contents | None:
-        """Contents by the file's index; None if it has none.
+        """Contents as listed in the file's index; None if the file has no index.
 
-        The index is walked as any other stretch of the file: no length in it leads beyond its end.
+        The index is read like any other part of the file, so that no wrong length in it leads beyond the end of the
+        file.
         """
         data = self.mapped()
         footer = len(data) - len(mcap_file.MAGIC) - _FOOTER_SIZE
@@ -120,7 +121,7 @@ class McapSource:
     # -- files without an index ------------------------------------------------------------------
 
     def _scan(self, *, is_whole: bool) -> Contents:
-        """Contents by reading the file; damaged chunks are left out if it need not be whole."""
+        """Contents found by reading the whole file. Damaged chunks are left out if ``is_whole`` is False."""
         found = Contents()
         data = self.mapped()
         rows, found.end = walk.walk(data, len(mcap_file.MAGIC), len(data))
@@ -137,17 +138,17 @@ class McapSource:
         return found
 
     def mapped(self) -> layouts.Bytes:
-        """The file as an array that is read where it is looked at."""
+        """The file as a memory-mapped array: bytes are read from the disk when they are accessed."""
         return np.memmap(self.path, np.uint8, "r").view(np.ndarray)
 
     # -- messages --------------------------------------------------------------------------------
 
     def records(self, places: list[Place], window: int = _WINDOW) -> Iterator[Records]:
-        """Messages place by place; the next places are decompressed meanwhile.
+        """Messages of each place in turn; the next places are decompressed in another thread meanwhile.
 
         Args:
-            places: Where to read.
-            window: Bytes outside of chunks that make one table.
+            places: Parts of the file to read.
+            window: Size of the tables of messages outside of chunks [bytes].
 
         Raises:
             RecordingError: A chunk is damaged.
@@ -171,18 +172,18 @@ class McapSource:
 
 
 def _stream(data: layouts.Bytes, begin: int, size: int) -> ReadDataStream:
-    """Stream of some bytes of a file, as the mcap library reads records from."""
+    """Stream over some bytes of a file, of the type from which the mcap library reads records."""
     return ReadDataStream(BytesIO(data[begin : begin + size].tobytes()))
 
 
 def _place(index: ChunkIndex) -> Place:
-    """Where a chunk is, by the file's index."""
+    """Place of a chunk, from its entry in the file's index."""
     channels = frozenset(index.message_index_offsets) or None
     return Place(index.chunk_start_offset, index.message_start_time, index.message_end_time, channels)
 
 
 def _chunk_at(file: BinaryIO, offset: int) -> Chunk:
-    """Chunk record; lengths in it cannot lead beyond its end."""
+    """Chunk record at an offset; wrong lengths in it cannot lead beyond its end."""
     size = file.seek(0, 2)
     if offset > size:
         raise ValueError(f"the file has {size} bytes")
@@ -206,7 +207,7 @@ def _table(data: layouts.Bytes, rows: walk.Rows) -> Records:
 
 
 def _windows(data: layouts.Bytes, place: Place, window: int) -> Iterator[Records]:
-    """Messages outside of chunks, some megabytes at a time."""
+    """Messages outside of chunks, as tables of about ``window`` bytes of the file."""
     at = place.offset
     while at < place.end:
         end = min(at + window, place.end)
@@ -220,7 +221,7 @@ def _windows(data: layouts.Bytes, place: Place, window: int) -> Iterator[Records
 
 
 def _note_cold(found: Contents, data: layouts.Bytes, rows: walk.Rows) -> None:
-    """Note schemas, channels and metadata among records."""
+    """Add the schemas, channels and metadata among some records to ``found``."""
     is_cold = np.isin(rows[:, walk.OPCODE], (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.METADATA))
     for opcode, begin, size in rows[is_cold, :3].tolist():
         stream = _stream(data, begin, size)

@@ -1,4 +1,4 @@
-"""Memory bag: a recording that was never written, to be read and scored like any other."""
+"""Memory bag: a recording in memory, which can be read and scored like a recording on disk."""
 
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
@@ -16,21 +16,21 @@ Message = tuple[int, bytes]
 
 
 class LeftOutError(RecordingError):
-    """A stream is asked for that was not kept."""
+    """The caller asks for a stream that was not kept."""
 
 
 class MemoryBag(reader.Bag):
     """Recording held in arrays.
 
     Args:
-        name: What it is called in scores.
+        name: Name of the recording in scores.
         series: Streams with their samples, by topic.
         reports: Messages of reports in the order of their log times, by topic.
         metadata: Names and texts, as a writer would store them.
-        left_out: Streams that were there and were not kept.
+        left_out: Streams of the session that were not kept.
 
     Raises:
-        RecordingError: There is no sample at all.
+        RecordingError: The recording has no samples.
     """
 
     def __init__(
@@ -57,7 +57,7 @@ class MemoryBag(reader.Bag):
         self.end_ns = max(int(log[-1]) for log in logs)
 
     def read_many(self, topics: Iterable[Topic | str], joint_names: tuple[str, ...] | None = None) -> dict[str, Series]:
-        """As of any recording."""
+        """The same as for any recording."""
         wanted = [topic.name if isinstance(topic, Topic) else topic.strip("/") for topic in topics]
         self.require(wanted)
         for name in wanted:
@@ -71,17 +71,17 @@ class MemoryBag(reader.Bag):
     def blocks(
         self, topics: Iterable[Topic | str], joint_names: tuple[str, ...] | None = None
     ) -> Iterator[dict[str, Series]]:
-        """As of any recording, in one piece."""
+        """The same as for any recording, but as a single block."""
         yield self.read_many(topics, joint_names)
 
     def reports(self, topic: Topic | str) -> list[Report]:
-        """As of any recording."""
+        """The same as for any recording."""
         self.require([topic])
         name = topic.name if isinstance(topic, Topic) else topic.strip("/")
         return [one for _, data in self._reports.get(name, ()) for one in messages.read_reports(data)]
 
     def raw(self, topics: Iterable[Topic | str] | None = None) -> Iterator[tuple[str, str, int, bytes]]:
-        """As of any recording; the bytes are made as they are asked for."""
+        """The same as for any recording; the bytes are made when they are requested."""
         given = self.topics if topics is None else topics
         names = [topic.name if isinstance(topic, Topic) else topic.strip("/") for topic in given]
         self.require(names if topics is not None else ())

@@ -1,7 +1,7 @@
 """Messages: the one place that knows what a message's fields and bytes mean.
 
 Inside the package a message is a stamp and a row of numbers
-(:class:`~teleop_core.graph.topics.Kind` says which). Three ways lead from one to the other:
+(:class:`~teleop_core.graph.topics.Kind` defines the numbers). Three groups of functions convert between both:
 :func:`layout` for whole streams and for single messages of a known stream (fast),
 :func:`read_values` and :func:`write_values` for messages of any other sender, :func:`report` and
 :func:`read_reports` for reports. Quaternions are w, x, y, z in values and x, y, z, w in messages.
@@ -26,11 +26,11 @@ __all__ = [
 
 QUATERNION_TOLERANCE = 1e-3
 BUTTONS = (0, 1, 2)
-"""Places of clutch, fixture and mode among the buttons of a message."""
+"""Indices of clutch, fixture and mode among the buttons of a message."""
 
 
 class Refusal(Enum):
-    """Why a live message is not used."""
+    """Reason why a live message is not used."""
 
     NOT_FINITE = "holds NaN or infinite numbers"
     NOT_UNIT = "its quaternion is not of unit length"
@@ -47,7 +47,7 @@ class Refusal(Enum):
 
 
 def check(kind: Kind, stamp_ns: int, values: Values, last_stamp_ns: int | None) -> Refusal | None:
-    """Reason to refuse a live message, None if it is sound.
+    """Reason to refuse a live message; None if the message is valid.
 
     Args:
         kind: What the values are.
@@ -75,12 +75,13 @@ def read_values(
     Args:
         kind: What the values are.
         message: From rclpy, or deserialised by rosbags.
-        joint_names: Wanted order of the joints; others in the message are left out. Empty takes them as they come.
-        buttons: Which buttons of the message are clutch, fixture and mode; -1: it has none.
+        joint_names: Wanted order of the joints; other joints in the message are left out. If empty, all joints are
+            returned in the order of the message.
+        buttons: Indices of clutch, fixture and mode among the message's buttons; -1 if the message lacks a button.
 
     Returns:
-        Stamp and values, shape (width,); or why the message cannot be used. Velocities or efforts
-        that the message leaves empty are NaN.
+        Stamp and values, shape (width,); or the reason why the message cannot be used. Velocities or efforts that the
+        message leaves empty are NaN.
     """
     stamp = message.header.stamp
     is_joy = kind is Kind.BUTTONS
@@ -97,7 +98,7 @@ def read_any(
 
     Args:
         kind: What the values are.
-        data: Bytes from anywhere.
+        data: Bytes from any sender.
         joint_names: As of :func:`read_values`.
         buttons: As of :func:`read_values`.
     """
@@ -162,13 +163,14 @@ def read_joints(message: Any, part: str, joint_names: tuple[str, ...]) -> Values
     """Numbers (n,) of the joints in a JointState, in the order of their names.
 
     Args:
-        message: From rclpy, or deserialised by rosbags. Without names its numbers are in the order
-            of ``joint_names`` already, as those of CRTK's clients are.
+        message: From rclpy, or deserialised by rosbags. If the message contains no names, its numbers must be in the
+            order of ``joint_names``; clients of CRTK send such messages.
         part: ``position``, ``velocity`` or ``effort``.
-        joint_names: Wanted order; others in the message are left out. Empty takes them as they are.
+        joint_names: Wanted order; other joints in the message are left out. If empty, all joints are returned in the
+            order of the message.
 
     Returns:
-        The numbers; or why the message cannot be used.
+        The numbers; or the reason why the message cannot be used.
     """
     names, numbers = list(message.name) or list(joint_names), getattr(message, part)
     if any(name not in names for name in joint_names):

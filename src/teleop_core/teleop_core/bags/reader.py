@@ -1,4 +1,4 @@
-"""Reading recordings, our own and others', as columns or in the order of their log times."""
+"""Reading recordings of this package and of other writers, as columns or in the order of their log times."""
 
 import sys
 import warnings
@@ -22,7 +22,7 @@ from teleop_core.graph.topics import Kind, Topic
 
 class _Message(NamedTuple):
     log_ns: int
-    place: int  # offset in the file of what holds it
+    place: int  # file offset of the chunk or records that contain it
     channel: int
     begin: int
     end: int
@@ -34,9 +34,9 @@ _order = itemgetter(0, 1)
 
 
 def in_order(source: mcap_source.McapSource, channels: frozenset[int]) -> Iterator[tuple[int, int, bytes]]:
-    """Channel, log time [ns] and CDR bytes of messages; equal times in the order of the file.
+    """Channel, log time [ns] and CDR bytes of messages in log-time order; equal log times in the order of the file.
 
-    Chunks may overlap in time: a message is held back until no later chunk can precede it.
+    Chunks may overlap in time, so a message is held back until no later chunk can contain an earlier message.
     """
     places = sorted(
         (p for p in source.contents.places if p.channels is None or p.channels & channels),
@@ -66,12 +66,12 @@ def _messages(place: int, records: mcap_source.Records, channels: frozenset[int]
 __all__ = ["Bag", "Series", "TopicInfo", "recover"]
 
 _LATEST_NS = 2**62
-"""Log times from here on [ns], the year 2116, are none; differences of others fit into 64 bits."""
+"""Log times from this one on [ns], in the year 2116, are invalid. Differences of valid log times fit into 64 bits."""
 
 
 @dataclass(frozen=True)
 class TopicInfo:
-    """Message type of a topic, and how many messages there are."""
+    """Message type of a topic, and its number of messages."""
 
     type: str
     count: int
@@ -82,7 +82,7 @@ def _name(topic: Topic | str) -> str:
 
 
 def _begin_ns(source: mcap_source.McapSource) -> int:
-    """First log time of a file [ns]; an index may list files in another order than that of time."""
+    """First log time of a file [ns]; needed because an index may list files in another order than that of time."""
     return min((place.start_ns for place in source.contents.places), default=0)
 
 
@@ -95,19 +95,19 @@ class Bag:
         path: Directory of a recording, or one ``.mcap`` file.
 
     Attributes:
-        topics: Topics in it, with type and count.
-        metadata: Names and texts stored by our writer; empty if others recorded it.
-        is_ros1: Whether the messages are those of ROS 1, which only an import reads.
+        topics: Topics of the recording, with type and count.
+        metadata: Names and texts that this package's writer stored; empty for recordings of other writers.
+        is_ros1: Whether the messages are messages of ROS 1, which can only be imported.
         start_ns: First log time, [ns].
         end_ns: Last log time, [ns].
 
     Raises:
-        RecordingError: The path is missing, or is no recording, or was cut off, or is empty.
+        RecordingError: The path does not exist or is no recording, or the recording was cut off or is empty.
     """
 
     def __init__(self, path: Path | str) -> None:
         self.path = Path(path)
-        # Of each file the channels of each topic; several publishers may have made several.
+        # For each file, the channels of each topic. Several publishers of a topic may have made several channels.
         self._numbers: dict[mcap_source.McapSource, dict[str, list[int]]] = {
             source: {} for source in sorted(map(mcap_source.McapSource, finding.mcap_files(self.path)), key=_begin_ns)
         }
@@ -141,7 +141,7 @@ class Bag:
         """Insist on topics with at least one message.
 
         Raises:
-            RecordingError: Lists what is missing and what there is.
+            RecordingError: A topic is missing or empty. The message lists the missing and the existing topics.
         """
         missing = []
         for topic in topics:
@@ -165,7 +165,7 @@ class Bag:
 
         Args:
             topics: Streams; reports are read with :meth:`reports`.
-            joint_names: Wanted order of joints; None for that in the recording.
+            joint_names: Wanted order of the joints; None for the order in the recording.
 
         Returns:
             Topic names to series.
@@ -183,9 +183,9 @@ class Bag:
     def blocks(
         self, topics: Iterable[Topic | str], joint_names: tuple[str, ...] | None = None
     ) -> Iterator[dict[str, Series]]:
-        """As :meth:`read_many`, chunk by chunk: memory does not grow with the recording.
+        """The same as :meth:`read_many`, but chunk by chunk, so that memory use does not grow with the recording.
 
-        Chunks come as they stand in the file; topics without messages in a chunk are left out.
+        Chunks are returned in the order of the file. Topics without messages in a chunk are left out of its result.
         """
         yield from self._blocks(self._columns(topics, joint_names))
 
@@ -237,7 +237,7 @@ class Bag:
         """All reports of a topic.
 
         Raises:
-            RecordingError: The topic is missing or carries something else.
+            RecordingError: The topic is missing or does not contain reports.
         """
         self.require([topic])
         out: list[messages.Report] = []

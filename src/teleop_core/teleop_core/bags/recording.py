@@ -39,10 +39,10 @@ class RecordingParameters:
                 raise ParameterError("every_of", entry, "topic=n with a whole number n >= 1")
 
     def every_nth(self, topics: Iterable[Topic]) -> dict[str, int]:
-        """Of which samples one is recorded, for each topic; 0 if the topic is not recorded.
+        """Decimation of each topic: n if every n-th sample is recorded; 0 if the topic is not recorded.
 
         Raises:
-            UnknownNameError: A wanted topic or exception is none of them.
+            UnknownNameError: ``topics`` or ``every_of`` of the parameters names an unknown topic.
         """
         exceptions = dict(entry.split("=") for entry in self.every_of)
         declared = list(topics)
@@ -59,6 +59,6 @@ class RecordingParameters:
 
 
 MARKS = Topic("recorder/marks", Kind.REPORT, Stamp("time of the mark"), quality=Quality.REPORT)
-"""Marks that somebody set during a live recording: one text each."""
+"""Marks that a user set during a live recording; each mark is one text."""
 RECORDER = Stage("recorder", RecordingParameters, reads=(), writes=(), node="teleop_core.nodes.recorder:RecorderNode")
 """The recorder; it reads every topic of its graph, of all arms."""

@@ -1,4 +1,4 @@
-"""Recovery: a recording that was cut off, made readable again in a new place."""
+"""Recovery: a readable copy of a recording that was cut off."""
 
 from pathlib import Path
 
@@ -10,11 +10,11 @@ from teleop_core.base.errors import RecordingError
 
 
 def recover(path: Path | str, out: Path | str | None = None) -> tuple[Path, int]:
-    """Copy what is whole of a recording into a new one; the old one is left as it is.
+    """Copy all intact messages of a recording into a new recording; the old recording is not changed.
 
     Args:
         path: Directory or ``.mcap`` file of a recording whose writer was killed.
-        out: Directory to make; None puts ``_recovered`` behind the name of the old one.
+        out: Directory to make; None appends ``_recovered`` to the name of the old recording.
 
     Returns:
         The new directory and the number of messages in it.
@@ -68,7 +68,7 @@ def _copy(source: mcap_source.McapSource, target: Path) -> int:
 
 
 def _chunk(records: mcap_source.Records, chosen: NDArray[np.bool_]) -> chunks.Chunk:
-    """The chosen messages in the same order, with an index."""
+    """Chunk of the chosen messages, in the same order, with an index."""
     channels, log_ns = records.channel[chosen], records.log_ns[chosen]
     begins, sizes = records.begin[chosen] - chunks.HEADER.size, records.size[chosen] + chunks.HEADER.size
     pieces = [records.data[b : b + n] for b, n in zip(begins.tolist(), sizes.tolist(), strict=True)]

@@ -23,11 +23,11 @@ def report(stamp_ns: int, name: str, level: int, message: str, values: Mapping[s
 
     Args:
         stamp_ns: Time of the report, [ns].
-        name: Who reports.
+        name: Name of the reporting component.
         level: 0 ok, 1 warning, 2 error, 3 stale.
         message: One line for people.
-        values: Names and texts of what is reported.
-        hardware: What it is a report of.
+        values: Names and texts of the reported values.
+        hardware: Identifier of the reported hardware.
     """
     types = ros_types.typestore().types
     pairs = [types["diagnostic_msgs/msg/KeyValue"](key, text) for key, text in values.items()]

@@ -9,7 +9,7 @@ from rosbags.typesys import Stores, get_typestore
 
 DISTRIBUTION = "jazzy"
 _UNREADABLE = (SerdeError, AssertionError, IndexError, ValueError, OverflowError, MemoryError, struct.error)
-"""What the rosbags library raises about bytes that are no such message."""
+"""Exceptions that the rosbags library raises for bytes that are not a message of the type."""
 
 
 @cache
@@ -20,7 +20,7 @@ def typestore() -> Any:
 
 @cache
 def definition(ros_type: str) -> str:
-    """Text of a message type and of all types in it, as a ``ros2msg`` schema."""
+    """Definition of a message type and of all types in it, as the text of a ``ros2msg`` schema."""
     return str(typestore().generate_msgdef(ros_type, ros_version=2)[0])
 
 
@@ -33,13 +33,14 @@ def type_hash(ros_type: str) -> str:
 def deserialise(data: bytes, ros_type: str) -> Any:
     """Message with the attributes of its ROS type.
 
-    Up to eleven bytes may follow it: rclpy's serializer leaves four for each of two empty lists of doubles.
+    Up to eleven further bytes may follow the message: rclpy's serializer appends four bytes for each of two empty
+    lists of doubles.
 
     Raises:
-        ValueError: The bytes are no such message.
+        ValueError: The bytes are not a message of this type.
     """
     said: Exception | None = None
-    for size in (len(data), len(data) - 4, len(data) - 8):  # the type store takes three alone
+    for size in (len(data), len(data) - 4, len(data) - 8):  # the type store accepts only up to three bytes
         try:
             return typestore().deserialize_cdr(data[:size], ros_type)
         except _UNREADABLE as error:
@@ -48,5 +49,5 @@ def deserialise(data: bytes, ros_type: str) -> Any:
 
 
 def serialise(message: Any) -> bytes:
-    """CDR of a message made of the types of :func:`typestore`."""
+    """CDR bytes of a message whose type is from :func:`typestore`."""
     return bytes(typestore().serialize_cdr(message, message.__msgtype__))

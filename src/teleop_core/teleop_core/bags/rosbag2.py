@@ -40,7 +40,7 @@ def offered_qos(quality: Quality) -> list[dict[str, Any]]:
 
 
 def records_of(topics: list[Topic]) -> tuple[list[Schema], list[Channel]]:
-    """MCAP schemas and channels of topics; a topic's channel is its place in the list plus one."""
+    """MCAP schemas and channels of topics; a topic's channel number is its index in the list plus one."""
     names = list(dict.fromkeys(topic.ros_type for topic in topics))
     schemas = [
         Schema(number, ros_types.definition(name).encode(), "ros2msg", name)
@@ -58,7 +58,7 @@ def records_of(topics: list[Topic]) -> tuple[list[Schema], list[Channel]]:
 
 
 def _parsed(qos: str) -> Any:
-    """Quality of service from a channel; none if it is not readable."""
+    """Quality of service from the text of a channel; empty if the text cannot be parsed."""
     try:
         return plain_yaml.parse(qos) or []
     except plain_yaml.UnreadableError:
@@ -88,7 +88,7 @@ def metadata_text(
         schemas: Its message types.
         channels: Its topics.
         statistics: Its numbers of messages.
-        start_ns: Starting time if there are no messages, [ns].
+        start_ns: Starting time to write if the file has no messages, [ns].
     """
     types = {schema.id: schema.name for schema in schemas}
     begin = statistics.message_start_time if statistics.message_count else start_ns
@@ -118,10 +118,10 @@ def metadata_text(
 
 @contextmanager
 def new_directory(path: Path) -> Iterator[Path]:
-    """Make a recording's directory and tell its file; take it away again if that cannot be written.
+    """Make a recording's directory and yield the path of its file. Remove the directory if the file cannot be written.
 
     Raises:
-        RecordingError: The directory exists already, or it or its file cannot be written.
+        RecordingError: The directory exists already, or the directory or its file cannot be written.
     """
     try:
         path.mkdir(parents=True)
@@ -137,14 +137,14 @@ def new_directory(path: Path) -> Iterator[Path]:
 
 
 def write_metadata(directory: Path, text: str) -> None:
-    """Write ``metadata.yaml`` as a whole or not at all.
+    """Write ``metadata.yaml`` completely or not at all.
 
     Raises:
-        OSError: Not written.
+        OSError: The file was not written.
     """
     draft, final = directory / "metadata.yaml.part", directory / "metadata.yaml"
     try:
-        if final.exists():  # of another recording, into whose directory ours was moved
+        if final.exists():  # this recording was moved into the directory of another one
             raise FileExistsError(errno.EEXIST, f"{final.name} is there already", str(final))
         draft.write_text(text, encoding="utf-8")
         draft.replace(final)

@@ -1,4 +1,4 @@
-"""Series: the messages of one topic as columns, collected stretch by stretch."""
+"""Series: the messages of one topic as columns, collected from successive parts of a recording."""
 
 from collections import Counter
 from dataclasses import dataclass, replace
@@ -34,21 +34,21 @@ class Series:
         return len(self.stamp_ns)
 
     def at(self, time_ns: int) -> int:
-        """Index of the last message that was recorded by a time [ns]; -1 before the first."""
+        """Index of the last message recorded at or before a time [ns]; -1 if the time is before the first message."""
         return int(np.searchsorted(self.log_ns, time_ns, side="right")) - 1
 
     def only(self, is_kept: NDArray[np.bool_]) -> "Series":
-        """Some of the messages; ``is_kept`` has the shape (N,)."""
+        """The messages for which ``is_kept``, shape (N,), is True."""
         return self if is_kept.all() else self[is_kept]
 
     def __getitem__(self, rows: slice | NDArray[np.bool_] | NDArray[np.int64]) -> "Series":
-        """A stretch of the messages, some of them, or all in another order."""
+        """Messages selected by a slice, a mask or an array of indices."""
         stamps, logs, values = self.stamp_ns[rows], self.log_ns[rows], self.values[rows]
         return Series(stamps, logs, values, self.names, self.frame_id)
 
 
 def empty(width: int) -> Series:
-    """No messages, of so many columns."""
+    """Series without messages, with ``width`` columns."""
     return Series(np.empty(0, np.int64), np.empty(0, np.int64), np.empty((0, width)))
 
 
@@ -61,20 +61,20 @@ def kind_of(name: str, ros_type: str) -> Kind | None:
 
 
 class UnreadableError(ValueError):
-    """Bytes are no message of their type."""
+    """Bytes that are not a valid message of their type."""
 
 
 class Column:
-    """Reader of one topic's messages; malformed ones are left out and counted.
+    """Reader of one topic's messages; malformed messages are left out and counted.
 
     Args:
         name: Topic.
-        kind: What its values are; for joints of a foreign topic the first message decides.
-        joint_names: Wanted order of the joints; empty for that of the first message.
+        kind: What its values are. For joints of a topic that this package does not define, the first message decides.
+        joint_names: Wanted order of the joints; empty for the order in the first message.
 
     Attributes:
         total: Number of messages seen.
-        left_out: Number of those that are none of the topic, by reason.
+        left_out: Number of messages that were left out, by reason.
     """
 
     def __init__(self, name: str, kind: Kind, joint_names: tuple[str, ...]) -> None:
@@ -89,7 +89,7 @@ class Column:
         """Series of messages ``data[begins[i] : begins[i] + sizes[i]]``.
 
         Raises:
-            ValueError: The topic lacks joints that are wanted; the text says which.
+            ValueError: The topic lacks wanted joints; the error text names them.
         """
         self.total += len(begins)
         if self._is_new:
@@ -101,7 +101,7 @@ class Column:
         return Series(stamps, log_ns[kept], values, self.names, self.frame_id)
 
     def notes(self) -> list[str]:
-        """What was left out, in words."""
+        """Notes for the user: how many messages were left out and why, and which stand in another frame."""
         return [
             f"{self.name}: {count} of {self.total} messages are left out: each {reason.value}"
             for reason, count in self.left_out.items()
@@ -112,7 +112,7 @@ class Column:
         ]
 
     def _begin(self, data: Bytes, begins: Stamps, sizes: Stamps) -> None:
-        """Learn from the first message that can be read, of those of the commonest size first."""
+        """Learn the layout from the first readable message; messages of the most frequent size are tried first."""
         usual = np.bincount(sizes).argmax() if len(sizes) else 0
         for i in np.argsort(sizes != usual, kind="stable").tolist():
             try:
@@ -152,7 +152,7 @@ class Column:
         return stamps, values
 
     def _slow(self, data: Bytes, begins: Stamps, sizes: Stamps) -> tuple[Stamps, Values, list[int]]:
-        """Stamps and values message by message, and the places of the messages they are of."""
+        """Stamps and values, read message by message, and the indices of the messages that could be read."""
         stamps: list[int] = []
         values: list[Values] = []
         kept: list[int] = []
@@ -176,7 +176,7 @@ class Column:
 
 
 def join(parts: list[Series], column: Column) -> Series:
-    """One series of all parts, in the order of log times."""
+    """One series of all parts, sorted by log time."""
     if not parts:
         width = column.kind.width(len(column.names))
         return empty(width)
@@ -184,7 +184,10 @@ def join(parts: list[Series], column: Column) -> Series:
 
 
 def in_order(parts: list[Series]) -> Series:
-    """One series of all parts, at least one, in the order of log times; names are the first's."""
+    """One series of all parts, sorted by log time; joint names are those of the first part.
+
+    The argument ``parts`` must not be empty.
+    """
     stamps = np.concatenate([part.stamp_ns for part in parts])
     logs = np.concatenate([part.log_ns for part in parts])
     values = np.concatenate([part.values for part in parts])

@@ -14,14 +14,14 @@ ROBOT_DESCRIPTION = Topic(
 )
 """URDF of the slave."""
 TF = Topic("tf", Kind.REPORT, quality=Quality.REPORT, message="tf2_msgs/msg/TFMessage")
-"""Where the frames of all arms are; one topic for all, since frames carry the arm's name."""
+"""Poses of the frames of all arms. All arms share this topic, since names of frames contain the arm's name."""
 WORLD = "world"
-"""Frame of the picture, in which all bases stand."""
+"""Root frame of the drawing; the bases of all arms are placed in it."""
 _MESSAGE_ORDER = [0, 1, 2, 4, 5, 6, 3]  # columns of a pose in a message: x, y, z, qx, qy, qz, qw
 
 
 class TransformMessages:
-    """Messages of ``/tf`` that always tell of the same frames.
+    """Messages of ``/tf`` that always contain the same frames.
 
     Args:
         frames: Names of parent and child of each transform.
@@ -38,19 +38,19 @@ class TransformMessages:
             cdr.string(child)
             cdr.gap("d", slice(7 * index, 7 * index + 7))
         self._template: layouts.Bytes = np.frombuffer(bytes(cdr.template), np.uint8)
-        # Where the bytes of all stamps, and of all numbers, stand in a message.
+        # Positions of the bytes of all stamps, and of all numbers, in a message.
         self._stamps = _places([at for at, code, *_ in cdr.gaps if code == "i"], 8)
         self._numbers = _places([at for at, code, *_ in cdr.gaps if code == "d"], 56)
 
     def encode(self, stamp_ns: layouts.Stamps, poses: Array) -> list[bytes]:
-        """Messages of N times.
+        """Messages of N times, one message for each time.
 
         Args:
             stamp_ns: Stamps (N,) [ns].
-            poses: Children in their parents (N, frames, 7): x, y, z [m], quaternion w, x, y, z.
+            poses: Poses of the child frames in their parent frames (N, frames, 7): x, y, z [m], quaternion w, x, y, z.
 
         Raises:
-            ShapeError: The poses have another shape.
+            ShapeError: ``poses`` does not have the shape (N, frames, 7).
         """
         if poses.shape != (len(stamp_ns), len(self.frames), 7):
             raise ShapeError("poses", (len(stamp_ns), len(self.frames), 7), poses.shape)
@@ -69,6 +69,6 @@ def _places(begins: list[int], size: int) -> NDArray[np.int64]:
 
 
 def text_message(text: str) -> bytes:
-    """Message of a topic of texts."""
+    """Bytes of a message that contains one text."""
     kind = ros_types.typestore().types[ROBOT_DESCRIPTION.message]
     return ros_types.serialise(kind(data=text))

@@ -1,4 +1,4 @@
-"""Walking through MCAP records: compiled, since every message of a recording passes through it."""
+"""Walking through MCAP records. These functions are compiled, since they process every message of a recording."""
 
 import numpy as np
 from mcap.opcode import Opcode
@@ -15,7 +15,7 @@ OPCODE, BEGIN, SIZE, CHANNEL, LOG = range(5)
 
 @inner
 def _little_endian(data, at, count):  # type: ignore[no-untyped-def]
-    """Unsigned number of ``count`` bytes; of eight bytes as a signed one."""
+    """Unsigned little-endian number of ``count`` bytes; eight bytes give a signed number."""
     number = np.int64(0)
     for i in range(count):
         number |= np.int64(data[at + i]) << (8 * i)
@@ -24,7 +24,10 @@ def _little_endian(data, at, count):  # type: ignore[no-untyped-def]
 
 @kernel
 def _walk(data, at, end, rows):  # type: ignore[no-untyped-def]
-    """Fill rows with opcode, begin, size, channel, log time; number filled and where it ended."""
+    """Fill ``rows`` with opcode, begin, size, channel, log time.
+
+    Return the number of filled rows and the end position.
+    """
     count = 0
     while at + 9 <= end and count < len(rows):
         size = _little_endian(data, at + 1, 8)
@@ -49,10 +52,13 @@ def _walk(data, at, end, rows):  # type: ignore[no-untyped-def]
 
 @kernel
 def _gather(data, begins, template, mask, out):  # type: ignore[no-untyped-def]
-    """Copy pieces of equal size from anywhere into rows; whether all are the template where the mask is not zero."""
+    """Copy pieces of equal size into ``out``.
+
+    Return whether all pieces are equal to ``template`` where ``mask`` is not zero.
+    """
     wrong, size = np.uint8(0), out.shape[1]
     for i in range(len(begins)):
-        piece = data[begins[i] : begins[i] + size]  # indices into a slice need no test of their sign
+        piece = data[begins[i] : begins[i] + size]  # numba does not test the sign of an index into a slice
         row = out[i]
         for j in range(size):
             row[j] = piece[j]
@@ -61,16 +67,17 @@ def _gather(data, begins, template, mask, out):  # type: ignore[no-untyped-def]
 
 
 def walk(data: Bytes, begin: int, end: int) -> tuple[Rows, int]:
-    """Whole records between two places.
+    """Table of the whole records between two positions.
 
     Args:
         data: Read-only bytes.
-        begin: Where the first record begins.
-        end: Where the last one ends at the latest.
+        begin: Position at which the first record begins.
+        end: Position behind which no record is read.
 
     Returns:
-        Rows of (opcode, begin of the payload, its size, channel, log time [ns]), shape (n, 5), where the payload of a
-        message is its CDR, and other records have channel and time -1; and where the last whole record ends.
+        Rows of (opcode, begin of the payload, its size, channel, log time [ns]), shape (n, 5), and the position at
+        which the last whole record ends. The payload of a message is its CDR. Records other than messages have channel
+        -1 and log time -1.
     """
     parts = []
     while True:
@@ -83,13 +90,15 @@ def walk(data: Bytes, begin: int, end: int) -> tuple[Rows, int]:
 
 
 def gather(data: Bytes, begins: Stamps, template: Bytes, mask: Bytes) -> Bytes | None:
-    """Pieces that begin at these places, shape (n, size); None where one differs from a template.
+    """Pieces of equal size that begin at the given positions, shape (n, size).
+
+    The result is None if any piece differs from the template.
 
     Args:
         data: Read-only bytes.
-        begins: Where the pieces begin, shape (n,); each ends inside of the data.
-        template: What pieces are, shape (size,).
-        mask: Bits that count, shape (size,).
+        begins: Begin of each piece, shape (n,); each piece must end within the data.
+        template: Expected bytes of a piece, shape (size,).
+        mask: Bits that are compared with the template, shape (size,).
     """
     out = np.empty((len(begins), len(template)), np.uint8)
     return out if _gather(data, np.ascontiguousarray(begins), template, mask, out) else None

@@ -1,7 +1,7 @@
 """Writing recordings: streams in blocks and single messages become a rosbag2 directory.
 
-Building, compressing and writing happen in a thread of their own, in the order of the calls, so
-that the same calls give the same bytes. Everything given to the writer is copied first.
+A separate thread builds, compresses and writes the messages in the order of the calls, so that the same calls give the
+same bytes. The writer copies all data that it is given.
 """
 
 from collections.abc import Iterable, Iterator, Mapping
@@ -23,13 +23,13 @@ from teleop_core.graph.topics import Kind, Topic
 
 CHUNK_BYTES = 2 << 20
 QUEUE_LENGTH = 8
-"""Seconds of a session that wait for a slow disk, before callers wait too."""
+"""Seconds of a session that are queued for a slow disk before callers have to wait."""
 METADATA_NAME = "teleop_core"
 Block = Mapping[Topic, tuple[Stamps, Values, Stamps]]
 
 
 class _Channel:
-    """A topic being recorded: ``every`` is 0 if it is not, ``seen`` counts what came."""
+    """A topic that may be recorded: ``every`` is 0 if it is not recorded, ``seen`` counts all its messages."""
 
     __slots__ = ("every", "layout", "number", "recorded", "seen")
 
@@ -38,25 +38,26 @@ class _Channel:
         self.seen = self.recorded = 0
 
     def is_turn(self) -> bool:
-        """Whether the next sample is one of those that are recorded; counts it."""
+        """Count the next sample and return whether it is recorded."""
         self.seen += 1
         return self.every > 0 and (self.seen - 1) % self.every == 0
 
 
 class BagWriter:
-    """Recorder of one session, to be used with ``with``.
+    """Recorder of one session, a context manager for ``with``.
 
     Args:
         path: Directory to make.
-        topics: Topics that may be written; those that the parameters deselect are passed over.
-        joint_names: Joints of the robot, in the order of the columns; with several arms those of each by its namespace.
+        topics: Topics that may be written; topics that the parameters deselect are ignored.
+        joint_names: Joints of the robot, in the order of the columns. For several arms: the joints of each arm, by its
+            namespace.
         parameters: Which topics are recorded, at what rate and how compressed.
-        compression: Takes the place of ``parameters.compression``.
+        compression: Replaces ``parameters.compression``.
         metadata: Names and texts stored with the recording: configuration, seed.
         start_ns: Log time at which the session starts, [ns].
-        hold_ns: Longest log time for which single messages wait for more of them, [ns]. Shorter
-            than a second means a live recording: what was handed over is brought to the disk at
-            once, so that neither the end of the process nor a loss of power costs more.
+        hold_ns: Longest log time for which single messages are collected before they are written, [ns]. A value below
+            one second means a live recording: written data are synced to the disk at once. The end of the process or a
+            loss of power then loses only the collected messages.
         background: Its thread, queue and disk.
 
     Raises:
@@ -113,7 +114,7 @@ class BagWriter:
 
     @property
     def counts(self) -> dict[str, int]:
-        """Messages given for recording so far, per recorded topic, decimation applied."""
+        """Number of messages given for recording so far, per recorded topic, after decimation."""
         return {topic.name: self._channels[topic.name].recorded for topic in self._topics}
 
     def write(self, topic: Topic, log_ns: int, data: bytes, publish_ns: int | None = None) -> None:
@@ -121,9 +122,9 @@ class BagWriter:
 
         Args:
             topic: Its topic.
-            log_ns: Time at which it came, [ns].
+            log_ns: Time at which the message was received, [ns].
             data: Its CDR bytes.
-            publish_ns: Time at which it was sent, [ns]; None if unknown.
+            publish_ns: Time at which the message was sent, [ns]; None if unknown.
 
         Raises:
             RecordingError: Writing has failed, now or earlier.
@@ -145,11 +146,11 @@ class BagWriter:
             self.flush_older(log_ns)
 
     def write_block(self, block: Block) -> None:
-        """Record samples of streams, at best about a second of them at a time.
+        """Record a block of samples of streams; a block of about one second is best.
 
         Args:
-            block: Per topic stamps [ns], shape (N,); values, shape (N, width); and log times
-                [ns], shape (N,), which do not decrease. N may differ between topics.
+            block: For each topic: stamps [ns], shape (N,); values, shape (N, width); and log times [ns], shape (N,),
+                which must not decrease. N may differ between topics.
 
         Raises:
             RecordingError: Writing has failed, now or earlier.
@@ -168,7 +169,7 @@ class BagWriter:
         self._hand_over(stretches)
 
     def flush(self) -> None:
-        """Hand single messages that wait for more of them to the disk.
+        """Hand collected single messages to the writing thread.
 
         Raises:
             RecordingError: Writing has failed, now or earlier.
@@ -176,10 +177,10 @@ class BagWriter:
         self._hand_over([])
 
     def flush_older(self, now_ns: int) -> None:
-        """Hand single messages to the disk if the first of them has waited long enough.
+        """Hand collected single messages to the writing thread if the first of them is older than ``hold_ns``.
 
         Args:
-            now_ns: Log time now, [ns]; a clock that was set back lets nothing wait for longer.
+            now_ns: Current log time, [ns]. A clock that was set back does not make messages wait longer.
 
         Raises:
             RecordingError: Writing has failed, now or earlier.
@@ -188,7 +189,7 @@ class BagWriter:
             self.flush()
 
     def close(self) -> None:
-        """Write what is left and finish the recording; further calls do nothing.
+        """Write the remaining messages and finish the recording; further calls do nothing.
 
         Raises:
             RecordingError: Writing has failed, now or earlier.
@@ -243,7 +244,7 @@ class BagWriter:
                     self._mcap.sync()
         except OSError as error:
             stopped = error
-        except BaseException as error:  # a fault of ours: what is written stays readable
+        except BaseException as error:  # a bug in this package: the written part stays readable
             self._failure = error
         try:
             given = sum(self.counts.values())

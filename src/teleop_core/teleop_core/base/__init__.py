@@ -1,4 +1,4 @@
-"""Base: errors, texts, parameters and registries, which everything else is written with."""
+"""Base: errors, texts, parameters and registries, which all other modules use."""
 
 from typing import TYPE_CHECKING
 
@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from teleop_core.base.parameters import *  # noqa: F403
     from teleop_core.base.registry import *  # noqa: F403
     from teleop_core.base.texts import *  # noqa: F403
-else:  # loaded with their first use
+else:  # imported when they are first used
     _NAMES = {
         "errors": ("ClosureError", "EvaluationError", "KernelError", "ParameterError", "PartError", "RecordingError",
             "SessionError", "ShapeError", "TeleopError", "TeleopWarning", "UnknownNameError"),

@@ -1,8 +1,8 @@
-"""Damage: whatever a reader raises about the content of a file becomes one refusal that names it.
+"""Damage: converts any exception of a reader about the content of a file into one error that names the file.
 
-Readers of others (rosbags, mcap, pyarrow, pandas, SQLite, decompressors) raise what they like about
-bytes that lie: ``struct.error``, ``OverflowError``, ``MemoryError``, errors of their own. Every
-place that opens a file reads it within :func:`damage_told`, and nowhere else are these translated.
+Foreign readers (rosbags, mcap, pyarrow, pandas, SQLite, decompressors) raise many kinds of exceptions for damaged
+bytes: ``struct.error``, ``OverflowError``, ``MemoryError`` and their own errors. All code that opens a file reads it
+within :func:`damage_told`; these exceptions are converted nowhere else.
 """
 
 from collections.abc import Iterator
@@ -15,15 +15,15 @@ from teleop_core.base.plain_yaml import UnreadableError, check_regular
 
 @contextmanager
 def damage_told(path: Path | str, said: str = "cannot be read: {}") -> Iterator[None]:
-    """Tell what goes wrong while a file is read.
+    """Convert exceptions that are raised while a file is read.
 
     Args:
-        path: The file; must be no pipe and no device.
-        said: What is said of it, with ``{}`` for the reader's own words.
+        path: The file; must not be a pipe or a device.
+        said: Text of the error, with ``{}`` for the reader's message.
 
     Raises:
-        RecordingError: The file is missing, or its content is not what its reader takes.
-        TeleopError: As it was raised within.
+        RecordingError: The file is missing, or its reader does not accept its content.
+        TeleopError: Passed on unchanged if it is raised within.
     """
     path = Path(path)
     try:
@@ -40,6 +40,6 @@ def damage_told(path: Path | str, said: str = "cannot be read: {}") -> Iterator[
         raise RecordingError(path, said.format("it asks for more memory than there is")) from error
     except KeyError as error:  # says the name alone
         raise RecordingError(path, said.format(f"it lacks {error}")) from error
-    except Exception as error:  # there is no list of what foreign readers raise
+    except Exception as error:  # foreign readers do not document which exceptions they raise
         words = " ".join(str(error).split())[:200] or type(error).__name__
         raise RecordingError(path, said.format(words)) from error

@@ -1,7 +1,7 @@
-"""Errors: every wrong use of the package raises a child of :class:`TeleopError`.
+"""Errors: every wrong use of the package raises a subclass of :class:`TeleopError`.
 
-Expected events (a joint limit, a stale command, an unreachable pose) are never errors; they come
-back as a status beside the value.
+Expected events (a joint limit, a stale command, an unreachable pose) are never errors; they are returned as a status
+beside the value.
 """
 
 from collections.abc import Iterable
@@ -12,26 +12,26 @@ from typing import Any
 from teleop_core.base.texts import LONGEST_LINE, one_line, printable, shown
 
 _SHOWN = 40
-"""Alternatives that a message lists whole."""
+"""Largest number of alternatives that a message lists completely."""
 _NEAR = 8
 
 
 class TeleopError(Exception):
     """Base of all errors of this package; its text is one line that a user can act on.
 
-    What stands in it may come from files and topics: it is made printable, and cut if it is long.
+    Parts of the text may come from files and topics, so the text is made printable, and long texts are cut.
     """
 
     def __init__(self, text: str = "") -> None:
         super().__init__(one_line(text))
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """What pickle needs to make the same error in another process."""
+        """Data from which pickle makes the same error in another process."""
         return _same, (type(self), str(self), self.__dict__)
 
 
 class TeleopWarning(UserWarning):
-    """Category of all warnings of this package: it runs, but may not be what was meant."""
+    """Category of all warnings of this package: the program runs, but possibly not as intended."""
 
 
 def _same(kind: type[TeleopError], text: str, attributes: dict[str, object]) -> TeleopError:
@@ -51,7 +51,7 @@ class ParameterError(TeleopError, ValueError):
 class UnknownNameError(ParameterError):
     """A name is not in its list: carries the ``alternatives``, each once.
 
-    The text lists the nearest alternatives first; of a long list it names only those.
+    The text lists the nearest alternatives first; if the list is long, it names only these.
     """
 
     def __init__(self, kind: str, value: object, alternatives: Iterable[str]) -> None:

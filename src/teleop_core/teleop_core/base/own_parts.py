@@ -1,7 +1,7 @@
-"""Own parts: Python files that register parts, for commands and for processes they start.
+"""Own parts: Python files that register parts, for commands and for the processes that these start.
 
-A package that is installed registers its parts by entry points; a single file is named once, by ``teleop --parts
-FILE.py`` or in the environment variable ``TELEOP_PARTS``, and holds for every process of the session.
+An installed package registers its parts by entry points. A single file is named once, by ``teleop --parts FILE.py`` or
+in the environment variable ``TELEOP_PARTS``, and is loaded in every process of the session.
 """
 
 import os
@@ -16,17 +16,17 @@ from teleop_core.base.errors import PartError, TeleopError
 from teleop_core.base.registry import ADDED, Registry
 
 VARIABLE = "TELEOP_PARTS"
-_texts: dict[str, tuple[str, bytes]] = {}  # by module: path and content of the file that was run
-_made: dict[str, list[tuple[Registry[Any], str]]] = {}  # by module: what its file registered
+_texts: dict[str, tuple[str, bytes]] = {}  # path and content of the file that was run, by module
+_made: dict[str, list[tuple[Registry[Any], str]]] = {}  # parts that its file registered, by module
 
 
 def load_own_parts(files: Iterable[Path] = ()) -> None:
-    """Run the given files and those of the environment, each once, and pass them on to children.
+    """Run the given files and the files of the environment, each once, and pass them on to child processes.
 
-    A file that has changed since is run again: what it registered before is taken away.
+    A file that has changed since it was run is run again; the parts that it registered before are removed.
 
     Raises:
-        PartError: A file is missing or raises; the text names it and says what.
+        PartError: A file is missing or raises an exception; the error text names the file and the exception.
     """
     wanted = list(dict.fromkeys(path.resolve() for path in (*named_files(), *files)))
     for path in wanted:
@@ -41,7 +41,7 @@ def named_files() -> list[Path]:
 
 
 def own_files() -> list[Path]:
-    """Files that the environment names and are loaded, and those of modules that stand beside them."""
+    """Files that the environment names and that are loaded, and files of modules in the same folders."""
     folders = {path.parent for path in named_files()}
     modules = (getattr(module, "__file__", None) for module in tuple(sys.modules.values()))
     beside = {Path(file) for file in modules if file and Path(file).parent in folders}
@@ -49,7 +49,7 @@ def own_files() -> list[Path]:
 
 
 def forget_own_parts() -> None:
-    """Take away what all files have registered, and name none any more."""
+    """Remove the parts that all files have registered, and delete the files from the environment."""
     for name in tuple(_texts):
         _forget(name)
     os.environ.pop(VARIABLE, None)
@@ -74,11 +74,11 @@ def _load(path: Path) -> None:
         _forget(name)
     module = module_from_spec(spec)
     sys.modules[name], _texts[name], count = module, text, len(ADDED)
-    if str(path.parent) not in sys.path:  # as of any script, for what stands beside it
+    if str(path.parent) not in sys.path:  # as for any script, so that it can import modules in its folder
         sys.path.append(str(path.parent))
     try:
-        exec(compile(text[1], path, "exec"), module.__dict__)  # a cached compilation may be of what it was before
-    except Exception as error:  # whatever a user's file raises, one line names it
+        exec(compile(text[1], path, "exec"), module.__dict__)  # a cached compilation may be from an earlier version
+    except Exception as error:  # any exception of a user's file becomes a one-line error that names the file
         _made.setdefault(name, []).extend(ADDED[count:])
         _forget(name)
         if isinstance(error, TeleopError):

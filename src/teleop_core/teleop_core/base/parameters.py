@@ -1,4 +1,4 @@
-"""Parameters: declared once as dataclass fields with unit, bounds and text, checked without ROS."""
+"""Parameters: declared once, as dataclass fields with unit, bounds and text, and checked without ROS."""
 
 import dataclasses
 import math
@@ -21,13 +21,14 @@ Value = Scalar | tuple[Scalar, ...]
 LARGEST = 10**18
 """Largest whole number of a parameter: kernels count in 64 bits."""
 MARKS = ("published", "derived", "fitted", "assumed")
-"""How a number is known: a source prints it, follows from one, is fitted to data, is plausible."""
+"""Origin of a number: printed in a source, derived from a source, fitted to data, or assumed because it is plausible.
+"""
 
 
 class Within(NamedTuple):
-    """Bounds of a number, each itself allowed, and its SI unit, empty for pure numbers.
+    """Inclusive bounds of a number, and its SI unit, which is empty for pure numbers.
 
-    They hold for each element of a tuple. None is the bound of the unit (:mod:`~teleop_core.base.ranges`).
+    For a tuple, the bounds apply to each element. None means the bound of the unit (:mod:`~teleop_core.base.ranges`).
     """
 
     lower: float | None = None
@@ -53,22 +54,23 @@ def parameter(
     """Dataclass field that describes one parameter.
 
     Args:
-        default: Value when nothing else is said; its type is the parameter's type.
+        default: Default value; its type is the parameter's type.
         within: Bounds and unit of numbers.
         doc: One line for the README's table and the ROS descriptor.
         choices: Allowed names; empty for any.
         length: Number of elements of a tuple; None for any.
-        off: Number that is allowed whatever the bounds, and turns off what it sets; None for none.
+        off: Number that is allowed outside of the bounds and switches the feature off; None if there is no such
+            number.
         fixed: Whether it can only be set before the stage is built.
-        source: Where the default comes from: a mark of :data:`MARKS`, a colon, and by whom, from
-            what, to what or why; empty for a matter of taste.
-        **former: ``lower``, ``upper`` and ``unit``, as 0.6.0 has them in place of ``within``.
+        source: Origin of the default: a mark of :data:`MARKS`, a colon, and the source, the data or the reason; empty
+            if the default is a free choice.
+        **former: ``lower``, ``upper`` and ``unit``, as in version 0.6.0, instead of ``within``.
 
     Returns:
         The dataclass field.
 
     Raises:
-        ParameterError: The source begins with no mark.
+        ParameterError: The source does not begin with a mark.
     """
     if source and source.partition(":")[0] not in MARKS:
         raise ParameterError("source", source, f"one of {', '.join(MARKS)}, a colon and a text")
@@ -80,16 +82,16 @@ def parameter(
 
 @dataclass(frozen=True)
 class NoParameters:
-    """Group of a part that has nothing to set."""
+    """Group of a part without parameters."""
 
 
 @dataclass(frozen=True)
 class Choice:
-    """Which part of a registry a group uses, and the parameters of every part there is.
+    """The part of a registry that a group uses, and the parameters of all parts of the registry.
 
     Attributes:
         kind: Name of the part.
-        groups: Parameters of each part by its name; those of parts that are not used wait.
+        groups: Parameters of each part by its name, also of parts that are not used now.
     """
 
     kind: str
@@ -106,12 +108,12 @@ def choice(
 ) -> Any:
     """Dataclass field, to be called ``kind``, that chooses a part by name.
 
-    Beside ``kind`` the group then has the parameters of every part, each below the part's name:
-    ``fixture.kind`` and ``fixture.sphere.radius``. Parts have a group in ``parameters``.
+    In addition to ``kind``, the group then has the parameters of every part, each below the part's name:
+    ``fixture.kind`` and ``fixture.sphere.radius``. Each part has a parameter group in its attribute ``parameters``.
 
     Args:
-        registry: Where the parts are.
-        default: Part when nothing else is said.
+        registry: Registry of the parts.
+        default: Name of the default part.
         doc: One line for tables and the ROS descriptor.
         fixed: Whether it can only be set before the stage is built.
         usual: Dotted names of parts' parameters that have another default here.
@@ -127,7 +129,7 @@ def _make_choice(registry: "Registry[Any]", kind: str, values: Mapping[str, obje
 
 
 def _below(name: str, values: Mapping[str, object]) -> dict[str, object]:
-    """Values of a nested group, with its name cut from their keys."""
+    """Values of a nested group, with the group's name removed from their keys."""
     start = name + "."
     return {key[len(start) :]: value for key, value in values.items() if key.startswith(start)}
 
@@ -165,7 +167,7 @@ class Spec:
         """Refuse a value of another type, length, bound or choice.
 
         Raises:
-            ParameterError: Names the parameter, the value and what is allowed.
+            ParameterError: The value is not allowed. The error names the parameter, the value and the allowed values.
         """
         if self.kind is not tuple:
             self._check_element(value)
@@ -228,7 +230,7 @@ def specs(group: type, prefix: str = "") -> Iterator[Spec]:
 
 @cache
 def _spec(group: type, name: str, prefix: str) -> Spec:
-    """Declaration of one field; made once, for it is most of what a configuration costs."""
+    """Declaration of one field; cached, because making it is most of the cost of a configuration."""
     hint, entry = _hints(group)[name], next(one for one in dataclasses.fields(group) if one.name == name)
     kind = get_origin(hint) or hint
     if kind is UnionType or kind not in {bool, int, float, str, tuple}:
@@ -255,7 +257,7 @@ def _choice_specs(entry: Any, prefix: str) -> Iterator[Spec]:
 
 
 def build(group: type[Group], values: Mapping[str, object], prefix: str = "") -> Group:
-    """Group with ``values`` in place of its defaults, checked.
+    """Checked group with ``values`` instead of its defaults.
 
     Args:
         group: Dataclass whose fields come from :func:`parameter` or are such groups.
@@ -266,8 +268,8 @@ def build(group: type[Group], values: Mapping[str, object], prefix: str = "") ->
         The group.
 
     Raises:
-        UnknownNameError: A name is not declared; the alternatives are listed.
-        ParameterError: A value breaks its declaration, or a relation between values.
+        UnknownNameError: A name is not declared; the error lists the alternatives.
+        ParameterError: A value violates its declaration, or a relation between values.
     """
     declared = {spec.name: spec for spec in specs(group)}
     for name, value in values.items():
@@ -297,7 +299,7 @@ def _make(group: type[Group], values: Mapping[str, object]) -> Group:
 
 
 def values_of(group: object, prefix: str = "") -> dict[str, Value]:
-    """Dotted names to values of a group: what :func:`build` would need to make it again."""
+    """Dotted names and values of a group, from which :func:`build` makes the same group again."""
     out: dict[str, Value] = {}
     for entry in dataclasses.fields(group):  # type: ignore[arg-type]
         value = getattr(group, entry.name)

@@ -1,8 +1,8 @@
-"""Plain YAML: what files and settings say, with bounds on what reading it can cost, and writing it.
+"""Plain YAML: reads files and settings, with limits on the cost of reading, and writes them.
 
-It is YAML 1.1 as PyYAML's safe loader reads it, except that dates stay texts. Recursive aliases, aliases that expand to
-too many values, and overlong numbers are refused. Where PyYAML has libyaml, that reads and writes: the values are the
-same, five times as fast.
+The format is YAML 1.1 as PyYAML's safe loader reads it, except that dates stay texts. Recursive aliases, aliases that
+expand to too many values, and overlong numbers are refused. If PyYAML includes libyaml, libyaml reads and writes: the
+values are the same, and it is five times as fast.
 """
 
 import stat
@@ -14,19 +14,20 @@ import yaml
 from teleop_core.base.errors import TeleopError
 
 LARGEST_TEXT = 1 << 20
-"""Bytes of a file: two seconds of reading. A recording's own parameters are five thousand."""
+"""Largest size of a file [bytes], which takes two seconds to read. The parameters in a recording have five thousand
+bytes."""
 MOST_VALUES = 50_000
-"""Values that a text may stand for, aliases counted as often as they are used."""
+"""Largest number of values in a text; aliases count as often as they are used."""
 LONGEST_NUMBER = 400
-"""Characters of a number: the longest double written out has 309 digits before its point."""
+"""Largest number of characters of a number: the longest double, written out, has 309 digits before its point."""
 DEEPEST = 100
-"""Levels of lists and mappings within each other: libyaml's composer has no bound of its own."""
+"""Largest depth of nested lists and mappings; libyaml's composer has no limit of its own."""
 _DATE = "tag:yaml.org,2002:timestamp"
 _NUMBERS = ("tag:yaml.org,2002:int", "tag:yaml.org,2002:float")
 
 
 class UnreadableError(ValueError):
-    """A text is not YAML as this package reads it; says why in one line."""
+    """A text is not YAML as this package reads it; the error gives the reason in one line."""
 
 
 _BEGINS, _ENDS = yaml.CollectionStartEvent, yaml.CollectionEndEvent
@@ -45,7 +46,7 @@ class _Dumper(getattr(yaml, "CSafeDumper", yaml.SafeDumper)):  # type: ignore[mi
     """Writes equal parts in full instead of as references, which rcl cannot read."""
 
     def ignore_aliases(self, data: Any) -> bool:
-        """Never refer to what was written before."""
+        """Never write a reference to an earlier part."""
         return True
 
 
@@ -54,7 +55,7 @@ def written(value: Any, **options: Any) -> str:
 
     Args:
         value: Mappings, lists, texts, numbers, truth values or None.
-        options: As of ``yaml.dump``, such as ``width``.
+        options: Options of ``yaml.dump``, such as ``width``.
     """
     return str(yaml.dump(value, Dumper=_Dumper, sort_keys=False, allow_unicode=True, **options))
 
@@ -63,7 +64,7 @@ def parse(text: str) -> Any:
     """Value of a text: mappings, lists, texts, numbers, truth values or None.
 
     Raises:
-        UnreadableError: It is not YAML, or would cost too much.
+        UnreadableError: The text is not YAML, or reading it would cost too much.
     """
     if len(text) > LARGEST_TEXT:
         raise UnreadableError(f"has {len(text)} characters, must have at most {LARGEST_TEXT}")
@@ -103,7 +104,7 @@ def _count(node: yaml.Node, known: dict[int, int], within: set[int]) -> int:
     """Number of values that a node expands to, with its aliases.
 
     Raises:
-        UnreadableError: It is part of itself, or there are too many, or a number is too long.
+        UnreadableError: The node contains itself, or there are too many values, or a number is too long.
     """
     if isinstance(node, yaml.ScalarNode):
         if node.tag in _NUMBERS and len(node.value) > LONGEST_NUMBER:
@@ -127,10 +128,10 @@ def _count(node: yaml.Node, known: dict[int, int], within: set[int]) -> int:
 
 
 def load(path: Path) -> Any:
-    """Value of a file that a person named.
+    """Value of a file that a user named.
 
     Raises:
-        TeleopError: It cannot be read, or is not YAML; the message names it.
+        TeleopError: The file cannot be read, or is not YAML; the message names the file.
     """
     try:
         return read(path)
@@ -141,7 +142,7 @@ def load(path: Path) -> Any:
 
 
 def read(path: Path) -> Any:
-    """Value of a file, as :func:`parse`.
+    """Value of a file, as returned by :func:`parse`.
 
     Raises:
         OSError: The file cannot be read.
@@ -151,7 +152,7 @@ def read(path: Path) -> Any:
 
 
 def read_text(path: Path) -> str:
-    """Text of a regular file of at most :data:`LARGEST_TEXT` bytes; raises as :func:`read`."""
+    """Text of a regular file of at most :data:`LARGEST_TEXT` bytes. Raises the same errors as :func:`read`."""
     try:
         check_regular(path)
         with path.open("rb") as file:
@@ -164,15 +165,15 @@ def read_text(path: Path) -> str:
 
 
 def check_regular(path: Path) -> None:
-    """Make sure that a path leads to a file with an end, not to a pipe or a device.
+    """Make sure that a path is a regular file, not a pipe or a device.
 
     Raises:
-        OSError: There is nothing to read.
-        UnreadableError: It is something else than a file.
+        OSError: The path does not exist.
+        UnreadableError: The path is not a regular file.
     """
     try:
         mode = path.stat().st_mode
     except ValueError as error:  # a zero byte in its name
         raise UnreadableError(f"is no name of a file: {error}") from error
-    if not stat.S_ISREG(mode) and not stat.S_ISDIR(mode):  # reading a directory speaks for itself
+    if not stat.S_ISREG(mode) and not stat.S_ISDIR(mode):  # reading a directory raises a clear error itself
         raise UnreadableError("is a pipe or a device, must be a file")

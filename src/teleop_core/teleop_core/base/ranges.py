@@ -1,7 +1,7 @@
-"""Ranges: what a number from outside may be at all, by its unit, declared once for all readers.
+"""Ranges: possible values of a number from outside, by its unit, declared once for all readers.
 
-Parameters, arms of files and traces of networks are checked against them. A number beyond ``most`` is impossible for
-any arm and is refused. One beyond ``usual`` gives a warning: it looks like another unit.
+Parameters, arms of files and traces of networks are checked against these ranges. A number beyond ``most`` is
+impossible for any arm and is refused. A number beyond ``usual`` gives a warning, because it probably has another unit.
 """
 
 import math
@@ -12,7 +12,7 @@ from teleop_core.base.errors import ParameterError
 
 
 class Range(NamedTuple):
-    """Sizes of a quantity, whatever its sign, and what a larger one than ``usual`` looks like."""
+    """Possible magnitudes of a quantity, and the unit that a number larger than ``usual`` probably has."""
 
     most: float
     usual: float = math.inf
@@ -35,27 +35,27 @@ RANGES = {
     "N·m·s/rad": Range(1e9),
     "s": Range(1e6),
 }
-"""By unit. Four rounds are more than arms turn to either side, 50 rad/s more than they do."""
+"""Ranges by unit. No arm turns by more than four revolutions to either side, or faster than 50 rad/s."""
 MOST_OF_ARM = 1e3
-"""Length in an arm [m] or limit of its joints [rad, m]; the longest arms span 500 m. Files write
-limits of 999999 where they mean none, and origins far away where they mean a place on a map."""
+"""Largest length in an arm [m] or limit of its joints [rad, m]; the longest arms span 500 m. Some files contain limits
+of 999999 that mean no limit, or far origins that mean a position on a map."""
 LONGEST_DELAY = 10.0
-"""Of a packet on its way [s]: to the Moon and back takes 2.6 s, ETS-VII took 7 s."""
+"""Longest delay of a packet [s]: the way to the Moon and back takes 2.6 s, ETS-VII took 7 s."""
 LATEST_S = 4e9
-"""Time of the clock [s] since 1970, the year 2096."""
+"""Latest time of a clock [s] since 1970, in the year 2096."""
 
 
 def range_of(unit: str) -> Range:
-    """Range of a unit; for ``rad or m`` the wider of both, for an unknown unit any number."""
+    """Range of a unit; for ``rad or m`` the wider range, for an unknown unit any number."""
     parts = [RANGES.get(part, Range(math.inf)) for part in unit.split(" or ")]
     return max(parts, key=lambda part: part.most)
 
 
 def check(name: str, value: float, unit: str, most: float = math.inf) -> float:
-    """The number, if it is finite and within its range, and no larger than ``most``.
+    """Return the number if it is finite, within its range and not larger than ``most``.
 
     Raises:
-        ParameterError: It is not; says which numbers are.
+        ParameterError: The number is not allowed; the error states the allowed numbers.
     """
     most = min(most, range_of(unit).most)
     if not (math.isfinite(value) and abs(value) <= most):
@@ -66,7 +66,7 @@ def check(name: str, value: float, unit: str, most: float = math.inf) -> float:
 
 
 def unusual(names: Iterable[str], values: Iterable[float], unit: str) -> str:
-    """What looks like numbers of another unit, in words; empty if nothing does."""
+    """Text about numbers that probably have another unit; empty if there are none."""
     found = range_of(unit)
     large = [(n, v) for n, v in zip(names, values, strict=True) if abs(v) > found.usual]
     if not large:

@@ -6,7 +6,7 @@ package adds parts through a Python entry-point group of the registry's name::
     [project.entry-points."teleop_core.shapes"]
     my_cone = "my_package.cone:CONE"
 
-A program adds them with :meth:`Registry.add`. Nothing is imported before it is asked for.
+A program adds parts with :meth:`Registry.add`. No part is imported before it is requested.
 """
 
 import re
@@ -25,22 +25,22 @@ from teleop_core.base.errors import PartError, UnknownNameError
 Part = TypeVar("Part")
 _NAME = re.compile(r"\w[\w-]*")
 ADDED: list[tuple["Registry[Any]", str]] = []
-"""What this program has added so far, in its order."""
+"""Parts that this program has added so far, in order."""
 
 
 class Registry(Generic[Part]):
     """Named parts of one kind.
 
     Args:
-        kind: What a part is, in the singular, for messages: "fixture".
+        kind: Name of the kind in the singular, for messages: "fixture".
         kinds: The plural; the entry-point group is ``<package>.<kinds>``.
-        builtin: Names to places ``module:attribute`` in the package.
-        check: Raises :class:`~teleop_core.base.errors.PartError` for what is no such part, else returns it.
-        trial: Tries a part that is not of the package, and raises as ``check`` does.
-        package: Whose registry it is.
-        others: What serves in place of a name, for messages: "FILE.urdf".
-        base: Registry whose parts are parts here too.
-        elsewhere: Names of parts that come with other distributions of this project, to these.
+        builtin: Maps names to places ``module:attribute`` in the package.
+        check: Returns a part if it is valid, else raises :class:`~teleop_core.base.errors.PartError`.
+        trial: Tries a part that is not from the package, and raises the same errors as ``check``.
+        package: Package that owns the registry.
+        others: Alternative to a name, for messages: "FILE.urdf".
+        base: Registry whose parts are also parts of this one.
+        elsewhere: Maps names of parts in other distributions of this project to these distributions.
     """
 
     def __init__(
@@ -69,7 +69,7 @@ class Registry(Generic[Part]):
             return self.add(getattr(part, "name", type(part).__name__), part, replace=replace)
 
         self.register = register
-        """A function, which modules offer as their own."""
+        """The function ``register``, which modules export under their own names."""
 
     def __iter__(self) -> Iterator[str]:
         return iter(self.names())
@@ -83,9 +83,9 @@ class Registry(Generic[Part]):
         """Part of a name.
 
         Raises:
-            UnknownNameError: No such part; the alternatives are listed.
-            PartError: An installed part cannot be loaded, is no such part, or comes with another
-                distribution of this project that is not installed.
+            UnknownNameError: There is no such part; the error lists the alternatives.
+            PartError: An installed part cannot be loaded, is not a valid part, or is in another distribution of this
+                project that is not installed.
         """
         if self._base is not None and name in self._base.names():
             return self._base.find(name)
@@ -100,13 +100,13 @@ class Registry(Generic[Part]):
         """Add a part for the rest of this program; the same object again changes nothing.
 
         Args:
-            name: What configurations call it.
+            name: Name of the part in configurations.
             part: The part.
-            replace: Whether it may take the place of one that the program added before, as when
-                a notebook's cell is run again.
+            replace: Whether it may replace a part that the program added before, for example when a notebook's cell is
+                run again.
 
         Raises:
-            PartError: The name is taken, or this is no such part.
+            PartError: The name is already used, or the part is not valid.
         """
         if not (isinstance(name, str) and _NAME.fullmatch(name)):
             text = "named by letters, digits, _ and -, for it stands in keys and files"
@@ -125,10 +125,10 @@ class Registry(Generic[Part]):
         return checked
 
     def remove(self, name: str) -> None:
-        """Take away a part that the program added; its name is free again.
+        """Remove a part that the program added; its name is free again.
 
         Raises:
-            UnknownNameError: The program added no part of this name; those that it did are listed.
+            UnknownNameError: The program added no part with this name; the error lists the added parts.
         """
         if name not in self._own:
             raise UnknownNameError(f"added {self.kind}", name, sorted(self._own) or ["none"])
@@ -162,7 +162,7 @@ class Registry(Generic[Part]):
             raise UnknownNameError(self.kind, name, (*self.names(), *self._others))
         try:
             return entry.load()
-        except Exception as error:  # whatever a foreign module raises, one line names it
+        except Exception as error:  # any exception of a foreign module becomes a one-line error that names the module
             reason = f"{type(error).__name__}: {' '.join(str(error).split())}"
             expected = f"loadable from {entry.value} ({reason})"
             raise PartError(self.kind, name, expected) from error
@@ -175,7 +175,7 @@ def places(package: str, names: str) -> dict[str, str]:
 
 @cache
 def _entry_points(_path: tuple[str, ...]) -> Callable[..., EntryPoints]:
-    """Selection from all there are in the folders of ``sys.path``, read once for all registries."""
+    """Entry points of all folders in ``sys.path``, read once for all registries."""
     return entry_points().select
 
 
@@ -185,7 +185,7 @@ def part_check(kind: str, form: type[Part], *calls: str) -> Callable[[str, objec
     Args:
         kind: As the registry's.
         form: Class of its parts.
-        calls: Names of their attributes that can be called.
+        calls: Names of the attributes that must be callable.
     """
 
     def check(name: str, part: object) -> Part:
@@ -206,15 +206,15 @@ def part_check(kind: str, form: type[Part], *calls: str) -> Callable[[str, objec
 
 @contextmanager
 def tried(kind: str, name: str, needs: str) -> Iterator[None]:
-    """Report what a part raises inside this ``with`` as a :class:`PartError`.
+    """Convert exceptions of a part inside this ``with`` into a :class:`PartError`.
 
     Args:
         kind: As the registry's.
-        name: Of the part.
-        needs: What it must be: "one with ...".
+        name: Name of the part.
+        needs: Requirement on the part: "one with ...".
 
     Raises:
-        PartError: Whatever it raises, in one line; a PartError passes as it is.
+        PartError: The part raised any exception, which is given in one line. A PartError is passed on unchanged.
     """
     try:
         yield

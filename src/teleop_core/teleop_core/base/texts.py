@@ -1,9 +1,9 @@
-"""Texts that come from files, topics and users, made fit to be shown on a terminal."""
+"""Texts: make texts from files, topics and users safe to show on a terminal."""
 
 LONGEST_LINE = 600
-"""Characters of a message: what a terminal shows in a few rows."""
+"""Largest number of characters of a message; a terminal shows it in a few rows."""
 LONGEST_VALUE = 200
-"""Characters of a value in a message."""
+"""Largest number of characters of a value in a message."""
 
 _CONTROLS = {code: 0x2400 + code for code in range(32) if chr(code) not in "\n\t"} | {0x7F: 0x2421}
 _HIDDEN = dict.fromkeys(
@@ -13,17 +13,17 @@ _SHOWN = _CONTROLS | _HIDDEN
 
 
 def printable(text: str) -> str:
-    """The text with every character that a terminal would obey in a visible form.
+    """The text with all control characters replaced by visible characters.
 
-    Control characters become their pictures (``ESC`` is U+241B); those of the second set, marks
-    that reverse the direction of writing and halves of pairs become U+FFFD. Newlines and tabs stay.
+    Control characters of the first set become their pictures (``ESC`` is U+241B). Control characters of the second
+    set, marks that reverse the direction of writing, and single surrogates become U+FFFD. Newlines and tabs stay.
     """
     return text if text.isascii() and text.isprintable() else text.translate(_SHOWN)
 
 
 def one_line(text: str, longest: int = LONGEST_LINE) -> str:
-    """The text on one printable line of so many characters at most, cut in the middle."""
-    if len(text) > 20 * longest:  # far more than is shown need not be gone through
+    """The text on one printable line of at most ``longest`` characters, cut in the middle."""
+    if len(text) > 20 * longest:  # text far beyond the shown part need not be processed
         text = f"{text[: 10 * longest]} … {text[-10 * longest :]}"
     line = printable(" ".join(text.split()))
     if len(line) <= longest:
@@ -33,13 +33,13 @@ def one_line(text: str, longest: int = LONGEST_LINE) -> str:
 
 
 def shown(value: object, longest: int = LONGEST_VALUE) -> str:
-    """What a message shows of a value: its ``repr``, cut in the middle."""
-    if isinstance(value, int) and value.bit_length() > 1000:  # Python refuses to write out some
+    """Text of a value for messages: its ``repr``, cut in the middle."""
+    if isinstance(value, int) and value.bit_length() > 1000:  # Python refuses to write some numbers
         return f"a number of about {value.bit_length() * 301 // 1000} digits"
     if isinstance(value, str | bytes) and len(value) > 10 * longest:
         value = value[: 10 * longest]
     try:
         text = repr(value)
-    except (ValueError, RecursionError):  # a number of that size deep inside
+    except (ValueError, RecursionError):  # a nested number of that size
         return f"a {type(value).__name__} that is too large to show"
     return one_line(text, longest)

@@ -1,1 +1,1 @@
-"""Commands: what their arguments have in common, and those with a file of their own."""
+"""Commands: their common arguments, and commands that have their own file."""

@@ -1,4 +1,4 @@
-"""Arguments that several commands share, and what becomes of them."""
+"""Arguments that several commands share, and their evaluation."""
 
 import argparse
 from collections.abc import Callable
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 
 def geometry_argument(parser: argparse.ArgumentParser) -> None:
-    """Let a command take lengths in place of the published ones."""
+    """Add an argument to a command: lengths that replace the published lengths of the robot."""
     parser.add_argument(
         "--geometry",
         nargs="+",
@@ -25,9 +25,9 @@ def geometry_argument(parser: argparse.ArgumentParser) -> None:
 def command(
     commands: Any, name: str, run: Callable[[argparse.Namespace], int], text: str, examples: str | None = None
 ) -> argparse.ArgumentParser:
-    """Parser of a command, which calls ``run``; its help says ``text``, and last the examples."""
+    """Parser of a command, which calls ``run``; its help contains ``text``, then the examples."""
     parser: argparse.ArgumentParser = commands.add_parser(name, help=text, description=text, epilog=examples)
-    if examples is not None:  # line by line, as they stand in the source
+    if examples is not None:  # with the line breaks of the source
         parser.formatter_class = argparse.RawDescriptionHelpFormatter
     parser.set_defaults(run=run)
     parser.add_argument(
@@ -43,13 +43,13 @@ def command(
 
 
 def out_argument(parser: argparse.ArgumentParser) -> None:
-    """Let a command write a recording; interrupted, it keeps what it has recorded."""
+    """Add the argument of the recording's path to a command. An interrupted command keeps the recorded part."""
     parser.set_defaults(records=True)
     parser.add_argument("--out", type=Path, required=True, help="directory for the recording; it must not exist yet")
 
 
 def without_argument(parser: argparse.ArgumentParser) -> None:
-    """Let a command leave out nodes for which others stand."""
+    """Add the argument for nodes that are left out because other nodes replace them."""
     parser.add_argument(
         "--without",
         action="append",
@@ -61,7 +61,7 @@ def without_argument(parser: argparse.ArgumentParser) -> None:
 
 
 def session_arguments(parser: argparse.ArgumentParser) -> None:
-    """Let a command configure a session, from a scenario on."""
+    """Add the arguments that configure a session, beginning with the scenario."""
     parser.add_argument("--scenario", help="one of `teleop scenarios`")
     parser.add_argument(
         "--duration", type=float, metavar="S", help="time that the hand moves [s] (default: the scenario's)"
@@ -71,7 +71,7 @@ def session_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def setting_arguments(parser: argparse.ArgumentParser) -> None:
-    """Let a command take files and values of parameters."""
+    """Add the arguments for files and values of parameters."""
     parser.add_argument(
         "--config",
         type=Path,
@@ -92,7 +92,7 @@ def setting_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def settings(arguments: argparse.Namespace) -> list[str]:
-    """Texts ``key=value`` of all that was given."""
+    """Texts ``key=value`` of all given settings."""
     given = list(arguments.settings)
     if arguments.duration is not None:
         given.append(f"teleop.duration={arguments.duration!r}")
@@ -102,7 +102,7 @@ def settings(arguments: argparse.Namespace) -> list[str]:
 
 
 def configured(arguments: argparse.Namespace) -> "Configuration":
-    """Configuration of a session, as its arguments say."""
+    """Configuration of a session from the command's arguments."""
     from teleop_core.session import api
 
     return api.configuration(arguments.scenario, files=arguments.config, texts=settings(arguments))
@@ -118,7 +118,7 @@ def ros_module(module: str, package: str = "teleop_core.nodes") -> Any:
 
     Args:
         module: Its name in the package.
-        package: Where it is.
+        package: The package of the module.
 
     Raises:
         TeleopError: ROS is missing.

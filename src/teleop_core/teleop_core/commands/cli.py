@@ -1,6 +1,6 @@
-"""The ``teleop`` command: simulate, run live, replay, play, score and look things up.
+"""The ``teleop`` command: simulate, run live, replay, play, score and show information.
 
-Imports stand inside the commands: ``teleop --help`` answers at once.
+Imports are inside the commands, so that ``teleop --help`` answers at once.
 """
 
 import argparse
@@ -50,7 +50,7 @@ class _Parser(argparse.ArgumentParser):
 
 def main(arguments: list[str] | None = None) -> int:
     """Entry point of ``teleop``; returns the exit code: 0, 2 for wrong use, 130 for Ctrl-C."""
-    if "_ARGCOMPLETE" in os.environ:  # a shell asks what can come next
+    if "_ARGCOMPLETE" in os.environ:  # a shell requests completions
         from argcomplete import autocomplete
 
         autocomplete(_parser())
@@ -66,10 +66,10 @@ def main(arguments: list[str] | None = None) -> int:
         kept = "; what was recorded is kept" if getattr(parsed, "records", False) else ""
         print(f"teleop {parsed.command}: interrupted{kept}", file=sys.stderr)
         return INTERRUPTED
-    except BrokenPipeError:  # the reader of our output, such as head, has seen enough
+    except BrokenPipeError:  # the reader of the output, such as head, has closed it
         sys.stderr.close()
         return 0
-    except OSError as error:  # a file that cannot be read or written speaks for itself
+    except OSError as error:  # the error of a file that cannot be read or written is clear by itself
         about = f"{error.filename}: {error.strerror}" if error.filename else str(error)
         print(f"teleop {parsed.command}: {one_line(about)}", file=sys.stderr)
         return FAILED
@@ -81,14 +81,14 @@ def _note(message: Warning | str, *_: object) -> None:
 
 
 def _take_parts(files: list[Path]) -> None:
-    """Load files with own parts here, and in every process that is started from here."""
+    """Load files with a user's parts in this process, and in every process that it starts."""
     from teleop_core.base.own_parts import load_own_parts
 
     load_own_parts(files)
 
 
 def _parsed(words: list[str]) -> argparse.Namespace:
-    """Arguments of a command; installed packages are asked only if it is none of the core."""
+    """Parsed arguments of a command; installed packages are searched only if the command is not in the core."""
     parser, commands = _core()
     name = _command_of(words)
     if name not in commands.choices:
@@ -118,7 +118,7 @@ def _parser() -> argparse.ArgumentParser:
 
 @cache
 def _core() -> tuple[argparse.ArgumentParser, Any]:
-    """Parser of the commands of this package, and what more of them are added to."""
+    """Parser of this package's commands, and the object to which further commands are added."""
     parser = _Parser(
         prog="teleop",
         description="Master-slave teleoperation: simulate, record, replay and score sessions.",

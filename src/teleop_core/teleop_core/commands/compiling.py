@@ -18,7 +18,7 @@ a session compiles what it needs and is not there yet; compiled before, it start
 """
 _FIRST = "coarse_box"
 Job = tuple[str, str, str]
-"""Scenario, setting or nothing, stage or nothing for the whole session."""
+"""Scenario, setting (may be empty), and stage; an empty stage means the whole session."""
 _MESH = "OFF\n4 4 6\n0 0 0\n90 90 0\n90 0 90\n0 90 90\n3 0 2 1\n3 0 1 3\n3 0 3 2\n3 1 2 3\n"
 """A closed surface of four triangles [mm], for parts that need a file."""
 
@@ -52,7 +52,7 @@ def _run(arguments: argparse.Namespace) -> int:
 
 
 def phases_of(*, is_all: bool) -> Iterator[Sequence[Job]]:
-    """Groups of jobs. Those of a group run in parallel; later groups reuse the kernels of earlier ones."""
+    """Groups of jobs. Jobs of one group run in parallel; later groups reuse the kernels of earlier groups."""
     from importlib.util import find_spec
 
     from teleop_core.graph.graph import BUILT_IN
@@ -83,7 +83,7 @@ def configured_job(job: Job, folder: Path) -> "Configuration":
 
     Args:
         job: See :data:`Job`.
-        folder: Where a part that needs a file finds one.
+        folder: Folder with a file for parts that need one.
     """
     from teleop_core.session import api
 
@@ -94,7 +94,7 @@ def configured_job(job: Job, folder: Path) -> "Configuration":
         mesh = folder / "mesh.off"
         mesh.write_text(_MESH, encoding="ascii")
         texts.append(f"fixture.{name}.file={mesh}")
-    if setting == "fixture=hole":  # whose middle is not in the plate
+    if setting == "fixture=hole":  # a hole whose middle is not in the plate
         texts.append("fixture.keep_out=true")
     return api.configuration(scenario, texts=["teleop.duration=0.01", *texts])
 
@@ -115,7 +115,7 @@ def _compile(job: Job, is_replayed: bool) -> int:
             runner = STAGES.find(stage).run(configuration.groups[stage], DT)
             runner.load()
             if (motion := getattr(runner, "motion", None)) is not None:
-                motion.load()  # commands, which a live slave takes
+                motion.load()  # commands that a live slave accepts
             return compiled_count() - before
         recording = Path(folder) / "recording"
         api.run(configuration, out=recording)

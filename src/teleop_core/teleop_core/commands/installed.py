@@ -1,6 +1,6 @@
 """Commands of installed packages, which ``teleop`` finds through an entry-point group.
 
-A package adds a command by a function that adds its parser, as ``add`` of the modules here does::
+A package adds a command by a function that adds its parser, like ``add`` in the modules of this folder::
 
     [project.entry-points."teleop_core.commands"]
     polish = "my_package.commands.polish:add"
@@ -22,7 +22,7 @@ RELEASED_TOGETHER = {
 
 
 def add(commands: Any) -> None:
-    """Add the parsers of installed commands; one that cannot be loaded is named and left out."""
+    """Add the parsers of installed commands. A command that cannot be loaded is reported and left out."""
     from importlib.metadata import entry_points
 
     for entry in sorted(entry_points(group=GROUP), key=lambda entry: entry.name):
@@ -30,12 +30,12 @@ def add(commands: Any) -> None:
             continue
         try:
             entry.load()(commands)
-        except Exception as error:  # whatever a foreign module raises, one line names it
+        except Exception as error:  # any exception of a foreign module becomes one line that names the module
             reason = one_line(f"{type(error).__name__}: {error}")
             print(f"note: no command {entry.name}, from {entry.value}: {reason}", file=sys.stderr)
 
 
 def advice(name: str) -> str | None:
-    """What to install for a command of this project that is not there; None for any other word."""
+    """Advice which distribution to install for a missing command of this project; None for any other word."""
     distribution = RELEASED_TOGETHER.get(name)
     return distribution and f"install {distribution}, which has this command"

@@ -1,4 +1,4 @@
-"""``teleop stop`` and ``teleop operate``: stop arms, command their states, see how they are."""
+"""``teleop stop`` and ``teleop operate``: stop arms, command their states, show their states."""
 
 import argparse
 import os
@@ -46,10 +46,10 @@ def add(commands: Any) -> None:
 
 
 def _domains(arguments: argparse.Namespace) -> tuple[int, ...]:
-    """Domains that are meant.
+    """ROS domains that the command applies to.
 
     Raises:
-        SessionError: None is named, and no session runs here.
+        SessionError: No domain is named, and no session runs on this machine.
     """
     if arguments.domain is not None:
         return (arguments.domain,)

@@ -6,11 +6,11 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 PATIENCE = 2.0
-"""Time [s] after which somebody wants to know why nothing happens."""
+"""Time [s] without progress after which the reason is shown."""
 
 
 class Progress:
-    """What sessions tell of their ticks, one after the other; shown by a bar if there is one."""
+    """Collects the ticks of successive sessions, and shows them in a bar if there is one."""
 
     def __init__(self) -> None:
         self.ticks = self.sessions = 0
@@ -18,7 +18,7 @@ class Progress:
         self.say: Callable[[str], None] | None = None
 
     def __call__(self, done: int, total: int) -> None:
-        """Take how many ticks are done, of how many."""
+        """Set the number of finished ticks and the total number of ticks."""
         self.sessions += done < self.ticks or not self.sessions
         self.ticks = done
         if self.show is not None:
@@ -44,7 +44,7 @@ def shown_progress(text: str) -> Iterator[Progress]:
 
 
 def _watch(progress: Progress, ended: threading.Event) -> None:
-    """Wait for what takes long, and say it: in the bar, or once where there is none."""
+    """Wait for work that takes long, and show it: in the bar, or once as a line if there is no bar."""
     wait = PATIENCE
     while not ended.wait(wait) and not progress.ticks:
         if say_work(progress.say) and progress.say is None:
@@ -53,10 +53,10 @@ def _watch(progress: Progress, ended: threading.Event) -> None:
 
 
 def say_work(say: Callable[[str], None] | None = None) -> bool:
-    """Say what is made once, such as kernels, if anything is now; whether that was said.
+    """Show current one-time work, such as compiling kernels; return whether there was any.
 
     Args:
-        say: Shows a text in place of the last one; None prints a line.
+        say: Shows a text that replaces the last one; None prints a line.
     """
     from teleop_core.kernels.progress import in_work
 

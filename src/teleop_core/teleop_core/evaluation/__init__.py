@@ -1,8 +1,8 @@
-"""Evaluation: what a recording is worth, in numbers, tables and plots.
+"""Evaluation: scores of a recording, as numbers, tables and plots.
 
-:func:`evaluate` scores one arm of a recording, :func:`scores` all of them. What is measured are
-metrics, one file each in ``evaluation/metrics``; a user's own is a class below :class:`Metric` that
-is added to :data:`METRICS`, and stands in every table, page and JSON from then on.
+:func:`evaluate` scores one arm of a recording, :func:`scores` all arms. Each measured quantity is a metric, a file in
+``evaluation/metrics``. A user's own metric is a subclass of :class:`Metric` that is added to :data:`METRICS`; from
+then on it appears in every table, page and JSON file.
 """
 
 from typing import TYPE_CHECKING
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from teleop_core.evaluation.traces import *  # noqa: F403
     from teleop_core.evaluation.tracking import *  # noqa: F403
     from teleop_core.evaluation.windows import *  # noqa: F403
-else:  # loaded with their first use
+else:  # imported when they are first used
     _NAMES = {
         "accumulators": ("Delay", "Distribution", "Integers", "Moments", "Spread"),
         "context": ("Context",),

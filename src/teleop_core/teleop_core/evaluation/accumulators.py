@@ -1,4 +1,4 @@
-"""Accumulators: statistics of a stream that is handed over stretch by stretch.
+"""Accumulators: statistics of a stream that is passed in parts.
 
 Their memory does not grow with the number of samples, so a recording of any length can be scored.
 """
@@ -20,7 +20,7 @@ _US = 1000  # resolution of a distribution [ns]
 class Spread:
     """Root mean square, sample standard deviation (n − 1) and largest magnitude of an error.
 
-    None where there are too few samples: one for ``rms`` and ``max``, two for ``sd``.
+    A value is None if there are too few samples: ``rms`` and ``max`` need one sample, ``sd`` needs two.
     """
 
     rms: float | None
@@ -38,7 +38,7 @@ class Delay:
 
 
 class Moments:
-    """Spread of scalar samples; samples that are not finite are left out.
+    """Accumulates the spread of scalar samples; samples that are not finite are left out.
 
     Source:
         Chan, Golub and LeVeque 1983, eq. 2.1: merging means and squared deviations.
@@ -49,7 +49,7 @@ class Moments:
         self._mean = self._deviations = self._squares = self._largest = 0.0
 
     def add(self, samples: Array) -> None:
-        """Take samples, shape (N,)."""
+        """Add samples, shape (N,)."""
         finite = np.isfinite(samples)
         if not finite.all():
             samples = samples[finite]
@@ -74,14 +74,14 @@ class Moments:
 
 
 class Distribution:
-    """How often each duration occurred, to the microsecond: quantiles without keeping samples."""
+    """Counts durations, rounded to microseconds, so that quantiles need no stored samples."""
 
     def __init__(self) -> None:
         self.values_us: Integers = np.empty(0, np.int64)
         self.counts: Integers = np.empty(0, np.int64)
 
     def add(self, durations_ns: Integers) -> None:
-        """Take durations, shape (N,), [ns]."""
+        """Add durations, shape (N,), [ns]."""
         values, counts = np.unique((durations_ns + _US // 2) // _US, return_counts=True)
         if np.array_equal(values, self.values_us):
             self.counts = self.counts + counts
@@ -98,7 +98,7 @@ class Distribution:
         return int(self.counts.sum())
 
     def quantile_us(self, share: float) -> int | None:
-        """Smallest duration [µs] that at least this share (0 to 1) does not exceed."""
+        """Quantile: smallest duration [µs] that at least a share (0 to 1) of the durations does not exceed."""
         if not len(self.counts):
             return None
         rank = max(1, math.ceil(share * self.count))
@@ -112,7 +112,7 @@ class Distribution:
     def histogram(self, width_us: int) -> tuple[Array, Array]:
         """Share of the durations per bin, for drawing.
 
-        Bins reach to the 99th percentile; what is longer counts as the last one.
+        Bins reach to the 99th percentile; longer durations are counted in the last bin.
 
         Args:
             width_us: Width of each bin, [µs].

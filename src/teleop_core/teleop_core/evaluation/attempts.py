@@ -1,4 +1,4 @@
-"""Attempts: what ``task/state`` tells of the attempts at a task's goals, and the base of measures of them."""
+"""Attempts at a task's goals, from ``task/state``, and the base class of metrics about them."""
 
 from abc import abstractmethod
 
@@ -15,19 +15,19 @@ _ATTEMPTS, _SUCCESSES = (TASK_STATE.columns.index(name) for name in ("attempts",
 
 
 class Attempts:
-    """Attempts at the goals of a task: the samples of ``task/state`` with which their number rises.
+    """Attempts at the goals of a task: the samples of ``task/state`` at which the number of attempts rises.
 
     Attributes:
-        successes: How many of them reached their goal; None without a task.
+        successes: Number of attempts that reached their goal; None without a task.
     """
 
     def __init__(self, _: Context) -> None:
         self.successes: int | None = None
         self._tried: list[Array] = []
-        self._attempts, self._before = np.nan, 0.0  # of the last sample; successes before the first one
+        self._attempts, self._before = np.nan, 0.0  # attempts at the last sample; successes at the first sample
 
     def add(self, window: Window) -> None:
-        """Take one window."""
+        """Process one window."""
         told = window.samples(TASK_STATE).values
         if len(told):
             if self.successes is None:
@@ -37,7 +37,7 @@ class Attempts:
 
     @property
     def count(self) -> int:
-        """How many there are."""
+        """Number of attempts."""
         return len(self._tried)
 
     def column(self, name: str) -> Array:
@@ -45,7 +45,10 @@ class Attempts:
         return np.array([row[TASK_STATE.columns.index(name)] for row in self._tried])
 
     def settled(self, name: str) -> Array:
-        """The same; of four or more without the first one, which begins while the arm is led in."""
+        """The same as :meth:`column`, but if there are four or more attempts, without the first one.
+
+        The first attempt begins while the arm is still moved to its start.
+        """
         return self.column(name)[int(self.count >= 4) :]
 
 
@@ -60,10 +63,10 @@ class AttemptsMetric(Metric):
 
     @abstractmethod
     def judge(self, tried: Attempts) -> None:
-        """Set the figures of the class; not called without a task."""
+        """Compute the figures of this metric; not called without a task."""
 
     def add(self, window: Window) -> None:
-        """Nothing: :class:`Attempts` takes each window once for all measures."""
+        """Do nothing: :class:`Attempts` processes each window once for all metrics."""
 
     def values(self) -> Values:
         """Figures of all attempts so far; None without a task."""

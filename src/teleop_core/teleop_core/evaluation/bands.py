@@ -1,4 +1,4 @@
-"""Bands: stretches of time in which the slave was held back, as pages draw them behind curves."""
+"""Bands: time intervals in which the slave was limited; pages draw them behind curves."""
 
 from dataclasses import dataclass
 
@@ -10,9 +10,9 @@ from teleop_core.evaluation.state_history import StateHistory
 from teleop_core.graph import STATE, topics
 from teleop_core.kernels.geometry import Array
 
-_STRETCHES = 20_000  # per cause; more than a screen has pixels
+_STRETCHES = 20_000  # largest number per cause; more than a screen has pixels
 _FINEST_S = 1e-3
-# Told apart without seeing red or green too; none is the colour of a curve.
+# Colours that colour-blind readers (red or green) can distinguish; no curve has any of them.
 LIMIT_COLORS = {
     topics.Limit.JOINT: "#e8590c",
     topics.Limit.WORKSPACE: "#7048e8",
@@ -31,13 +31,13 @@ _CLUTCHED = ("clutched", "#adb5bd")
 
 @dataclass(frozen=True, eq=False)
 class Band:
-    """All stretches of one cause.
+    """All time intervals with one cause.
 
     Attributes:
-        cause: In words.
-        color: As in CSS.
-        stretches: Begin and end of each from the start of the recording, in their order and apart
-            from each other, shape (N, 2), [s].
+        cause: Cause as text.
+        color: CSS colour.
+        stretches: Begin and end of each interval since the start of the recording, sorted and without overlap, shape
+            (N, 2), [s].
     """
 
     cause: str
@@ -48,7 +48,7 @@ class Band:
 def bands_of(context: Context) -> tuple[Band, ...]:
     """Bands of a recording: what limited the slave, and the clutch; only causes that occurred.
 
-    Recordings of earlier versions do not tell limits.
+    Recordings of earlier versions do not contain limits.
     """
     history, bag = context.history, context.bag
     if not len(history.rows):
@@ -65,13 +65,13 @@ def bands_of(context: Context) -> tuple[Band, ...]:
 
 
 def stretches_of(history: StateHistory, is_so: NDArray[np.bool_], start_ns: int, end_ns: int) -> Array:
-    """Stretches in which something that rows of a history say holds, shape (M, 2), [s].
+    """Time intervals in which a condition on rows of a history is true, shape (M, 2), [s].
 
     Args:
-        history: Each of its rows holds until the next one, the last one until the end.
-        is_so: Whether each row says it, shape (N,).
-        start_ns: Start of the recording, from which times count, [ns].
-        end_ns: Its end, [ns].
+        history: Each row is valid until the next row, the last row until the end of the recording.
+        is_so: Whether the condition is true in each row, shape (N,).
+        start_ns: Start of the recording; the intervals are relative to it, [ns].
+        end_ns: End of the recording, [ns].
     """
     is_begin = is_so & ~np.concatenate(([False], is_so[:-1]))
     is_end = ~is_so & np.concatenate(([False], is_so[:-1]))
@@ -83,11 +83,11 @@ def stretches_of(history: StateHistory, is_so: NDArray[np.bool_], start_ns: int,
 
 
 def merged(stretches: Array, count: int = _STRETCHES) -> Array:
-    """At most so many stretches: those nearest to each other become one, none is lost.
+    """Merge intervals until at most ``count`` are left: neighbours with the smallest distance become one interval.
 
     Args:
-        stretches: In order and apart from each other, shape (N, 2), [s].
-        count: How many there may be.
+        stretches: Intervals, sorted and without overlap, shape (N, 2), [s].
+        count: Largest number of intervals in the result.
     """
     apart = _FINEST_S
     while len(stretches) > count:

@@ -1,4 +1,4 @@
-"""Changes: by how much, and when, the columns of a stream rise or begin to fall."""
+"""Changes: how much the columns of a stream rise, and when they rise or begin to fall."""
 
 import numpy as np
 
@@ -7,21 +7,21 @@ from teleop_core.graph.topics import Topic
 
 
 class Changes:
-    """How some columns of a stream change; what was before its first sample does not count.
+    """Accumulates changes of columns of a stream, relative to its first sample.
 
     Args:
         topic: The stream.
-        names: Columns of which stamps are kept.
+        names: Columns for which the stamps of changes are kept.
     """
 
     def __init__(self, topic: Topic, *names: str) -> None:
         self._columns = topic.columns
         self._topic, self._first, self._peak = topic, np.empty(0), np.empty(0)
-        self._last = np.empty((0, 0))  # two samples: the sign of the last change counts too
+        self._last = np.empty((0, 0))  # the last two samples, which give the sign of the last change
         self._rises, self._falls = ({name: list[int]() for name in names} for _ in range(2))
 
     def add(self, window: Window) -> bool:
-        """Take one window; whether there has been a sample so far."""
+        """Process one window. Return whether there has been any sample so far."""
         found = window.samples(self._topic)
         if len(found):
             if not len(self._first):
@@ -40,7 +40,7 @@ class Changes:
         return self._columns.index(name)
 
     def risen(self, *names: str) -> list[int]:
-        """By how much columns of counts rose since the first sample."""
+        """Increase of columns that are counters, since the first sample."""
         return [int(self._last[-1, self._at(name)] - self._first[self._at(name)]) for name in names]
 
     def peak(self, name: str) -> float:
@@ -48,9 +48,9 @@ class Changes:
         return float(self._peak[self._at(name)])
 
     def rises(self, name: str) -> list[int]:
-        """Stamps of the samples with which a column rises [ns]."""
+        """Stamps of the samples at which a column rises [ns]."""
         return self._rises[name]
 
     def falls(self, name: str) -> list[int]:
-        """Stamps of the samples with which a column begins to fall [ns]."""
+        """Stamps of the samples at which a column begins to fall [ns]."""
         return self._falls[name]

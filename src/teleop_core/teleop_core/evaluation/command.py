@@ -1,4 +1,4 @@
-"""Command: what ``teleop evaluate`` does."""
+"""Command: implementation of ``teleop evaluate``."""
 
 import json
 from collections.abc import Callable, Sequence
@@ -27,16 +27,16 @@ def evaluate_bags(
 
     Args:
         paths: Recordings.
-        json_file: Where the scores go: a list with one entry per recording and arm.
-        html_file: Where the page goes.
-        console: Where the table and the paths of the files are shown.
-        span: Begin and end [s] of what is scored of each; None for all.
+        json_file: File for the scores: a list with one entry per recording and arm.
+        html_file: File for the page.
+        console: Console that shows the table and the paths of the files.
+        span: Begin and end [s] of the scored part of each recording; None for the whole recording.
 
     Returns:
         One score per recording and arm.
 
     Raises:
-        EvaluationError: A recording cannot be scored, or a file not be written.
+        EvaluationError: A recording cannot be scored, or a file cannot be written.
         RecordingError: A recording is missing, damaged, or lacks a topic.
     """
     check_places(json_file, html_file)
@@ -64,7 +64,7 @@ def page_maker(name: str) -> Callable[..., str]:
     """Function of an installed package that makes a page: ``report`` or ``workspace``.
 
     Raises:
-        EvaluationError: None is installed.
+        EvaluationError: No such package is installed.
     """
     for entry in entry_points(group=PAGES, name=name):
         maker: Callable[..., str] = entry.load()
@@ -73,13 +73,13 @@ def page_maker(name: str) -> Callable[..., str]:
 
 
 def check_places(*files: Path | None) -> None:
-    """Refuse places where no file can be written, before there is anything to write.
+    """Refuse paths at which no file can be written, before the scores are computed.
 
     Args:
-        files: Where files go; None for one that is not wanted.
+        files: Paths of the files; None for a file that is not wanted.
 
     Raises:
-        EvaluationError: A directory is missing, a place is one, or nothing can be made there.
+        EvaluationError: A directory is missing, a path is a directory, or no file can be created there.
     """
     for file in filter(None, files):
         if not file.parent.is_dir():
@@ -96,10 +96,10 @@ def check_places(*files: Path | None) -> None:
 
 
 def write_whole(file: Path, text: str) -> None:
-    """Write a file whole or not at all.
+    """Write a file completely or not at all.
 
     Raises:
-        EvaluationError: It cannot be written.
+        EvaluationError: The file cannot be written.
     """
     part = file.with_name(file.name + ".part")
     try:

@@ -1,4 +1,4 @@
-"""Context: what a metric knows of the recording when it is made, and what metrics share."""
+"""Context: the data about a recording that a new metric gets, and the accumulators that metrics share."""
 
 from collections.abc import Callable, Iterable
 from contextlib import suppress
@@ -16,10 +16,10 @@ from teleop_core.robots.robot import Robot
 
 
 class Accumulator(Protocol):
-    """Takes a recording window by window."""
+    """Processes a recording window by window."""
 
     def add(self, window: Window) -> None:
-        """Take one window."""
+        """Process one window."""
 
 
 Shared = TypeVar("Shared", bound=Accumulator)
@@ -29,12 +29,12 @@ class Context:
     """One arm of one recording.
 
     Attributes:
-        bag: The recording; it holds this arm only, under the plain names.
-        arm: Name of the arm; empty for the default arm of a recording that names none.
-        history: What teleop/state said at any time.
-        origin: The session it was made in: graph, streams, chain of stages, map of axes.
+        bag: The recording; it contains this arm only, under the plain names.
+        arm: Name of the arm; empty for the default arm of a recording that names no arms.
+        history: Values of teleop/state at all times.
+        origin: The session that was recorded: graph, streams, chain of stages, map of axes.
         robot: Name of the robot; None if unknown.
-        span: What is scored; None for all of it.
+        span: Scored part of the recording; None for the whole recording.
     """
 
     def __init__(self, bag: Bag, arm: str, history: StateHistory, origin: Origin, span: Span | None = None) -> None:
@@ -46,7 +46,7 @@ class Context:
         self._has_begun = False
 
     def load_robot(self) -> Robot | None:
-        """The robot as it was recorded; None if the recording does not name it, or it is not installed."""
+        """The robot as it was recorded; None if the recording does not name a robot, or the robot is not installed."""
         if self.robot is not None:
             with suppress(TeleopError, OSError):
                 files = recorded_files(self.bag.metadata)
@@ -55,25 +55,26 @@ class Context:
         return None
 
     def missing(self) -> tuple[str, ...]:
-        """Parts that the recording names and that are not installed here, each as a text."""
+        """Parts that the recording names but that are not installed, each as a text."""
         is_lost = self.robot is not None and self.load_robot() is None
         return (*self.origin.missing, *[f"robot {shown(self.robot)}"] * is_lost)
 
     def expected(self, topic: Topic) -> int:
-        """Messages of a topic in the recording."""
+        """Number of messages of a topic in the recording."""
         info = self.bag.topics.get(topic.name)
         return 0 if info is None else info.count
 
     def read(self, topics: Iterable[Topic]) -> None:
-        """Ask for streams that depend on the recording, beside those that metrics declare.
+        """Request streams that depend on the recording, in addition to the streams that metrics declare.
 
-        Those that it lacks have no samples.
+        Streams that the recording lacks have no samples.
 
         Args:
             topics: Streams, under their plain names.
 
         Raises:
-            EvaluationError: The recording is being read; ask while a metric is made.
+            EvaluationError: The recording is already being read; streams must be requested while a metric is
+                constructed.
         """
         for topic in topics:
             if self._has_begun:
@@ -83,19 +84,20 @@ class Context:
 
     @property
     def topics(self) -> list[Topic]:
-        """Streams that windows hold: all that were asked for and recorded."""
+        """Streams in the windows: all streams that were requested and recorded."""
         return list(self._read.values())
 
     def shared(self, kind: Callable[["Context"], Shared]) -> Shared:
-        """The one accumulator of a kind, metrics included, that all metrics of a score share.
+        """The accumulator of one kind that all metrics of a score share; it may be a metric itself.
 
-        It is made when it is first asked for, gets every window once, and gets it before those who asked for it.
+        The accumulator is constructed at the first request. It gets every window once, before the metrics that
+        requested it.
 
         Args:
-            kind: Its class, or another maker.
+            kind: Class of the accumulator, or another function that constructs it.
 
         Raises:
-            EvaluationError: It would miss windows; ask for it while a metric is made.
+            EvaluationError: The accumulator would miss windows; it must be requested while a metric is constructed.
         """
         if kind not in self._parts:
             if self._has_begun:
@@ -105,6 +107,6 @@ class Context:
         return cast(Shared, self._parts[kind])
 
     def begin(self) -> list[Accumulator]:
-        """All accumulators in the order in which they take windows; no more are made."""
+        """All accumulators in the order in which they process windows. No accumulators can be added after this call."""
         self._has_begun = True
         return list(self._parts.values())

@@ -1,4 +1,4 @@
-"""Figure: one plot of the report page before it is encoded; where a long path spent its time."""
+"""Figure: one plot of the report page before encoding, and the plot of the time that a long path spent in each area."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 Numbers = NDArray[np.floating[Any]]
 
 COMMAND, REFERENCE, MEASURED, FIXTURE = "#8a94a0", "#9ed0fb", "#c2370a", "#2b8a3e"
-# Three curves that must be told apart, also without seeing red or green (Okabe and Ito 2008).
+# Colours of three curves that colour-blind readers can also distinguish (Okabe and Ito 2008).
 FIRST, SECOND, THIRD = "#0072b2", "#009e73", "#cc79a7"
 DARK = "#343a40"
 DRAWN_FIXTURES = 4
@@ -20,10 +20,10 @@ _TIME = "time"
 
 @dataclass(frozen=True, eq=False)
 class Figure:
-    """A plot: what it is, one sentence on what one sees, and plotly.js' traces and layout.
+    """A plot: a title, one sentence that describes it, and the traces and layout of plotly.js.
 
-    Arrays among the traces stand as they are, with every sample; the page packs them, and draws as
-    many points as there are pixels. Without traces it is a line of text.
+    Arrays in the traces contain every sample. The page packs them and draws only as many points as there are pixels. A
+    figure without traces is a line of text.
     """
 
     title: str
@@ -50,8 +50,8 @@ def line(x: Numbers, y: Numbers, name: str, color: str, width: float, unit: str 
 def time_axis() -> dict[str, Any]:
     """Axis of time from the start of the recording.
 
-    A page links all axes that are made here: they show the same time, zoom down to single samples,
-    and have bands where the slave was held back. The mark is plotly.js' ``uirevision``.
+    A page links all axes made by this function: they show the same time interval, zoom to single samples, and have
+    bands where the slave was limited. Such axes are marked by ``uirevision`` of plotly.js.
     """
     return {"title": {"text": "time [s]"}, "uirevision": _TIME}
 
@@ -81,14 +81,14 @@ def along(
     colored: bool = False,
     whole: bool = False,
 ) -> dict[str, Any]:
-    """A trace of a path; the page shows the part of it that lies in the visible time.
+    """A trace of a path. The page shows only the part within the visible time interval.
 
     Args:
         trace: Line in a plane or in space.
         times: Time of each of its points, shape (N,), [s].
-        during: Begin and end of the stretches [s] in which it is drawn at all; None for always.
-        colored: Whether its colour tells the time; in space only.
-        whole: Whether all of it stays, as what surrounds the visible part.
+        during: Begin and end of the intervals [s] in which the path is drawn; None for the whole time.
+        colored: Whether its colour shows the time; only for lines in space.
+        whole: Whether the whole path stays visible, as background of the visible part.
     """
     stretches = None if during is None else [list(stretch) for stretch in during]
     meta = {"path": True, "during": stretches, "colored": colored, "whole": whole}
@@ -96,12 +96,12 @@ def along(
 
 
 def axis_suffix(row: int) -> str:
-    """What plotly.js appends to the names of the axes of a row."""
+    """Suffix that plotly.js appends to the names of the axes of a row."""
     return "" if row == 0 else str(row + 1)
 
 
 def stacked_axes(names: Sequence[str], unit: str) -> dict[str, Any]:
-    """Layout of plots on top of each other with one time axis, at the lowest of them."""
+    """Layout of plots one above the other, with one time axis at the lowest plot."""
     count = len(names)
     layout: dict[str, Any] = {"xaxis": {**time_axis(), "anchor": f"y{axis_suffix(count - 1)}"}}
     for row, name in enumerate(names):
@@ -114,7 +114,7 @@ def stacked_axes(names: Sequence[str], unit: str) -> dict[str, Any]:
 
 
 def span(values: Numbers) -> list[float] | None:
-    """Range of an axis that shows all values with a margin; None without any."""
+    """Range of an axis that shows all values with a margin; None if there are no values."""
     finite = values[np.isfinite(values)]
     if not len(finite):
         return None
@@ -124,13 +124,13 @@ def span(values: Numbers) -> list[float] | None:
 
 
 LONG = 25.0
-"""Lengths, in diagonals of what it fills, from which a path in a plane is no longer readable."""
+"""Limit of readable paths: a path longer than this many diagonals of its bounding box is not readable as a line."""
 _CELLS = 110
 _COLORS = [[0.0, "#f1f3f5"], [0.4, "#ced4da"], [1.0, "#495057"]]
 
 
 def is_long(points: Numbers) -> bool:
-    """Whether a path (N, 3) crosses itself too often to be read as a line; NaN lifts the pen."""
+    """Whether a path (N, 3) crosses itself too often to be read as a line; NaN interrupts the line."""
     thin = points[:: max(1, len(points) // 20_000)]
     steps = np.sqrt(np.square(np.diff(thin, axis=0)).sum(axis=1))
     known = thin[np.isfinite(thin).all(axis=1)]
@@ -143,13 +143,13 @@ def is_long(points: Numbers) -> bool:
 def time_spent(
     across: Numbers, up: Numbers, ranges: tuple[list[float], list[float]], sample_s: float
 ) -> dict[str, Any]:
-    """Trace with the time in each square of a plane, dark where it is long, on a logarithmic scale.
+    """Trace with the time spent in each square of a plane, on a logarithmic scale; dark squares mean long times.
 
     Args:
-        across: Places, shape (N,); NaN is left out.
-        up: The same along the other axis, shape (N,).
-        ranges: Smallest and largest place along both axes.
-        sample_s: Time that each of the places stands for, [s].
+        across: Horizontal coordinates, shape (N,); NaN is left out.
+        up: Vertical coordinates, shape (N,).
+        ranges: Smallest and largest coordinate along both axes.
+        sample_s: Time between two samples, [s].
     """
     (left, right), (bottom, top) = ranges
     side = max(right - left, top - bottom) / _CELLS

@@ -1,4 +1,4 @@
-"""HTML table: scores side by side as markup, for the page and for notebooks."""
+"""HTML table: scores side by side, for the page and for notebooks."""
 
 from collections.abc import Sequence
 from html import escape
@@ -16,7 +16,7 @@ _MARKS = {True: " ✓", False: " ✗", None: ""}
 
 
 def html_table(scores: "Sequence[Score]") -> str:
-    """Table of the page: a column per score, and one beside those with published figures."""
+    """Table of the page: one column per score, and one column of published figures beside scores that have them."""
     found = side_by_side(scores)
     columns = list(zip(*(line.rows for line in found), strict=True))
     are_compared = [any(row.published for row in rows) for rows in columns]
@@ -44,7 +44,7 @@ def _line(line: Line, are_compared: Sequence[bool]) -> str:
 
 
 def compact_table(score: "Score") -> str:
-    """Table for a notebook, which brings no style of its own."""
+    """Table for a notebook, without a style sheet."""
     session = score.session
     head = f"<b>{escape(session.place)}</b> · {escape(' · '.join(session.facts))}"
     lines = [f'<tr><th colspan="4" style="text-align:left">{head}<br>{escape(score.verdict.text)}</th></tr>']

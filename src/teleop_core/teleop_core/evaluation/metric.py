@@ -1,4 +1,4 @@
-"""Metric: one thing that is measured on a recording; each is one file, ours or a user's."""
+"""Metric: one quantity that is measured on a recording. Each metric is one file, in this package or by a user."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
@@ -16,14 +16,13 @@ from teleop_core.graph.topics import Topic
 from teleop_core.kernels.geometry import Array
 
 SPREAD_MEANING = "rms, sample S.D. (n − 1), largest"
-"""What the keys ``rms``, ``sd`` and ``max`` of a :class:`Spread` mean, for texts of keys."""
+"""Meaning of the keys ``rms``, ``sd`` and ``max`` of a :class:`Spread`, for descriptions of keys."""
 
 
 class Key(NamedTuple):
     """A JSON key: path with dots, unit, and meaning.
 
-    In a path ``<…>`` stands for any name, and ``|`` between the names that may stand there. The
-    unit of counts and shares is 1.
+    In a path, ``<…>`` means any name, and ``|`` separates alternative names. The unit of counts and shares is 1.
     """
 
     path: str
@@ -31,11 +30,11 @@ class Key(NamedTuple):
     meaning: str
 
     def names(self) -> list[str]:
-        """Every single key; ``<…>`` stays."""
+        """Every single path, with alternatives expanded; ``<…>`` is kept."""
         return [".".join(parts) for parts in product(*self._choices())]
 
     def covers(self, path: tuple[str, ...]) -> bool:
-        """Whether a value's path is one of this key's."""
+        """Whether the path of a value matches this key."""
         choices = self._choices()
         return len(choices) == len(path) and all(
             choice[0].startswith("<") or name in choice for choice, name in zip(choices, path, strict=True)
@@ -46,22 +45,22 @@ class Key(NamedTuple):
 
 
 def figure(unit: str, meaning: str, label: str = "", **default: object) -> Any:
-    """Field of a metric's values, with a ``default`` if wanted; :func:`keys_of` makes its key.
+    """Field of a metric's values, with an optional ``default``; :func:`keys_of` makes the field's key.
 
-    With a ``label`` it has a row in tables, in which a share is in per cent; see :meth:`Metric.rows`.
+    A field with a ``label`` has a row in tables, in which shares are in per cent; see :meth:`Metric.rows`.
     """
     return field(metadata={"unit": unit, "meaning": meaning, "label": label}, **default)  # type: ignore[call-overload]
 
 
 def keys_of(path: str, values: type[Any] | Sequence[Field[Any]], said: str = "") -> tuple[Key, ...]:
-    """Keys of a dataclass all whose fields are :func:`figure`, below a path.
+    """Keys, below a path, of a dataclass whose fields are all made by :func:`figure`.
 
     A field that is a :class:`Spread` has the keys ``rms``, ``sd`` and ``max``.
 
     Args:
-        path: What stands before the names of the fields, without the dot.
+        path: Prefix of the fields' names, without the dot.
         values: The dataclass, or some of its fields.
-        said: What stands before the meaning of each.
+        said: Text before the meaning of each key.
     """
     found = fields(values) if isinstance(values, type) else values
     return tuple(
@@ -75,15 +74,15 @@ def keys_of(path: str, values: type[Any] | Sequence[Field[Any]], said: str = "")
 
 
 class Metric(ABC):
-    """One thing that is measured on one arm of a recording, made anew for each.
+    """One quantity that is measured on one arm of a recording. Each arm and recording gets a new instance.
 
-    A metric takes the recording window by window and must keep little of each, so that a recording
-    of any length can be scored. What several metrics need comes from
-    :meth:`~teleop_core.evaluation.context.Context.shared` (over the recording) and
-    :meth:`~teleop_core.evaluation.windows.Window.once` (of a window).
+    A metric processes the recording window by window. It must store little of each window, so that a recording of any
+    length can be scored. Results that several metrics need come from
+    :meth:`~teleop_core.evaluation.context.Context.shared` (for the recording) and
+    :meth:`~teleop_core.evaluation.windows.Window.once` (for a window).
 
-    The shortest one declares each value as a :func:`figure`, which is None before it is set. It needs neither ``keys``
-    nor :meth:`values`::
+    The shortest metric declares each value as a :func:`figure`, which is None until it is set. It needs neither
+    ``keys`` nor :meth:`values`::
 
         class PeakMetric(tc.Metric):
             name, topics = "peak", (SLAVE_TRUE_CF,)
@@ -94,15 +93,14 @@ class Metric(ABC):
                 self.force_n = max(force.max(initial=0.0), self.force_n or 0.0)
 
     Attributes:
-        name: What it is called, in JSON too.
-        below: Name of another metric below which its keys stand in JSON; empty for its own name.
-        group: Of its rows; empty for the name below which its keys stand.
-        keys: Its keys in JSON; each path begins with the name and a dot. Without keys a metric
-            is not in JSON and only draws. Those of its figures come of themselves.
-        topics: Streams it reads. Those that a recording lacks have no samples in its windows. For
-            streams that depend on the recording see
-            :meth:`~teleop_core.evaluation.context.Context.read`.
-        declared: Its figures; not to be set.
+        name: Name of the metric, also in JSON.
+        below: Name of another metric under which its keys appear in JSON; empty for its own name.
+        group: Group of its table rows; empty for the name under which its keys appear.
+        keys: Its keys in JSON; each path begins with the name and a dot. A metric without keys is not in JSON and only
+            draws. Keys of its figures are added automatically.
+        topics: Streams that the metric reads. Streams that a recording lacks have no samples in its windows. For
+            streams that depend on the recording see :meth:`~teleop_core.evaluation.context.Context.read`.
+        declared: Its figures; set automatically.
     """
 
     name: ClassVar[str]
@@ -113,7 +111,7 @@ class Metric(ABC):
     declared: ClassVar[tuple[Field[Any], ...]] = ()
 
     def __init_subclass__(cls) -> None:
-        """Make keys of the figures of the class, each of which is None at first."""
+        """Make the keys for the figures of a subclass, and set each figure to None."""
         super().__init_subclass__()
         found = {name: one for name, one in vars(cls).items() if isinstance(one, Field)}
         for name, one in found.items():
@@ -124,32 +122,32 @@ class Metric(ABC):
             cls.keys = keys_of(cls.place(), cls.declared)
 
     def __init__(self, context: Context) -> None:
-        """Make it for one arm of a recording."""
+        """Construct the metric for one arm of a recording."""
         super().__init__()
 
     @classmethod
     def place(cls) -> str:
-        """Name below which its keys stand in JSON."""
+        """Name under which its keys appear in JSON."""
         return cls.below or cls.name
 
     @abstractmethod
     def add(self, window: Window) -> None:
-        """Take one window; ``window.samples(topic)`` are its samples."""
+        """Process one window; ``window.samples(topic)`` returns its samples."""
 
     def values(self) -> Values:
-        """What was found: names and values below the metric's name, as its keys say.
+        """Results: names and values below the metric's name, as declared by its keys.
 
-        None stands for what does not apply, such as a mean without samples. Without a method of its own a metric has
-        its attributes of these names.
+        None means not applicable, such as a mean without samples. By default, the values are the metric's attributes
+        with the names of its keys.
         """
         names = [key.path.removeprefix(f"{self.place()}.") for key in self.keys]
         return {name: getattr(self, name, None) for name in names}
 
     def rows(self) -> list[TableRow]:
-        """What tables show.
+        """Rows of tables.
 
-        Unless a metric says otherwise, this is one row per :func:`figure` with a label that has a value, and none where
-        all counts are 0. Without labels it is one row per key without ``<…>``.
+        By default, this is one row per :func:`figure` that has a label and a value, and no row if all counts are 0. If
+        no figure has a label, it is one row per key without ``<…>``.
         """
         values = self.values()
         labels = [
@@ -171,7 +169,7 @@ class Metric(ABC):
         return out
 
     def figures(self) -> list[Figure]:
-        """Plots for the page, in their order; none unless a metric says otherwise."""
+        """Plots for the page, in their order; empty by default."""
         return []
 
 
@@ -191,12 +189,13 @@ def _row(name: str, label: str, unit: str, value: Leaf) -> TableRow:
 
 
 class SpreadMetric(Metric):
-    """Spread of an error that every sample has.
+    """Spread of an error that is computed for every sample.
 
     Attributes:
-        label: What is off.
-        unit: Of the error.
-        meaning: From what to what it is, as its key says; empty for a class that has keys of its own.
+        label: Name of the error.
+        unit: Unit of the error.
+        meaning: Between what the error is measured, for the description of its key; empty for a class with its own
+            keys.
     """
 
     label: ClassVar[str] = "position"
@@ -204,7 +203,7 @@ class SpreadMetric(Metric):
     meaning: ClassVar[str] = ""
 
     def __init_subclass__(cls) -> None:
-        """Make the key of a class that says its meaning."""
+        """Make the key of a subclass that has a ``meaning``."""
         super().__init_subclass__()
         if cls.meaning:
             cls.keys = (Key(f"{cls.name}.rms|sd|max", cls.unit, f"{cls.meaning}: {SPREAD_MEANING}"),)
@@ -218,7 +217,7 @@ class SpreadMetric(Metric):
         """Errors (N,) of the samples of a window."""
 
     def add(self, window: Window) -> None:
-        """Take one window."""
+        """Process one window."""
         self._error.add(self.errors(window))
 
     def values(self) -> Spread:

@@ -1,4 +1,4 @@
-"""Motion figures: all numbers of motion_measures of one motion at once."""
+"""Motion figures: all measures of :mod:`motion_measures` for one motion."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
@@ -17,7 +17,7 @@ Mask = NDArray[np.bool_]
 
 @dataclass(frozen=True)
 class MotionFigures:
-    """How something moved; None where there is too little motion to say."""
+    """Figures of a motion; None if there is too little motion for a figure."""
 
     time_s: float = figure("s", "time without the approach; in_fixture: hand while a fixture was on")
     path_mm: float = figure("mm", "way of the tip")
@@ -62,7 +62,7 @@ class Kinematics:
 
     Attributes:
         times: Times of the samples at 30 Hz, shape (N,), [s].
-        position: Places, shape (N, 3), [m].
+        position: Positions, shape (N, 3), [m].
         speed: Magnitudes of the velocity, shape (N,), [m/s].
     """
 

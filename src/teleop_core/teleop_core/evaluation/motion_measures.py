@@ -1,9 +1,9 @@
 """Motion: how a hand moves, in numbers: speed, spectrum, smoothness, submovements, tremor.
 
-All figures but the tremor are taken from positions at :data:`RATE`, so that recordings of any rate
-can be compared: samples are interpolated linearly to 30 Hz, velocities are central differences of
-these. Smoothness is that of windows of :data:`WINDOW`. Where time is missing, the motion falls into
-stretches (:func:`stretches`); nothing is computed across a gap.
+All figures except the tremor are computed from positions at :data:`RATE`, so that recordings of any rate can be
+compared. Samples are interpolated linearly to 30 Hz; velocities are central differences of these. Smoothness is
+computed for windows of :data:`WINDOW`. Gaps divide the motion into stretches (:func:`stretches`); nothing is computed
+across a gap.
 """
 
 import itertools
@@ -15,43 +15,43 @@ import numpy as np
 from teleop_core.kernels.geometry import Array
 
 RATE = 30.0
-"""Rate of the samples that figures are taken from [Hz]."""
+"""Rate of the samples from which figures are computed [Hz]."""
 WINDOW = 5.0
 """Length of a window of smoothness and tremor [s]."""
 IDLE_SPEED = 5e-3
 """Below this speed a hand rests [m/s]."""
 PROMINENCE = 10e-3
-"""How far a peak of speed stands above the valleys beside it, to be a submovement [m/s]."""
+"""Smallest height of a speed peak above the valleys beside it that counts as a submovement [m/s]."""
 SWING = 2e-3
-"""How far a coordinate goes back for its turning point to be a reversal [m]."""
+"""Smallest distance by which a coordinate must move back for its turning point to count as a reversal [m]."""
 TREMOR_BAND = (8.0, 12.0)
 """Band of physiological tremor [Hz]."""
 SLOWEST_FOR_TREMOR = 60.0
-"""Rate of recording that carries tremor: five samples in a period of 12 Hz [Hz]."""
+"""Lowest rate of a recording from which tremor is computed: five samples in a period of 12 Hz [Hz]."""
 SPECTRUM_SAMPLES = 256
 """Samples of a segment of the velocity's spectrum: 8.5 s, so that a bin is 0.117 Hz wide."""
 SHORTEST = 8
-"""Samples that a spectrum needs at least."""
+"""Smallest number of samples for a spectrum."""
 GAP = 0.25
 """Time without a sample that ends a stretch [s]."""
 
 
 def stretches(times: Array, gap: float = GAP) -> list[slice]:
-    """Where samples follow each other without a gap.
+    """Stretches of samples without a gap.
 
     Args:
         times: Rising times (N,) [s].
         gap: Longest step within a stretch [s].
 
     Returns:
-        Slices of the samples, in order; none for no samples.
+        Slices of the samples, in order; empty if there are no samples.
     """
     ends = [0, *(np.flatnonzero(np.diff(times) > gap) + 1).tolist(), len(times)]
     return [slice(a, b) for a, b in itertools.pairwise(ends) if b > a]
 
 
 def resampled(times: Array, rows: Array, rate: float = RATE) -> Array:
-    """Rows at equal steps from the first time on, linear in between, shape (M, columns).
+    """Rows at equal time steps from the first time on, linearly interpolated, shape (M, columns).
 
     Args:
         times: Rising times (N,) [s], at least one.
@@ -73,7 +73,7 @@ def velocities(position: Array) -> Array:
 
 def turn_rates(attitude: Array) -> Array:
     """Angular speed (N - 1,) [rad/s] between unit quaternions (N, 4), w first, of any sign."""
-    # The chord between two quaternions keeps small angles exact, where their product does not.
+    # The chord between two quaternions gives exact small angles; their product does not.
     chord = np.linalg.norm(np.diff(attitude, axis=0), axis=1)
     other = np.linalg.norm(attitude[1:] + attitude[:-1], axis=1)
     found: Array = 4.0 * RATE * np.arcsin(np.minimum(0.5 * np.minimum(chord, other), 1.0))
@@ -83,15 +83,15 @@ def turn_rates(attitude: Array) -> Array:
 def sparc(speed: Array, rate: float, cutoff: float = 10.0, threshold: float = 0.05, padding: int = 4) -> float | None:
     """Spectral arc length of a profile of speed: 0 at best, lower where motion is less smooth.
 
-    The length of the normalised magnitude spectrum, taken up to the last frequency that is not
-    above ``cutoff`` and where it still reaches ``threshold``.
+    This is the arc length of the normalised magnitude spectrum. The spectrum ends at the last frequency that is not
+    above ``cutoff`` and at which the magnitude still reaches ``threshold``.
 
     Args:
         speed: Magnitudes of velocity (N,).
         rate: Samples per second [Hz].
         cutoff: Highest frequency that counts [Hz].
-        threshold: Share of the largest magnitude below which the spectrum has ended.
-        padding: Powers of two by which zeros lengthen the profile.
+        threshold: Share of the largest magnitude; the spectrum ends where it falls below this share.
+        padding: Powers of two by which the profile is lengthened with zeros.
 
     Returns:
         The smoothness; None without motion.
@@ -163,12 +163,12 @@ def velocity_spectrum(parts: Iterable[Array]) -> tuple[Array, Array]:
             total += (np.abs(spectrum) ** 2).sum(axis=1) * (size / np.sum(window**2))
             weight += size
     frequency = np.asarray(np.fft.rfftfreq(SPECTRUM_SAMPLES, 1.0 / RATE), np.float64)
-    total[1:-1] *= 2.0  # what stands at negative frequencies
+    total[1:-1] *= 2.0  # adds the power at negative frequencies
     return frequency, total / max(weight, 1) / RATE
 
 
 def frequency_holding(share: float, frequency: Array, density: Array) -> float | None:
-    """Lowest frequency [Hz] up to which the spectrum holds this share of its power.
+    """Lowest frequency [Hz] up to which the spectrum contains a given share of its power.
 
     None without power.
     """
@@ -186,9 +186,9 @@ def share_between(low: float, high: float, frequency: Array, density: Array) -> 
 
 
 def turning_points(values: Array, swing: float) -> tuple[list[int], list[int]]:
-    """Peaks and valleys from which a signal goes back by at least ``swing`` on both sides.
+    """Peaks and valleys of a signal that differ from both sides by at least ``swing``.
 
-    The peaks are those whose topographic prominence is at least ``swing``.
+    The peaks are the peaks with a topographic prominence of at least ``swing``.
 
     Args:
         values: Signal (N,).
@@ -202,7 +202,7 @@ def turning_points(values: Array, swing: float) -> tuple[list[int], list[int]]:
     if len(values) < 3:
         return peaks, valleys
     slope = np.sign(np.diff(values))
-    # Ends and changes of direction; samples in between cannot be extremes.
+    # Ends and changes of direction; all other samples cannot be extremes.
     at = np.unique(np.append(np.flatnonzero(np.diff(slope) != 0.0) + 1, (0, len(values) - 1)))
     low = high = int(at[0])
     heading = 0
@@ -226,7 +226,7 @@ def submovements(speed: Array, prominence: float = PROMINENCE) -> list[int]:
 
 
 def reversals(position: Array, swing: float = SWING) -> int:
-    """Turning points of x, y and z (N, 3) [m] on both sides of which the hand goes ``swing``."""
+    """Number of turning points of x, y and z (N, 3) [m] at which the hand moves by at least ``swing`` on both sides."""
     return sum(len(turns) for column in position.T for turns in turning_points(column, swing))
 
 
@@ -234,11 +234,11 @@ def tremor_power(position: Array, rate: float) -> float:
     """Mean square [m²] of the motion in :data:`TREMOR_BAND`, summed over the axes.
 
     Args:
-        position: Places (N, 3) [m] at equal steps, a window of a few seconds.
+        position: Positions (N, 3) [m] at equal time steps, a window of a few seconds.
         rate: Samples per second [Hz].
 
     Returns:
-        Power of the Hann-windowed spectrum in the band, without the straight line through the window.
+        Power of the Hann-windowed spectrum in the band, after a straight line was removed from the window.
     """
     count = len(position)
     window = 0.5 - 0.5 * np.cos(2.0 * np.pi * np.arange(count) / count)
@@ -252,9 +252,9 @@ def tremor_power(position: Array, rate: float) -> float:
 
 
 def cut(count: int, rate: float = RATE, length: float = WINDOW) -> list[slice]:
-    """Whole windows of a stretch of ``count`` samples; the stretch itself if it is shorter.
+    """Whole windows of a stretch of ``count`` samples; the stretch itself if it is shorter than a window.
 
-    A stretch of less than a second has none.
+    A stretch shorter than one second has no windows.
     """
     size = round(length * rate)
     if count < size:
@@ -263,6 +263,6 @@ def cut(count: int, rate: float = RATE, length: float = WINDOW) -> list[slice]:
 
 
 def median(values: Sequence[float | None]) -> float | None:
-    """Median of the values that are known; None without any."""
+    """Median of the known values; None if no value is known."""
     known = [value for value in values if value is not None]
     return float(np.median(known)) if known else None

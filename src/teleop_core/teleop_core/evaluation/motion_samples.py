@@ -1,4 +1,4 @@
-"""Motion samples: a pose stream of any rate at 30 Hz, and its tremor, while it is read."""
+"""Motion samples: resamples a pose stream of any rate to 30 Hz and computes its tremor, while the stream is read."""
 
 from collections.abc import Sequence
 
@@ -9,16 +9,16 @@ from teleop_core.evaluation.motion_measures import GAP, RATE, SLOWEST_FOR_TREMOR
 from teleop_core.kernels.geometry import Array
 
 REST = 1e-3
-"""Extent of the motion in a second that is rest [m]."""
-_REGULAR = 0.01  # share by which steps may differ to be taken as equal
-_ENOUGH = 150.0  # rate down to which samples are averaged: it takes 1 % off a wave of 12 Hz [Hz]
+"""Largest extent of the motion within a second that counts as rest [m]."""
+_REGULAR = 0.01  # share by which steps may differ and still count as equal
+_ENOUGH = 150.0  # samples are averaged down to this rate, which reduces a wave of 12 Hz by 1 % [Hz]
 
 
 class MotionSamples:
     """A motion at :data:`RATE`, interpolated on the fly, and the tremor of its full rate.
 
-    The samples stand at whole multiples of 1/30 s since the first one. An hour is 108 000 of
-    them; what is kept of the full rate does not grow.
+    The samples are at whole multiples of 1/30 s after the first sample; an hour has 108 000 samples. The amount of
+    stored data at the full rate does not grow.
 
     Attributes:
         tremor: Tremor of the full rate.
@@ -28,15 +28,15 @@ class MotionSamples:
         self.tremor = TremorWindows()
         self._parts: list[tuple[Array, Array]] = []
         self._last: tuple[Array, Array] = (np.empty(0), np.empty((0, 7)))
-        self._next = 0  # number of the sample that comes next
+        self._next = 0  # number of the next sample
         self._begin: float | None = None
 
     def add(self, times: Array, rows: Array) -> None:
-        """Take samples.
+        """Add samples.
 
         Args:
-            times: Times (N,) [s]; samples that are not later than the one before are left out.
-            rows: Place [m] and quaternion w, x, y, z (N, 7); what is not finite is left out.
+            times: Times (N,) [s]; samples that are not later than the previous sample are left out.
+            rows: Position [m] and quaternion w, x, y, z (N, 7); rows that are not finite are left out.
         """
         times, rows = self._valid(times, rows)
         if not len(times):
@@ -67,7 +67,7 @@ class MotionSamples:
         return (times, rows) if is_later.all() else (times[is_later], rows[is_later])
 
     def rows(self) -> tuple[Array, Array]:
-        """Times (M,) [s] and rows (M, 7); where time is missing there are no samples."""
+        """Times (M,) [s] and rows (M, 7); gaps contain no samples."""
         if not self._parts:
             return np.empty(0), np.empty((0, 7))
         times, rows = zip(*self._parts, strict=True)
@@ -75,14 +75,14 @@ class MotionSamples:
 
 
 def _numbers(at: Array, first: int, stop: int) -> NDArray[np.int64]:
-    """Indices from ``first`` to below ``stop`` of the samples that lie in no gap.
+    """Numbers from ``first`` to below ``stop`` of the samples that are not in a gap.
 
-    A single time that lies years later costs nothing, for gaps hold no samples.
+    Gaps contain no samples, so a single time that is years later needs no extra memory.
 
     Args:
-        at: Times since the sample number 0 (N,) [s].
+        at: Times since sample number 0 (N,) [s].
         first: Smallest number.
-        stop: Behind the largest number.
+        stop: End of the numbers, exclusive.
     """
     ends = np.flatnonzero(np.diff(at) > GAP)
     low = np.floor(at[np.append(0, ends + 1)] * RATE).astype(np.int64)
@@ -94,7 +94,7 @@ def _numbers(at: Array, first: int, stop: int) -> NDArray[np.int64]:
 
 
 def _between(at: Array, rows: Array, before: Array, after: Array, wanted: Array) -> Array:
-    """Rows at the wanted times, linear between two samples; quaternions normalised."""
+    """Rows at the wanted times, linearly interpolated between two samples, with normalised quaternions."""
     step = at[after] - at[before]
     share = np.where(step > 0.0, (wanted - at[before]) / np.where(step > 0.0, step, 1.0), 1.0)
     share = np.clip(share, 0.0, 1.0)[:, None]
@@ -108,7 +108,7 @@ def _between(at: Array, rows: Array, before: Array, after: Array, wanted: Array)
 
 
 class TremorWindows:
-    """Mean square in 8 to 12 Hz of windows of :data:`WINDOW`, and of the seconds of rest."""
+    """Mean square of the motion in 8 to 12 Hz, for windows of :data:`WINDOW` and for seconds of rest."""
 
     def __init__(self) -> None:
         self._times, self._places = np.empty(0), np.empty((0, 3))
@@ -116,7 +116,7 @@ class TremorWindows:
         self._rests: list[tuple[float, float, float]] = []
 
     def add(self, times: Array, places: Array) -> None:
-        """Take samples: later times (N,) [s], places (N, 3) [m]."""
+        """Add samples: times (N,) [s], later than those before, and positions (N, 3) [m]."""
         times = np.append(self._times, times)
         places = np.vstack((self._places, places))
         first = 0
@@ -130,7 +130,7 @@ class TremorWindows:
         self._times, self._places = times[first:].copy(), places[first:].copy()
 
     def _take(self, times: Array, places: Array) -> None:
-        """Take one window, whose last sample is the first one of the next."""
+        """Process one window. Its last sample is also the first sample of the next window."""
         begin, count = float(times[0]), len(times) - 1
         length = float(times[-1]) - begin
         rate = count / length
@@ -152,9 +152,9 @@ class TremorWindows:
                 self._rests.append((moment, moment + 1.0, tremor_power(rest, rate)))
 
     def between(self, spans: Sequence[tuple[float, float]]) -> tuple[float | None, float | None]:
-        """Mean squares [m²] of all windows and of those at rest that lie in one of the spans [s].
+        """Mean squares [m²] of the windows, and of the seconds of rest, that lie in one of the spans [s].
 
-        None without any.
+        A value is None if there are none.
         """
         return _mean(self._windows, spans), _mean(self._rests, spans)
 

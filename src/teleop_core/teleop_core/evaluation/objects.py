@@ -1,4 +1,4 @@
-"""Objects: what a recording's slave could touch, and the base of measures of one kind of object."""
+"""Objects: the object that a recording's slave could touch, and the base class of metrics of one kind of object."""
 
 from abc import abstractmethod
 from contextlib import suppress
@@ -17,11 +17,12 @@ def object_of(context: Context, kind: type) -> tuple[WorldParameters, Array] | N
     """The world of a recording, and the middle (3,) [m] of the object in it.
 
     Args:
-        context: Of the recording.
+        context: Context of the recording.
         kind: Parameter group of the object.
 
     Returns:
-        None where the object is another, or a part of it or its robot are not there any more.
+        World and middle; None if the object is of another kind, or if a part of it or its robot is no longer
+        available.
     """
     with suppress(TeleopError):
         world = build(WorldParameters, dict(context.origin.world))
@@ -31,7 +32,7 @@ def object_of(context: Context, kind: type) -> tuple[WorldParameters, Array] | N
 
 
 class ObjectMetric(Metric):
-    """Measure of what the true tip does at one kind of object; nothing is known of it at another one.
+    """Metric of the true tip at one kind of object; its values are None for other objects.
 
     Attributes:
         kind: Parameter group of the object.
@@ -48,16 +49,16 @@ class ObjectMetric(Metric):
 
     @abstractmethod
     def meet(self, shape: Any, ways: Array, wrench: Array) -> None:
-        """Take some samples of the tip.
+        """Process some samples of the tip.
 
         Args:
-            shape: Parameters of the object, of ``kind``.
-            ways: From its middle to the tip (N, 3) [m].
-            wrench: On the tip (M, 6) [N, N·m].
+            shape: Parameters of the object, of type ``kind``.
+            ways: Vectors from the object's middle to the tip (N, 3) [m].
+            wrench: Wrenches on the tip (M, 6) [N, N·m].
         """
 
     def add(self, window: Window) -> None:
-        """Take one window."""
+        """Process one window."""
         if self._object is not None:
             world, center = self._object
             places = window.samples(SLAVE_TRUE_CP).values[:, :3]

@@ -1,4 +1,4 @@
-"""Origin: what a recording says of the session it was made in: its graph, and how axes map."""
+"""Origin: the session in which a recording was made, as stored in it: graph, map of axes and parts."""
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
@@ -27,23 +27,24 @@ _TOOL = ("axes", "tool_axes", "tool_roll", "rotation_gain")
 
 @dataclass(frozen=True, eq=False)
 class Origin:
-    """Session that a recording was made in, as one of its arms sees it: topics have plain names.
+    """Session in which a recording was made, from the view of one arm, whose topics have plain names.
 
     Attributes:
-        graph: What ran; the built-in stages where nothing is known or a stage is not installed.
+        graph: Graph of the session; the built-in stages if it is unknown or a stage is not installed.
         axes: Rotation (3, 3) from the master's base to the slave's axes.
-        operator: What is stored of the stage ``operator``, by names.
-        interpolation: How the slave goes from command to command; None if it is not told.
-        plant: What the simulated slave was; "ideal" of versions that knew no other, None if no simulator is told of.
-        controller: Its control law; None if it is not told.
+        operator: Stored parameters of the stage ``operator``, by names.
+        interpolation: Interpolation of the slave between commands; None if not stored.
+        plant: Plant of the simulated slave; "ideal" for versions that had no other plant, None if no simulator is
+            stored.
+        controller: Control law of the slave; None if not stored.
         geometry: Settings that its robot was made with.
-        lag: By how many setpoints a measured pose comes after that which it was sampled with: by
-            one since it is the arm's server that tells it.
-        world: What is stored of the object that the slave touches, by names without ``world.``.
-        missing: Parts that the recording names and that are not known here, each as a text.
-        begin: Stage up to which topics were taken from a file; empty if none were.
+        lag: Number of setpoints between a measured pose and the setpoint with which it was sampled: 1 since the arm's
+            server publishes the pose.
+        world: Stored parameters of the object that the slave touches, by names without ``world.``.
+        missing: Parts that the recording names but that are unknown here, each as a text.
+        begin: Last stage whose topics were taken from a file; empty if there is no such stage.
         tool: Quaternions (4,) of the maps from the master's base to the slave's axes, and from the
-            stylus to the tool; None where the tool does not turn as much as the stylus.
+            stylus to the tool; None if the tool does not rotate as much as the stylus.
     """
 
     graph: Graph
@@ -61,7 +62,7 @@ class Origin:
 
     @cached_property
     def chain(self) -> tuple[tuple[str, topics.Topic], ...]:
-        """Way of a master's sample to the slave: stages, each with the topic it answers with."""
+        """Chain from a master's sample to the slave: stages, each with its output topic."""
         return self.graph.chain()
 
     @property
@@ -71,14 +72,14 @@ class Origin:
 
     @property
     def chain_delay(self) -> float:
-        """Time [s] that the session was told to add along the chain."""
+        """Sum of the configured delays [s] along the chain."""
         steps = {(topic, stage) for (_, topic), (stage, _) in pairwise(self.chain)}
         links = (link for link in self.graph.links if not link.reader.arm)
         return sum(link.delay for link in links if (link.topic, link.reader.stage.name) in steps)
 
     @property
     def sources(self) -> dict[str, topics.Topic]:
-        """Topic whose stamps each passes on, by its name."""
+        """For each topic that passes on stamps, by its name: the topic from which the stamps come."""
         return {
             written.name: link.topic
             for link in self.graph.links
@@ -93,7 +94,7 @@ class Origin:
         return frozenset(topic.name for stage in stages for topic in stage.writes)
 
     def writer(self, topic: topics.Topic) -> str:
-        """Name of the stage that writes a topic; empty if none does."""
+        """Name of the stage that writes a topic; empty if no stage writes it."""
         names = (stage.name for stage in self.graph.stages if topic in stage.writes)
         return next(names, "")
 
@@ -101,8 +102,8 @@ class Origin:
 def read_origin(bag: reader.Bag, arm: str = "") -> Origin:
     """Origin of a recording.
 
-    What is missing, or cannot be built any more, is taken from the built-in stages and their published values; scores
-    of recorded streams do not depend on it.
+    Stages that are missing, or cannot be built any more, are replaced by the built-in stages with published values.
+    Scores of recorded streams do not depend on this.
 
     Args:
         bag: The recording, or the view of one arm.
@@ -119,7 +120,7 @@ def read_origin(bag: reader.Bag, arm: str = "") -> Origin:
 
 
 def _content(bag: reader.Bag) -> Mapping[Any, Any]:
-    """What is stored about stages, installed or not."""
+    """Stored parameters of all stages, installed or not."""
     try:
         content = plain_yaml.parse(bag.metadata.get("configuration", ""))
     except plain_yaml.UnreadableError:
@@ -132,7 +133,7 @@ def _stage(name: object) -> str:
 
 
 def _layer(bag: reader.Bag, content: Mapping[Any, Any]) -> Layer:
-    """What is stored about stages that are installed."""
+    """Stored parameters of the stages that are installed."""
     known = {SESSION, *STAGES}
     kept = {name: said for name, said in content.items() if _stage(name) in known}
     try:
@@ -142,7 +143,7 @@ def _layer(bag: reader.Bag, content: Mapping[Any, Any]) -> Layer:
 
 
 def _missing(layer: Layer, arm: str) -> Iterator[str]:
-    """Stages of the session, and parts that its stages chose by name, that are not known here."""
+    """Unknown parts: stages of the session, and parts that its stages chose by name, that are not installed."""
     stages = layer.get(SESSION, {}).get("stages", ())
     for name in stages if isinstance(stages, list | tuple) else ():
         if name not in STAGES.names():
@@ -173,7 +174,7 @@ def _said(layer: Layer, stage: str, arm: str) -> dict[str, object]:
 
 
 def _interpolation(layer: Layer, arm: str) -> str | None:
-    """Way of the slave between commands, if it is told."""
+    """Interpolation of the slave between commands, if it is stored."""
     said = _said(layer, slave.SLAVE.name, arm).get("interpolation")
     return said if isinstance(said, str) else None
 
@@ -193,13 +194,13 @@ def _geometry(layer: Layer, arm: str) -> tuple[str, ...]:
 
 
 def _world(layer: Layer, arm: str) -> dict[str, object]:
-    """Parameters of the object that the slave touches, by names without what is before them."""
+    """Parameters of the object that the slave touches, by names without prefix."""
     said = _said(layer, slave_sim.SLAVE_SIM.name, arm).items()
     return {name[len(_WORLD) :]: value for name, value in said if name.startswith(_WORLD)}
 
 
 def _mapping(layer: Layer, arm: str, names: Iterable[str]) -> MotionScalingParameters:
-    """Some parameters of the mapping, as they are told; the published ones if these are wrong."""
+    """Some stored parameters of the mapping; the published parameters if the stored values are invalid."""
     name = MOTION_SCALING.name
     said = _said(layer, name, arm)
     try:
@@ -210,7 +211,7 @@ def _mapping(layer: Layer, arm: str, names: Iterable[str]) -> MotionScalingParam
 
 
 def _tool(layer: Layer, arm: str) -> tuple[Array, Array] | None:
-    """Maps of the tool's orientation, if it turns as far as the master."""
+    """Maps of the tool's orientation; None unless the tool rotates as far as the master."""
     parameters = _mapping(layer, arm, _TOOL)
     return tool_maps(parameters) if parameters.rotation_gain == 1.0 else None
 

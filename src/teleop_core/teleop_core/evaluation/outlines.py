@@ -15,8 +15,8 @@ from teleop_core.kernels.geometry import Array
 from teleop_core.shapes.box import BOX
 
 _SECOND_NS = 1e9
-# Walls are looked for up to here at the hand [m], in so many places, closer in every round. Less
-# than a nanometre beyond is rounding.
+# Walls are searched up to this distance at the hand [m], at this number of points, in rounds of finer steps. Depths
+# below a nanometre are rounding errors.
 _FAR, _STEPS, _ROUNDS, _GRAZED = 1.0, 1001, 3, 1e-9
 
 
@@ -25,12 +25,12 @@ class Outline:
     """A fixture that was on for a while.
 
     Attributes:
-        begin_s: When it came on, from the start of the recording, [s].
-        end_s: When it went, [s].
+        begin_s: Time at which it was switched on, since the start of the recording, [s].
+        end_s: Time at which it was switched off, [s].
         kind: Name of its kind.
-        points: One line along its edges in the slave's base, shape (N, 3), [mm]; NaN lifts the pen.
-        walls: Places on each axis (3, 2) [mm] where one who goes straight from the middle down and
-            up that axis meets a wall; NaN where there is none.
+        points: One line along its edges in the slave's base, shape (N, 3), [mm]; NaN interrupts the line.
+        walls: Positions of the walls on each axis (3, 2) [mm]: the first wall in negative and in positive direction
+            from the middle; NaN if there is no wall.
     """
 
     begin_s: float
@@ -41,7 +41,7 @@ class Outline:
 
     @property
     def size(self) -> list[float]:
-        """Size along the three axes, [mm], as text; empty for a shape that is open on a side."""
+        """Size along the three axes, [mm]; empty for a shape that is open on a side."""
         if not np.isfinite(self.walls).all():
             return []
         extent: list[float] = (np.nanmax(self.points, axis=0) - np.nanmin(self.points, axis=0)).tolist()
@@ -49,7 +49,7 @@ class Outline:
 
     @property
     def place(self) -> tuple[str, bytes]:
-        """Key that is equal for fixtures of one kind and size at one place."""
+        """Key that is equal for fixtures of the same kind and size at the same position."""
         return self.kind, np.round(self.points, 6).tobytes()
 
     def wall_lines(self, axis: int, suffix: str) -> list[dict[str, Any]]:
@@ -71,9 +71,9 @@ class Outline:
 
 
 def outlines_of(context: Context) -> list[Outline]:
-    """Outlines in the order of time; one per fixture, place and stretch of time.
+    """Outlines in the order of time; one per fixture, position and time interval.
 
-    A fixture whose shape is not known here is drawn as the box around it.
+    A fixture of unknown shape is drawn as its bounding box.
     """
     history, start_ns = context.history, context.bag.start_ns
     states = States(history.rows, history.fixture, history.fixtures)
@@ -97,9 +97,9 @@ def outlines_of(context: Context) -> list[Outline]:
 
 
 def _around(fixture: ReportedFixture, gain: float, axes: Array) -> tuple[Array, Array]:
-    """Points (N, 3) [m] of its edges around its middle, and of its walls (3, 2) on the axes."""
+    """Points (N, 3) [m] of a fixture's edges and positions (3, 2) [m] of its walls on the axes, from its middle."""
     points = fixture.outline(gain, axes)
-    if fixture.size:  # a box, told by its size alone
+    if fixture.size:  # a box, of which only the size is reported
         return points, np.stack((points.min(axis=0), points.max(axis=0)), axis=1)
     walls = np.full((3, 2), np.nan)
     for axis in range(3):
@@ -110,7 +110,7 @@ def _around(fixture: ReportedFixture, gain: float, axes: Array) -> tuple[Array, 
 
 
 def _first_wall(fixture: ReportedFixture, way: Array, gain: float, axes: Array) -> float:
-    """Distance [m] from the middle to the first wall along a way (3,) of length 1; NaN: none."""
+    """Distance [m] from the middle to the first wall in the direction of a unit vector (3,); NaN without a wall."""
     low, high = 0.0, _FAR * gain
     for _ in range(_ROUNDS):
         places = np.linspace(low, high, _STEPS)
@@ -124,7 +124,7 @@ def _first_wall(fixture: ReportedFixture, way: Array, gain: float, axes: Array) 
 
 
 def largest(outlines: Sequence[Outline]) -> list[Outline]:
-    """Those that were on longest, one per place."""
+    """The outlines that were on for the longest time, one per position."""
     lengths: dict[tuple[str, bytes], float] = {}
     one: dict[tuple[str, bytes], Outline] = {}
     for outline in outlines:
@@ -136,5 +136,5 @@ def largest(outlines: Sequence[Outline]) -> list[Outline]:
 
 
 def kinds_of(outlines: Sequence[Outline]) -> str:
-    """Names of their kinds in words: "box", "box and sphere"."""
+    """Text with the names of the outlines' kinds: "box", "box and sphere"."""
     return " and ".join(dict.fromkeys(outline.kind for outline in outlines))

@@ -11,7 +11,7 @@ from teleop_core.evaluation.accumulators import Integers
 NONE = -1
 """Index of a sample that has no partner."""
 _ROW = 3
-_SMOOTHED = 21  # samples; bursts of half as many leave the pairing alone
+_SMOOTHED = 21  # samples; bursts of up to half as many do not change the pairing
 _FARTHEST_NS = 50_000_000
 _FAR = 2**62
 
@@ -19,19 +19,19 @@ _FAR = 2**62
 def same_tick(log_ns: Integers, other_log_ns: Integers) -> Integers:
     """Partners of samples that one node publishes in pairs, tick by tick, without a common stamp.
 
-    Partners are counted off: the difference of the two indices is constant until a message is
-    lost. It is known wherever the nearest sample in log time is far nearer than any other, some
-    times in a row. In between, where a late recorder or network mixed the ticks, it is the same
-    if it is the same on both sides; if it is not, something was lost there, and it is the running
-    median of the difference to the nearest sample (a median ignores bursts and keeps edges).
+    Partners are found by counting: the difference of both indices is constant until a message is lost. The difference
+    is certain where, several times in a row, the nearest sample in log time is far nearer than any other. Between such
+    places, a late recorder or network may have mixed the ticks. If the difference is equal on both sides, it is used
+    in between too. If it is not equal, a message was lost in between. Then the running median of the difference to the
+    nearest sample is used (a median ignores bursts and keeps edges).
 
     Args:
         log_ns: Log times of one topic, shape (N,), in order, [ns].
-        other_log_ns: Those of the other, shape (M,).
+        other_log_ns: Log times of the other topic, shape (M,).
 
     Returns:
-        Index into the other topic for each sample, shape (N,); :data:`NONE` where its partner was
-        lost or would be more than 50 ms away.
+        Index into the other topic for each sample, shape (N,); :data:`NONE` if the partner was lost or would be
+        more than 50 ms away.
     """
     index = np.arange(len(log_ns))
     if np.array_equal(log_ns, other_log_ns):
@@ -48,7 +48,7 @@ def same_tick(log_ns: Integers, other_log_ns: Integers) -> Integers:
 
 
 def latest(stamp_ns: Integers, other_stamp_ns: Integers) -> Integers:
-    """Index of the newest sample of another topic that is not newer than each stamp, or NONE.
+    """For each stamp, the index of the newest sample of another topic that is not newer than the stamp, or NONE.
 
     Args:
         stamp_ns: Wanted times, shape (N,), [ns].
@@ -75,7 +75,7 @@ def same_stamp(stamp_ns: Integers, other_stamp_ns: Integers) -> Integers:
 
 
 def mean_wait_s(begins_ns: Sequence[int], ends_ns: Sequence[int]) -> float | None:
-    """Mean time [s] from the last beginning, not after an end, to it; None without any."""
+    """Mean time [s] from the latest begin at or before each end to that end; None if no end has a begin."""
     before = np.searchsorted(begins_ns, ends_ns, side="right")
     waits = [1e-9 * (end - begins_ns[i - 1]) for end, i in zip(ends_ns, before.tolist(), strict=True) if i]
     return float(np.mean(waits)) if waits else None
@@ -95,7 +95,7 @@ def _nearest(times: Integers, others: Integers) -> Integers:
 
 
 def _offsets(log_ns: Integers, other_log_ns: Integers) -> tuple[Integers, NDArray[np.bool_]]:
-    """Partner's index minus own, and whether it is certain, both of shape (N,)."""
+    """Partner's index minus own index, and whether this difference is certain, both of shape (N,)."""
     nearest = _nearest(log_ns, other_log_ns)
     offset = nearest - np.arange(len(log_ns))
     is_certain = _in_a_row(_is_clear(log_ns, other_log_ns, nearest), offset)
@@ -109,7 +109,7 @@ def _offsets(log_ns: Integers, other_log_ns: Integers) -> tuple[Integers, NDArra
 
 
 def _in_a_row(is_clear: NDArray[np.bool_], offset: Integers) -> NDArray[np.bool_]:
-    """Samples that are clear with the same offset at least :data:`_ROW` times in a row."""
+    """Mask of samples that are clear with the same offset at least :data:`_ROW` times in a row."""
     is_new = np.diff(np.where(is_clear, offset, _FAR), prepend=_FAR - 1) != 0
     run = np.cumsum(is_new) - 1
     in_a_row: NDArray[np.bool_] = is_clear & (np.bincount(run)[run] >= _ROW)
@@ -117,7 +117,7 @@ def _in_a_row(is_clear: NDArray[np.bool_], offset: Integers) -> NDArray[np.bool_
 
 
 def _is_clear(times: Integers, others: Integers, nearest: Integers) -> NDArray[np.bool_]:
-    """Whether the nearest is four times nearer than the next sample of either topic."""
+    """Whether the nearest sample is four times nearer than the next sample of either topic."""
     own = np.concatenate(([_FAR], np.diff(times), [_FAR]))
     padded = np.concatenate(([-_FAR], others, [_FAR]))
     second = np.minimum(times - padded[nearest], padded[nearest + 2] - times)

@@ -11,16 +11,16 @@ if TYPE_CHECKING:
     from _typeshed import DataclassInstance
 
 Values: TypeAlias = "Mapping[str, object] | DataclassInstance"
-"""What a metric found: names to values, which may be such mappings again; or a dataclass."""
+"""Results of a metric: a mapping of names to values, which may be such mappings themselves; or a dataclass."""
 Leaf: TypeAlias = float | int | str | None
 Plain: TypeAlias = "dict[str, Plain] | Leaf"
 
 
 def plain(values: Values) -> dict[str, Plain]:
-    """Dictionaries, texts and numbers; what is not finite becomes None.
+    """Values as dictionaries, texts and numbers; numbers that are not finite become None.
 
     Raises:
-        TypeError: Something is neither.
+        TypeError: A value has another type.
     """
     entries: Iterator[tuple[object, object]]
     if isinstance(values, Mapping):
@@ -45,7 +45,7 @@ def _plain(name: str, value: object) -> Plain:
 
 
 def leaves(tree: Mapping[str, Plain], before: tuple[str, ...] = ()) -> dict[tuple[str, ...], Leaf]:
-    """Values at the ends of a tree, by their paths."""
+    """Values at the leaves of a tree, by their paths."""
     found: dict[tuple[str, ...], Leaf] = {}
     for name, value in tree.items():
         if isinstance(value, dict):

@@ -1,4 +1,4 @@
-"""Published figures: what the RCRT-1 and its operator reached, and which of them compare here."""
+"""Published figures: results of the RCRT-1 and its operator, and the conditions for comparing with them."""
 
 import math
 from collections import Counter
@@ -13,14 +13,15 @@ from teleop_core.slave.controllers.source_pid import SOURCE_PID
 
 SOURCE = "Vongbunyong 2008, Table 8.2"
 POSITION_SHARE, ANGLE_FACTOR = 0.15, 1.6
-"""A root mean square agrees with the published one within this share, or this factor."""
+"""A root mean square agrees with the published value if it is within this share (positions) or this factor (angles)."""
 
 
 @dataclass(frozen=True)
 class Published:
     """Root mean square and maximum of one mode: position [mm], angles [deg].
 
-    Angles have our names, roll about x and yaw about z; the source calls them yaw and roll (its eqs. 2.7.1-2.7.6).
+    Angles have the names of this package, roll about x and yaw about z; the source calls them yaw and roll (eqs.
+    2.7.1-2.7.6).
     """
 
     mode: str
@@ -32,20 +33,20 @@ class Published:
 
 
 COARSE = Published("coarse", 1.0, (0.338, 0.702), (0.112, 0.537), (0.092, 0.828), (0.044, 0.172))
-# Table 8.2's maximum; the text's 0.266 mm is below its own root mean square.
+# Maximum of table 8.2. The text of the source states 0.266 mm, which is below its own root mean square.
 FINE = Published("fine", 0.1, (0.293, 0.791), (0.153, 0.811), (0.105, 0.832), (0.077, 0.628))
 
 BOX_OVERSHOOT_MM = 1.0
-"""How far the source's paths went beyond each wall, about [mm] (section 7.6)."""
+"""Approximate distance by which the source's paths went beyond each wall [mm] (section 7.6)."""
 
 
 def published_for(gain: float | None, robot: str | None = "rcrt1", plant: str | None = "hardware") -> Published | None:
-    """Figures of the mode whose gain is nearer, on a scale of ratios.
+    """Figures of the mode whose gain is nearer, on a logarithmic scale.
 
     Returns:
-        None without a gain, for another robot than the one they are of, and for a plant that does
-        not claim to be like it: an ideal arm beside a real one would tell nothing. A recording
-        that does not name its robot or its plant (None) may be of the machine itself.
+        The figures; None without a gain, for another robot, and for a plant that does not model the real machine. A
+        comparison of an ideal arm with a real arm would be meaningless. A recording that does not name its robot or
+        its plant (None) may be of the machine itself.
     """
     if gain is None or not gain > 0.0 or robot not in {"rcrt1", None}:
         return None
@@ -55,31 +56,31 @@ def published_for(gain: float | None, robot: str | None = "rcrt1", plant: str | 
 
 
 def agrees(value: float | None, published: float, share: float) -> bool | None:
-    """Whether a figure is within a share of the published one; None without a figure."""
+    """Whether a figure is within a share of the published figure; None without a figure."""
     return None if value is None else abs(value - published) <= share * published
 
 
 def agrees_by_factor(value: float | None, published: float, factor: float) -> bool | None:
-    """Whether a figure is within a factor of the published one; None without a figure."""
+    """Whether a figure is within a factor of the published figure; None without a figure."""
     return None if value is None else published / factor <= value <= published * factor
 
 
 class Gains:
-    """Accumulator of how many slave samples each gain was in force for."""
+    """Counts the slave samples during which each gain was in force."""
 
     def __init__(self, context: Context) -> None:
         self._robot, self._origin = context.robot, context.origin
         self._counts: Counter[float] = Counter()
 
     def add(self, window: Window) -> None:
-        """Take one window."""
+        """Process one window."""
         column = window.states(SLAVE_MEASURED_CP).column("gain")
         gains, counts = np.unique(column, return_counts=True)
         self._counts.update({g: n for g, n in zip(gains.tolist(), counts.tolist(), strict=True) if g})
 
     @property
     def gain(self) -> float | None:
-        """Gain that was in force for most slave samples; None without teleop/state."""
+        """The most frequent gain over all slave samples; None without teleop/state."""
         return self._counts.most_common(1)[0][0] if self._counts else None
 
     @property
@@ -89,5 +90,5 @@ class Gains:
 
     @property
     def is_source(self) -> bool:
-        """Whether this may be the real machine or our prediction of it, with the source's control law."""
+        """Whether this may be the real machine, or this package's simulation of it with the source's control law."""
         return self._origin.plant is None or self._origin.controller == SOURCE_PID.name

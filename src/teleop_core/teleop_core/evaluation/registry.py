@@ -12,15 +12,15 @@ from teleop_core.evaluation.metric import Key, Metric
 from teleop_core.graph import topics
 
 SESSION = "session"
-"""Name in JSON that no metric may have."""
+"""Reserved name in JSON, which no metric may have."""
 _FOLDER = "teleop_core.evaluation.metrics"
 
 
 def check_metric(name: str, part: object) -> type[Metric]:
-    """The part, if it is a metric.
+    """Return the part if it is a valid metric.
 
     Raises:
-        PartError: It is none; the text says what is missing.
+        PartError: The part is not a metric; the error text names what is missing.
     """
     if not (isinstance(part, type) and issubclass(part, Metric)):
         raise _refusal(name, f"a class below teleop_core.evaluation.Metric, is {part!r}")
@@ -52,7 +52,7 @@ def _is_stream(topic: object) -> bool:
 
 
 def _takes(method: Callable[..., object] | None, count: int) -> bool:
-    """Whether a method can be called with so many arguments."""
+    """Whether a method can be called with ``count`` arguments."""
     if not callable(method):
         return False
     try:
@@ -132,10 +132,10 @@ METRICS: Registry[type[Metric]] = Registry(
 
 
 def all_metrics(further: Iterable[type[Metric]] = ()) -> list[type[Metric]]:
-    """Metrics of the registry, and some that are not in it.
+    """Metrics of the registry, and further metrics that are not in it.
 
     Raises:
-        PartError: One of them is no metric, or has the name of another.
+        PartError: A part is not a metric, or has the name of another metric.
     """
     found = {name: METRICS.find(name) for name in METRICS}
     for part in further:

@@ -1,4 +1,4 @@
-"""Rows: what tables show of metrics, of one score or of several, beside the published figures."""
+"""Rows: table rows of metrics, for one score or several scores, beside the published figures."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,15 +10,15 @@ if TYPE_CHECKING:
     from teleop_core.evaluation.score import Score
 
 MISSING = "–"
-_LEAST = 1e-9  # a number below it is rounding
+_LEAST = 1e-9  # smaller numbers are rounding errors
 
 
 @dataclass(frozen=True)
 class TableRow:
-    """One row: what it is, its unit, the value, the published value, and whether both agree.
+    """One row: label, unit, value, published value, and whether both agree.
 
-    Rows of one group stand together under its name. ``is_met`` says whether the value agrees with
-    what was published; None where nothing is compared.
+    Rows of one group are shown together under the group's name. ``is_met`` is True if the value agrees with the
+    published value, and None if nothing is compared.
     """
 
     group: str
@@ -32,7 +32,7 @@ class TableRow:
 def row(
     group: str, label: str, unit: str, value: float | None, published: float | None = None, agrees: bool | None = None
 ) -> TableRow:
-    """Row of a number, beside what was published, and whether both agree if that is asked."""
+    """Row of a number with its published value; with ``agrees``, it also shows whether both agree."""
     return TableRow(group, label, unit, number(value), number(published, ""), agrees)
 
 
@@ -46,7 +46,7 @@ def spread_rows(
 ) -> list[TableRow]:
     """Three rows of a spread; ``figures`` are the published root mean square and maximum.
 
-    Agreement is judged of the root mean square alone: a maximum is one moment of one session.
+    Agreement is judged only from the root mean square, because a maximum is a single moment of one session.
     """
     rms, largest = figures or (None, None)
     return [
@@ -57,14 +57,14 @@ def spread_rows(
 
 
 def error_rows(group: str, label: str, unit: str, spread: Spread) -> list[TableRow]:
-    """Root mean square and maximum of a spread of which nothing was published."""
+    """Rows of root mean square and maximum of a spread without published values."""
     return [row(group, f"{label}, RMS", unit, spread.rms), row(group, f"{label}, max", unit, spread.max)]
 
 
 def number(value: float | None, missing: str = MISSING) -> str:
     """Text with four significant digits, at most three of them decimals; ``missing`` for None.
 
-    Values below 0.1 have two significant digits, and what rounds to nothing is 0.
+    Values below 0.1 have two significant digits; values that are only rounding errors are shown as 0.
     """
     if value is None:
         return missing
@@ -75,12 +75,12 @@ def number(value: float | None, missing: str = MISSING) -> str:
 
 
 def fixed(value: float, decimals: int) -> str:
-    """Text with so many decimals, and without a minus sign where they are all zero."""
+    """Text with a given number of decimals, without a minus sign if all digits are zero."""
     return f"{value:z.{decimals}f}"
 
 
 _NOTHING = {MISSING, "0/0/0", "0, 0", "0/0"}
-"""Values that say nothing."""
+"""Texts of values without information."""
 
 
 class Line(NamedTuple):
@@ -93,7 +93,7 @@ class Line(NamedTuple):
 
 
 def summary(score: "Score") -> list[TableRow]:
-    """Rows of a score; those of one group stand together, where its first row stands."""
+    """Rows of a score. Rows of one group are together, at the position of the group's first row."""
     groups: dict[str, list[TableRow]] = {}
     for result in score.results:
         for row in result.rows:
@@ -104,7 +104,7 @@ def summary(score: "Score") -> list[TableRow]:
 def side_by_side(scores: "Sequence[Score]") -> list[Line]:
     """Lines of a table of several scores; a row that a score lacks is a dash.
 
-    Lines that say nothing of any of them are left out: dashes, and delays of nothing, as in virtual time.
+    Lines without information for all scores are left out: dashes, and delays of zero, as in virtual time.
     """
     found = [{_place(row): row for row in summary(score)} for score in scores]
     places = dict.fromkeys(place for rows in found for place in rows)
@@ -113,7 +113,7 @@ def side_by_side(scores: "Sequence[Score]") -> list[Line]:
 
 
 def is_compared(lines: Sequence[Line]) -> bool:
-    """Whether a published figure stands beside any value."""
+    """Whether any value has a published figure beside it."""
     return any(row.published for line in lines for row in line.rows)
 
 

@@ -1,4 +1,4 @@
-"""Score: everything that is measured on one arm of a recording, and its keys in JSON."""
+"""Score: all values measured on one arm of a recording, and their keys in JSON."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -37,15 +37,15 @@ SESSION_KEYS = (
     Key("verdict.worst", "1", "key of the worst; null if nothing is beyond what is fine"),
     Key("verdict.advice", "1", "what the worst means and what to do; null if nothing is wrong"),
 )
-"""Keys of what is told about a recording, beside those of its metrics."""
+"""Keys of the data about a recording, in addition to the keys of its metrics."""
 Record = TypeVar("Record")
 
 
 def keys() -> tuple[Key, ...]:
-    """Every key of the JSON, in its order. Numbers are finite; null stands for not applicable.
+    """All keys of the JSON, in their order. Numbers are finite; null means not applicable.
 
     Raises:
-        PartError: An added metric is no metric.
+        PartError: An added metric is not a valid metric.
     """
     return (*SESSION_KEYS, *(key for name in METRICS for key in METRICS.find(name).keys))
 
@@ -60,9 +60,9 @@ def key_table() -> str:
 class Session:
     """Which recording was scored; texts as in its metadata, None if it has none.
 
-    ``arm`` is empty for the default arm of a recording that names no arms. ``from_s`` and ``to_s``
-    bound what was scored, since the first message; None stands for the last one. ``missing`` lists
-    the parts that the recording names and that are not known here.
+    ``arm`` is empty for the default arm of a recording that names no arms. ``from_s`` and ``to_s`` are the begin and
+    end of the scored part, since the first message; None means the last message. ``missing`` lists the parts that the
+    recording names but that are unknown here.
     """
 
     name: str
@@ -113,14 +113,14 @@ class Session:
 
 @dataclass(frozen=True)
 class Result:
-    """What one metric found.
+    """Results of one metric.
 
     Attributes:
-        name: The metric.
-        place: Name below which its keys stand.
-        values: What its ``values()`` returned.
-        json: The same as plain dictionaries; None for a metric without keys.
-        rows: What tables show.
+        name: Name of the metric.
+        place: Name under which its keys appear.
+        values: Return value of its ``values()``.
+        json: The values as plain dictionaries; None for a metric without keys.
+        rows: Rows of tables.
     """
 
     name: str
@@ -131,7 +131,7 @@ class Result:
 
 
 class _Found(Generic[Record]):
-    """Attribute of a score: what the metric of that name found, of a type."""
+    """Attribute of a score: values of the metric with the attribute's name, of a given type."""
 
     def __init__(self, kind: type[Record]) -> None:
         self._kind = kind
@@ -147,13 +147,13 @@ class _Found(Generic[Record]):
 
 @dataclass(frozen=True, repr=False)
 class Score:
-    """Score of one arm of a recording; :func:`keys` says what each entry means.
+    """Score of one arm of a recording; :func:`keys` describes each entry.
 
-    Values of the metrics of this package are attributes; :meth:`value` has those of any metric.
+    Values of this package's metrics are attributes; :meth:`value` returns values of any metric.
 
     Attributes:
-        session: Which recording and arm it is of.
-        results: What each metric found, in the order of the metrics.
+        session: The scored recording and arm.
+        results: Results of each metric, in the order of the metrics.
     """
 
     session: Session
@@ -163,8 +163,8 @@ class Score:
         """Number under a key, such as ``"fixture.penetration_max_mm"``; None if not applicable.
 
         Raises:
-            UnknownNameError: There is no such key; the alternatives are listed.
-            EvaluationError: A text stands there.
+            UnknownNameError: There is no such key; the error lists the alternatives.
+            EvaluationError: The value under this key is a text.
         """
         found = self.to_dict()
         if key not in found:
@@ -177,15 +177,15 @@ class Score:
         return value
 
     def record(self, metric: str, kind: type[Record]) -> Record:
-        """What a metric's ``values()`` returned.
+        """Return value of a metric's ``values()``.
 
         Args:
-            metric: Its name.
-            kind: What it returns: ``Spread``, a dataclass of the metric's own, ``dict``.
+            metric: Name of the metric.
+            kind: Type of the return value: ``Spread``, a dataclass of the metric, or ``dict``.
 
         Raises:
-            UnknownNameError: There is no such metric; the alternatives are listed.
-            EvaluationError: It returns something else.
+            UnknownNameError: There is no such metric; the error lists the alternatives.
+            EvaluationError: The metric returned another type.
         """
         for result in self.results:
             if result.name == metric:
@@ -196,13 +196,13 @@ class Score:
         raise UnknownNameError("metric", metric, [result.name for result in self.results])
 
     def __getattr__(self, name: str) -> NoReturn:
-        """Raise an error that says where values of a user's metrics are."""
+        """Raise an error that explains how to read the values of a user's metrics."""
         hint = f"{name!r} is none; values of any metric: score.value({name + '.rms'!r})"
         raise AttributeError(f"attribute of a Score: {hint}")
 
     @property
     def verdict(self) -> Verdict:
-        """One line that names the worst first."""
+        """One line about the score that names the worst problem first."""
         return verdict_of(_by_key(self._found()))
 
     def to_json(self) -> dict[str, Plain]:
@@ -211,7 +211,7 @@ class Score:
         return dict([session, (VERDICT, plain(self.verdict)), *found])
 
     def _found(self) -> dict[str, Plain]:
-        """What is known without the verdict: the session, then each metric that has keys."""
+        """The score without the verdict: the session, then each metric that has keys."""
         found: dict[str, dict[str, Plain]] = {SESSION: plain(self.session)}
         for result in self.results:
             if result.json is not None:
@@ -240,23 +240,23 @@ class Score:
     samples = _Found(Samples)
     """How many slave poses were scored."""
     reach = _Found(ReachScore)
-    """For how much of the time the slave followed, and why not for all of it."""
+    """Share of the time in which the slave followed, and the causes of the rest."""
     asked_error_mm = _Found(Spread)
-    """Distance of the slave's tip from where the hand would have brought it, [mm]."""
+    """Distance of the slave's tip from the position that the hand asked for, [mm]."""
     asked_error_deg = _Found(Spread)
-    """Angle between the tool and how the hand would have turned it, [deg]."""
+    """Angle between the tool and the orientation that the hand asked for, [deg]."""
     position_error_mm = _Found(Spread)
     """Distance of the slave's tip from its reference, [mm]."""
     orientation_error_deg = _Found(OrientationError)
     """Angles between the slave's tip and its reference, [deg]."""
     true_error_mm = _Found(Spread)
-    """Distance of the true tip from its reference, [mm]; of None where nobody tells it."""
+    """Distance of the true tip from its reference, [mm]; values are None if the true tip was not recorded."""
     command_error_mm = _Found(Spread)
     """Distance of the slave's tip from the newest command, [mm]."""
     command_orientation_error_deg = _Found(OrientationError)
     """Angles between the slave's tip and the newest command, [deg]."""
     fixture = _Found(FixtureScore)
-    """How far hand and slave got out of the virtual fixture."""
+    """How far hand and slave left the virtual fixture."""
     force_n = _Found(Spread)
     """Magnitude of the force on the hand, [N]."""
     latency_ms = _Found[dict[str, Delay]](dict)
@@ -264,7 +264,7 @@ class Score:
     ticks = _Found(Ticks)
     """Control ticks of the slave."""
     nodes = _Found[Counts](dict)
-    """Counts that the nodes reported last."""
+    """Last reported counts of the nodes."""
     topics = _Found[dict[str, TopicScore]](dict)
     """Messages of each topic and how many are missing."""
 
@@ -274,7 +274,7 @@ def _by_key(tree: Mapping[str, Plain]) -> dict[str, Leaf]:
 
 
 def frame_of(scores: Iterable[Score]) -> "pandas.DataFrame":
-    """Scores as a data frame: a row for each, a column for each key of any of them."""
+    """Scores as a data frame: one row per score, one column for each key that any score has."""
     import pandas
 
     return pandas.DataFrame([score.to_dict() for score in scores])

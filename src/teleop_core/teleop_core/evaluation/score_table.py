@@ -1,4 +1,4 @@
-"""Table: scores on the terminal, side by side and beside the published figures."""
+"""Table: scores on the terminal, side by side, with the published figures."""
 
 from collections.abc import Sequence
 from itertools import groupby
@@ -21,11 +21,11 @@ CAPTION = (
 
 
 def score_tables(scores: Sequence[Score], width: int) -> list[Table]:
-    """Tables of as many scores side by side as fit.
+    """Tables with as many scores side by side as fit on the terminal.
 
     Args:
-        scores: One or more.
-        width: Room on the terminal, in characters.
+        scores: One or more scores.
+        width: Width of the terminal, in characters.
     """
     label = max((len(f"  {line.label} {line.unit} ") for line in side_by_side(scores)), default=0)
     fitting = max(1, (width - label) // COLUMN_WIDTH)
@@ -33,7 +33,7 @@ def score_tables(scores: Sequence[Score], width: int) -> list[Table]:
 
 
 def score_table(scores: Sequence[Score]) -> Table:
-    """One column per score; each figure beside what was published, with a tick if both agree."""
+    """Table with one column per score; each figure is beside its published value, with a check mark if both agree."""
     lines = side_by_side(scores)
     caption = CAPTION if is_compared(lines) else None
     table = Table(box=SIMPLE, caption=caption, caption_justify="left", pad_edge=False, padding=(0, 1, 0, 0))
@@ -50,7 +50,7 @@ def score_table(scores: Sequence[Score]) -> Table:
 
 
 def heading(session: Session) -> str:
-    """Name of a recording, what it was, and its mode and arm, in three lines or more."""
+    """Heading of a column in three or more lines: name and facts of the recording, mode and arm."""
     gain = "" if session.gain is None else f"gain {session.gain:g}, "
     mode = published_for(session.gain, session.robot, session.plant)
     seed = "" if session.seed is None else f", seed {session.seed}"

@@ -1,4 +1,4 @@
-"""Scoring: a recording becomes a score, in one pass and in memory that does not grow with it."""
+"""Scoring: computes the score of a recording in one pass; the memory use does not grow with its length."""
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -28,11 +28,11 @@ from teleop_core.evaluation.windows import DisorderError, Seconds, Span, Window,
 from teleop_core.graph.topics import SLAVE_MEASURED_CP, SLAVE_SERVO_CP, SLAVE_SETPOINT_CP, TELEOP_STATE, Topic
 
 REQUIRED = (SLAVE_MEASURED_CP, SLAVE_SETPOINT_CP, SLAVE_SERVO_CP)
-"""Topics without which there is no score; what needs others is None without them."""
+"""Topics that every score requires. Values that need other topics are None if these are missing."""
 
 
 class Study(NamedTuple):
-    """A score, the metrics that a page asks for what it draws, and when the slave was held back."""
+    """A score, the metrics that make the plots of a page, and the intervals in which the slave was limited."""
 
     score: Score
     metrics: tuple[Metric, ...]
@@ -42,7 +42,7 @@ class Study(NamedTuple):
         """Plots in the order of the metrics.
 
         Raises:
-            EvaluationError: A metric cannot draw; the text names it.
+            EvaluationError: A metric cannot draw its plots; the error text names the metric.
         """
         place, found = self.score.session.place, []
         for metric in self.metrics:
@@ -58,23 +58,23 @@ def evaluate(bag: Bag, arm: str = "", further: Sequence[type[Metric]] = (), span
 
     Args:
         bag: The recording.
-        arm: Name of the arm; empty for the default one.
-        further: Metrics beside those of the registry.
-        span: Begin and end [s] of what is scored, since the first message; None for all of it.
-            Counts of messages, and what nodes reported, are of the whole recording.
+        arm: Name of the arm; empty for the default arm.
+        further: Metrics in addition to the metrics of the registry.
+        span: Begin and end [s] of the scored part, since the first message; None for the whole recording. Counts of
+            messages and reports of nodes are always of the whole recording.
 
     Raises:
         ParameterError: The span is empty or lies beyond the recording.
-        PartError: An added metric is no metric, or does not keep to its keys.
+        PartError: An added metric is not a valid metric, or its values do not match its keys.
         EvaluationError: Nothing in the recording can be compared, or a metric fails.
-        RecordingError: It lacks one of :data:`REQUIRED`, or is damaged.
-        UnknownNameError: It has no such arm.
+        RecordingError: The recording lacks one of :data:`REQUIRED`, or is damaged.
+        UnknownNameError: The recording has no such arm.
     """
     return study(bag, arm, further, span).score
 
 
 def scores(bag: Bag, further: Sequence[type[Metric]] = (), span: Seconds | None = None) -> list[Score]:
-    """Scores of all arms of a recording, the default arm first; as :func:`evaluate`."""
+    """Scores of all arms of a recording, the default arm first; see :func:`evaluate`."""
     return [found.score for found in studies(bag, further, span)]
 
 
@@ -83,17 +83,17 @@ def measure(bag: Bag, keys: Iterable[str], arm: str = "") -> dict[str, float | N
 
     Args:
         bag: The recording.
-        keys: Such as ``task.time_s``.
+        keys: Keys such as ``task.time_s``.
         arm: As in :func:`evaluate`.
 
     Returns:
-        Numbers by key; None where one does not apply.
+        Numbers by key; None if a key is not applicable.
 
     Raises:
         UnknownNameError: There is no such metric or key.
-        EvaluationError: A text stands there, or a metric fails.
+        EvaluationError: A value is a text, or a metric fails.
         RecordingError: The recording is damaged.
-        PartError: A metric does not keep to its keys.
+        PartError: The values of a metric do not match its keys.
     """
     wanted = list(keys)
     context, metrics = _run(of_arm(bag, arm), arm or arm_names(bag)[0], _makers(wanted), None)
@@ -113,7 +113,10 @@ def measure(bag: Bag, keys: Iterable[str], arm: str = "") -> dict[str, float | N
 
 
 def streams_of(keys: Iterable[str]) -> frozenset[str]:
-    """Names of the streams that :func:`measure` reads for some keys, as their metrics declare; some read more."""
+    """Names of the streams that :func:`measure` reads for some keys, as declared by their metrics.
+
+    Some metrics read further streams.
+    """
     read = {topic.name for maker in _makers(keys) for topic in maker.topics}
     return frozenset(read | {SLAVE_MEASURED_CP.name, TELEOP_STATE.name})
 
@@ -124,7 +127,7 @@ def _makers(keys: Iterable[str]) -> list[type[Metric]]:
 
 
 def study(bag: Bag, arm: str = "", further: Sequence[type[Metric]] = (), span: Seconds | None = None) -> Study:
-    """Score of one arm with its metrics; raises as :func:`evaluate`."""
+    """Score of one arm with its metrics. Raises the same errors as :func:`evaluate`."""
     makers = all_metrics(further)
     view = of_arm(bag, arm)
     view.require(REQUIRED)
@@ -141,7 +144,7 @@ def study(bag: Bag, arm: str = "", further: Sequence[type[Metric]] = (), span: S
 
 
 def studies(bag: Bag, further: Sequence[type[Metric]] = (), span: Seconds | None = None) -> list[Study]:
-    """All arms of a recording, the default arm first; as :func:`evaluate`."""
+    """Scores of all arms with their metrics, the default arm first; see :func:`evaluate`."""
     return [study(bag, arm, further, span) for arm in arm_names(bag)]
 
 
@@ -149,7 +152,7 @@ Cut = Callable[[Bag, Iterable[Topic], StateHistory, int], Iterable[Window]]
 
 
 def _run(bag: Bag, arm: str, makers: Sequence[type[Metric]], span: Span | None) -> tuple[Context, list[Metric]]:
-    """Metrics after the whole recording, or its span."""
+    """Metrics after they have processed the whole recording, or its span."""
     history, origin = read_history(bag), read_origin(bag, arm)
     try:
         context = Context(bag, arm, history, origin, span)
@@ -168,7 +171,7 @@ def _feed(context: Context, makers: Sequence[type[Metric]], cut: Cut) -> list[Me
     context.shared(Gains)
     accumulators = context.begin()
     found = cut(context.bag, context.topics, context.history, context.origin.lag)
-    # What foreign devices record may be infinite; such samples are left out and counted.
+    # Recordings of foreign devices may contain infinite values; such samples are left out and counted.
     with np.errstate(invalid="ignore", over="ignore"):
         for window in context.span.cut(found) if context.span else found:
             for accumulator in accumulators:
@@ -179,12 +182,15 @@ def _feed(context: Context, makers: Sequence[type[Metric]], cut: Cut) -> list[Me
 
 @contextmanager
 def _named(place: str, part: Accumulator | type[Metric]) -> Iterator[None]:
-    """Turn an exception of a metric into one line that names the metric; errors of the recording pass."""
+    """Convert an exception of a metric into a one-line error that names the metric.
+
+    Errors of the recording are passed on.
+    """
     try:
         yield
     except (RecordingError, PartError):
         raise
-    except Exception as error:  # a metric may be anybody's
+    except Exception as error:  # a metric may be from any user
         name = getattr(part, "name", type(part).__name__)
         reason = " ".join(f"{type(error).__name__}: {error}".split())
         raise EvaluationError(f"{place}: the metric {name!r} failed with {reason}") from error
@@ -201,7 +207,7 @@ def _result(context: Context, metric: Metric) -> Result:
 def _compared(results: tuple[Result, ...]) -> tuple[Result, ...]:
     """Results that are compared with published figures only if the slave followed nearly all the time.
 
-    Otherwise the rows say so: what it tracked well was not what the hand asked for.
+    If it did not, the rows state this instead: the slave then did not track the motion that the hand asked for.
     """
     reach = next((result.values for result in results if isinstance(result.values, ReachScore)), None)
     share = reach.followed_share if reach is not None else None
@@ -222,7 +228,10 @@ def _compared(results: tuple[Result, ...]) -> tuple[Result, ...]:
 
 
 def _too_little(share: float | None) -> str:
-    """Share of the time followed beside what is needed; rounded down, so that it reads as less."""
+    """Text with the share of followed time and the required share.
+
+    The share is rounded down, so that it is visibly smaller.
+    """
     if share is None:
         return "not known"
     return f"{math.floor(1000.0 * share) / 10.0:.1f} % < {100.0 * COMPARABLE:.0f} %"

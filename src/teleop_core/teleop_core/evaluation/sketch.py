@@ -1,4 +1,4 @@
-"""Sketch: a small picture of a recording for a notebook, without any library of its own."""
+"""Sketch: a small picture of a recording for a notebook; needs no plotting library."""
 
 from html import escape
 from typing import TYPE_CHECKING
@@ -18,7 +18,7 @@ _PANELS = (("x", "y"), ("x", "z"), ("y", "z"))
 
 
 def sketch(recording: "Recording") -> str:
-    """The path of each arm's tip along each axis, as inline SVG with a line of facts."""
+    """Inline SVG with each arm's tip path seen along each axis, and a line of facts."""
     parts = [f"<p><b>{escape(repr(recording))}</b></p>"]
     for arm in recording.arms:
         prefix = topic_prefix(recording.bag, arm)

@@ -1,4 +1,4 @@
-"""Stamps: steps between the stamps of every stream, for what counts and what measures time."""
+"""Stamps: steps between the stamps of every stream, for metrics that count messages or measure time."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,8 +14,8 @@ class StampTally:
 
     Args:
         topic: The topic.
-        source: Topic whose stamps it passes on; None where it has stamps of its own.
-        is_played: Whether its messages are those of a file that was replayed.
+        source: Topic whose stamps it passes on; None if it has its own stamps.
+        is_played: Whether its messages come from a replayed file.
     """
 
     def __init__(self, topic: Topic, source: Topic | None = None, *, is_played: bool) -> None:
@@ -24,11 +24,11 @@ class StampTally:
         self._repeats = 0
 
     def add(self, window: Window) -> None:
-        """Take the topic's samples of a window."""
+        """Add the topic's samples of a window."""
         own = window.own(self.topic)
         if own.stop > own.start:
             stamps = window.series[self.topic.name].stamp_ns[max(0, own.start - 1) : own.stop]
-            # Before the first command a slave holds its pose under this stamp; 0 in old recordings.
+            # Before the first command, a slave publishes its pose with this stamp; old recordings have 0.
             is_known = stamps[:-1] > NO_COMMAND_NS
             steps, is_own = np.diff(stamps)[is_known], self._is_own(window, stamps)[is_known]
             if self.topic.stamp.of:
@@ -37,7 +37,7 @@ class StampTally:
             self._holes.add(steps[(steps > 0) & is_own])
 
     def _is_own(self, window: Window, stamps: Integers) -> NDArray[np.bool_]:
-        """Whether samples between two stamps were lost here, and not already in the topic that is passed on."""
+        """Mask of steps in which samples were lost in this topic, and not already in its source topic."""
         if self._source is None or not len(source := window.around(self._source)):
             return np.full(len(stamps) - 1, not self._is_played)
         known = np.sort(source.stamp_ns)
@@ -51,13 +51,13 @@ class StampTally:
         return self._steps.quantile_us(0.5)
 
     def gaps(self) -> int:
-        """Samples that are missing at the nominal period.
+        """Number of samples that are missing at the nominal period.
 
-        Holes that are passed on are those of the source, and holes of a file are its own.
+        Gaps that were passed on from the source topic are counted there, and gaps of a replayed file are not counted.
 
-        A stamp that is another topic's makes up for one that was passed over when it comes again:
-        the slave holds a command when none came, and takes the newest when several did. A time of
-        sampling that comes again is the same sample twice.
+        If the stamps are passed on from another topic, each repeated stamp compensates one skipped stamp: the slave
+        repeats a command when no command came, and uses only the newest when several came. If the stamps are times of
+        sampling, a repeated stamp is the same sample twice.
         """
         period = self.period_us
         if not period:
@@ -70,7 +70,7 @@ class StampTallies:
     """Accumulator of the steps of all streams of a recording.
 
     Attributes:
-        of: Tally per topic name; only of streams that were recorded.
+        of: Tally by topic name, for recorded streams only.
     """
 
     def __init__(self, context: Context) -> None:
@@ -85,6 +85,6 @@ class StampTallies:
         }
 
     def add(self, window: Window) -> None:
-        """Take one window."""
+        """Process one window."""
         for tally in self.of.values():
             tally.add(window)

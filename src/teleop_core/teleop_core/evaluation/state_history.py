@@ -1,4 +1,4 @@
-"""State history: what teleop/state said at any time, as columns and fixtures."""
+"""State history: values of teleop/state over time, as columns and fixtures."""
 
 import warnings
 from dataclasses import dataclass, field
@@ -25,10 +25,10 @@ class StateHistory:
     """Changes of the state, in the order of their stamps.
 
     Attributes:
-        stamp_ns: Time from which a row holds, shape (N,), [ns].
+        stamp_ns: Time from which each row is valid, shape (N,), [ns].
         rows: Columns as in :data:`~teleop_core.graph.signals.STATE_FIELDS`, shape (N, 13).
-        fixture: Which of ``fixtures`` each row tells, shape (N,).
-        fixtures: All that were told, each once; on or off.
+        fixture: Index in ``fixtures`` of each row's fixture, shape (N,).
+        fixtures: All reported fixtures, each once; on or off.
     """
 
     stamp_ns: Integers
@@ -47,7 +47,7 @@ class StateHistory:
 
 @dataclass(frozen=True, eq=False)
 class States:
-    """State at N times; all as in :class:`StateHistory`."""
+    """State at N times; the attributes are as in :class:`StateHistory`."""
 
     rows: Array
     fixture: Integers
@@ -59,22 +59,22 @@ class States:
 
     @property
     def is_fixture_on(self) -> NDArray[np.bool_]:
-        """Whether a fixture holds the slave, shape (N,)."""
+        """Whether the fixture is on, shape (N,)."""
         return self.column("is_fixture_on") > 0.0
 
     def only(self, is_kept: NDArray[np.bool_]) -> "States":
-        """States of some of the times; ``is_kept`` has the shape (N,)."""
+        """States at the times for which ``is_kept``, shape (N,), is True."""
         if is_kept.all():
             return self
         return States(self.rows[is_kept], self.fixture[is_kept], self.fixtures)
 
     def fixture_counts(self) -> dict[ReportedFixture, int]:
-        """Fixtures that are told, on or off, and at how many of the times."""
+        """Reported fixtures, on or off, and the number of times at which each was reported."""
         counts = np.bincount(self.fixture).tolist()
         return {self.fixtures[index]: count for index, count in enumerate(counts) if count}
 
     def is_told(self, fixture: ReportedFixture) -> NDArray[np.bool_]:
-        """Whether this fixture is told, on or off, shape (N,)."""
+        """Whether this fixture is reported, on or off, shape (N,)."""
         return self.fixture == self.fixtures.index(fixture)
 
     @property
@@ -89,17 +89,17 @@ class States:
 
 
 NO_HISTORY: StateHistory = StateHistory(np.empty(0, np.int64), np.empty((0, len(STATE_FIELDS))))
-"""That of a recording without teleop/state."""
+"""History of a recording without teleop/state."""
 
 
 def read_history(bag: reader.Bag) -> StateHistory:
     """State history of a recording; empty if it has no teleop/state.
 
-    Reports of others that lack a field, or have one that is no number, are left out with a warning.
+    Reports of other writers that lack a field, or have a field that is not a number, are left out with a warning.
 
     Raises:
         EvaluationError: No report can be read.
-        RecordingError: The topic carries something else.
+        RecordingError: The topic does not contain reports.
     """
     info = bag.topics.get(topics.TELEOP_STATE.name)
     stamps: list[int] = []

@@ -1,4 +1,4 @@
-"""Traces: the curves that a page draws of a recording, kept while it is read."""
+"""Traces: the curves that a page draws of a recording, collected while the recording is read."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -7,32 +7,32 @@ from teleop_core.evaluation.accumulators import Integers
 from teleop_core.kernels.geometry import Array
 
 SAMPLES = 660_000
-"""Samples that are kept of a stream as they are: eleven minutes at 1 kHz."""
+"""Largest number of samples of a stream that are all kept: eleven minutes at 1 kHz."""
 BUCKETS = SAMPLES // 2
-"""Stretches of a longer recording, with a smallest and a largest value each."""
+"""Number of intervals of a longer recording; the smallest and largest value of each interval is kept."""
 _SECOND_NS = 1e9
 Rows = NDArray[np.float32]
 
 
 def spacing_s(samples: int, duration_s: float) -> float:
-    """Time [s] of which a page keeps the smallest and largest value; 0 where it keeps all samples.
+    """Length [s] of the intervals of which a page keeps the smallest and largest value; 0 if it keeps all samples.
 
     Args:
-        samples: Samples of the stream in the recording.
+        samples: Number of samples of the stream in the recording.
         duration_s: Length of the recording, [s].
     """
     return duration_s / BUCKETS if samples > SAMPLES else 0.0
 
 
 class Envelope:
-    """Columns against time: every sample, as long as there are no more than :data:`SAMPLES`.
+    """Columns against time: every sample, if there are no more than :data:`SAMPLES`.
 
-    Of a longer recording it keeps the smallest and largest value of each column in each of
-    :data:`BUCKETS` stretches of time, so that peaks survive and memory does not grow.
+    For a longer recording it keeps the smallest and largest value of each column in each of :data:`BUCKETS` time
+    intervals. Peaks are thus kept and the memory use does not grow.
 
     Args:
-        start_ns: Where the recording begins, [ns].
-        end_ns: Where it ends, [ns].
+        start_ns: Begin of the recording, [ns].
+        end_ns: End of the recording, [ns].
         columns: Number of columns.
     """
 
@@ -44,7 +44,7 @@ class Envelope:
         self._buckets: _Buckets | None = None
 
     def add(self, time_ns: Integers, values: Array) -> None:
-        """Take samples: times (N,) in order [ns], values (N, columns); NaN is left out."""
+        """Add samples: sorted times (N,) [ns] and values (N, columns); NaN is left out."""
         if not len(time_ns):
             return
         rows = values.astype(np.float32)
@@ -62,7 +62,7 @@ class Envelope:
     def line(self) -> tuple[Array, Rows]:
         """Times (M,) [s] from the start and values (M, columns), through all samples or extremes.
 
-        Each stretch of a long recording gives two points, in the order in which the line rises or falls there.
+        Each interval of a long recording gives two points, ordered so that the line rises or falls as the samples do.
         """
         if self._buckets is not None:
             return self._buckets.line()
@@ -76,7 +76,7 @@ class Envelope:
 
 
 class _Buckets:
-    """Smallest and largest value of each column per stretch of time."""
+    """Smallest and largest value of each column per time interval."""
 
     def __init__(self, start_ns: int, end_ns: int, columns: int) -> None:
         self._start_ns, self._length_ns = start_ns, max(1, end_ns - start_ns + 1)

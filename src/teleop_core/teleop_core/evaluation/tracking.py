@@ -1,4 +1,4 @@
-"""Tracking: the slave's poses beside those it should have had, and how far they are off."""
+"""Tracking: the slave's poses, the poses it should have had, and the errors between them."""
 
 from dataclasses import dataclass
 
@@ -15,18 +15,18 @@ from teleop_core.graph.topics import NO_COMMAND_NS, SLAVE_MEASURED_CP, SLAVE_SER
 from teleop_core.kernels.geometry import Array, roll_pitch_yaw, rotations_from_quaternions
 
 DEGENERATE_DEG = 1.0
-"""Roll and yaw are not defined where pitch is nearer to ±90° than this, [deg]."""
+"""Roll and yaw are undefined if pitch is nearer to ±90° than this angle, [deg]."""
 
 
 @dataclass(frozen=True, eq=False)
 class PoseErrors:
-    """Errors of N poses; NaN where a pose or its reference is not valid.
+    """Errors of N poses; NaN if a pose or its reference is not valid.
 
     Attributes:
         position_mm: Distances, shape (N,), [mm].
         roll_pitch_yaw_deg: Differences of the fixed angles, wrapped to ±180, shape (N, 3), [deg];
             roll and yaw are NaN near pitch ±90°.
-        angle_deg: Angle of the one rotation between the two, shape (N,), [deg].
+        angle_deg: Angle of the single rotation between both orientations, shape (N,), [deg].
         is_degenerate: Whether pitch is too near to ±90° for roll and yaw, shape (N,).
     """
 
@@ -37,11 +37,11 @@ class PoseErrors:
 
 
 def pose_errors(poses: Array, references: Array) -> PoseErrors:
-    """Errors of poses against their references, both in the same frame.
+    """Errors of poses relative to their references, both in the same frame.
 
     Args:
         poses: Rows x, y, z [m] and quaternion w, x, y, z, shape (N, 7).
-        references: The same, shape (N, 7).
+        references: Reference poses in the same form, shape (N, 7).
 
     Source:
         Vongbunyong 2008, eqs. 2.7.1-2.7.6 (fixed angles) and section 7.6 (which error is meant).
@@ -58,12 +58,12 @@ def pose_errors(poses: Array, references: Array) -> PoseErrors:
 
 
 def angles_between(quaternions: Array, others: Array) -> Array:
-    """Angles (N,) [rad] between orientations (N, 4) of any length; NaN without a direction."""
+    """Angles (N,) [rad] between quaternions (N, 4) of any length; NaN for quaternions of length zero."""
     return _angle(_unit(quaternions), _unit(others))
 
 
 def _unit(quaternions: Array) -> Array:
-    """Quaternions of unit length; NaN for those of none."""
+    """Quaternions scaled to unit length; NaN for quaternions of length zero."""
     norm = np.sqrt(np.einsum("ij,ij->i", quaternions, quaternions))
     with np.errstate(invalid="ignore", divide="ignore"):
         unit: Array = quaternions / norm[:, None]
@@ -77,7 +77,7 @@ def _wrapped(angle: Array) -> Array:
 
 
 def _angle(a: Array, b: Array) -> Array:
-    """Angle [rad] of the rotation from b to a; exact for small ones, unlike the arc cosine."""
+    """Angle [rad] of the rotation from b to a; exact for small angles, unlike the arc cosine."""
     w = np.abs(np.einsum("ij,ij->i", a, b))
     axis = b[:, :1] * a[:, 1:] - a[:, :1] * b[:, 1:] - np.cross(a[:, 1:], b[:, 1:])
     angle: Array = 2.0 * np.arctan2(np.sqrt(np.einsum("ij,ij->i", axis, axis)), w)
@@ -93,14 +93,14 @@ class Tracked:
     """Poses of a window, rows x, y, z [m] and quaternion w, x, y, z; NaN without a partner.
 
     Attributes:
-        log_ns: When they were recorded, shape (N,), [ns].
-        stamp_ns: When they were sampled, shape (N,), [ns].
+        log_ns: Times of recording, shape (N,), [ns].
+        stamp_ns: Times of sampling, shape (N,), [ns].
         poses: slave/measured_cp, shape (N, 7).
         setpoints: slave/setpoint_cp of the tick in which they were sampled, shape (N, 7).
         commands: Latest slave/servo_cp at the stamp of the pose, shape (N, 7).
         is_paired: Whether the setpoint of the same tick was recorded, shape (N,).
-        against: Errors against the setpoints.
-        behind: Errors against the commands.
+        against: Errors relative to the setpoints.
+        behind: Errors relative to the commands.
     """
 
     log_ns: Integers
@@ -122,7 +122,7 @@ def _track(window: Window) -> Tracked:
     measured, setpoint = window.samples(SLAVE_MEASURED_CP), window.around(SLAVE_SETPOINT_CP)
     command, all_measured = window.around(SLAVE_SERVO_CP), window.around(SLAVE_MEASURED_CP)
     partner = same_tick(all_measured.log_ns, setpoint.log_ns)[window.own(SLAVE_MEASURED_CP)]
-    # Until a command is in force, as on the way to where it starts, the slave follows nobody.
+    # Until a command is in force, for example on the way to its start, the slave follows no command.
     is_led = partner == NONE
     partner = np.where(is_led, NONE, np.maximum(partner - window.lag, 0))
     is_led[~is_led] = setpoint.stamp_ns[partner[~is_led]] > NO_COMMAND_NS
@@ -142,7 +142,7 @@ def _track(window: Window) -> Tracked:
 
 
 def rows_of(series: Series, index: Integers) -> Array:
-    """Rows of poses by index, shape (N, 7); NaN for those without a partner."""
+    """Rows of poses by index, shape (N, 7); NaN for indices without a partner."""
     if not len(series):
         return np.full((len(index), 7), np.nan)
     return np.where((index == NONE)[:, None], np.nan, series.values[index])
@@ -159,7 +159,7 @@ class ErrorTrace:
         self.envelope = Envelope(context.bag.start_ns, context.bag.end_ns, columns=6)
 
     def add(self, window: Window) -> None:
-        """Take one window."""
+        """Process one window."""
         found = tracked(window)
         turns = (*found.against.roll_pitch_yaw_deg.T, found.against.angle_deg)
         errors = np.stack((found.against.position_mm, found.behind.position_mm, *turns), axis=1)

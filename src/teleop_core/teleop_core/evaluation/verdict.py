@@ -10,12 +10,12 @@ from teleop_core.evaluation.published import BOX_OVERSHOOT_MM
 
 SHARE = "reach.followed_share"
 NAMED = 3
-"""Concerns that a verdict names."""
-# From where on something is a concern. Assumed, but for the overshoot of a fixture and the share of
-# the time followed, below which no published figure is compared.
+"""Largest number of concerns that a verdict names."""
+# Limits from which on a value is a concern. They are assumed, except the overshoot of a fixture and the share of
+# followed time, below which no published figure is compared.
 _FOLLOWED, _DRIFT_MM, _ERROR_MM, _LATENCY_MS, _SHARE = 0.99, 5.0, 1.0, 20.0, 1e-3
 _CREATED_MJ = 1.0
-"""More than passivity lends, and the last touch before a recording ends."""
+"""Larger than the energy that passivity lends, and than the energy of a last touch before the recording ends."""
 _CAUSES = {
     "joint": "at a joint's end",
     "workspace": "beyond the workspace",
@@ -44,7 +44,7 @@ Values = Mapping[str, Leaf]
 
 
 class Concern(NamedTuple):
-    """Something wrong: how many times beyond what is fine, its key, and in words."""
+    """A problem: the ratio of the value to its acceptable limit, the value's key, and a text."""
 
     weight: float
     key: str
@@ -53,12 +53,12 @@ class Concern(NamedTuple):
 
 @dataclass(frozen=True)
 class Verdict:
-    """What is to be said of a score first.
+    """Summary of a score.
 
     Attributes:
-        text: One line, the worst first.
-        worst: Key of the worst; None if nothing is beyond what is fine.
-        advice: What the worst means and what to do, one line; None if nothing is wrong.
+        text: One line that names the worst problem first.
+        worst: Key of the worst value; None if all values are acceptable.
+        advice: One line about the meaning of the worst value and what to do; None if nothing is wrong.
     """
 
     text: str
@@ -67,7 +67,7 @@ class Verdict:
 
     @property
     def is_good(self) -> bool:
-        """Whether nothing is beyond what is fine."""
+        """Whether all values are acceptable."""
         return self.worst is None
 
     def __str__(self) -> str:
@@ -97,12 +97,12 @@ def _number(values: Values, key: str) -> float | None:
 
 
 def percent(share: float) -> str:
-    """Text in percent, rounded down, so that 100 means always."""
+    """Text in percent, rounded down, so that "100" means the whole time."""
     return f"{math.floor(1000.0 * share + 1e-9) / 10.0:g}"
 
 
 def _missing(values: Values) -> Iterator[Concern]:
-    """Parts that are not known here: what depends on them is in no score, so it comes first."""
+    """Concern about unknown parts. It comes first, because values that depend on them are missing."""
     for key, what in (("session.missing", "not known here"), ("fixture.unscored", "not scored")):
         if told := values.get(key):
             text = f"{what}: {told}; give the file that has it: teleop evaluate --parts FILE.py"
@@ -111,7 +111,10 @@ def _missing(values: Values) -> Iterator[Concern]:
 
 
 def _drift(values: Values) -> Iterator[Concern]:
-    """Concern about the error to where the hand led, beyond the lag of filters, which the command error has too."""
+    """Concern about the error relative to the hand's asked position.
+
+    The lag of filters is subtracted, since the command error contains it too.
+    """
     key = "asked_error_mm.max"
     off, lag = _number(values, key), _number(values, "command_error_mm.max") or 0.0
     if off is not None:
@@ -130,7 +133,7 @@ def _following(values: Values) -> Iterator[Concern]:
 
 
 def _beyond(key: str, fine: float, text: str) -> Callable[[Values], Iterator[Concern]]:
-    """Concern about one number, which stands in the text."""
+    """Function that gives a concern about one number, which is inserted into the text."""
 
     def concern(values: Values) -> Iterator[Concern]:
         value = _number(values, key)
@@ -141,13 +144,13 @@ def _beyond(key: str, fine: float, text: str) -> Callable[[Values], Iterator[Con
 
 
 def _in_vain(values: Values) -> Iterator[Concern]:
-    """A task none of whose attempts succeeded."""
+    """Concern about a task without a successful attempt."""
     if (tried := _number(values, "task.attempts")) and not _number(values, "task.successes"):
         yield Concern(1.0 + tried, "task.successes", f"no success in {tried:.0f} attempts at the task")
 
 
 def _messages(values: Values) -> Iterator[Concern]:
-    """Messages that are missing, of all topics: lost, or never sent by a stage that was late."""
+    """Concern about missing messages of all topics: messages that were lost, or never sent by a late stage."""
     missing, count, lost = (_of_topics(values, name) for name in ("gaps", "count", "lost"))
     if missing:
         share = missing / max(1, count + missing)
@@ -157,7 +160,7 @@ def _messages(values: Values) -> Iterator[Concern]:
 
 
 def _of_topics(values: Values, name: str) -> int:
-    """Sum of a number of all topics; a simulated network loses what it is told to."""
+    """Sum of a number over all topics, except topics of a simulated network, whose losses are configured."""
     return sum(
         int(value)
         for key, value in values.items()
@@ -169,7 +172,7 @@ def _of_topics(values: Values, name: str) -> int:
 
 
 def _delay(values: Values) -> Iterator[Concern]:
-    """Delay beyond what was asked for, of a simulated network and of links."""
+    """Concern about delay in addition to the configured delay of a simulated network and of links."""
     key = "latency_ms.total.p99"
     asked = _number(values, "latency_ms.asked.p99") or 0.0
     if (whole := _number(values, key)) is not None:
@@ -179,7 +182,7 @@ def _delay(values: Values) -> Iterator[Concern]:
 
 
 def _ticks(values: Values) -> Iterator[Concern]:
-    """Control ticks that were not in time: the machine was busy."""
+    """Concern about control ticks that were not in time because the machine was busy."""
     done = _number(values, "ticks.executed")
     for key, (fine, text) in _UNTIMELY.items():
         if done and (count := _number(values, key)):
@@ -188,7 +191,7 @@ def _ticks(values: Values) -> Iterator[Concern]:
 
 
 def _created(values: Values) -> Iterator[Concern]:
-    """Energy that came out beyond what hand and slave put in, where both were recorded."""
+    """Concern about output energy that exceeds the input energy of hand and slave, if both were recorded."""
     into, out = ([_number(values, f"passivity.{side}.{way}_mj") for side in ("hand", "slave")] for way in ("in", "out"))
     if None not in (*into, *out):
         taken, given = (sum(part or 0.0 for part in parts) for parts in (into, out))

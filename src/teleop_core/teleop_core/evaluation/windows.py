@@ -1,9 +1,9 @@
-"""Windows: a recording as some seconds of all topics at a time, each with what surrounds it.
+"""Windows: a recording, divided into windows of some seconds of all topics, each with context on both sides.
 
-Samples of different topics belong together although they stand in different chunks. A window holds its own stretch of
-log time and a second of context on both sides, so that partners are found across its ends. A span is the stretch that
-is scored, all of it unless something else is wanted: samples count that were recorded within it. What they belong to
-may lie before it: the command that was in force when the span began, and what teleop/state had said, hold on.
+Samples of different topics may belong together although they are in different chunks. A window contains its own
+interval of log time and one second of context on both sides, so that partners are found across its ends. A span is the
+scored part, by default the whole recording: only samples that were recorded within the span count. Their partners may
+be before the span: the command in force at its begin and the last values of teleop/state remain valid.
 """
 
 import math
@@ -30,10 +30,10 @@ class Window:
     """Series of topics around the log times ``after_ns`` < t <= ``until_ns``.
 
     Attributes:
-        series: Per topic name, in the order of log times; at least the sample before the window
-            is in it, if there is one. Topics without samples are left out.
-        history: What teleop/state said at any time.
-        lag: By how many setpoints a measured pose comes after that which it was sampled with.
+        series: Series by topic name, sorted by log time. They contain at least the last sample before the window, if
+            there is one. Topics without samples are left out.
+        history: Values of teleop/state over time.
+        lag: Number of setpoints between a measured pose and the setpoint with which it was sampled.
     """
 
     after_ns: int
@@ -44,11 +44,11 @@ class Window:
     _known: dict[object, object] = field(default_factory=dict, repr=False)
 
     def samples(self, topic: Topic) -> Series:
-        """Samples of a topic inside of the window; none if the recording has no such topic."""
+        """Samples of a topic inside the window; empty if the recording has no such topic."""
         return self.around(topic)[self.own(topic)]
 
     def around(self, topic: Topic) -> Series:
-        """The same with the context; :meth:`own` says which of them are inside."""
+        """Samples of a topic with the context; :meth:`own` returns which of them are inside the window."""
         series = self.series.get(topic.name)
         return empty(topic.width(0)) if series is None else series
 
@@ -57,7 +57,7 @@ class Window:
         return self._once(("states", topic.name), lambda: self.history.at(self.samples(topic).stamp_ns))
 
     def once(self, compute: Callable[["Window"], Found]) -> Found:
-        """Result of a function of this window; computed once, when the first metric asks."""
+        """Result of a function of this window; computed once, when the first metric requests it."""
         return self._once(compute, lambda: compute(self))
 
     def _once(self, name: object, compute: Callable[[], Found]) -> Found:
@@ -66,7 +66,7 @@ class Window:
         return cast(Found, self._known[name])
 
     def own(self, topic: Topic | str) -> slice:
-        """Samples of a topic inside of the window; the rest is context."""
+        """Slice of the samples of a topic that are inside the window; the other samples are context."""
         series = self.series.get(topic if isinstance(topic, str) else topic.name)
         if series is None:
             return slice(0, 0)
@@ -75,13 +75,13 @@ class Window:
 
 
 class DisorderError(Exception):
-    """Samples stand further out of order in the file than the context of a window reaches."""
+    """Samples in the file are so far out of order that the context of a window is too short."""
 
 
 def whole(
     bag: Bag, topics: Iterable[Topic | str], history: StateHistory = NO_HISTORY, lag: int = 0
 ) -> Iterator[Window]:
-    """The recording as one window, whatever the order in its file."""
+    """The whole recording as one window, for any order of samples in its file."""
     yield Window(-_FOREVER, _FOREVER, bag.read_many(topics), history, lag)
 
 
@@ -91,7 +91,7 @@ def windows(
     """Windows of a recording in the order of time; memory does not grow with its length.
 
     Raises:
-        DisorderError: A sample belongs to a window that was handed out already; :func:`whole` reads such a file.
+        DisorderError: A sample belongs to a window that was already yielded; :func:`whole` can read such a file.
     """
     pending: dict[str, Series] = {}
     waiting: list[dict[str, Series]] = []
@@ -113,7 +113,7 @@ def windows(
 
 
 def _joined(pending: dict[str, Series], waiting: list[dict[str, Series]]) -> dict[str, Series]:
-    """Everything so far, each topic in the order of its log times."""
+    """All samples so far, each topic sorted by log time."""
     parts = {name: [series] for name, series in pending.items()}
     for block in waiting:
         for name, series in block.items():
@@ -122,7 +122,7 @@ def _joined(pending: dict[str, Series], waiting: list[dict[str, Series]]) -> dic
 
 
 def _since(series: Series, until_ns: int) -> Series:
-    """What the next window needs: the context before it, and the last sample at any rate."""
+    """Samples that the next window needs: the context before it, and always the last sample."""
     logs = series.log_ns
     first = min(
         int(np.searchsorted(logs, until_ns - CONTEXT_NS)),
@@ -141,7 +141,7 @@ class Span(NamedTuple):
     last_ns: int
 
     def cut(self, windows: Iterable[Window]) -> Iterator[Window]:
-        """Windows with what lies outside of the span as context only; those beyond are left out."""
+        """Windows of this span. Samples outside of the span are context only; windows beyond the span are left out."""
         for window in windows:
             if window.after_ns >= self.last_ns:
                 return
@@ -156,11 +156,11 @@ Seconds = tuple[float, float]
 
 
 def span_of(bag: Bag, seconds: Seconds | None) -> Span | None:
-    """Span of a recording; None for None: all of it.
+    """Span of a recording; None, for the whole recording, if ``seconds`` is None.
 
     Args:
         bag: The recording.
-        seconds: Begin and end [s] since its first message; an end beyond it is its last message.
+        seconds: Begin and end [s] since the first message; an end after the last message is reduced to it.
 
     Raises:
         ParameterError: The span is empty, not finite, or begins after the end.

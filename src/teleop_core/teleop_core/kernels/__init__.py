@@ -8,10 +8,10 @@ only other kernels call it::
         for i in range(3):
             force[i] = -stiffness * position[i]
 
-It is compiled when it is first called, for the types of that call, and kept on disk. What is kept is thrown away when
-anything changes that it was made from: its file, a kernel that it calls, the value of a constant that either refers to,
-numba or this package. There is no ``fastmath`` and no reordering: results are the same in every way of running, and on
-every x86-64 processor since 2013 with the same C library.
+A kernel is compiled when it is first called, for the types of that call, and stored on disk. The stored code becomes
+invalid when anything changes that it was made from: its file, a kernel that it calls, the value of a constant that
+either refers to, numba or this package. There is no ``fastmath`` and no reordering: results are the same in all modes,
+and on every x86-64 processor since 2013 with the same C library.
 
 With ``NUMBA_DISABLE_JIT=1`` in the environment all kernels stay Python functions: a debugger steps
 through them, coverage counts their lines, and everything is some hundred times slower.
@@ -49,14 +49,14 @@ __all__ = [
 ]
 
 SUPPORTED = ((0, 68), (0, 69))
-"""The first that will do, and the first beyond it that may differ; the same as in setup.py."""
+"""First supported version, and first later version that is not supported; the same as in setup.py."""
 
 
 def check_version(found: str = numba.__version__) -> None:
-    """Refuse other versions of numba.
+    """Refuse unsupported versions of numba.
 
     Raises:
-        ImportError: That version is installed; the text says which will do.
+        ImportError: An unsupported version is installed; the error text names the supported versions.
     """
     first, beyond = SUPPORTED
     if not first <= tuple(int(part) for part in found.split(".")[:2]) < beyond:
@@ -80,7 +80,7 @@ _written: dict[str, tuple[Mapping[str, object], Any]] = {}
 
 
 class Kernel(Protocol[P, R_co]):
-    """A kernel, to be called like the function that it was made from."""
+    """A kernel; it is called like the function from which it was made."""
 
     @property
     def __name__(self) -> str: ...
@@ -90,27 +90,27 @@ class Kernel(Protocol[P, R_co]):
         """The Python function, uncompiled."""
 
     def __call__(self, *args: P.args, **kwargs: P.kwargs) -> R_co:
-        """What the function does."""
+        """Call the compiled function."""
 
 
 def kernel(function: Callable[P, R_co]) -> Kernel[P, R_co]:
     """Compile a pure function over float64 arrays and records.
 
-    The kernel releases the interpreter lock, so that other threads run beside it. Arrays must be
-    writable: numba compiles a second time for read-only ones. Where no file can be written beside
-    the source, or the function was typed in, it is compiled in every process.
+    The kernel releases the interpreter lock, so that other threads run in parallel. Arrays must be writable: numba
+    compiles a second time for read-only arrays. If no file can be written beside the source, or the function was
+    entered interactively, it is compiled in every process.
 
     Raises:
-        KernelError: Not here but when it is first called, compiled for other arguments or made a
-            pointer: the function is none that can be compiled.
+        KernelError: The function cannot be compiled. This is raised not here, but when the kernel is first called,
+            compiled for other arguments or made a pointer.
     """
     return _compiler.dispatcher(function) if IS_COMPILED else _plain(function)
 
 
 def inner(function: Callable[P, R_co]) -> Kernel[P, R_co]:
-    """Compile a kernel that only other kernels call: about a quarter less work than :func:`kernel`.
+    """Compile a kernel that only other kernels call; compilation is about a quarter faster than with :func:`kernel`.
 
-    A call from Python raises TypeError, but in pure-Python mode.
+    A call from Python raises TypeError, except in pure-Python mode.
     """
     return _compiler.dispatcher(function, is_inner=True) if IS_COMPILED else _plain(function)
 
@@ -123,20 +123,20 @@ def is_kernel(value: object) -> bool:
 
 
 def kernel_from_source(text: str, name: str, names: Mapping[str, object]) -> Any:
-    """Kernel from source text that the program wrote itself.
+    """Kernel from source text that the program generated.
 
-    It is cached on disk like others: the same text, calling the same kernels with the same
-    constants, is compiled once. Tracebacks show its lines.
+    It is cached on disk like other kernels: the same text that calls the same kernels with the same constants is
+    compiled once. Tracebacks show its lines.
 
     Args:
-        text: Python source that defines a function; it makes no arrays, but kernels that it calls may.
+        text: Python source that defines a function. The function must not make arrays, but kernels that it calls may.
         name: Name of that function.
-        names: What the text refers to: kernels, constants, modules.
+        names: Objects to which the text refers: kernels, constants, modules.
     """
     tokens = Tokens()
     values = [f"{key}={tokens.of(value)}" for key, value in sorted(names.items())]
     key = hexdigest((text, name, *values))
-    if key in _written:  # kernels may have been defined again under their old names
+    if key in _written:  # kernels may have been redefined under the same names
         before, made = _written[key]
         if all(before[known] is value for known, value in names.items()):
             return made
@@ -147,7 +147,7 @@ def kernel_from_source(text: str, name: str, names: Mapping[str, object]) -> Any
 
 
 def _executed(text: str, name: str, names: Mapping[str, object], key: str) -> FunctionType:
-    """Function of a source text; its qualified name is one for each text and meaning of names."""
+    """Function of a source text; its qualified name is unique for each text and meaning of names."""
     file = f"<{name} {key}>"
     linecache.cache[file] = (len(text), None, text.splitlines(keepends=True), file)
     space: dict[str, Any] = {**names, "__name__": __name__}
@@ -163,23 +163,23 @@ def _plain(function: Any) -> Any:
 
 
 def pointer(function: Callable[P, R], signature: Any) -> Callable[P, R]:
-    """Function as a value of a fixed signature, which kernels take as argument and call.
+    """Function as a value of a fixed signature, which kernels accept as an argument and call.
 
-    A plain Python function in place of a kernel works too, if the signature has only float64,
-    int64, bool and C-contiguous float64 arrays (n,) or (n, m), and returns one of void, float64 and
-    int64. It gets views of the kernel's arrays and may write to them. When it raises, the kernel
-    goes on with 0, and :func:`raise_pending` raises the first such exception after the block.
+    A plain Python function also works, if the signature has only float64, int64, bool and C-contiguous float64 arrays
+    (n,) or (n, m), and returns void, float64 or int64. It gets views of the kernel's arrays and may write to them. If
+    it raises an exception, the kernel continues with 0, and :func:`raise_pending` raises the first such exception
+    after the block.
 
-    Handed three arrays, a compiled kernel costs 0.005 µs per call, a Python function 0.5 µs besides
-    what it does itself: with ``out[:] = a * b`` it is 1.2 µs. To make its pointer takes 40 ms.
+    With three arrays as arguments, the call of a compiled kernel takes 0.005 µs. The call of a Python function takes
+    0.5 µs plus its own work: with ``out[:] = a * b`` 1.2 µs in all. Making its pointer takes 40 ms.
 
     Args:
         function: A kernel, or a plain Python function or other callable.
-        signature: numba signature, the same for all that may stand in this place.
+        signature: numba signature, the same for all functions that may be passed for this argument.
 
     Returns:
-        The callable to hand to a kernel, one for each kernel and signature; called from Python, it
-        runs the Python function.
+        The callable to pass to a kernel, one for each kernel and signature; called from Python, it runs the Python
+        function.
 
     Raises:
         KernelError: The function cannot be compiled, or called, with this signature.
@@ -201,15 +201,15 @@ def records(fields: Any, count: int = 1) -> Any:
 
 
 def bound(compiled: Callable[P, R], *arguments: P.args, **_: P.kwargs) -> Callable[[], R]:
-    """Kernel on arguments that stay the same objects, without the cost of looking at their types.
+    """Kernel with bound arguments that stay the same objects, so that their types are not checked at each call.
 
-    Numbers keep the value they have now; what changes from call to call travels in arrays and
-    records. With function pointers among the arguments this saves two thirds of a call. The kernel is compiled here,
-    so that a mistake in it is reported here.
+    Numbers keep the value that they have now; pass changing values in arrays and records. With function pointers among
+    the arguments this saves two thirds of the time of a call. The kernel is compiled here, so that a mistake in it is
+    reported here.
 
     Args:
-        compiled: A kernel; a plain Python function is bound as it is.
-        arguments: All its arguments, in their order.
+        compiled: A kernel; a plain Python function is bound unchanged.
+        arguments: All its arguments, in order.
 
     Raises:
         KernelError: The kernel cannot be compiled for these arguments.
@@ -220,7 +220,10 @@ def bound(compiled: Callable[P, R], *arguments: P.args, **_: P.kwargs) -> Callab
 
 
 def _memory(value: Any) -> Any:
-    """Memory of a record, also of one in a tuple: its attributes are looked up at every call, at 1 µs each."""
+    """Memory of a record, also of records in a tuple.
+
+    Numba looks up a record's attributes at every call, which takes 1 µs each.
+    """
     if isinstance(value, np.void):
         return _Memory(value)
     return tuple(map(_memory, value)) if isinstance(value, tuple) else value
@@ -229,8 +232,8 @@ def _memory(value: Any) -> Any:
 def direct(compiled: Callable[P, R], signature: Any) -> Callable[P, R]:
     """Kernel for arguments of one signature, called without a check of their types.
 
-    It saves 0.15 µs of a call. The caller must pass the right types: arguments of other types are misread. A plain
-    Python function stays as it is.
+    This saves 0.15 µs per call. The caller must pass the right types: arguments of other types are misread. A plain
+    Python function is returned unchanged.
 
     Args:
         compiled: A kernel.
@@ -248,15 +251,15 @@ def direct(compiled: Callable[P, R], signature: Any) -> Callable[P, R]:
 def apart(compiled: Callable[..., R], *arguments: object) -> Callable[..., R]:
     """Kernel that other kernels call by its address, instead of compiling a copy of its code.
 
-    A kernel that names another is compiled with a copy of it, which takes seconds where that is
-    large. This one is compiled once for its arguments, and its callers without it.
+    A kernel that calls another kernel by name is compiled with a copy of it, which takes seconds if the other kernel
+    is large. The kernel returned here is compiled once for its arguments, and its callers are compiled without it.
 
     Args:
         compiled: A kernel.
-        arguments: Such as it will be called with: their types count.
+        arguments: Example arguments; only their types matter.
 
     Returns:
-        The value to hand to a kernel, which calls it with arguments of these types.
+        The value to pass to a kernel, which calls it with arguments of these types.
 
     Raises:
         KernelError: The kernel cannot be compiled for these arguments.
@@ -270,7 +273,7 @@ def _types(arguments: tuple[object, ...]) -> tuple[Any, ...]:
 
 
 def _type_of(value: Any) -> Any:
-    """Type for the compiler; that of records is looked up once, for it takes a millisecond for a hundred fields."""
+    """Type for the compiler; types of records are cached, since a look-up takes a millisecond for a hundred fields."""
     if isinstance(value, np.void):
         return _record_type(value.dtype)
     if type(value) is tuple:
@@ -284,9 +287,9 @@ def _record_type(dtype: np.dtype[Any]) -> Any:
 
 
 class _Memory:
-    """What compiled code asks a record for: its bytes.
+    """Array interface of a record with its bytes only, for compiled code.
 
-    NumPy answers with a description of all fields besides, anew in each call: 5 µs for a record of a hundred.
+    NumPy's own interface also describes all fields, in each call: this takes 5 µs for a record of a hundred fields.
     """
 
     __slots__ = ("data",)
@@ -302,18 +305,18 @@ def bare(value: Any) -> Any:
     return value
 
 
-_NUMPY_RECORD: Any = np.record  # numpy's types call its parents final
+_NUMPY_RECORD: Any = np.record  # numpy's type stubs declare its parents final
 
 
 class Record(_NUMPY_RECORD):
-    """One record, whose attributes are its fields first of all.
+    """One record whose fields have priority over other attributes of the same name.
 
-    With :class:`numpy.record` a field named ``size``, ``min`` or ``data`` gives what every NumPy
-    number has under that name; compiled kernels know fields only.
+    With :class:`numpy.record`, the name ``size``, ``min`` or ``data`` returns NumPy's own attribute instead of a field
+    with that name. Compiled kernels always use the field.
     """
 
     def __getattribute__(self, name: str) -> Any:
-        """Value of a field, else what NumPy has of that name."""
+        """Value of a field, or, if there is no such field, NumPy's attribute of that name."""
         fields = np.void.__getattribute__(self, "dtype").fields
         if name in fields:
             return self[name]
@@ -331,7 +334,7 @@ class Record(_NUMPY_RECORD):
 
 
 def _missing(name: str, fields: Iterable[str]) -> str:
-    """Message for a field that does not exist, in the compiler's own words."""
+    """Message for a field that does not exist, with the same text as the compiler's message."""
     known = list(fields)
     near = get_close_matches(name, known, n=1)
     hint = f"; did you mean {near[0]!r}?" if near else ""
@@ -352,7 +355,7 @@ if TYPE_CHECKING:
     from teleop_core.kernels.geometry import *  # noqa: F403
     from teleop_core.kernels.parts import *  # noqa: F403
     from teleop_core.kernels.portable import *  # noqa: F403
-else:  # loaded with their first use
+else:  # imported when they are first used
     _NAMES = {
         "fields": ("Fields", "IntegerPerJoint", "Integers", "PerJoint", "PoseRow", "Quaternion", "Vector3", "Wrench",
             "fields_of", "record", "record_array"),

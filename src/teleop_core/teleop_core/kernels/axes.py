@@ -12,7 +12,7 @@ def axis_map(name: str, axes: tuple[str, ...]) -> Array:
     """Rotation (3, 3) whose rows pick axes by name: ("-z", "-x", "+y") maps z to -x and so on.
 
     Args:
-        name: Of the parameter, for messages.
+        name: Name of the parameter, for messages.
         axes: Three of :data:`AXES`.
 
     Raises:

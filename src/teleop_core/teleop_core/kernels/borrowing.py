@@ -1,9 +1,9 @@
-"""Borrowing: kernels that make no arrays do not count who holds those that they are handed.
+"""Borrowing: switches reference counting of array arguments off in kernels that make no arrays.
 
-Compiled code keeps a count of holders in each array, so that the last one frees it. A kernel that
-is handed twenty arrays in a tuple counts all of them up and down in each call: in a tick of a
-session that was six hundred times, a quarter of its time. Where all arrays of a kernel come from
-its caller, the caller holds them until the kernel returns, and there is nothing to count.
+Compiled code counts the references to each array, so that the last holder frees it. A kernel that gets twenty arrays
+in a tuple increments and decrements all counts in each call. In a tick of a session this happened six hundred times
+and took a quarter of the time. If all arrays of a kernel come from its caller, the caller keeps them until the kernel
+returns, so no counting is needed.
 """
 
 from typing import Any
@@ -20,12 +20,12 @@ _LOOKS = frozenset({
     "getattr", "static_getitem", "getitem", "build_tuple", "exhaust_iter", "getiter", "iternext",
     "pair_first", "pair_second", "cast", "phi", "null", "undef", "typed_getitem",
 })  # fmt: skip
-"""Operations that give a part or a view of what they are applied to."""
+"""Operations that return a part or a view of their operand."""
 
 
 @register_pass(mutates_CFG=False, analysis_only=True)
 class _Borrowing(AnalysisPass):
-    """Switch counting off for a function that makes no arrays."""
+    """Switches reference counting off for a function that makes no arrays."""
 
     _name = "teleop_core_borrowing"
 
@@ -33,16 +33,16 @@ class _Borrowing(AnalysisPass):
         AnalysisPass.__init__(self)
 
     def run_pass(self, state: Any) -> bool:
-        """Look at the typed function, before code is made of it."""
+        """Examine the typed function before code generation."""
         if _is_held(state, state.return_type) and _takes_room(state):
             raise TypingError("its scratch memory is free again when it returns: it must return no array")
         if state.targetctx.enable_nrt and _borrows(state):
-            state.targetctx.enable_nrt = False  # of this function's own context
+            state.targetctx.enable_nrt = False  # in the context of this function only
         return False
 
 
 class Pipeline(Compiler):
-    """Numba's compiler with this step in it."""
+    """numba's compiler with this additional step."""
 
     def define_pipelines(self) -> list[Any]:
         """Steps of the compiler."""
@@ -53,13 +53,13 @@ class Pipeline(Compiler):
 
 
 def _takes_room(state: Any) -> bool:
-    """Whether a function has room of its own."""
+    """Whether a function uses :func:`~teleop_core.kernels.room.room`."""
     calls = (call for block in state.func_ir.blocks.values() for call in block.find_exprs(op="call"))
     return any(_called(state, call) is room for call in calls)
 
 
 def _borrows(state: Any) -> bool:
-    """Whether no array can begin, or be handed on, in a function."""
+    """Whether a function neither makes nor passes on any array."""
     if _is_held(state, state.return_type):
         return False
     lines = [line for block in state.func_ir.blocks.values() for line in block.body]
@@ -82,12 +82,12 @@ def _is_plain(state: Any, line: Any) -> bool:
 
 
 def _called(state: Any, call: Any) -> object:
-    """Python function that is called, if it is one that numba knows by itself."""
+    """Python function that is called, if numba supports this function itself."""
     return getattr(state.typemap[call.func.name], "typing_key", None)
 
 
 def _is_plain_call(state: Any, call: Any) -> bool:
-    """Whether a call is of a kernel, which counts for itself, or has nothing to do with arrays."""
+    """Whether the called function is a kernel, which counts references itself, or does not use arrays."""
     function = state.typemap[call.func.name]
     if isinstance(function, types.Dispatcher | types.FunctionType):
         return True
@@ -97,13 +97,13 @@ def _is_plain_call(state: Any, call: Any) -> bool:
 
 
 def _is_index(kind: Any) -> bool:
-    """Whether an index gives a view: numbers and slices do, arrays of them do not."""
+    """Whether an index gives a view: numbers and slices do, index arrays do not."""
     parts: Any = kind if isinstance(kind, types.BaseTuple) else (kind,)
     views = types.Integer | types.SliceType | types.EllipsisType | types.NoneType
     return all(isinstance(part, views) for part in parts)
 
 
 def _is_held(state: Any, kind: Any) -> bool:
-    """Whether values of a type have holders that are counted."""
+    """Whether values of a type are reference-counted."""
     held: bool = state.targetctx.data_model_manager[kind].contains_nrt_meminfo()
     return held

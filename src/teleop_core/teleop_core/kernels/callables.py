@@ -1,7 +1,7 @@
-"""Plain Python callables in the place of a kernel: slower, and called like any other.
+"""Plain Python callables instead of kernels: slower, but called in the same way.
 
-Compiled code calls back through ctypes, which takes the interpreter's lock for the time of the
-call. An exception cannot travel through compiled code: it waits until :func:`raise_pending`.
+Compiled code calls them through ctypes, which holds the interpreter's lock during the call. An exception cannot pass
+through compiled code: it is stored until :func:`raise_pending`.
 """
 
 import ctypes
@@ -21,7 +21,7 @@ from teleop_core.kernels.mistakes import place_of
 
 Array = NDArray[np.float64]
 
-_MOST_VIEWS = 256  # arrays remembered for each callable
+_MOST_VIEWS = 256  # largest number of arrays that are cached for each callable
 _SCALARS: dict[Any, Any] = {types.float64: ctypes.c_double, types.int64: ctypes.c_int64, types.boolean: ctypes.c_bool}
 _ARRAYS = (types.float64[::1], types.float64[:, ::1])
 _TAKEN = "float64, int64, bool or a C-contiguous array of float64, 1-D or 2-D"
@@ -31,7 +31,7 @@ _RESULTS: dict[Any, tuple[Any, Callable[[Any], Any]]] = {
     types.int64: (ctypes.c_int64, operator.index),
 }
 
-# C has no arrays that know their lengths: an array travels as its address and its lengths.
+# C arrays do not contain their lengths: an array is passed as its address and its lengths.
 _TEXT = """
 def callback({flat}):
     try:
@@ -50,10 +50,10 @@ _pending = threading.local()
 
 
 def raise_pending() -> None:
-    """Raise the first exception of a plain callable since the last time, if there was one.
+    """Raise the first exception of a plain callable since the last call, if there was one.
 
-    To be called after each block of ticks, in the thread that ran it: every thread has its own.
-    In pure-Python mode exceptions need not wait, and this does nothing.
+    Must be called after each block of ticks, in the thread that ran it, because every thread stores its own
+    exceptions. In pure-Python mode exceptions are raised at once, and this does nothing.
     """
     error: BaseException | None = getattr(_pending, "error", None)
     if error is not None:
@@ -62,16 +62,16 @@ def raise_pending() -> None:
 
 
 def entry_of(function: Callable[..., Any], arguments: tuple[Any, ...], result: Any) -> Any:
-    """Function for the compiler that calls a plain Python one.
+    """Function for the compiler that calls a plain Python function.
 
     Args:
-        function: Gets scalars as they are and arrays as writable views of the kernel's memory,
-            good for the time of the call. When it raises, the kernel gets 0.
+        function: Python function. It gets scalars unchanged and arrays as writable views of the kernel's memory, which
+            are valid during the call. If it raises an exception, the kernel gets 0.
         arguments: numba types: float64, int64, boolean, C-contiguous float64 arrays (n,), (n, m).
         result: numba type: void, float64 or int64.
 
     Raises:
-        KernelError: Another type, or a function that takes another number of arguments.
+        KernelError: A type is not supported, or the function takes another number of arguments.
     """
     _check(function, arguments, result)
     c_result, converted = _RESULTS[result]
@@ -102,9 +102,9 @@ def _keep(error: BaseException) -> None:
 
 
 def _views() -> Callable[..., Array]:
-    """Maker of arrays at an address, which are the same ones when asked again.
+    """Function that makes arrays at an address and caches them.
 
-    A kernel hands over the same few arrays tick after tick; to make one costs 2 µs.
+    A kernel passes the same few arrays in every tick; to make an array takes 2 µs.
     """
     known: dict[tuple[int, ...], Array] = {}
 
@@ -134,5 +134,5 @@ def _check(function: Any, arguments: tuple[Any, ...], result: Any) -> None:
     except TypeError as error:
         count = f"{len(arguments)} argument" + "s" * (len(arguments) != 1)
         raise KernelError(place, f"{name!r} must take {count} ({error})") from error
-    except ValueError:  # a builtin, which does not say what it takes
+    except ValueError:  # a builtin whose signature is unknown
         return

@@ -1,8 +1,8 @@
-"""Dependencies of a kernel: one digest over everything that its compiled form is made from.
+"""Dependencies of a kernel: one digest of everything from which its compiled code is made.
 
-A compiled kernel on the disk is as good as the sources and values it was made from. Its digest
-covers the text of its file and the values of all global constants that its code refers to, and the
-same for every kernel that it calls, directly or through others.
+A compiled kernel on the disk is valid only for the sources and values from which it was made. Its digest covers the
+text of its file and the values of all global constants that its code refers to, and the same for every kernel that it
+calls directly or indirectly.
 """
 
 import hashlib
@@ -18,15 +18,15 @@ import numpy as np
 from numba import types
 
 _PLAIN = (type(None), bool, int, float, complex, str, bytes)
-# Their functions are known to numba by name, and change with numba's version only.
+# numba identifies their functions by name; they change only with numba's version.
 _FOREIGN = frozenset(["builtins", "math", "cmath", "numpy", "numba", "llvmlite"])
 
 
 def digest(function: FunctionType) -> str:
-    """Hexadecimal digest of a function and all it depends on, through any number of calls.
+    """Hexadecimal digest of a function and all its dependencies, through any number of calls.
 
-    Constants count with the value they have when the function is first asked for, which is when
-    numba compiles it or the first of its callers.
+    Constants count with the value that they have at the first call for this function, which is when numba compiles the
+    function or its first caller.
     """
     reached, waiting = {function: _own(function)}, [function]
     while waiting:
@@ -48,7 +48,7 @@ def hexdigest(parts: Iterable[str]) -> str:
 
 @dataclass(frozen=True)
 class _Own:
-    """A function by itself: digest of its source and constants, and the functions it names."""
+    """Data of a single function: the digest of its source and constants, and the functions that it names."""
 
     digest: str
     called: tuple[FunctionType, ...]
@@ -58,14 +58,14 @@ class _Own:
 def _own(function: FunctionType) -> _Own:
     tokens = Tokens()
     code = function.__code__
-    # What is kept names its module, and cannot be loaded where the file has another name.
+    # The stored code contains the module's name, and cannot be loaded if the file has another name.
     parts = [function.__module__ or "", function.__qualname__]
     parts.append(source_digest(code.co_filename) or _code_digest(code))
     parts.append(tokens.of(function.__defaults__))
     parts.extend(tokens.of(cell.cell_contents) for cell in function.__closure__ or ())
     names = frozenset(_names_in(code))
     for name in sorted(names & function.__globals__.keys()):
-        # Attributes of records are among the names too; one that is also a global does no harm.
+        # The names include attributes of records. If such a name is also a global, this does no harm.
         parts.append(f"{name}={tokens.of(function.__globals__[name], names - {name})}")
     return _Own(hexdigest(parts), tuple(tokens.functions))
 
@@ -102,7 +102,7 @@ def _names_in(code: CodeType) -> Iterator[str]:
 
 @dataclass(frozen=True)
 class Tokens:
-    """Texts that differ when constants differ; keeps the functions that it meets on the way."""
+    """Makes texts that differ if constants differ, and collects the functions that it finds."""
 
     functions: dict[FunctionType, None] = field(default_factory=dict)
 
@@ -111,7 +111,7 @@ class Tokens:
 
         Args:
             value: A number, text, array, dtype, enumeration, kernel, module or a collection.
-            names: Attributes that count when the value is a module.
+            names: Attributes that are considered if the value is a module.
         """
         if isinstance(value, Enum):
             return f"{type(value).__qualname__}.{value.name}={self.of(value.value)}"
@@ -129,7 +129,7 @@ class Tokens:
         return f"{value.__module__}.{value.__qualname__}{members}"
 
     def _of_module(self, module: ModuleType, names: frozenset[str]) -> str:
-        """Name of a module, with those of its values that are among the names of the code."""
+        """Name of a module, with the values of its attributes that the code names."""
         if _is_foreign(module.__name__):
             return module.__name__
         values = vars(module)
@@ -137,7 +137,7 @@ class Tokens:
         return f"{module.__name__}({','.join(found)})"
 
     def _of_callable(self, value: Callable[..., Any]) -> str:
-        """Name of a kernel or Python function, which is kept; of anything else the type's name."""
+        """Name of a kernel or Python function, which is collected; for other objects the type's name."""
         function = getattr(value, "py_func", getattr(value, "__wrapped__", value))
         place = f"{getattr(value, '__module__', '')}.{getattr(value, '__qualname__', '')}"
         if isinstance(function, FunctionType) and not _is_foreign(function.__module__ or ""):
@@ -152,7 +152,7 @@ def _is_foreign(module: str) -> bool:
 def _plain_token(value: Any) -> str:
     """Text of a number, string, array, dtype or type of numba.
 
-    No compiled code reads other objects, as dictionaries and sets are: their type does for them.
+    Compiled code does not read other objects, such as dictionaries and sets, so their type is sufficient.
     """
     if isinstance(value, np.generic | np.ndarray):
         content = hashlib.blake2b(value.tobytes(), digest_size=16).hexdigest()

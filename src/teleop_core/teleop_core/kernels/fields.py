@@ -1,4 +1,4 @@
-"""Fields: what a record has, as a class, so that type checkers and editors know its names.
+"""Fields: declares the fields of a record as a class, so that type checkers and editors know the names.
 
 A class names the fields of a kind of record and gives each a type::
 
@@ -8,9 +8,9 @@ A class names the fields of a kind of record and gives each a type::
         anchor: Vector3
         pull: PerJoint
 
-``record(Spring, joints)`` makes one with all fields zero. Kernels say ``s: Spring``: a field that
-is not there is an error of the type checker, and of numba. A record of several parts inherits from
-their classes. ``int`` and ``float`` have 64 bits; a truth value is an ``int``.
+``record(Spring, joints)`` makes a record with all fields zero. Kernels annotate it as ``s: Spring``: the type checker
+and numba then report unknown fields. A record of several parts inherits from their classes. ``int`` and ``float`` have
+64 bits; a truth value is an ``int``.
 """
 
 from inspect import get_annotations
@@ -38,7 +38,7 @@ PoseRow = Annotated[Array, 7]
 class Fields:
     """Base of the classes that name the fields of a record; see the module."""
 
-    if TYPE_CHECKING:  # what records have besides
+    if TYPE_CHECKING:  # other attributes of records
         dtype: np.dtype[Any]
 
         def __getitem__(self, name: str) -> Any: ...
@@ -47,13 +47,13 @@ class Fields:
 
 
 class Cells:
-    """Fields of a record by name, looked up once: NumPy takes 1 µs for each look.
+    """Fields of a record by name, looked up once, because a look-up in NumPy takes 1 µs.
 
-    ``cells["now_ns"]`` is a Python number, or the array of a field that is one; both are set by
-    assignment, in the record's own memory.
+    ``cells["now_ns"]`` is a Python number, or an array if the field is an array. An assignment writes into the
+    record's memory.
 
     Args:
-        record: The record, which it keeps alive.
+        record: The record; this object keeps it alive.
     """
 
     def __init__(self, record: Any) -> None:
@@ -74,7 +74,7 @@ _R = TypeVar("_R", bound=Fields)
 
 
 def fields_of(kind: type[Fields], joints: int = 0) -> list[Field]:
-    """Names and types of the fields of a class, those of its bases first.
+    """Names and types of the fields of a class; fields of its base classes come first.
 
     Args:
         kind: The class.

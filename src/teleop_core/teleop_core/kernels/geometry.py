@@ -68,7 +68,7 @@ def multiply_quaternions(a: Array, b: Array, product: Array) -> None:
 
 @kernel
 def invert_quaternion(quaternion: Array, inverse: Array) -> None:
-    """Write the quaternion of the rotation back into ``inverse`` (may be the same)."""
+    """Write the quaternion of the inverse rotation into ``inverse`` (may be the same array)."""
     inverse[0] = quaternion[0]
     for i in range(1, 4):
         inverse[i] = -quaternion[i]
@@ -131,9 +131,9 @@ def rotation_angle_between(a: Array, b: Array) -> float:
 
 @kernel
 def rotation_vector_between(a: Array, b: Array, vector: Array) -> None:
-    """Write the rotation vector (3,) [rad], in the base, that turns the rotation of a to that of b.
+    """Write the rotation vector (3,) [rad], in the base, that turns the rotation of a to the rotation of b.
 
-    Half a turn, whose axis has two directions, comes out about either of them.
+    For half a turn, whose axis has two directions, the result may have either direction.
     """
     qa, qb = room(4), room(4)
     quaternion_from_rotation(a, qa)
@@ -183,7 +183,7 @@ def turn_by(vector: Array, quaternion: Array) -> None:
 def is_rigid(transform: Array) -> bool:
     """Whether a (4, 4) matrix is finite, with a right-handed rotation within 1e-6.
 
-    Two unit columns at right angles and their cross product as the third say it all; a NaN or
+    It is sufficient that two columns are unit vectors at right angles and the third is their cross product. A NaN or
     infinity anywhere makes a comparison fail.
     """
     first, second, cosine, third = -1.0, -1.0, 0.0, 0.0
@@ -221,8 +221,8 @@ def transform(rotation: Array, position: Array) -> Array:
 def roll_pitch_yaw(rotations: Array) -> Array:
     """Fixed angles (..., 3) [rad] of rotations (..., 3, 3): R = Rz(roll) Ry(pitch) Rx(yaw).
 
-    The names follow the RCRT-1 source, which calls the turn about z roll; at pitch = ±90°, where
-    only a sum or difference is defined, yaw comes out as 0.
+    The names follow the RCRT-1 source, which calls the rotation about z roll. At pitch = ±90°, where only a sum or
+    difference of roll and yaw is defined, yaw is 0.
 
     Source:
         Craig 2005, fixed angles.
@@ -274,15 +274,16 @@ def continuous(quaternions: Array, last: Array | None) -> Array:
 def framed_wrenches(wrench: Array, pose: Array) -> tuple[Array, Array]:
     """The same force on a tip in the two frames of CRTK's ``body`` and ``spatial``.
 
-    With the twist of its frame each has the power ``f·v + t·w`` of the other: with the body twist
-    that of the tip, with the spatial twist that of the point of the tool that is at the base.
+    Both wrenches have the same power ``f·v + t·w`` with the twist of their frame. The body twist is the velocity of
+    the tip; the spatial twist is the velocity of the point of the tool that is at the base's origin.
 
     Args:
-        wrench: Force [N] and torque about the tip [N·m] (6,), along the base.
-        pose: Of the tip in the base (7,).
+        wrench: Force [N] and torque about the tip [N·m] (6,), along the base's axes.
+        pose: Pose of the tip in the base (7,).
 
     Returns:
-        Along the tip's axes, torque about the tip; along the base's, torque about its origin.
+        The body wrench along the tip's axes, with the torque about the tip; and the spatial wrench along the base's
+        axes, with the torque about the base's origin.
 
     Source:
         Murray, Li and Sastry 1994, section 2.5.
@@ -297,7 +298,8 @@ def rotation_vectors(quaternions: Array) -> Array:
     """Turns since the first of a series of unit quaternions (N, 4), w, x, y, z.
 
     Returns:
-        Rotation vectors (N, 3) [rad] in the axes of the first. They run on beyond half a turn, up to a whole one.
+        Rotation vectors (N, 3) [rad] in the axes of the first orientation. They continue beyond half a turn, up to a
+        whole turn.
     """
     signs = np.where((quaternions[1:] * quaternions[:-1]).sum(axis=1) < 0.0, -1.0, 1.0)
     q = quaternions * np.concatenate(([1.0], np.cumprod(signs)))[:, None]
@@ -309,10 +311,10 @@ def rotation_vectors(quaternions: Array) -> Array:
 
 
 def checked_array(name: str, value: object, shape: tuple[int, ...]) -> Array:
-    """Writable float array of the wanted trailing shape, a leading batch axis allowed.
+    """Writable float array of the wanted trailing shape; a leading batch axis is allowed.
 
     Raises:
-        ShapeError: Another shape.
+        ShapeError: The array has another shape.
         ParameterError: A value is NaN or infinite.
     """
     array = np.ascontiguousarray(value, dtype=np.float64)

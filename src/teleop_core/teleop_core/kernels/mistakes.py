@@ -1,4 +1,4 @@
-"""Mistakes in kernels: what the compiler says in a page, in one line with file and line number."""
+"""Mistakes in kernels: shortens the compiler's long message to one line with file and line number."""
 
 import re
 import textwrap
@@ -13,9 +13,9 @@ from numba import types
 from teleop_core.base.errors import KernelError
 
 _PACKAGE = Path(__file__).parents[1]
-_LONGEST = 300  # characters of a reason: two lines of a terminal or three
+_LONGEST = 300  # largest number of characters of a reason: two or three lines of a terminal
 
-# A record is named by all its fields with types and offsets; a literal by its type and value.
+# numba names a record by all its fields with types and offsets, and a literal by its type and value.
 _RECORD = re.compile(r"Record\(\[.*?\)\], \d+, (?:True|False)\)")
 _LITERAL = re.compile(r"Literal\[(\w+)\]\(([^()]*)\)")
 _MISSING = re.compile(r"No implementation of function .*?>>> (.*?)\n", re.DOTALL)
@@ -24,10 +24,10 @@ _UNBOUND = re.compile(r'Cannot bind .* due to "\w+: (.*?)"\.')
 
 
 def kernel_error(error: BaseException, function: Callable[..., Any], arguments: Sequence[Any]) -> KernelError:
-    """Error that says in one line what is wrong with a kernel, and where.
+    """Error that describes in one line the mistake in a kernel and its position.
 
     Args:
-        error: What numba raised.
+        error: Exception of numba.
         function: The Python function that it compiled.
         arguments: Types it was compiled for.
     """
@@ -40,7 +40,7 @@ def kernel_error(error: BaseException, function: Callable[..., Any], arguments: 
 
 
 def place_of(function: object) -> str:
-    """File and line of a function; of another object its type."""
+    """File and line of a function; for another object its type."""
     code = getattr(function, "__code__", None)
     if not isinstance(code, CodeType):
         return type(function).__qualname__
@@ -48,7 +48,7 @@ def place_of(function: object) -> str:
 
 
 def _shown(file: str) -> str:
-    """Path of a file from the package or the working directory on, if it is in there."""
+    """Path of a file relative to the package or the working directory, if the file is inside of it."""
     for folder in (_PACKAGE, Path.cwd()):
         if Path(file).is_relative_to(folder):
             return Path(file).relative_to(folder).as_posix()
@@ -65,7 +65,7 @@ def _frames(error: BaseException) -> Iterator[dict[str, Any]]:
 
 
 def _location(error: BaseException) -> tuple[str, int] | None:
-    """File and line that numba was at: the error's own, else that of the statement it looked at."""
+    """File and line of the error; if the error has none, those of the statement that numba was compiling."""
     places = [getattr(error, "loc", None)]
     places += [getattr(frame.get("self"), "loc", None) for frame in _frames(error)]
     for place in places:
@@ -76,7 +76,7 @@ def _location(error: BaseException) -> tuple[str, int] | None:
 
 
 def _unknown_field(error: BaseException) -> str | None:
-    """Reason for a field that a record does not have: with the fields it has."""
+    """Reason for a field that a record does not have, with the list of its fields."""
     if not isinstance(error, KeyError):
         return None
     record = next((f["self"] for f in _frames(error) if isinstance(f.get("self"), types.Record)), None)
@@ -89,7 +89,7 @@ def _unknown_field(error: BaseException) -> str | None:
 
 
 def _bad_argument(code: CodeType, arguments: Sequence[Any]) -> str | None:
-    """Reason for an argument that no kernel can take."""
+    """Reason for an argument that no kernel can accept."""
     for name, kind in zip(code.co_varnames, arguments, strict=False):
         if isinstance(kind, types.PyObject):
             return f"argument {name!r} must be a number, array, record, function or tuple of them"
@@ -97,7 +97,7 @@ def _bad_argument(code: CodeType, arguments: Sequence[Any]) -> str | None:
 
 
 def _reason(error: BaseException) -> str:
-    """Shortest part of numba's message that says what is wrong."""
+    """Shortest part of numba's message that describes the mistake."""
     text = re.sub(r"^Failed in \w+ mode pipeline \(step: .*?\)\n", "", str(error).strip())
     text = _LITERAL.sub(r"\1 \2", _RECORD.sub("record", text))
     if found := _MISSING.match(text):

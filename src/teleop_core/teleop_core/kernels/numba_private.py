@@ -1,7 +1,7 @@
-"""What is taken from inside numba and may change in any version: here, ``borrowing`` and ``room``.
+"""All uses of numba's internals, which may change in any version, are in this module, ``borrowing`` and ``room``.
 
-The public part of numba cannot stamp a cache, compile without a wrapper for Python, count literals
-as plain numbers, or say in one line what is wrong with a function.
+The public interface of numba cannot stamp a cache, compile without a wrapper for Python, treat literals as plain
+numbers, or report a mistake in one line.
 """
 
 import os
@@ -36,16 +36,16 @@ from teleop_core.kernels.dependencies import digest, source_digest
 from teleop_core.kernels.mistakes import kernel_error
 from teleop_core.kernels.shipped import places
 
-# Function pointers as arguments are what lets one compiled graph run any robot.
+# Function pointers as arguments allow one compiled graph to run any robot.
 warnings.filterwarnings("ignore", "First-class function", NumbaExperimentalFeatureWarning)
 
 # Division by zero gives infinity or NaN as in NumPy, not an exception in the middle of a loop;
 # pointers (below) make their own C wrapper, so kernels compile faster without one.
 _ERRORS: dict[str, Any] = {"error_model": "numpy"}
-# Said though it is numba's own choice: a kernel that says nothing takes over what its caller has.
+# Set explicitly, although it is numba's default: a kernel without this option inherits its caller's option.
 _OPTIONS = {"nopython": True, "nogil": True, "no_cfunc_wrapper": True, "_nrt": True, **_ERRORS}
 
-# What numba raises about a function that it cannot compile: seldom one of its own errors alone.
+# Exceptions that numba raises for a function that it cannot compile; many are not its own error types.
 _MISTAKES = (
     NumbaError,
     UnsupportedBytecodeError,
@@ -61,10 +61,11 @@ _generated: set[FunctionType] = set()
 
 
 def _roomy(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Function whose frame is so large that all it calls finds room beside it.
+    """Function with a frame so large that the frames of all functions it calls fit into the same memory chunk.
 
-    CPython keeps frames in chunks of 16 KiB. A deep compiler crosses the end of a chunk thousands of times, each time
-    with a system call. A large frame gets a large chunk, the rest of which serves the frames after it. Measured on
+    CPython keeps frames in chunks of 16 KiB. A deeply nested compiler crosses the end of a chunk thousands of times,
+    each time with a system call. A large frame gets a large chunk, and later frames use the rest of this chunk.
+    Measured on
     Python 3.11 without a cache, as the mean of three: the kernels of rcrt1 and mma take 3.9 s of processor time with it
     and 4.4 s without, of which 0.17 s and 0.79 s in the system.
     """
@@ -73,23 +74,23 @@ def _roomy(function: Callable[..., Any]) -> Callable[..., Any]:
 
 
 class Dispatcher(CPUDispatcher):
-    """Compiles a kernel once, in as little time as numba lets it.
+    """Compiles a kernel once, as fast as numba allows.
 
-    Numbers that are written in a call count as any number of their type, where numba would
-    compile again for each of their values. The cache is opened when the kernel is first compiled:
-    by then all constants of its module have their values.
+    Literal numbers in a call are treated as any number of their type; numba would compile again for each of their
+    values. The cache is opened when the kernel is first compiled, because all constants of its module have their
+    values by then.
     """
 
     _has_cache = False
 
     @_roomy
     def compile(self, sig: Any) -> Any:
-        """Compile for one signature, or load that from the disk."""
+        """Compile for one signature, or load the compiled code from the disk."""
         try:
             if not self._has_cache:
                 self._cache, self._has_cache = _cache(self.py_func), True
             return super().compile(sig)
-        except ForceLiteralArg:  # no mistake: numba asks itself to compile again
+        except ForceLiteralArg:  # not a mistake: a request of numba to compile again
             raise
         except _MISTAKES as error:
             raise kernel_error(error, self.py_func, normalize_signature(sig)[0]) from error
@@ -109,12 +110,12 @@ def _general(kind: Any) -> Any:
 
 @lower_cast(types.NestedArray, types.Array)
 def _as_array(_context: Any, _builder: Any, _from: Any, _to: Any, value: Any) -> Any:
-    """Array in a record as an array of any shape: both are laid out the same."""
+    """Array in a record as an array of any shape: both have the same memory layout."""
     return value
 
 
 def _mismatch(_source: Any, _target: Any) -> None:
-    """Stand in for what compiled code does where a slice is assigned another number of values."""
+    """Replaces numba's code for the assignment of a wrong number of values to a slice."""
 
 
 @overload(_mismatch)
@@ -125,7 +126,7 @@ def _raise_mismatch(_source: Any, _target: Any) -> Callable[..., None]:
     return raise_it
 
 
-# numba's own writes both shapes into the message: forty functions on texts, two seconds to compile.
+# numba's code writes both shapes into the message: this takes forty text functions and two seconds to compile.
 arrayobj.raise_with_shape_context = _mismatch
 
 
@@ -141,13 +142,13 @@ def _unbox_function(kind: Any, value: Any, c: Any) -> NativeValue:
     return NativeValue(function._getvalue())
 
 
-# numba's own asks functions written in Python, for each pointer and in each call: 5 µs.
+# numba's code calls Python functions for each pointer in each call, which takes 5 µs.
 assert function_type.unbox_function_type is _unboxers.functions[types.FunctionType]
 _unboxers.functions[types.FunctionType] = _unbox_function
 
 
 class InnerDispatcher(Dispatcher):
-    """Kernel that Python cannot call: this raises, where numba would crash."""
+    """Kernel that Python cannot call: a call raises an exception; numba would crash."""
 
     def __call__(self, *_: Any, **__: Any) -> Any:
         """Refuse."""
@@ -163,16 +164,16 @@ def dispatcher(function: Callable[..., Any], *, is_inner: bool = False) -> Any:
 
 
 def generated_dispatcher(function: FunctionType) -> Any:
-    """Kernel without a source file, whose qualified name alone says under what it is cached.
+    """Kernel without a source file; its qualified name is the key of the cache.
 
-    It makes no arrays: without counting who holds those that it is handed, a tick is a fifth faster.
+    It must make no arrays. Without reference counting of its array arguments, a tick is a fifth faster.
     """
     _generated.add(function)
     return Dispatcher(function, targetoptions={**_OPTIONS, "_nrt": False})
 
 
 class Pointer(CFunc):
-    """Function of a fixed signature; numba need not compare that in every call it is handed to."""
+    """Function of a fixed signature; numba does not compare the signature in every call to which it is passed."""
 
     _code_address = 0
 
@@ -184,12 +185,12 @@ class Pointer(CFunc):
 def c_function(function: Any, signature: Any) -> Any:
     """Function of a fixed signature, kernel or not, as a value that kernels call.
 
-    What :func:`numba.cfunc` does, but with our stamp: it shares a cache file with the kernel of
-    the same function, and with different stamps each would throw the other away.
+    The same as :func:`numba.cfunc`, but with this package's stamp. It shares a cache file with the kernel of the same
+    function; with different stamps, each would invalidate the other.
     """
     arguments, result = normalize_signature(signature)
     is_compiled = isinstance(function, CPUDispatcher)
-    # To load one from disk takes 5 ms, and every robot asks anew for those of its kernels.
+    # To load a function from disk takes 5 ms, and every robot requests those of its kernels again.
     made = vars(function).setdefault("_pointers", {}) if is_compiled else {}
     if (arguments, result) in made:
         return made[arguments, result]
@@ -208,7 +209,7 @@ def c_function(function: Any, signature: Any) -> Any:
 
 
 class Code(types.WrapperAddressProtocol):  # type: ignore[misc]
-    """Machine code of a kernel for one tuple of types, which other kernels call where it is."""
+    """Machine code of a kernel for one tuple of types; other kernels call it by its address."""
 
     _wrapper_address = 0
 
@@ -218,11 +219,11 @@ class Code(types.WrapperAddressProtocol):  # type: ignore[misc]
         self._code_address = self._made.library.get_pointer_to_function(self._made.fndesc.llvm_func_name)
 
     def __wrapper_address__(self) -> int:
-        """Address for a call from C, which there is none of."""
+        """Address for calls from C; there are no such calls."""
         return self._wrapper_address
 
     def signature(self) -> Any:
-        """Types of what it is called with, and of what it returns."""
+        """Types of its arguments and of its return value."""
         return self._made.signature
 
 
@@ -232,22 +233,22 @@ def entry(kernel: Any, arguments: tuple[Any, ...]) -> Callable[..., Any]:
     return found
 
 
-# As after a loss of power, or of a version whose classes are no longer there.
+# For example after a loss of power, or from a version whose classes no longer exist.
 _BROKEN = (OSError, EOFError, UnpicklingError, AttributeError, ImportError)
 
 
 class _Cache(FunctionCache):
-    """Cache on disk; files that are broken or cannot be written count as absent."""
+    """Cache on disk; files that are damaged or cannot be written count as missing."""
 
     shipped_name = ""
-    """Name of its files beside a source, which a wheel gives them."""
+    """Name of the cache files that a wheel contains beside a source."""
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """What was kept for a signature, here or in the wheel; None without."""
+        """Stored code for a signature, from the cache or from the wheel; None if there is none."""
         try:
             found = super().load_overload(sig, target_context)
             if found is not None:
-                with suppress(OSError):  # the store keeps what is used
+                with suppress(OSError):  # the store keeps code that is used
                     os.utime(self._cache_file._index_path)
         except _BROKEN:
             with suppress(OSError):
@@ -256,7 +257,7 @@ class _Cache(FunctionCache):
         return found or self._shipped(sig, target_context)
 
     def _shipped(self, sig: Any, target_context: Any) -> Any:
-        """What the wheel holds for a signature, if this processor can run it."""
+        """Code in the wheel for a signature, if this processor can run it."""
         _, (triple, *_), code = self._index_key(sig, target_context.codegen())
         own, file = self._cache_file, self._py_func.__code__.co_filename
         source = Path(__file__ if self._py_func in _generated else file)
@@ -269,19 +270,19 @@ class _Cache(FunctionCache):
         return None
 
     def save_overload(self, sig: Any, data: Any) -> None:
-        """Keep what was compiled for a signature, if the disk lets us."""
+        """Store the compiled code for a signature, if the disk allows it."""
         with suppress(OSError):
             folder = Path(self._cache_file._index_path).parent
             folder.mkdir(parents=True, exist_ok=True)
             with store.locked(folder):
                 try:
                     super().save_overload(sig, data)
-                except _BROKEN:  # by another version of the package, since this one looked
+                except _BROKEN:  # by another version of the package, after this version checked
                     self.flush()
                     super().save_overload(sig, data)
 
     def keep(self, function: FunctionType, name: str, stamp: tuple[str, ...]) -> "_Cache":
-        """Keep a function in the store, or under a name beside its source where there is none."""
+        """Store a function in the store, or, if there is no store, in a named file beside its source."""
         self.shipped_name = name
         place = store.place(function, stamp) or Path(self.cache_path) / name
         self._cache_file = IndexDataCacheFile(str(place.parent), place.name, stamp)
@@ -289,11 +290,11 @@ class _Cache(FunctionCache):
 
 
 def _cache(function: Any) -> Any:
-    """Cache on disk of a function; none where it has no source file to stand beside."""
+    """Cache on disk of a function; None if the function has no source file."""
     files = (__file__, borrowing.__file__, room.__file__, digest.__code__.co_filename)
     own = [source_digest(file) for file in files]
     config: Any = numba.config
-    checked = str(config.BOUNDSCHECK)  # NUMBA_BOUNDSCHECK=1 makes other code
+    checked = str(config.BOUNDSCHECK)  # NUMBA_BOUNDSCHECK=1 gives different code
     versions = (numba.__version__, np.__version__, __version__)
     stamp = (*versions, checked, *own, digest(function))
     if function in _generated:

@@ -1,7 +1,7 @@
-"""Parts: the numbers that a part's kernel takes, and arrays to try it with.
+"""Parts: the numbers that a part's kernel gets, and arrays for trial calls.
 
-Compiled code checks no index. What lies behind an array in a session is another part's memory; in
-a trial it is a fence of NaN, which is seen in the result when it is read, and gone when written.
+Compiled code does not check indices. In a session, the memory after an array belongs to another part. In a trial,
+there is a fence of NaN after the array: if it is read, NaN appears in the result; if it is written, NaN is missing.
 """
 
 import numpy as np
@@ -13,7 +13,7 @@ _FENCE = 256
 
 
 def numbers_of(parameters: object) -> Array:
-    """Numbers of a parameter group in their order, tuples one by one, as its kernel takes them."""
+    """Numbers of a parameter group in order, with tuples flattened, as its kernel expects them."""
     row: list[float] = []
     for value in values_of(parameters).values():
         row.extend(value if isinstance(value, tuple) else (value,))  # type: ignore[arg-type]
@@ -27,7 +27,7 @@ def fenced(values: Array) -> tuple[Array, Array]:
         values: Array of any shape.
 
     Returns:
-        C-contiguous copy, and the NaN (256,) that follow it in memory.
+        C-contiguous copy, and the 256 NaN values (256,) that follow it in memory.
     """
     whole = np.full(values.size + _FENCE, np.nan)
     array = whole[: values.size].reshape(values.shape)

@@ -1,10 +1,10 @@
 """Portable arithmetic: products, lengths and functions with the same bits on every processor.
 
-NumPy hands ``@``, ``np.dot`` and ``np.linalg`` to OpenBLAS, which adds in an order of its own on each processor. Most
-of its functions, such as ``exp`` and ``x**3``, come from vector code that rounds otherwise with AVX-512 than without.
-Whatever decides the bits of a session is computed with what stands here, in compiled kernels, or with NumPy's sums,
-``sin``, ``cos``, ``sqrt`` and ``hypot``, which do not differ. What is left is the C library: its sines differ from
-version to version, and on processors without fused multiply-add (before 2013).
+NumPy computes ``@``, ``np.dot`` and ``np.linalg`` with OpenBLAS, whose order of additions depends on the processor.
+Most of NumPy's functions, such as ``exp`` and ``x**3``, use vector code that rounds differently with AVX-512 than
+without. Therefore all values that determine the bits of a session are computed with these functions, in compiled
+kernels, or with NumPy's sums, ``sin``, ``cos``, ``sqrt`` and ``hypot``, which do not differ. Only the C library
+remains: its sines differ between versions, and on processors without fused multiply-add (before 2013).
 """
 
 import math
@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 
 
 def dot(a: ArrayLike, b: ArrayLike) -> Array:
-    """Sum of a times b along the last axis, (..., n) and (..., n) to (...), from the first on."""
+    """Sum of a times b along the last axis, (..., n) and (..., n) to (...), added in the order of the indices."""
     products = np.asarray(a) * b
     terms = products.T if products.ndim < 3 else np.moveaxis(products, -1, 0)
     total = np.zeros(terms.shape[1:])
@@ -33,7 +33,7 @@ def length(vectors: ArrayLike) -> Array:
 
 
 def product(a: ArrayLike, b: ArrayLike) -> Array:
-    """Product of matrices (..., n, m) and (..., m, k), as ``a @ b``; vectors (n,) as there."""
+    """Product of matrices (..., n, m) and (..., m, k), as ``a @ b``; vectors (n,) are treated as in ``a @ b``."""
     a, b = np.asarray(a), np.asarray(b)
     if b.ndim == 1:
         return dot(a, b)
@@ -43,7 +43,7 @@ def product(a: ArrayLike, b: ArrayLike) -> Array:
 
 
 def inverse_motion(transform: Array) -> Array:
-    """Rigid transform (4, 4) back: of the rotation R and the place p, Rᵀ and -Rᵀ p."""
+    """Inverse of a rigid transform (4, 4): for rotation R and position p, it is Rᵀ and -Rᵀ p."""
     out = np.eye(4)
     out[:3, :3] = transform[:3, :3].T
     out[:3, 3] = -product(out[:3, :3], transform[:3, 3])

@@ -1,7 +1,7 @@
-"""Progress of what is made once: whether this process compiles a kernel, or makes a grid, now.
+"""Progress of one-time work: whether this process is now compiling a kernel or making a grid.
 
-That takes seconds, in which the thread that needs the kernel stands still: whoever watches
-threads asks here before taking one for hung. Kernels that are loaded from disk do not count.
+Such work takes seconds, during which the thread that needs the kernel makes no progress. A watchdog asks this module
+before it treats a thread as hung. Kernels that are loaded from disk do not count.
 """
 
 import threading
@@ -19,12 +19,12 @@ class _Progress(event.Listener):  # type: ignore[misc]
         self.running = self.done = 0
 
     def on_start(self, event: object) -> None:
-        """Count a kernel that is begun; those that it calls are begun within."""
+        """Count a kernel whose compilation begins; kernels that it calls begin during its compilation."""
         with self._lock:
             self.running += 1
 
     def on_end(self, event: object) -> None:
-        """Count a kernel that is finished, or cannot be compiled."""
+        """Count a kernel whose compilation is finished or has failed."""
         with self._lock:
             self.running -= 1
             self.done += 1
@@ -44,7 +44,7 @@ _told: dict[str, str] = {}
 
 @contextmanager
 def told(work: str) -> Iterator[Callable[[str], None]]:
-    """Tell of work that takes seconds: hands out a function that takes how far it is."""
+    """Report work that takes seconds: yields a function that is called with the progress."""
     _told[work] = ""
     try:
         yield lambda text: _told.update({work: text})
@@ -53,7 +53,7 @@ def told(work: str) -> Iterator[Callable[[str], None]]:
 
 
 def in_work() -> str:
-    """What this process makes now, and how far it is; empty if it makes nothing."""
+    """Text about the current one-time work of this process and its progress; empty if there is none."""
     for work, text in list(_told.items()):
         return f"{work} ({text})" if text else work
     return f"compiling kernels ({compiled_count()} so far)" if is_compiling() else ""

@@ -1,7 +1,7 @@
-"""Shipped kernels: those of the built-in parts, compiled when the wheel was made.
+"""Shipped kernels: kernels of the built-in parts, compiled when the wheel was made.
 
-A wheel for x86-64 holds them in ``kernels/compiled``, for processors with AVX2 and FMA, as nearly all since 2013; only
-``make wheel`` writes there. A source tree has none.
+A wheel for x86-64 contains them in ``kernels/compiled``, for processors with AVX2 and FMA, which nearly all processors
+since 2013 have. Only ``make wheel`` writes there. A source tree has no shipped kernels.
 """
 
 from collections.abc import Iterator
@@ -26,7 +26,7 @@ _NEEDED = (
 def places(source: Path) -> Iterator[tuple[str, Path]]:
     """The tier, with the folder of a source file's kernels, if this processor can run them.
 
-    Where numba was told to compile for one processor (``NUMBA_CPU_NAME``), that one alone counts.
+    If numba was told to compile for one processor (``NUMBA_CPU_NAME``), only that processor counts.
     """
     if source.is_relative_to(_PACKAGE) and is_tier():
         yield TIER, FOLDER / TIER / source.parent.relative_to(_PACKAGE)

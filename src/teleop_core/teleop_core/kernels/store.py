@@ -1,7 +1,8 @@
-"""Store: where compiled kernels are kept for this user, by what they were made from.
+"""Store: folder of this user's compiled kernels, by the digest of their sources.
 
-A kernel that one copy of a source compiled serves every other copy with the same text: a second clone, another
-environment, a fresh checkout of a test run. Old versions stay until nobody has asked for them for :data:`KEPT_DAYS`.
+A kernel that was compiled from one copy of a source is used for every other copy with the same text: a second clone,
+another environment, a fresh checkout of a test run. Old versions are kept until they have not been used for
+:data:`KEPT_DAYS`.
 """
 
 import os
@@ -23,12 +24,12 @@ except ImportError:  # elsewhere than on Unix
     fcntl = None  # type: ignore[assignment]
 
 KEPT_DAYS = 30
-"""Days after which :func:`prune` removes what was not used."""
+"""Days after which :func:`prune` removes unused kernels."""
 _TAG = f"py{sys.version_info[0]}{sys.version_info[1]}"
 
 
 def folder() -> Path | None:
-    """Folder of the store; None where kernels are kept as numba does, beside their source.
+    """Folder of the store; None if kernels are stored beside their source, as numba does.
 
     ``TELEOP_KERNELS`` names another folder; empty, or with ``NUMBA_CACHE_DIR``, there is no store.
     """
@@ -42,7 +43,7 @@ def folder() -> Path | None:
 
 
 def user_cache(name: str) -> Path | None:
-    """Folder of this user for what can be made again; None where nobody's home is known."""
+    """Cache folder of this user, for files that can be made again; None if the home folder is unknown."""
     with suppress(RuntimeError):
         caches = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
         return Path(caches) / "teleop_core" / name
@@ -50,7 +51,7 @@ def user_cache(name: str) -> Path | None:
 
 
 def place(function: FunctionType, stamp: Iterable[str]) -> Path | None:
-    """Where the store keeps a function that was made from what a stamp says; None without store.
+    """Path of a function with a given stamp in the store; None without store.
 
     Functions of one name in one file differ by their line.
     """
@@ -64,18 +65,18 @@ def place(function: FunctionType, stamp: Iterable[str]) -> Path | None:
 
 @contextmanager
 def locked(kept: Path) -> Iterator[None]:
-    """Let one process at a time write in a folder: each reads the index that it adds to.
+    """Let only one process at a time write in a folder, because each process reads the index before it adds to it.
 
-    Two that added to one index at once would give two kernels one file.
+    If two processes added to an index at the same time, two kernels would get the same file.
     """
     with (kept / ".lock").open("a") as lock:
         if fcntl is not None:
-            fcntl.flock(lock, fcntl.LOCK_EX)  # let go when the file is closed
+            fcntl.flock(lock, fcntl.LOCK_EX)  # released when the file is closed
         yield
 
 
 def prune(days: float = KEPT_DAYS) -> int:
-    """Remove kernels and grids not used for some days; returns how many files that were."""
+    """Remove kernels and grids that were not used for some days; returns the number of removed files."""
     kept, removed = folder(), 0
     oldest = time.time() - 86400.0 * days
     grids = user_cache("grids")

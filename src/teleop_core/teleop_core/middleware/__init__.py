@@ -1,5 +1,5 @@
-"""Middleware: all that nodes ask of ROS, of time and of threads, behind one interface.
+"""Middleware: one interface for everything that nodes use of ROS, time and threads.
 
-``world`` says what there is to ask; ``ros`` answers with rclpy and the system's clock. A second world, in memory and in
-simulated time, is that of ``teleop_drill.simulation``. No other room of this package imports rclpy.
+``world`` defines the interface; ``ros`` implements it with rclpy and the system's clock. A second implementation, in
+memory and in simulated time, is in ``teleop_drill.simulation``. No other folder of this package imports rclpy.
 """

@@ -1,4 +1,4 @@
-"""Real-time options: what the system grants a loop beyond fair shares of time."""
+"""Real-time options: privileges of a loop, such as a real-time priority, that the system may grant."""
 
 import ctypes
 import gc
@@ -10,18 +10,18 @@ from teleop_core.graph.layers import RealTimeParameters
 
 _EVERYTHING = 3  # MCL_CURRENT | MCL_FUTURE of mlockall(2)
 _LOWEST = 1
-"""Priority of the threads beside the loop: one that holds the interpreter's lock, for which the
-loop waits, must not itself wait for other processes."""
+"""Priority of the other threads of the loop's process. The loop may wait for a thread that holds the interpreter's
+lock, so that thread must not wait for other processes."""
 
 
 def apply_options(options: RealTimeParameters) -> list[str]:
-    """Take the options for the calling thread and its process.
+    """Apply the options to the calling thread and its process.
 
     Args:
-        options: What is wanted; all off by default.
+        options: Wanted options; all off by default.
 
     Returns:
-        One line for everything that the system refused, with how to allow it.
+        One line for each option that the system refused, with advice how to allow it.
     """
     refusals = []
     if options.cpus:
@@ -49,7 +49,7 @@ def _cpus(cpus: tuple[int, ...]) -> list[str]:
 
 
 def is_priority_granted(priority: int) -> bool:
-    """Whether the system lets this process take a priority of SCHED_FIFO."""
+    """Whether the system allows this process a priority of SCHED_FIFO."""
     with ThreadPoolExecutor(1) as pool:
         return not pool.submit(_take, priority).result()
 
@@ -68,7 +68,7 @@ def _priority(priority: int) -> list[str]:
 
 
 def _take(priority: int, thread: int = 0) -> str:
-    """Give a thread a priority, but not what it starts; why the system refuses, or nothing."""
+    """Give a thread a priority that its children do not inherit. Return why the system refuses it, or nothing."""
     try:
         policy = os.SCHED_FIFO | os.SCHED_RESET_ON_FORK
         os.sched_setscheduler(thread, policy, os.sched_param(priority))

@@ -27,8 +27,8 @@ BAD_ARGUMENTS = (
     rclpy_implementation.UnknownROSArgsError,
     rclpy_implementation.RCLInvalidROSArgsError,
 )
-"""What :meth:`RosWorld.init` and nodes raise where ROS cannot read its arguments."""
-_LOOPS = 64  # that may be waiting to be heard
+"""Exceptions that :meth:`RosWorld.init` and nodes raise if ROS cannot read its arguments."""
+_LOOPS = 64  # largest number of lines that wait to be accepted
 _CREDENTIALS = struct.Struct("3i")  # process, user, group
 
 
@@ -36,7 +36,7 @@ class RosWorld:
     """Real time and ROS.
 
     Args:
-        context: Of rclpy; None for the one of the whole process.
+        context: Context of rclpy; None for the context of the whole process.
     """
 
     def __init__(self, context: Context | None = None) -> None:
@@ -50,19 +50,19 @@ class RosWorld:
     take_real_time: Callable[[RealTimeParameters], list[str]] = staticmethod(real_time.apply_options)
 
     def lock(self) -> world.Lock:
-        """As of :class:`~teleop_core.middleware.world.World`."""
+        """See :class:`~teleop_core.middleware.world.World`."""
         return threading.Lock()
 
     def thread(self, name: str, work: Callable[[], None]) -> world.Thread:
-        """As of :class:`~teleop_core.middleware.world.World`."""
+        """See :class:`~teleop_core.middleware.world.World`."""
         return threading.Thread(target=work, name=name, daemon=True)
 
     def tidy(self) -> None:
-        """As of :class:`~teleop_core.middleware.world.World`."""
-        gc.collect()  # compiling leaves millions of objects; to look through them takes seconds
+        """See :class:`~teleop_core.middleware.world.World`."""
+        gc.collect()  # compiling leaves millions of objects; one garbage collection of them takes seconds
 
     def connect(self, place: str) -> world.Line:
-        """As of :class:`~teleop_core.middleware.world.World`."""
+        """See :class:`~teleop_core.middleware.world.World`."""
         line = socket.socket(socket.AF_UNIX)
         line.setblocking(False)
         try:
@@ -73,46 +73,46 @@ class RosWorld:
         return line
 
     def listen(self, place: str) -> world.Listener:
-        """As of :class:`~teleop_core.middleware.world.World`."""
+        """See :class:`~teleop_core.middleware.world.World`."""
         return _Listener(place)
 
     def feed_place(self) -> str:
-        """As of :class:`~teleop_core.middleware.world.World`."""
+        """See :class:`~teleop_core.middleware.world.World`."""
         return f"\0teleop_core.recorder.{os.environ.get('ROS_DOMAIN_ID') or 0}"
 
     def node(self, name: str, **options: Any) -> LocalNode:
-        """As of :class:`~teleop_core.middleware.world.World`."""
+        """See :class:`~teleop_core.middleware.world.World`."""
         return ros_node.RosNode(Node(name, context=self._context, **options))
 
     def lifecycle_node(self, name: str, hooks: world.Hooks, **options: Any) -> world.LifecycleNode:
-        """As of :class:`~teleop_core.middleware.world.World`."""
+        """See :class:`~teleop_core.middleware.world.World`."""
         return ros_lifecycle.RosLifecycleNode(name, hooks, **options)
 
     def executor(self) -> world.Executor:
-        """As of :class:`~teleop_core.middleware.world.World`."""
+        """See :class:`~teleop_core.middleware.world.World`."""
         return RosExecutor(self._context)
 
     def guest(self, domain: int | None = None) -> world.World:
-        """As of :class:`~teleop_core.middleware.world.World`."""
+        """See :class:`~teleop_core.middleware.world.World`."""
         context = Context()
         context.init(args=[], domain_id=domain)
         return RosWorld(context)
 
     def init(self, arguments: Sequence[str]) -> None:
-        """Start the middleware with the arguments of a command line; signals stay as they are."""
+        """Start the middleware with the arguments of a command line; signal handlers are not changed."""
         rclpy.init(args=list(arguments), signal_handler_options=SignalHandlerOptions.NO)
 
     def shutdown(self) -> None:
-        """As of :class:`~teleop_core.middleware.world.World`."""
+        """See :class:`~teleop_core.middleware.world.World`."""
         rclpy.utilities.try_shutdown(context=self._context)
 
     def ok(self) -> bool:
-        """Whether the middleware works still."""
+        """Whether the middleware still works."""
         return bool(rclpy.utilities.ok(context=self._context))
 
 
 class RosExecutor:
-    """As of :class:`~teleop_core.middleware.world.Executor`."""
+    """See :class:`~teleop_core.middleware.world.Executor`."""
 
     def __init__(self, context: Context | None) -> None:
         self._own = SingleThreadedExecutor(context=context)
@@ -122,7 +122,7 @@ class RosExecutor:
         self._own.add_node(node.own)
 
     def spin_once(self, timeout_sec: float | None = None) -> None:
-        """Serve one thing, or none within the time [s]; raises WorldEndedError."""
+        """Serve one event, or none if none comes within the time [s]; raises WorldEndedError."""
         try:
             self._own.spin_once(timeout_sec)
         except ExternalShutdownException as error:
@@ -133,16 +133,16 @@ class RosExecutor:
         self._own.create_task(_nothing)
 
     def shutdown(self) -> None:
-        """Serve nothing any more."""
+        """Stop serving."""
         self._own.shutdown()
 
 
 def _nothing() -> None:
-    """Have something to do, so that the executor returns."""
+    """Do nothing: an empty task that makes the executor return."""
 
 
 class _Listener:
-    """Where loops of this machine and of the same user reach its recorder."""
+    """Socket at which loops of this machine and of the same user connect to the recorder."""
 
     def __init__(self, place: str) -> None:
         self._own = socket.socket(socket.AF_UNIX)
@@ -168,7 +168,7 @@ class _Listener:
             line.close()
 
     def close(self) -> None:
-        """Accept none any more."""
+        """Stop accepting lines."""
         self._own.close()
 
 

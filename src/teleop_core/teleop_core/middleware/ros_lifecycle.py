@@ -25,7 +25,7 @@ _SIM_TIME = "use_sim_time"
 
 
 def _sim_time(node: str) -> ParameterError:
-    """Refusal of ``use_sim_time``: a step is a millisecond of real time, for drives too."""
+    """Refuse ``use_sim_time``: a step is a millisecond of real time, for drives too."""
     requirement = (
         "false: nodes step in real time; teleop sim and replay go as fast as the machine can, "
         "teleop play --clock publishes /clock"
@@ -34,15 +34,15 @@ def _sim_time(node: str) -> ParameterError:
 
 
 class RosLifecycleNode(RosNode):
-    """As of :class:`~teleop_core.middleware.world.LifecycleNode`.
+    """See :class:`~teleop_core.middleware.world.LifecycleNode`.
 
     Args:
-        name: What it is called.
-        hooks: What it does in its transitions.
-        options: Of the class in rclpy; ``values`` are parameters over those of the command line.
+        name: Name of the node.
+        hooks: Functions that it calls in its transitions.
+        options: Options of the class in rclpy; ``values`` are parameters that override the command line.
 
     Raises:
-        ParameterError: It is to use simulated time.
+        ParameterError: The node is configured to use simulated time.
     """
 
     def __init__(self, name: str, hooks: Hooks, values: Mapping[str, Value] | None = None, **options: Any) -> None:
@@ -63,14 +63,14 @@ class RosLifecycleNode(RosNode):
     def declare(
         self, specs: Iterable[Spec], values: Mapping[str, Value], accept: Callable[[Mapping[str, Value]], str]
     ) -> None:
-        """Declare parameters, and have their changes accepted."""
+        """Declare parameters, and call ``accept`` for their changes."""
         self._specs, self._accept = {spec.name: spec for spec in specs}, accept
         declare(self.own, self._specs.values(), values)
         self.own.add_pre_set_parameters_callback(self._type_empty_lists)
         self.own.add_on_set_parameters_callback(self._judge)
 
     def show(self, values: Mapping[str, Value]) -> None:
-        """Show values that the node has changed by itself: nobody is asked."""
+        """Show values that the node has changed by itself; ``accept`` is not called."""
         self._shows = True
         try:
             self.own.set_parameters([Parameter(k, value=v) for k, v in values.items()])
@@ -78,7 +78,7 @@ class RosLifecycleNode(RosNode):
             self._shows = False
 
     def trigger(self, transition: str) -> Outcome:
-        """Bring about a transition."""
+        """Execute a transition."""
         return _OUTCOMES[getattr(self.own, f"trigger_{transition}")()]
 
     def _type_empty_lists(self, changes: list[Parameter]) -> list[Parameter]:
@@ -96,7 +96,7 @@ class RosLifecycleNode(RosNode):
 
 
 class _Own(LifecycleNode):  # type: ignore[misc]
-    """Node of rclpy that hands its transitions on."""
+    """Node of rclpy that passes its transitions on."""
 
     def __init__(self, name: str, hooks: Hooks, **options: Any) -> None:
         self._hooks = hooks
@@ -111,7 +111,10 @@ class _Own(LifecycleNode):  # type: ignore[misc]
 
     @property
     def subscriptions(self) -> Iterator[Any]:
-        """Subscriptions that the executor serves; those taken by hand are opened and closed by any thread."""
+        """Subscriptions that the executor serves.
+
+        Subscriptions that are read without the executor are left out, because any thread may open and close them.
+        """
         for entry in tuple(super().subscriptions):
             if not isinstance(entry.callback_group, Unattended):
                 yield entry
@@ -138,7 +141,7 @@ class _Own(LifecycleNode):  # type: ignore[misc]
         return _CODES[self._hooks.on_error()]
 
     def _change_state(self, change: Callable[..., Any], request: Any, response: Any) -> Any:
-        """Answer a service that asks for a transition; refuse one that the present state does not have."""
+        """Answer a service that requests a transition; refuse a transition that does not exist in the current state."""
         try:
             return change(request, response)
         except rclpy_implementation.RCLError:  # it would end the process

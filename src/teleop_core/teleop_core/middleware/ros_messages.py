@@ -1,4 +1,4 @@
-"""Messages as bytes and back, by ROS's own serializers, whatever world they travel in."""
+"""Conversion of messages to bytes and back with ROS's own serializers, for every world."""
 
 from typing import Any
 
@@ -6,7 +6,7 @@ from rclpy.serialization import deserialize_message, serialize_message
 
 
 def read_message(data: bytes, kind: Any) -> Any:
-    """Message of a class, from its bytes; raises what rclpy raises for malformed bytes."""
+    """Message of a class, from its bytes; raises the exceptions of rclpy for malformed bytes."""
     return deserialize_message(data, kind)
 
 

@@ -29,7 +29,7 @@ _DESTROY = {
 
 
 def profile_of(qos: Qos) -> QoSProfile:
-    """Quality of service as rclpy has it."""
+    """Quality of service as an rclpy profile."""
     return QoSProfile(
         history=HistoryPolicy.KEEP_ALL if qos.keeps_all else HistoryPolicy.KEEP_LAST,
         depth=qos.depth,
@@ -39,7 +39,7 @@ def profile_of(qos: Qos) -> QoSProfile:
 
 
 class RosPublisher:
-    """As of :class:`~teleop_core.middleware.world.Publisher`.
+    """See :class:`~teleop_core.middleware.world.Publisher`.
 
     Args:
         own: Publisher of rclpy.
@@ -60,12 +60,12 @@ class RosPublisher:
             self._handle.publish_raw(data)
 
     def wait_for_all_acked(self, seconds: float) -> None:
-        """Wait until all readers have all messages, for some time [s] at most."""
+        """Wait until all readers have all messages, at most for some time [s]."""
         self.own.wait_for_all_acked(Duration(nanoseconds=round(seconds * 1e9)))
 
 
 class RosNode:
-    """As of :class:`~teleop_core.middleware.world.Node`.
+    """See :class:`~teleop_core.middleware.world.Node`.
 
     Args:
         own: Node of rclpy.
@@ -91,36 +91,36 @@ class RosNode:
         return RosPublisher(self.own.create_publisher(kind, name, profile_of(qos)))
 
     def create_taker(self, kind: Any, name: str, qos: Qos) -> RosTaker:
-        """Subscription whose messages are taken by hand."""
+        """Subscription whose messages are read without an executor."""
         return RosTaker(self.own, kind, name, profile_of(qos))
 
     def create_subscription(self, kind: Any, name: str, callback: Callable[[Any], None], qos: Qos) -> Any:
-        """Subscription whose messages the executor hands over."""
+        """Subscription whose messages the executor passes to ``callback``."""
         return self.own.create_subscription(kind, name, callback, profile_of(qos))
 
     def destroy(self, entity: Any) -> None:
-        """Withdraw what one of the methods above has made."""
+        """Destroy an object that one of the methods above has made."""
         own = entity.own if isinstance(entity, RosPublisher) else entity
         destroy = next(name for kind, name in _DESTROY.items() if isinstance(own, kind))
         getattr(self.own, destroy)(own)
 
     def defer(self, work: Callable[..., object], *arguments: object) -> None:
-        """Have the executor do something soon; nothing without one. From any thread."""
+        """Let the executor call ``work`` soon; without an executor nothing happens. May be called from any thread."""
         executor = self.own.executor
         if executor is not None:
             executor.create_task(work, *arguments)
 
     def publishers(self, name: str) -> list[Endpoint]:
-        """Publishers of a topic that were found."""
+        """Discovered publishers of a topic."""
         return [_endpoint(info) for info in self.own.get_publishers_info_by_topic(name)]
 
     def readers(self, name: str) -> list[Endpoint]:
-        """Readers of a topic that were found."""
+        """Discovered readers of a topic."""
         return [_endpoint(info) for info in self.own.get_subscriptions_info_by_topic(name)]
 
 
 def _endpoint(info: Any) -> Endpoint:
-    """What rclpy tells of one."""
+    """Endpoint from rclpy's data about it."""
     return Endpoint(
         f"{info.node_namespace.rstrip('/')}/{info.node_name}",
         bytes(info.endpoint_gid),

@@ -1,4 +1,4 @@
-"""Declaration: parameter groups become typed, bounded ROS parameters, and back."""
+"""Declaration: converts parameter groups to typed, bounded ROS parameters, and back."""
 
 import sys
 from collections.abc import Iterable, Mapping
@@ -12,7 +12,7 @@ from teleop_core.base.parameters import Spec, Value
 from teleop_core.middleware.world import Qos
 
 EVENTS = Qos(depth=1000)
-"""Quality of the topic on which nodes tell of changed parameters."""
+"""Quality of service of the topic on which nodes report changed parameters."""
 _SCALARS = {
     bool: Parameter.Type.BOOL,
     int: Parameter.Type.INTEGER,
@@ -59,10 +59,10 @@ def _bound(out: ParameterDescriptor, spec: Spec) -> None:
 
 
 def declare(node: Node, specs: Iterable[Spec], values: Mapping[str, Value]) -> None:
-    """Declare parameters with these values; what the command line says is in them already.
+    """Declare parameters with the given values, which already include values of the command line.
 
-    rclpy takes an empty list for bytes and refuses it elsewhere, so lists are declared by their
-    type and set afterwards; only then can they become read-only.
+    rclpy treats an empty list as bytes and refuses it for other types. Therefore lists are declared by their type and
+    set afterwards; only then can they become read-only.
     """
     for spec in specs:
         value, about = values[spec.name], descriptor(spec)
@@ -77,21 +77,21 @@ def declare(node: Node, specs: Iterable[Spec], values: Mapping[str, Value]) -> N
 
 
 def plain(spec: Spec | None, value: Any) -> Any:
-    """Python value of a ROS one: lists as tuples; an empty YAML list, which has no type, as ()."""
+    """Python value of a ROS value: lists become tuples; an empty YAML list, which has no type, becomes ()."""
     if spec is not None and spec.kind is tuple and value is None:
         return ()
     return value if value is None or isinstance(value, bool | int | float | str) else tuple(value)
 
 
 def typed(spec: Spec | None, parameter: Parameter) -> Parameter:
-    """The parameter, or if it is an empty list, one of the declared type."""
+    """The parameter; an empty list is replaced by a parameter of the declared type."""
     if spec is None or spec.kind is not tuple or plain(spec, parameter.value) != ():
         return parameter
     return Parameter(parameter.name, ros_type(spec), [])
 
 
 def to_message(name: str, value: Any, element: type = float) -> Any:
-    """Parameter as services of parameters take it; ``element`` is that of an empty list."""
+    """Message of a parameter for the parameter services; ``element`` is the element type of an empty list."""
     if value == ():
         return Parameter(name, _ARRAYS[element], []).to_parameter_msg()
     given = list(value) if isinstance(value, tuple) else value
@@ -99,5 +99,5 @@ def to_message(name: str, value: Any, element: type = float) -> Any:
 
 
 def from_message(value: Any) -> Any:
-    """Python value of a parameter as services and events tell it."""
+    """Python value of a parameter in a message of services and events."""
     return parameter_value_to_python(value)

@@ -1,8 +1,8 @@
-"""Taking: raw messages of a subscription, by hand, with all that the middleware tells of them.
+"""Taking: reads raw messages of a subscription without an executor, with all information of the middleware.
 
-rclpy does not hand over who sent a message. A lost message, or a second publisher, shows only in
-the sender and its number together. So this module itself calls what rclpy calls,
-``rcl_take_serialized_message``. All that depends on the layout of rcl's structures is in here.
+rclpy does not return the sender of a message. A lost message, or a second publisher, can be detected only from the
+sender and the message number together. Therefore this module calls ``rcl_take_serialized_message`` itself, as rclpy
+does. All code that depends on the layout of rcl's structures is in this module.
 """
 
 import ctypes
@@ -18,7 +18,7 @@ from rclpy.qos import QoSProfile
 from teleop_core.middleware.world import Taken
 
 _OK, _NOTHING = 0, 401  # RCL_RET_OK, RCL_RET_SUBSCRIPTION_TAKE_FAILED
-_ROOM = 64  # bytes at the beginning; rcl enlarges them
+_ROOM = 64  # initial size of the buffer [bytes]; rcl enlarges it
 _GID = 16
 
 
@@ -54,7 +54,7 @@ class _Info(ctypes.Structure):
 
 
 class Unattended(CallbackGroup):
-    """Group that no executor ever serves: its subscriptions are taken from by hand."""
+    """Group that no executor ever serves: its subscriptions are read directly."""
 
     def can_execute(self, entity: Any) -> bool:
         """Never."""
@@ -69,7 +69,7 @@ class Unattended(CallbackGroup):
 
 
 class RosTaker:
-    """Subscription whose messages are taken by hand; a look at an empty one takes 1 µs.
+    """Subscription whose messages are read without an executor; a call without a message takes 1 µs.
 
     Args:
         node: Node that owns it.
@@ -79,7 +79,7 @@ class RosTaker:
 
     Attributes:
         type: As given.
-        handle: What rcl knows it by.
+        handle: Its handle in rcl.
     """
 
     def __init__(self, node: Node, kind: Any, name: str, profile: QoSProfile) -> None:
@@ -94,7 +94,7 @@ class RosTaker:
             event_callbacks=SubscriptionEventCallbacks(use_default_callbacks=False),
         )
         self.handle: Any = self._own.handle
-        # With the interpreter's lock held, so that no thread destroys what is being taken from.
+        # Called with the interpreter's lock held, so that no thread destroys the subscription meanwhile.
         rcl, rcutils = ctypes.PyDLL("librcl.so"), ctypes.PyDLL("librcutils.so")
         self._bytes, self._info = _Bytes(), _Info()
         rcutils.rcutils_get_default_allocator.restype = _Allocator
@@ -110,7 +110,7 @@ class RosTaker:
     def take(self) -> Taken | None:
         """Oldest waiting message; None if there is none.
 
-        A message that the middleware cannot hand over is passed over.
+        A message that the middleware cannot deliver is skipped.
         """
         if not self._is_open:
             return None
@@ -131,21 +131,22 @@ class RosTaker:
 
     @property
     def lost(self) -> int:
-        """Messages of all its senders that the middleware should have handed over and did not.
+        """Number of messages of all its senders that the middleware should have delivered but did not.
 
-        Those of a sender that is heard for the first time count too, which numbers do not tell. A look takes 1 µs.
+        This also counts messages before the first received message of a sender, which message numbers cannot show. A
+        call takes 1 µs.
         """
         return int(self._loss.take_event().total_count) if self._is_open else 0
 
     @cached_property
     def _loss(self) -> Any:
-        """The middleware's account of lost messages; it counts from the beginning on."""
+        """The middleware's count of lost messages since the beginning."""
         kind = QoSSubscriptionEventType.RCL_SUBSCRIPTION_MESSAGE_LOST
         with self.handle:
             return rclpy_implementation.EventHandle(self.handle, kind)
 
     def wait(self, seconds: float) -> None:
-        """Return when there is a message, or after some time [s]; no executor is needed."""
+        """Wait for a message, at most for some time [s]; no executor is needed."""
         waiting = self._waiting
         waiting.clear_entities()
         waiting.add_subscription(self.handle)
@@ -153,7 +154,7 @@ class RosTaker:
 
     @cached_property
     def _waiting(self) -> Any:
-        """What waits for messages: 1 µs in place of the 200 of an executor."""
+        """Wait set for messages: a call takes 1 µs instead of the 200 µs of an executor."""
         return rclpy_implementation.WaitSet(1, 0, 0, 0, 0, 0, self._node.context.handle)
 
     def close(self) -> None:
@@ -167,4 +168,4 @@ class RosTaker:
 
 
 def _ignore(data: bytes) -> None:
-    """Stand in for the callback that is never called."""
+    """Placeholder for the callback, which is never called."""

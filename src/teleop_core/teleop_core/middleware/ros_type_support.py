@@ -1,4 +1,4 @@
-"""Type support: what Python messages need of ROS, without the rest."""
+"""Type support: loads only the parts of ROS that Python messages need."""
 
 import sys
 from collections.abc import Iterable
@@ -11,15 +11,15 @@ _OF_EVERY_NODE = ("rcl_interfaces", "lifecycle_msgs", "type_description_interfac
 
 
 def spare_generator() -> None:
-    """Load ``rosidl_generator_py``, of which messages need a function, without its code generator.
+    """Load ``rosidl_generator_py`` without its code generator; messages need only one function of it.
 
-    The generator's parsers take 20 MB and 0.2 s in each process. The package is made to do without
-    them; who generates code imports the generator himself, also afterwards.
+    The generator's parsers take 20 MB and 0.2 s in each process, so the package is loaded without them. Code that
+    needs the generator can still import it later.
     """
     if _GENERATOR in sys.modules:
         return
     modules: dict[str, object] = sys.modules  # type: ignore[assignment]
-    modules[_GENERATOR] = None  # importing it fails, as where the parsers are not installed
+    modules[_GENERATOR] = None  # its import fails, for example if the parsers are not installed
     try:
         import_module("rosidl_generator_py")
     finally:
@@ -27,7 +27,7 @@ def spare_generator() -> None:
 
 
 def load_type_support(kinds: Iterable[object]) -> None:
-    """Load the libraries of some messages, and of what every node serves.
+    """Load the libraries of some messages, and of the services that every node has.
 
     Args:
         kinds: Classes of messages.
@@ -37,7 +37,7 @@ def load_type_support(kinds: Iterable[object]) -> None:
         for folder in ("msg", "srv"):
             try:
                 found += vars(import_module(f"{package}.{folder}")).values()
-            except ModuleNotFoundError:  # a package without the one or the other
+            except ModuleNotFoundError:  # a package without messages or without services
                 continue
     for kind in found:
         if hasattr(type(kind), "_TYPE_SUPPORT"):

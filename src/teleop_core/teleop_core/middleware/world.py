@@ -1,6 +1,6 @@
-"""World: what nodes ask of the middleware, of time and of threads.
+"""World: the interface that nodes use for middleware, time and threads.
 
-The methods have the names and the meaning that they have in rclpy and in Python's ``threading``.
+The methods have the same names and meaning as in rclpy and in Python's ``threading``.
 """
 
 from collections.abc import Callable, Iterable, Mapping
@@ -18,10 +18,10 @@ class Qos:
     """Quality of service of one end of a topic.
 
     Attributes:
-        depth: How many messages wait, unless all do.
+        depth: Length of the queue; not used with ``keeps_all``.
         is_reliable: Whether lost messages are sent again.
-        is_latched: Whether who comes late gets the last messages (transient local).
-        keeps_all: Whether all messages wait, however many.
+        is_latched: Whether late readers get the last messages (transient local).
+        keeps_all: Whether the queue keeps all messages, without limit.
     """
 
     depth: int = 10
@@ -31,14 +31,14 @@ class Qos:
 
 
 class Taken(NamedTuple):
-    """A message as it came.
+    """A received message.
 
     Attributes:
         data: Its bytes.
-        sender: Which publisher sent it.
-        number: Its number in the sequence of that publisher, from 1 on; 0 where it has none.
-        sent_ns: When it was sent, by the clock of the sender [ns].
-        came_ns: When the middleware received it [ns].
+        sender: Publisher that sent it.
+        number: Its number in the sequence of that publisher, from 1 on; 0 if it has no number.
+        sent_ns: Time of sending, by the clock of the sender [ns].
+        came_ns: Time at which the middleware received it [ns].
     """
 
     data: bytes
@@ -49,11 +49,11 @@ class Taken(NamedTuple):
 
 
 class Endpoint(NamedTuple):
-    """Publisher or reader of a topic, as discovery knows it.
+    """Publisher or reader of a topic, as known from discovery.
 
     Attributes:
-        node: Name of its node, with the namespace and a slash before it.
-        sender: As of :class:`Taken`; of a reader its own number.
+        node: Name of its node, with the namespace and a leading slash.
+        sender: As in :class:`Taken`; for a reader, its own number.
         ros_type: Type of its messages, such as ``sensor_msgs/msg/JointState``.
         is_reliable: As of :class:`Qos`.
         is_latched: As of :class:`Qos`.
@@ -67,7 +67,7 @@ class Endpoint(NamedTuple):
 
 
 class Outcome(Enum):
-    """What became of a transition of the lifecycle."""
+    """Result of a transition of the lifecycle."""
 
     SUCCESS = "done"
     FAILURE = "refused"
@@ -81,7 +81,7 @@ class Lock(Protocol):
     """Lock between the threads of a process."""
 
     def acquire(self, blocking: bool = ..., timeout: float = ..., /) -> bool:
-        """Take it; whether that was possible within the timeout [s], by default without end."""
+        """Lock it; return whether this was possible within the timeout [s], by default unlimited."""
 
     def release(self) -> None:
         """Give it back."""
@@ -98,38 +98,38 @@ class Thread(Protocol):
 
     @property
     def ident(self) -> int | None:
-        """Number by which Python knows it; None before it has begun."""
+        """Number of the thread in Python; None before it has begun."""
 
     @property
     def native_id(self) -> int | None:
-        """Number by which the system knows it."""
+        """Number of the thread in the operating system."""
 
     def start(self) -> None:
         """Begin."""
 
     def join(self, timeout: float | None = None) -> None:
-        """Wait for its end, for ``timeout`` [s] at most."""
+        """Wait for its end, at most for ``timeout`` [s]."""
 
     def is_alive(self) -> bool:
-        """Whether it works still."""
+        """Whether the thread still runs."""
 
 
 class Line(Protocol):
     """End of a stream of bytes between two processes of one machine; it never waits."""
 
     def send(self, data: bytes | bytearray) -> int:
-        """Write what it takes; how much that was.
+        """Write as much as the line accepts now; return the number of bytes written.
 
         Raises:
-            BlockingIOError: It takes nothing now.
+            BlockingIOError: The line accepts nothing now.
             OSError: The other end is gone.
         """
 
     def recv(self, size: int) -> bytes:
-        """Read what has come, ``size`` bytes at most; nothing when the other end is closed.
+        """Read the received bytes, at most ``size``; empty if the other end is closed.
 
         Raises:
-            BlockingIOError: Nothing has come.
+            BlockingIOError: No bytes were received.
             OSError: The other end is gone.
         """
 
@@ -138,36 +138,36 @@ class Line(Protocol):
 
 
 class Listener(Protocol):
-    """Where lines of a machine arrive."""
+    """Listening end, which accepts lines from processes of the same machine."""
 
     def accept(self) -> Line | None:
         """Next line of a process of this user; None if there is none."""
 
     def close(self) -> None:
-        """Accept none any more."""
+        """Stop accepting lines."""
 
 
 # -- topics, services, parameters ------------------------------------------------------------------
 
 
 class Publisher(Protocol):
-    """One end of a topic."""
+    """Sending end of a topic."""
 
     def publish(self, message: Any) -> None:
         """Send a message, or the bytes of one; a node that is not active sends nothing."""
 
     def send(self, data: bytes) -> None:
-        """As :meth:`publish`, of bytes alone, in the shortest time."""
+        """The same as :meth:`publish`, but only for bytes and faster."""
 
     def get_subscription_count(self) -> int:
-        """Readers that were found."""
+        """Number of discovered readers."""
 
     def wait_for_all_acked(self, seconds: float) -> None:
-        """Wait until all readers have all messages, for some time [s] at most."""
+        """Wait until all readers have all messages, at most for some time [s]."""
 
 
 class Taker(Protocol):
-    """Other end of a topic, whose messages are taken by hand.
+    """Receiving end of a topic, whose messages are read without an executor.
 
     Attributes:
         type: Class of its messages.
@@ -180,37 +180,37 @@ class Taker(Protocol):
 
     @property
     def lost(self) -> int:
-        """Messages of all its senders that should have been handed over and were not."""
+        """Number of messages of all its senders that should have been delivered but were not."""
 
     def wait(self, seconds: float) -> None:
-        """Return when there is a message, or after some time [s]; no executor is needed."""
+        """Wait for a message, at most for some time [s]; no executor is needed."""
 
     def close(self) -> None:
         """Stop listening."""
 
 
 class Timer(Protocol):
-    """Calls again and again."""
+    """Calls a function periodically."""
 
     def cancel(self) -> None:
         """Pause."""
 
     def reset(self) -> None:
-        """Go on; the next call is one period from now."""
+        """Continue; the next call is one period from now."""
 
     def is_canceled(self) -> bool:
         """Whether it is paused."""
 
 
 class Guard(Protocol):
-    """Calls once soon."""
+    """Calls a function once in the executor, after it was triggered."""
 
     def trigger(self) -> None:
-        """Have the executor call soon, once for all triggers until then; from any thread."""
+        """Let the executor call the function soon, once for all triggers until then; may be called from any thread."""
 
 
 class Client(Protocol):
-    """Who asks a service; the executor of the node must be spun meanwhile, by whomever."""
+    """Client of a service; some thread must spin the node's executor meanwhile."""
 
     srv_name: str
 
@@ -218,29 +218,29 @@ class Client(Protocol):
         """Whether the service was found."""
 
     def wait_for_service(self, timeout_sec: float | None = None) -> bool:
-        """Wait until the service is found; whether it was."""
+        """Wait until the service is found; return whether it was found."""
 
     def call_async(self, request: Any) -> Any:
-        """Ask; the answer is the result of a future."""
+        """Send a request; returns a future of the answer."""
 
     def remove_pending_request(self, future: Any) -> None:
-        """Wait for an answer no longer."""
+        """Stop waiting for an answer."""
 
 
 class Log(Protocol):
-    """What a node tells people."""
+    """Log of a node."""
 
     def info(self, text: str) -> object:
-        """Say what is so."""
+        """Log information."""
 
     def warning(self, text: str) -> object:
-        """Say what should not be so."""
+        """Log a warning."""
 
     def error(self, text: str, *, throttle_duration_sec: float = 0.0) -> object:
-        """Say what has failed, once in some seconds at most."""
+        """Log an error, at most once in some seconds."""
 
     def fatal(self, text: str) -> object:
-        """Say what ends the node."""
+        """Log the error that ends the node."""
 
 
 class Node(Protocol):
@@ -262,10 +262,10 @@ class Node(Protocol):
         """Publisher of messages of a class."""
 
     def create_taker(self, kind: Any, name: str, qos: Qos) -> Taker:
-        """Subscription whose messages are taken by hand."""
+        """Subscription whose messages are read without an executor."""
 
     def create_subscription(self, kind: Any, name: str, callback: Callable[[Any], None], qos: Qos) -> object:
-        """Subscription whose messages the executor hands over."""
+        """Subscription whose messages the executor passes to ``callback``."""
 
     def create_service(self, kind: Any, name: str, callback: Callable[[Any, Any], Any]) -> object:
         """Service that the executor answers."""
@@ -274,50 +274,50 @@ class Node(Protocol):
         """Client of a service."""
 
     def create_timer(self, period: float, callback: Callable[[], None]) -> Timer:
-        """Call again and again after a period [s]."""
+        """Call ``callback`` periodically; the period is in [s]."""
 
     def create_guard_condition(self, callback: Callable[[], None]) -> Guard:
-        """Call when it is triggered."""
+        """Guard that calls ``callback`` when it is triggered."""
 
     def destroy(self, entity: Any) -> None:
-        """Withdraw what one of these methods has made."""
+        """Destroy an object that one of these methods has made."""
 
     def defer(self, work: Callable[..., object], *arguments: object) -> None:
-        """Have the executor do something soon; nothing without one. From any thread."""
+        """Let the executor call ``work`` soon; without an executor nothing happens. May be called from any thread."""
 
     def count_publishers(self, name: str) -> int:
-        """Publishers of a topic that were found."""
+        """Number of discovered publishers of a topic."""
 
     def publishers(self, name: str) -> list[Endpoint]:
-        """The same, one by one."""
+        """Discovered publishers of a topic."""
 
     def readers(self, name: str) -> list[Endpoint]:
-        """Readers of a topic that were found."""
+        """Discovered readers of a topic."""
 
     def get_topic_names_and_types(self) -> list[tuple[str, list[str]]]:
-        """Topics that were found."""
+        """Discovered topics."""
 
     def get_service_names_and_types(self) -> list[tuple[str, list[str]]]:
-        """Services that were found."""
+        """Discovered services."""
 
     def destroy_node(self) -> None:
-        """Leave."""
+        """Destroy the node."""
 
 
 class Hooks(Protocol):
-    """What a lifecycle node does in its transitions."""
+    """Functions that a lifecycle node calls in its transitions."""
 
     def on_configure(self) -> Outcome:
         """Make what it needs."""
 
     def on_activate(self) -> Outcome:
-        """Begin to work; its publishers are open already."""
+        """Begin to work; the node's publishers are already open."""
 
     def on_deactivate(self) -> Outcome:
-        """Stop to work; its publishers are open still."""
+        """Stop working; the node's publishers are still open."""
 
     def on_cleanup(self) -> Outcome:
-        """Close everything: it can be configured anew."""
+        """Close everything, so that the node can be configured again."""
 
     def on_shutdown(self) -> Outcome:
         """Stop and close everything for good."""
@@ -326,14 +326,14 @@ class Hooks(Protocol):
         """After a crash, close everything."""
 
     def on_no_transition(self, wanted: str) -> None:
-        """Somebody asked for a transition that there is not now."""
+        """A transition was requested that does not exist in the current state."""
 
 
 class LifecycleNode(Node, Protocol):
-    """Node with parameters and a lifecycle, as of ROS.
+    """Node with parameters and a lifecycle, as in ROS.
 
     Attributes:
-        given: Parameters of the command line and of parameter files that belong to no one yet.
+        given: Parameters of the command line and of parameter files that are not declared yet.
     """
 
     given: Mapping[str, Any]
@@ -347,16 +347,16 @@ class LifecycleNode(Node, Protocol):
         """Declare parameters.
 
         Args:
-            specs: What they are.
-            values: What they are set to.
-            accept: Told all of a change before it is made; why it is refused, empty if it is not.
+            specs: Declarations of the parameters.
+            values: Values of the parameters.
+            accept: Called with a whole change before it is made; returns the reason to refuse it, empty to accept it.
         """
 
     def show(self, values: Mapping[str, Value]) -> None:
-        """Show values that the node has changed by itself: nobody is asked."""
+        """Show values that the node has changed by itself; ``accept`` is not called."""
 
     def trigger(self, transition: str) -> Outcome:
-        """Bring about ``configure``, ``activate``, ``deactivate`` or ``shutdown``."""
+        """Execute ``configure``, ``activate``, ``deactivate`` or ``shutdown``."""
 
 
 class Executor(Protocol):
@@ -366,7 +366,7 @@ class Executor(Protocol):
         """Serve a node too."""
 
     def spin_once(self, timeout_sec: float | None = None) -> None:
-        """Serve one thing, or none within the time [s].
+        """Serve one event, or none if none comes within the time [s].
 
         Raises:
             WorldEndedError: The middleware was shut down.
@@ -376,7 +376,7 @@ class Executor(Protocol):
         """Let :meth:`spin_once` return; from any thread."""
 
     def shutdown(self) -> None:
-        """Serve nothing any more."""
+        """Stop serving."""
 
 
 class WorldEndedError(Exception):
@@ -388,10 +388,10 @@ class World(Protocol):
 
     @property
     def background(self) -> Background:
-        """Where recordings are written."""
+        """Functions for writing recordings."""
 
     def monotonic_ns(self) -> int:
-        """Time of a clock that never goes back [ns]."""
+        """Time of a monotonic clock [ns]."""
 
     def time_ns(self) -> int:
         """Time of the system's clock [ns]."""
@@ -403,52 +403,52 @@ class World(Protocol):
         """Lock between threads."""
 
     def thread(self, name: str, work: Callable[[], None]) -> Thread:
-        """Thread that does something, once it is started; the process does not wait for it."""
+        """Thread that calls ``work`` when it is started; the process does not wait for it at its end."""
 
     def thread_ident(self) -> int:
-        """Number by which Python knows the thread that calls."""
+        """Number of the calling thread in Python."""
 
     def take_real_time(self, options: RealTimeParameters) -> list[str]:
-        """Take options for the thread that calls; one line for everything that is refused."""
+        """Apply real-time options to the calling thread; returns one line for each refused option."""
 
     def tidy(self) -> None:
-        """Throw away what the start has left behind, before loops work."""
+        """Free the memory of objects that the start has left behind, before the loops run."""
 
     def connect(self, place: str) -> Line:
-        """Line to who listens at a place of this machine; raises OSError if nobody does."""
+        """Line to the listener at a place of this machine; raises OSError if there is no listener."""
 
     def listen(self, place: str) -> Listener:
-        """Listen at a place of this machine; raises OSError if another one does."""
+        """Listen at a place of this machine; raises OSError if another process already listens there."""
 
     def feed_place(self) -> str:
-        """Where the recorder of this machine listens, on the domain of this process."""
+        """Place at which the recorder of this machine listens, for the domain of this process."""
 
     def node(self, name: str, **options: Any) -> Node:
-        """A node; options as of the class in rclpy."""
+        """A node; options are those of the class in rclpy."""
 
     def lifecycle_node(self, name: str, hooks: Hooks, **options: Any) -> LifecycleNode:
-        """A node with parameters and a lifecycle; options as of the class in rclpy.
+        """A node with parameters and a lifecycle; options are those of the class in rclpy.
 
         Raises:
-            ParameterError: It is to use simulated time of ROS, by which no stage can step.
+            ParameterError: The node is configured to use ROS's simulated time, which stages cannot use.
         """
 
     def executor(self) -> Executor:
         """Executor of the nodes of this process, or guest."""
 
     def guest(self, domain: int | None = None) -> "World":
-        """The same world as seen by who is none of the session: a context of its own."""
+        """The same world for a guest that does not belong to the session; it has its own context."""
 
     def shutdown(self) -> None:
-        """Leave the middleware."""
+        """Shut the middleware down."""
 
 
 class Owner(Protocol):
-    """Who owns ends of topics: a node of a session, or a guest."""
+    """Owner of publishers and subscriptions: a node of a session, or a guest."""
 
     @property
     def world(self) -> World:
-        """Where it is."""
+        """World of the owner."""
 
     @property
     def ros(self) -> Node:

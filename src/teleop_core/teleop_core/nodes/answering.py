@@ -1,4 +1,4 @@
-"""Answering node: one step of its stage for every message of its trigger, under the same stamp."""
+"""Answering node: makes one step of its stage for every message of its trigger, with the trigger's stamp."""
 
 from collections.abc import Callable
 from typing import Any
@@ -11,12 +11,12 @@ from teleop_core.nodes.base import CoreNode
 class AnsweringNode(CoreNode):
     """Node that answers each message of one topic on all its outputs.
 
-    Nothing is answered before the topics that the stage needs have come: without knowing where the
-    slave is, any answer could move it.
+    The node sends no answer until it has received all topics that the stage needs: while the slave's pose is unknown,
+    any answer could move the slave.
     """
 
     def setup(self, parameters: Any) -> None:
-        """Make the stage, open its topics, and listen to the one it answers."""
+        """Make the stage, open its topics, and listen to its trigger."""
         super().setup(parameters)
         assert self.description.trigger is not None
         self._trigger: Topic = self.description.trigger
@@ -25,7 +25,7 @@ class AnsweringNode(CoreNode):
         self._stamp_fields = (f"{self._trigger.field}_ns", "now_ns")
 
     def start(self) -> None:
-        """Start from where the slave is now; forget everything before."""
+        """Start from the slave's current pose; forget all earlier messages."""
         self.stage.reset()
         self._was_silent, self._told_ns = True, 0
         for port in self.description.reads:
@@ -34,16 +34,16 @@ class AnsweringNode(CoreNode):
     def turn(self) -> None:
         """Answer the next message."""
         assert self._question.subscription is not None
-        # What is held back on a slow link comes without a message to wait for.
+        # A message that was delayed on a slow link becomes due without a new message to wait for.
         self._question.subscription.wait(DT if self._question.delay else 0.1)
         self.work(self.send_report)
 
     def tick(self, tick_ns: int) -> None:
-        """Answer what has come within a session, which has the state reported later."""
+        """Answer the messages that have come. Used within a session, which calls :meth:`tell` later."""
         self.work()
 
     def tell(self) -> None:
-        """Report the state that the last answer led to, if it has changed."""
+        """Report the state after the last answer, if it has changed."""
         if self._told_ns:
             self.send_report(self._told_ns)
 
@@ -51,7 +51,7 @@ class AnsweringNode(CoreNode):
         """Answer the messages that have come, one by one.
 
         Args:
-            report: Told the stamp of each answer [ns] when it is sent.
+            report: Called with the stamp of each answer [ns] when it is sent.
         """
         has_come = False
         while self._question.take():
@@ -68,7 +68,7 @@ class AnsweringNode(CoreNode):
             self._find_silence(report)
 
     def _find_silence(self, report: Callable[[int], None] | None) -> None:
-        """Have the stage make its outputs safe when its trigger falls silent, and report that once."""
+        """When the trigger falls silent, let the stage make its outputs safe, and report this once."""
         is_silent = self._question.age() > self._timeout
         if is_silent and not self._was_silent:
             with self.lock:
@@ -79,7 +79,7 @@ class AnsweringNode(CoreNode):
         self._was_silent = is_silent
 
     def answer(self, stamp_ns: int) -> None:
-        """Make one step of the stage, and send what came of it."""
+        """Make one step of the stage, and send its outputs."""
         for name in self._stamp_fields:
             self.row[name] = stamp_ns
         with self.lock:

@@ -1,4 +1,4 @@
-"""Nodes ``arm_bridge`` and ``jaw_bridge``: real controllers in the place of simulated drives."""
+"""Nodes ``arm_bridge`` and ``jaw_bridge``: real controllers instead of simulated drives."""
 
 from collections.abc import Callable, Iterable
 from typing import Any
@@ -12,19 +12,18 @@ from teleop_core.slave.bridges import BRIDGES, Command
 from teleop_core.slave.bridges.arm_bridge import BridgeParameters
 from teleop_core.slave.bridges.hearing import Sample
 
-_WAITING = 20  # messages of the arm that wait while the loop is late
+_WAITING = 20  # number of the arm's messages that are queued while the loop is late
 
 
 class ArmBridgeNode(TickingNode):
-    """Sends the newest setpoint as the controller takes it, and passes on what the arm says.
+    """Sends the newest setpoint in the form that the controller accepts, and passes on the arm's measurements.
 
-    What is measured goes out for each sound sample of the arm, under the time at which that
-    was taken, and never otherwise: its silence makes the server hold. None goes out before the
-    server is found.
+    The node publishes one measurement for each valid sample of the arm, with the time of that sample as stamp, and
+    none otherwise: its silence makes the server hold the arm. It publishes nothing before the server is discovered.
     """
 
     def setup(self, parameters: BridgeParameters) -> None:
-        """Make the stage, open its topics and those of the arm."""
+        """Make the stage, open its topics and the topics of the arm."""
         super().setup(parameters)
         kind, p = BRIDGES.find(parameters.kind.kind), parameters
         heard = Topic(p.state_topic or kind.state_topic, Kind.STATE)
@@ -44,7 +43,7 @@ class ArmBridgeNode(TickingNode):
         super().teardown()
 
     def work(self, ticks: Iterable[int], report: Callable[[int], None] | None = None) -> None:
-        """Pass on what the arm has said, and command it if that is due in one of the ticks."""
+        """Pass on the arm's measurements, and command the arm if a command is due in one of the ticks."""
         self.read_ports()
         now_ns = self.epoch_ns + max(ticks)
         with self.lock:
@@ -58,7 +57,7 @@ class ArmBridgeNode(TickingNode):
         self._trouble.tell(self.stage.concerns())
 
     def _listen(self) -> None:
-        if not self._has_server:  # one that is found late would go on without the arm
+        if not self._has_server:  # a server that is discovered late would continue without the arm
             self._has_server = self._setpoint.publishers() > 0
         while (taken := self._arm.take()) is not None:
             message = read_message(taken.data, self._arm.type)
@@ -76,7 +75,7 @@ class ArmBridgeNode(TickingNode):
         return found
 
     def values(self) -> dict[str, str]:
-        """How many commands went out, and how many samples of the arm were refused."""
+        """Number of sent commands, and number of refused samples of the arm."""
         refused = self.stage.hearing.refused.items()
         counts = {f"refused.arm.{wrong.value}": str(count) for wrong, count in refused}
         return {**counts, "commands": str(self.commands), "kind": self._kind.name}

@@ -23,7 +23,7 @@ from teleop_core.nodes.streams import Input, message_type
 from teleop_core.nodes.tuned import TunedNode
 from teleop_core.session.reports import report_of
 
-_GATE_PATIENCE = 1.0  # a tick of a whole session takes a hundredth of it on a busy machine
+_GATE_PATIENCE = 1.0  # on a busy machine, a tick of a whole session takes a hundredth of this time
 _NEWS = {"active": "at work", "finalized": "ended"}  # others: the state itself
 
 
@@ -39,18 +39,18 @@ class CoreNode(TunedNode):
         super().__init__(stage, group, **options)
         self.description = stage
         self.stage: Any = None
-        """The stage at work, which :attr:`runner` is too; None for a node without one."""
+        """The running stage, the same object as :attr:`runner`; None for a node without a stage."""
         self.row: Any = None
         """The stage's signals, by the names of their fields."""
-        self.gate = self.world.lock()  # held by a session while the node works in its thread
+        self.gate = self.world.lock()  # locked by a session while the node works in the session's thread
         self.ended: Future[None] = Future()
         self.exit_code = 0
         self.has_ended = False
-        """Whether the node was shut down: nothing more is to come from it."""
+        """Whether the node was shut down and will send nothing more."""
         self.patience = self.options.real_time.patience
         """Time without progress after which the loop counts as hung [s]; 0: never."""
         self.has_own_loop = True
-        """Whether the node works in a thread of its own, or in that of a whole session."""
+        """Whether the node works in its own thread; False if it works in the thread of a whole session."""
         self.is_at_work = self.has_worked = False
         self._loop: Loop | None = None
         self._feed: Feed | None = None
@@ -65,7 +65,7 @@ class CoreNode(TunedNode):
         wait = (phase - 1e-9 * self.world.monotonic_ns()) % REPORT_PERIOD
         self._report_timer = self.ros.create_timer(wait, self._begin_reports)
         self.ending = self.world.lock()
-        """Held while the end is told; shared by the nodes of a process, as ``ended`` is."""
+        """Locked while the end is being reported; all nodes of a process share this lock and ``ended``."""
 
     # -- what subclasses fill in -----------------------------------------------------------------
 
@@ -91,31 +91,31 @@ class CoreNode(TunedNode):
         raise NotImplementedError
 
     def tick(self, tick_ns: int) -> None:
-        """Work for one tick [ns, monotonic] of a session that goes through all its nodes."""
+        """Work for one tick [ns, monotonic] of a session, which calls all its nodes in turn."""
         raise NotImplementedError
 
     def tell(self) -> None:
-        """Report what a tick has changed, after its session has sent all messages of the tick."""
+        """Report changes of the last tick, after the session has sent all messages of the tick."""
 
     def start(self) -> None:
-        """Get ready for the first turn; what came while inactive is forgotten already."""
+        """Get ready for the first turn. Messages that came while the node was inactive are already deleted."""
 
     def stop(self) -> None:
         """Make the outputs safe after the last turn."""
 
     def teardown(self) -> None:
-        """Close what :meth:`setup` made beside topics."""
+        """Close everything except topics that :meth:`setup` made."""
 
     def concerns(self) -> list[str]:
-        """What is wrong now, in words."""
+        """Texts about everything that is wrong now."""
         return []
 
     def values(self) -> dict[str, str]:
-        """Names and texts to report beside the common ones."""
+        """Names and texts to report in addition to the common ones."""
         return {}
 
     def news(self, word: str) -> str:
-        """Log line for a new state of the node, whose name is ``word``."""
+        """Log line for a new state of the node; ``word`` is the state's name."""
         if word != _NEWS["active"]:
             return word
         inputs, robot = self.ports.all_inputs(), getattr(self.parameters, "robot", "")
@@ -123,17 +123,17 @@ class CoreNode(TunedNode):
         return f"{word}: {introduction(self.description, inputs, names, robot)}"
 
     def abandon(self) -> None:
-        """Save what must not be lost, in any thread, when an orderly end has become impossible."""
+        """Save data that must not be lost, when an orderly end is no longer possible. May be called in any thread."""
 
     # -- as the whole of a process ---------------------------------------------------------------
 
     @property
     def nodes(self) -> "tuple[CoreNode, ...]":
-        """The nodes of a process that runs this one alone."""
+        """The nodes of a process that runs only this node."""
         return (self,)
 
     def watched(self) -> list[tuple[Loop, int]]:
-        """The loop that works now, with a number that grows while it does."""
+        """The running loop, with a number that grows as long as the loop makes progress."""
         loop = self._loop
         if loop is None or not loop.is_ready:
             return []
@@ -141,7 +141,7 @@ class CoreNode(TunedNode):
         return [(loop, loop.turns + sent)]
 
     def halt(self) -> None:
-        """Stop what several nodes share; a single node shares nothing."""
+        """Stop the loop that several nodes share; a single node has no shared loop."""
 
     # -- topics ----------------------------------------------------------------------------------
 
@@ -155,14 +155,14 @@ class CoreNode(TunedNode):
         return publisher
 
     def leave_topics(self) -> None:
-        """Leave what the stage writes to another node, until the next configuration."""
+        """Stop publishing the stage's topics until the next configuration; another node publishes them instead."""
         self.ports.mute()
         for publisher in self._own_publishers:
             self.ros.destroy(publisher)
         self._own_publishers = []
 
     def _open_report(self) -> None:
-        """Open the topic that is sent where it changes, if the stage has one."""
+        """Open the stage's report topic, if it has one; reports are sent when they change."""
         own = (topic for topic in self.description.writes if topic.kind is Kind.REPORT)
         self._report = next(own, None)
         if self._report is not None:
@@ -183,11 +183,11 @@ class CoreNode(TunedNode):
         self.show_present()
 
     def input(self, port: Topic) -> Input:
-        """Input of a port; where several topics are added up, the one that the others are added to."""
+        """Input of a port. If the values of several topics are added, the input of the first topic."""
         return self.ports.input(port)
 
     def read_ports(self, trigger: Topic | None = None) -> None:
-        """Bring the signals up to date, all ports but that of the trigger."""
+        """Update the signals of all ports except the trigger's port."""
         self.ports.read(trigger)
 
     def _close(self) -> None:
@@ -200,7 +200,7 @@ class CoreNode(TunedNode):
     # -- lifecycle -------------------------------------------------------------------------------
 
     def on_configure(self) -> Outcome:
-        """Make the stage and open its topics; a refusal leaves nothing open."""
+        """Make the stage and open its topics. If this is refused, nothing stays open."""
         self._fresh_counts()
         result = self._guard("configure", lambda: self.setup(self.parameters), "inactive")
         if result is not Outcome.SUCCESS:
@@ -245,7 +245,7 @@ class CoreNode(TunedNode):
             self._loop.start()
 
     def _open_feed(self) -> None:
-        """Feed what it sends to the recorder of this machine, if there is one."""
+        """Feed the node's messages to the recorder of this machine, if there is one."""
         outputs = {topic.name: output for topic, output in self.ports.outputs.items()}
         if not outputs:
             return
@@ -253,7 +253,7 @@ class CoreNode(TunedNode):
         for name, output in outputs.items():
             output.tap = self._feed.channels[name].give
             self._feed.channels[name].join(True)
-        self._feed.flush()  # before the first message goes out by the middleware too
+        self._feed.flush()  # before the middleware publishes the first message
 
     def _fed_turn(self) -> None:
         self.turn()
@@ -272,7 +272,7 @@ class CoreNode(TunedNode):
         if self._feed is not None and has_stopped:
             self._feed.close()
             self._feed = None
-        if not (has_stopped and is_free):  # its outputs are silent: who sends them hangs
+        if not (has_stopped and is_free):  # its outputs are silent because the sending thread hangs
             raise SessionError(f"{self.member_name} does not answer and is left running")
         self.stop()
 
@@ -289,10 +289,10 @@ class CoreNode(TunedNode):
     def _guard(self, transition: str, action: Callable[[], None], word: str) -> Outcome:
         try:
             action()
-        except TeleopError as error:  # a refusal, in one readable line
+        except TeleopError as error:  # a refused configuration, as one readable line
             self.ros.get_logger().error(f"{transition} refused: {error}")
             return Outcome.FAILURE
-        except Exception:  # rclpy would turn it into ERROR without a word
+        except Exception:  # rclpy would convert it to ERROR without a message
             self.ros.get_logger().fatal(f"{transition} crashed:\n{traceback.format_exc()}")
             return Outcome.ERROR
         if self._word not in {"unconfigured", "failed"} or word != "finalized":
@@ -302,7 +302,7 @@ class CoreNode(TunedNode):
         return Outcome.SUCCESS
 
     def prepare(self) -> None:
-        """Take the real-time options for the thread that calls; say what the system refuses."""
+        """Apply the real-time options to the calling thread; log the options that the system refuses."""
         for refusal in self.world.take_real_time(self.options.real_time):
             self.ros.get_logger().warning(refusal)
 
@@ -318,38 +318,38 @@ class CoreNode(TunedNode):
 
     def end(self, exit_code: int) -> None:
         """Let the process end; may be called from any thread."""
-        with self.ending:  # whoever sees the end waits until all is said
+        with self.ending:  # a thread that sees the end waits until everything is reported
             self.exit_code = self.exit_code or exit_code
             if not self.ended.done():
                 self.ended.set_result(None)
 
     def _deactivate(self) -> None:
-        if self.is_at_work:  # a supervisor may have been faster
+        if self.is_at_work:  # a supervisor may have shut it down already
             self.ros.trigger("deactivate")
 
     def finish(self) -> None:
-        """Shut down from whatever state the node is in; what was shut down stays so."""
+        """Shut down from any state; a node that is already shut down is not changed."""
         self._report_timer.cancel()
         if not self.has_ended:
             self.ros.trigger("shutdown")
 
     def on_no_transition(self, wanted: str) -> None:
-        """Log that a transition was requested which the present state does not have."""
+        """Log that a requested transition does not exist in the current state."""
         self.ros.get_logger().error(f"no transition {wanted} while {self._word}")
 
     # -- diagnostics -----------------------------------------------------------------------------
 
     def _fresh_counts(self) -> None:
         self.schedule = Schedule(self.world.monotonic_ns, self.world.sleep, self.options.max_catch_up)
-        self.delay = Recent()  # from the master's sample to what was made of it, [ns]
+        self.delay = Recent()  # time from the master's sample to this node's output, [ns]
 
     @property
     def counts(self) -> TickCounts:
-        """What became of the ticks since the node was configured."""
+        """Counts of executed, late and missed ticks since the node was configured."""
         return self.schedule.counts
 
     def _begin_reports(self) -> None:
-        """Report, and from now on once a second."""
+        """Report now, and from then on once a second."""
         self.ros.destroy(self._report_timer)
         self._report_timer = self.ros.create_timer(REPORT_PERIOD, self._report_in_time)
         self._report_in_time()
@@ -362,7 +362,7 @@ class CoreNode(TunedNode):
             self.ros.get_logger().error(f"cannot report:\n{traceback.format_exc()}", throttle_duration_sec=60.0)
 
     def report(self) -> None:
-        """Publish how the node is."""
+        """Publish the node's status."""
         inputs = self.ports.all_inputs()
         is_active = self._word == "active"
         concerns = self._reporter.input_concerns(inputs)

@@ -1,7 +1,7 @@
-"""Chances: how long a process could have worked, by the kernel's accounting of its threads.
+"""Chances: the time for which a process could have worked, from the kernel's accounting of its threads.
 
-On a busy machine a healthy thread may get no processor for a second. Who judges by the clock takes
-it for one that hangs; so the time for which it waited for a processor does not count here.
+On a busy machine a healthy thread may get no processor for a second. Judged by the clock alone, it would seem to hang.
+Therefore the time for which a thread waited for a processor does not count here.
 """
 
 import time
@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 _LONGEST = 0.2
-"""Largest part of the time between two looks that counts [s]: who looks so late had no processor
-himself, or was stopped together with the process."""
+"""Largest time between two looks that counts [s]. If more time has passed, the caller itself had no processor, or was
+stopped together with the process."""
 
 
 @dataclass(frozen=True)
@@ -24,12 +24,12 @@ class _Account:
 
 
 class Chances:
-    """Time that a process had for its work from look to look.
+    """Time that a process had for its work between two looks.
 
     Args:
         pid: The process.
-        worker: Thread that does the work; what it ran counts in any case, as of a loop without end.
-            0: none in particular.
+        worker: Thread that does the work. The time for which it ran always counts, since it may be in an endless loop.
+            0: no particular thread.
     """
 
     def __init__(self, pid: int, worker: int = 0) -> None:
@@ -41,7 +41,7 @@ class Chances:
         """Time since the last look for which no thread waited for a processor [s].
 
         Args:
-            threads: Those that matter; None for all of the process.
+            threads: Threads to consider; None for all threads of the process.
         """
         now = time.monotonic()
         elapsed, self._last = min(now - self._last, _LONGEST), now
@@ -51,7 +51,7 @@ class Chances:
             if thread not in before:
                 continue
             got = account.ran - before[thread].ran
-            waits = account.is_ready and got <= 0.0  # its account is written when it runs again
+            waits = account.is_ready and got <= 0.0  # the kernel updates its account when it runs again
             waited = max(waited, elapsed if waits else account.waited - before[thread].waited)
             ran = got if thread == self._worker else ran
         return max(elapsed - waited, ran, 0.0)
@@ -61,7 +61,7 @@ class Chances:
         return {thread: one for thread in names if (one := self._account(thread)) is not None}
 
     def _threads(self) -> list[int]:
-        """All threads of the process; none once it has ended."""
+        """All threads of the process; empty after its end."""
         try:
             return [int(path.name) for path in self._folder.iterdir()]
         except OSError:
@@ -72,7 +72,7 @@ class Chances:
         folder = self._folder / str(thread)
         try:
             ran, waited, _ = map(int, (folder / "schedstat").read_text().split())
-            # The name, in parentheses, may hold anything.
+            # The name, in parentheses, may contain any characters.
             state = (folder / "stat").read_text().rpartition(")")[2].split()[0]
         except (OSError, ValueError):
             return None

@@ -20,19 +20,18 @@ from teleop_core.nodes.parent import VARIABLE
 from teleop_core.nodes.start import SESSION
 from teleop_core.nodes.starter import NODE, Starter
 
-# Not by SIGINT, which a process that a shell started in the background ignores, and its children.
+# Not SIGINT: a process that a shell started in the background ignores it, and so do its children.
 _PATIENCE = ((signal.SIGTERM, 30.0), (signal.SIGKILL, 5.0))
 _STILL_PATIENCE = ((signal.SIGTERM, 2.0), (signal.SIGKILL, 5.0))  # of one that stands still
 _TROUBLE = ("[ERROR]", "[FATAL]", "Traceback")
-_STILL = 3.0  # a thread of its own speaks ten times a second, whatever the process is doing
+_STILL = 3.0  # a separate thread reports ten times a second, whatever the process is doing
 _STILL_STARTING = 60.0  # the interpreter loads, perhaps from a cold disk
 
 
 def environment(domain: int | None = None) -> dict[str, str]:
-    """Environment of the nodes; by default this machine only, and a free domain.
+    """Environment of the nodes; by default communication within this machine only, and a free domain.
 
-    Variables that this process needs too are set here as well, except the domain: one process may lead several
-    sessions.
+    Variables that this process also needs are set in it too, except the domain: one process may run several sessions.
 
     Args:
         domain: ROS domain; None for that of ``ROS_DOMAIN_ID``, or else a free one.
@@ -45,7 +44,7 @@ def environment(domain: int | None = None) -> dict[str, str]:
 
 _reserved: deque[socket.socket] = deque()
 _KEPT = 8
-"""So many sockets keep domains reserved; a deque of bounded length would drop them unclosed."""
+"""Largest number of sockets that reserve domains. A deque of bounded length would drop them without closing them."""
 
 
 @atexit.register
@@ -55,10 +54,10 @@ def _release() -> None:
 
 
 def free_domain() -> str:
-    """Number of a DDS domain in which nobody takes part on this machine.
+    """Number of a DDS domain without participants on this machine.
 
     The first participant of domain d listens on UDP port 7410 + 250 d (DDSI-RTPS 2.5, 9.6.1.1).
-    Until it does, a TCP socket on the same number keeps other sessions away.
+    Until then, a TCP socket with the same port number keeps other sessions away.
     """
     for domain in random.SystemRandom().sample(range(1, 102), 101):
         port = 7410 + 250 * domain
@@ -80,21 +79,22 @@ def free_domain() -> str:
 class Child:
     """Process of one node, or of a whole session.
 
-    It ends in order when this process does, however that comes about. Nothing is left of it on
-    disk: what it writes goes to a file without a name.
+    The child ends in order when this process ends for any reason. It leaves nothing on the disk: its output goes to a
+    file without a name.
 
     Args:
         name: Stage with its namespace, or a whole session.
         parameters: Open parameter file.
         env: Its environment.
-        starter: Who starts it.
-        command: What it runs in place of the node of that name.
-        nodes: Nodes that it holds; more than one, or of another name, make it a side.
+        starter: Starter that starts it.
+        command: Command that it runs instead of the node with that name.
+        nodes: Nodes in the process. If there are several, or one with another name, the process is one side of a
+            session.
 
     Attributes:
         name: As given.
-        doing: What it says that it is doing: starting, compiling kernels, at work, ending.
-        is_told: Whether its end has been told already.
+        doing: Activity that it reports: starting, compiling kernels, at work, ending.
+        is_told: Whether its end has already been reported.
     """
 
     def __init__(
@@ -112,7 +112,7 @@ class Child:
         self._line, theirs = socket.socketpair()
         self._line.setblocking(False)
         self._text = b""
-        # Closed with us: nobody else knows its name.
+        # Closed together with this process: no other process has this file.
         self._log = cast("IO[bytes]", tempfile.TemporaryFile())  # noqa: SIM115
         is_side = bool(nodes) and tuple(nodes) != (name,)
         ours = [SESSION, *nodes] if is_side else [stage]
@@ -137,10 +137,10 @@ class Child:
         return self._process.poll() is None
 
     def check(self) -> None:
-        """Make sure that it runs and says what it is doing.
+        """Make sure that the child runs and reports.
 
         Raises:
-            SessionError: It has ended, or stands still; says how, with what it wrote last.
+            SessionError: The child has ended or hangs. The error contains the reason and its last output.
         """
         code = self._process.poll()
         if code is not None:
@@ -151,7 +151,7 @@ class Child:
             raise SessionError(text + self.last_words())
 
     def _silence(self) -> float:
-        """Processor time in which it could have reported and did not [s]; 0 while that is normal."""
+        """Processor time in which the child could have reported but did not [s]; 0 while its silence is normal."""
         with suppress(OSError):
             while came := self._line.recv(4096):
                 self._text += came
@@ -163,7 +163,7 @@ class Child:
         return self._silent if self._silent > patience else 0.0
 
     def last_words(self) -> str:
-        """Its error lines, or else its last lines of output, each indented."""
+        """Error lines of the child, or, if there are none, its last lines of output, each indented."""
         size = os.fstat(self._log.fileno()).st_size
         tail = os.pread(self._log.fileno(), 20_000, max(0, size - 20_000))
         lines = tail.decode(errors="replace").splitlines()
@@ -178,11 +178,11 @@ class Child:
     def ask(self) -> None:
         """Ask it to end, without waiting."""
         if self._process.poll() is None and not self._is_asked:
-            self._is_asked = True  # a second time would only disturb its end
+            self._is_asked = True  # a second signal would only disturb its end
             self._process.send_signal(signal.SIGTERM)
 
     def end(self) -> int:
-        """End it, more and more firmly; returns its exit code."""
+        """End the child with stronger and stronger signals; returns its exit code."""
         for number, patience in _STILL_PATIENCE if self._silence() else _PATIENCE:
             if number == signal.SIGTERM:
                 self.ask()
@@ -195,7 +195,7 @@ class Child:
         return self._process.wait()
 
     def close(self) -> None:
-        """Let go of what it said and wrote, after its end."""
+        """Close the child's output and its line, after its end."""
         self._line.close()
         self._log.close()
 
@@ -205,7 +205,7 @@ def _in_words(code: int) -> str:
 
 
 def end_all(children: Iterable[Child]) -> list[str]:
-    """End some processes side by side; returns what is to be told of their ends."""
+    """End several processes in parallel; returns texts about problems of their ends."""
     pending = list(children)
     for child in pending:
         child.ask()

@@ -1,4 +1,4 @@
-"""Crews: which processes a live session has, and which nodes each of them holds."""
+"""Crews: the processes of a live session, and the nodes in each process."""
 
 from collections.abc import Collection
 from enum import StrEnum
@@ -13,12 +13,12 @@ Crew = dict[str, tuple[str, ...]]
 
 
 class Processes(StrEnum):
-    """How the nodes of a session are shared out; the recorder always has a process of its own."""
+    """Distribution of a session's nodes over processes; the recorder always has its own process."""
 
     SIDES = "sides"
-    """The hand's side, to inverse kinematics; the slave's side, with the simulated arm."""
+    """Two processes: the hand's side up to inverse kinematics, and the slave's side with the simulated arm."""
     NODES = "nodes"
-    """A process for each node: any of them can be replaced or killed alone."""
+    """A process for each node, so that each node can be replaced or killed separately."""
     ONE = "one"
     """All stages in one process: the fastest session."""
 
@@ -27,12 +27,12 @@ def crews(graph: Graph, processes: Processes = Processes.SIDES, without: Collect
     """Processes of a graph: the recorder before the others.
 
     Args:
-        graph: What runs.
-        processes: How the nodes are shared out.
+        graph: Graph of the session.
+        processes: Distribution of the nodes over processes.
         without: Nodes that are not started.
 
     Raises:
-        UnknownNameError: A node that is to be left out is not there.
+        UnknownNameError: ``without`` names a node that does not exist.
     """
     names = tuple(member.name for member in graph.members)
     for name in without:

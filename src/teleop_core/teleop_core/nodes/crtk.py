@@ -1,9 +1,9 @@
-"""CRTK: operating state and state commands of an arm, as the Collaborative Robotics Toolkit has it.
+"""CRTK: operating state and state commands of an arm, as the Collaborative Robotics Toolkit defines them.
 
-``operating_state`` (crtk_msgs/OperatingState) is sent where it changes and five times a second;
+``operating_state`` (crtk_msgs/OperatingState) is sent when it changes and five times a second;
 ``state_command`` (crtk_msgs/StringStamped) takes the commands of
-:mod:`teleop_core.slave.operation.states`. Both need the package crtk_msgs; where it is not
-installed, an arm has its services and reports alone.
+:mod:`teleop_core.slave.operation.states`. Both need the package crtk_msgs; without it, an arm has only its services
+and reports.
 """
 
 from collections import deque
@@ -18,8 +18,8 @@ from teleop_core.slave.operation.states import COMMANDS, Answer
 
 OPERATING_STATE = "crtk_msgs/msg/OperatingState"
 STATE_COMMAND = "crtk_msgs/msg/StringStamped"
-_PERIOD = 1.0  # of operating_state where nothing changes [s]
-_QUIET = 1.0  # between two lines of the log about one topic [s]
+_PERIOD = 1.0  # period of operating_state while nothing changes [s]
+_QUIET = 1.0  # shortest time between two log lines about one topic [s]
 Condition = tuple[str, bool, bool]
 """Name of the state, whether the arm is homed, whether it is busy."""
 
@@ -47,10 +47,10 @@ class OperatingState:
     The node's loop calls :meth:`note` and never publishes here itself, so that no slow reader blocks it.
 
     Args:
-        node: Node that owns them; its ``lock`` is held while a command is taken.
+        node: Node that owns the topics; its ``lock`` is held while a command is processed.
         arm: Namespace of the topics, ``slave`` or ``master``.
-        request: Takes a command by name; the answer comes with a text.
-        condition: The condition now.
+        request: Executes a command by name and returns an answer with a text.
+        condition: Returns the current condition.
     """
 
     def __init__(
@@ -67,12 +67,12 @@ class OperatingState:
         self._timer = node.ros.create_timer(_PERIOD, self._send)
 
     def note(self, stamp_ns: int) -> None:
-        """Have the present condition sent soon, under its stamp [ns]; from any thread."""
+        """Let the current condition be sent soon, with its stamp [ns]; may be called from any thread."""
         self._changes.append((stamp_ns, self._condition()))
         self._guard.trigger()
 
     def close(self) -> None:
-        """Withdraw them."""
+        """Close the topics."""
         self._node.ros.destroy(self._timer)
         self._node.ros.destroy(self._guard)
         self._node.ros.destroy(self._commands)
@@ -107,10 +107,10 @@ class OperatingState:
 
 
 class Refusals:
-    """Counts commands that were refused, by topic, and says why once a second at most.
+    """Counts refused commands by topic, and logs the reason at most once a second.
 
     Args:
-        node: Node whose log tells it.
+        node: Node that logs the reasons.
     """
 
     def __init__(self, node: Any) -> None:
@@ -119,7 +119,7 @@ class Refusals:
         self._told: dict[str, float] = {}
 
     def add(self, topic: str, text: str) -> None:
-        """Take note of a refused command."""
+        """Count a refused command."""
         self._counts[topic] = self._counts.get(topic, 0) + 1
         now = 1e-9 * self._node.world.monotonic_ns()
         if now - self._told.get(topic, -_QUIET) >= _QUIET:

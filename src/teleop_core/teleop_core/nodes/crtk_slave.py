@@ -1,9 +1,8 @@
-"""CRTK slave: motion commands and further measurements of a slave, beside its streams.
+"""CRTK slave: motion commands and further measurements of a slave, in addition to its streams.
 
-What moves the arm, and what it may do, decides
-:class:`~teleop_core.slave.motion_commands.MotionCommands`. Here messages become its calls, in the
-executor: commands that come once, or some hundred times a second. A thousand a second go to
-``slave/servo_jp`` and ``slave/servo_cp``.
+:class:`~teleop_core.slave.motion_commands.MotionCommands` decides which command moves the arm, and which motions are
+allowed. This module converts messages to its calls, in the executor: for commands that come once, or some hundred
+times a second. Commands that come a thousand times a second go to ``slave/servo_jp`` and ``slave/servo_cp``.
 """
 
 from collections.abc import Callable
@@ -30,15 +29,15 @@ JACOBIAN = "slave/jacobian"
 _JOINTS, _POSE = "sensor_msgs/msg/JointState", "geometry_msgs/msg/PoseStamped"
 _TWIST, _EMPTY = "geometry_msgs/msg/TwistStamped", "std_msgs/msg/Empty"
 _MATRIX = "std_msgs/msg/Float64MultiArray"
-_PERIOD = 0.01  # of what is measured here, as long as somebody reads it [s]
-_LOOK = 1.0  # time from one look for readers to the next [s]
+_PERIOD = 0.01  # period of the measurements while there is a reader [s]
+_LOOK = 1.0  # time between two checks for readers [s]
 
 
 class CrtkSlave:
-    """Topics of CRTK that a slave has beside its streams.
+    """Topics of CRTK that a slave has in addition to its streams.
 
     Args:
-        node: Node that owns them; its ``lock`` is held while the stage is read or told something.
+        node: Node that owns the topics; its ``lock`` is held while the stage is read or commanded.
         stage: The slave.
     """
 
@@ -58,12 +57,12 @@ class CrtkSlave:
         self._measured = Measured(node, stage)
 
     def note(self, stamp_ns: int) -> None:
-        """Have a changed operation told, under its stamp [ns]; from the loop of the node."""
+        """Let a changed operating state be sent, with its stamp [ns]; called from the node's loop."""
         if self._state is not None:
             self._state.note(stamp_ns)
 
     def values(self) -> dict[str, str]:
-        """What moves the arm, and how many commands were refused."""
+        """The command that moves the arm, and the number of refused commands."""
         return {"motion": self._motion.source, **self._refusals.values()}
 
     def close(self) -> None:
@@ -81,7 +80,7 @@ class CrtkSlave:
     # -- commands --------------------------------------------------------------------------------
 
     def _commands(self) -> list[tuple[str, str, bool, Callable[[Any], Told]]]:
-        """Name, message type, whether it comes in a stream, and what takes it."""
+        """For each command: name, message type, whether it is streamed, and the function that processes it."""
         motion, now = self._motion, self._node.world.time_ns
         return [
             ("move_jp", _JOINTS, False, lambda m: self._locked(motion.move, self._of(m))),
@@ -127,10 +126,10 @@ class CrtkSlave:
             return command(*arguments)
 
     def _of(self, message: Any, part: str = "position") -> Array:
-        """Joint numbers of a message, in the robot's order; without names they come in it.
+        """Joint values of a message, in the robot's order. A message without names must have this order.
 
         Raises:
-            CommandError: It has not one for each joint.
+            CommandError: The message does not have one value for each joint.
         """
         found = read_joints(message, part, self._names)
         if isinstance(found, Refusal):
@@ -149,7 +148,7 @@ class CrtkSlave:
 
 
 class CommandError(TeleopError):
-    """A message that is no command for this arm."""
+    """A message is not a valid command for this arm."""
 
 
 def _transform(message: Any) -> Array:
@@ -173,7 +172,7 @@ def _twist(message: Any) -> list[float]:
 
 
 class Measured:
-    """What is measured beside the streams: sent a hundred times a second while somebody reads it.
+    """Measurements in addition to the streams, sent a hundred times a second while there is a reader.
 
     Args:
         node: Node that owns the topics.
@@ -190,7 +189,7 @@ class Measured:
         self._layouts = {t: layout(t.of_arm(node.arm), names) for t in self._publishers}
         self._jacobian = node.ros.create_lifecycle_publisher(message_type(_MATRIX), JACOBIAN, profile(MEASURED_CV))
         self._force: Any = None  # newest message of it
-        self._forces: Any = None  # subscription, as long as somebody reads them in other frames
+        self._forces: Any = None  # subscription, while there is a reader of forces in other frames
         self._timer = node.ros.create_timer(_PERIOD, self._send)
         self._timer.cancel()
         self._look = node.ros.create_timer(_LOOK, self._look_for_readers)
@@ -213,7 +212,7 @@ class Measured:
         self._listen(is_read=any(readers))
 
     def _listen(self, *, is_read: bool) -> None:
-        """Begin to take what the force sensor tells, or end it."""
+        """Begin or end the subscription of the force sensor."""
         if is_read and self._forces is None:
             kind = message_type(SLAVE_MEASURED_CF.kind.ros_type)
             self._forces = self._node.ros.create_subscription(kind, SLAVE_MEASURED_CF.name, self._take, STREAMED)
@@ -249,7 +248,7 @@ class Measured:
             self._send_force(tip)
 
     def _send_force(self, pose: Array) -> None:
-        """Say the newest force once, under its stamp, in the frames of a tip at a pose (7,)."""
+        """Publish the newest force once, with its stamp, in the frames of a tip at a pose (7,)."""
         message, self._force = self._force, None
         found = read_values(SLAVE_MEASURED_CF.kind, message)
         if isinstance(found, Refusal):

@@ -1,4 +1,4 @@
-"""Device hand: the thread that reads a gamepad or a 3-D mouse and tells a hand where to go."""
+"""Device hand: the thread that reads a gamepad or a 3-D mouse and moves a hand accordingly."""
 
 from collections.abc import Callable
 from concurrent.futures import Future
@@ -11,14 +11,14 @@ from teleop_core.hand.operators.remote import RemoteHand
 from teleop_core.nodes.loop import Loop
 
 PERIOD = 0.01
-"""Time from one look at the device to the next [s]."""
-_RUMBLES = 5  # looks from one rumble to the next
-_AGAIN = 1.0  # time from one try to find a lost device to the next [s]
+"""Time between two readings of the device [s]."""
+_RUMBLES = 5  # readings from one rumble to the next
+_AGAIN = 1.0  # time between two attempts to find a lost device [s]
 _OPENING = 20.0  # a device that takes longer to open hangs [s]
 
 
 class DeviceHand:
-    """Reader of a device, in a thread of its own that alone uses the device.
+    """Reader of a device in a separate thread; only this thread uses the device.
 
     A device that is unplugged is closed, and opened again when it comes back.
 
@@ -26,11 +26,11 @@ class DeviceHand:
         node: Node in whose log it reports.
     hand: Hand that it moves.
         opens: Opens the device.
-        parameters: Of the operator.
-        force: Force that the person shall feel, as a share of the largest.
+        parameters: Parameters of the operator.
+        force: Returns the force that the person should feel, as a share of the largest force.
 
     Raises:
-        TeleopError: The device cannot be opened; the text says what was found.
+        TeleopError: The device cannot be opened; the error text lists what was found.
     """
 
     def __init__(
@@ -57,7 +57,7 @@ class DeviceHand:
             raise SessionError(f"the device does not open within {_OPENING:g} s") from error
 
     def concerns(self) -> list[str]:
-        """A device that is gone; a stylus that nobody holds."""
+        """Texts about a lost device, and about a stylus that nobody holds."""
         if self._lost:
             return [f"{self._lost}; waits for it"]
         return [] if self._hand.is_held else ["waits for a hand: nobody holds the stylus"]
@@ -68,7 +68,7 @@ class DeviceHand:
         return {"hand": name, "hand.is_held": str(int(self._hand.is_held))}
 
     def close(self) -> None:
-        """Stop reading and give the device back."""
+        """Stop reading and close the device."""
         if self._loop.stop() and self._device is not None:
             self._pilot.let_go()
             self._device.close()
@@ -79,7 +79,7 @@ class DeviceHand:
     def _open(self) -> None:
         try:
             self._device = self._opens(self._parameters)
-        except Exception as error:  # the constructor raises it, in the thread of the node
+        except Exception as error:  # the constructor raises this error in the node's thread
             self._opened.set_exception(error)
             self._loop.is_running = False
             return

@@ -1,4 +1,4 @@
-"""Diagnostics: what a node says about itself once a second."""
+"""Diagnostics: the status that a node reports once a second."""
 
 from collections import Counter
 from collections.abc import Mapping
@@ -16,14 +16,14 @@ from teleop_core.nodes.streams import Input
 OK, WARNING = 0, 1
 """Levels of a report."""
 _STEP_NS = 50_000_000
-"""A clock that moves by more against the monotonic one within a second was stepped [ns]."""
+"""The system clock was stepped if it moves by more than this relative to the monotonic clock within a second [ns]."""
 
 
 class Reporter:
     """Sender of a node's ``diagnostics``.
 
     Args:
-        owner: The node; its name, with the namespace, is that of the status.
+        owner: The node; its name, with the namespace, is the name of the status.
     """
 
     def __init__(self, owner: Owner) -> None:
@@ -38,7 +38,7 @@ class Reporter:
         self._offset_ns = self._world.time_ns() - self._world.monotonic_ns()
 
     def clock_step(self) -> float:
-        """By how much the system's clock was stepped since the last call [s]; 0 if it was not."""
+        """Step of the system's clock since the last call [s]; 0 if it was not stepped."""
         offset_ns = self._world.time_ns() - self._world.monotonic_ns()
         step_ns, self._offset_ns = offset_ns - self._offset_ns, offset_ns
         return step_ns * 1e-9 if abs(step_ns) > _STEP_NS else 0.0
@@ -56,7 +56,7 @@ class Reporter:
         return max(rate, 0.0)
 
     def input_concerns(self, inputs: list[Input]) -> list[str]:
-        """What is wrong with what came in since the last call, in words."""
+        """Texts about problems of the received messages since the last call."""
         concerns = []
         for entry in inputs:
             name, publishers = entry.topic.name, entry.publishers()
@@ -73,7 +73,7 @@ class Reporter:
         return concerns
 
     def rates(self, inputs: list[Input]) -> dict[str, str]:
-        """Messages a second at each input, of the time that :meth:`rate` was last of."""
+        """Messages per second at each input, over the same time as the last call of :meth:`rate`."""
         values = {}
         for entry in inputs:
             new = entry.received - self._last_received.get(entry, 0)
@@ -90,7 +90,7 @@ class Reporter:
 
 
 def tick_values(state: str, rate: float, counts: TickCounts, period_ms: float) -> dict[str, str]:
-    """Names and texts of what became of a node's ticks."""
+    """Names and texts of the counts of a node's ticks."""
     return {
         "state": state,
         "rate_hz": f"{rate:.1f}",
@@ -103,7 +103,7 @@ def tick_values(state: str, rate: float, counts: TickCounts, period_ms: float) -
 
 
 def input_values(inputs: list[Input]) -> dict[str, str]:
-    """Names and texts of what came in and what of it was refused."""
+    """Names and texts of the counts of received and refused messages."""
     values = {"refused": str(sum(entry.refused.total() for entry in inputs))}
     for entry in inputs:
         values[f"received.{entry.topic.name}"] = str(entry.received)
@@ -115,7 +115,7 @@ def input_values(inputs: list[Input]) -> dict[str, str]:
 
 
 def sender_values(name: str, sender: Sender) -> dict[str, str]:
-    """Names and texts of what the numbers and stamps of a topic's messages tell."""
+    """Names and texts of losses and ages, found by the numbers and stamps of a topic's messages."""
     _, high, most = sender.ages.summary()
     return {
         f"gaps.{name}": str(sender.gaps),
@@ -127,6 +127,6 @@ def sender_values(name: str, sender: Sender) -> dict[str, str]:
 
 
 def recent_values(name: str, numbers_ns: Recent) -> dict[str, str]:
-    """Names and texts of median, 99th percentile and maximum of the last times, in ms."""
+    """Names and texts of median, 99th percentile and maximum of the most recent times, in ms."""
     parts = zip(("median", "p99", "max"), numbers_ns.summary(), strict=True)
     return {f"{name}_ms.{part}": f"{number * 1e-6:.3f}" for part, number in parts}

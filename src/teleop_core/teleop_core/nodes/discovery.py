@@ -1,12 +1,12 @@
-"""Discovery and transport: this machine alone by default, and no reader can hold a writer up.
+"""Discovery and transport: by default only this machine, and no reader can block a writer.
 
-Fast DDS is set up by a profile, an XML file that this package brings:
+Fast DDS is configured by a profile, an XML file of this package:
 
-- **UDP in place of shared memory.** A reader that is killed leaves shared memory in a state that
-  blocks whoever writes to it for two seconds at a time until the reader's lease ends. The kernel
-  throws away what nobody fetches from a socket: the writer never waits.
-- **Loopback.** ``ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST`` alone keeps discovery on the machine,
-  but binds all interfaces: who knows the ports gets all data. The profile binds 127.0.0.1.
+- **UDP instead of shared memory.** A killed reader leaves shared memory in a state that blocks each writer for two
+  seconds at a time, until the reader's lease ends. With sockets, the kernel drops messages that nobody reads: the
+  writer never waits.
+- **Loopback.** ``ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST`` alone limits discovery to the machine, but binds all
+  interfaces: another machine that knows the ports gets all data. The profile binds 127.0.0.1.
 - **Announcements.** Fast DDS announces a new participant five times in half a second, then every
   three seconds. While several processes start on a busy machine, all five may be missed: then
   a topic is silent, and its recording incomplete, for three seconds.
@@ -17,7 +17,7 @@ from collections.abc import Mapping, MutableMapping
 from pathlib import Path
 
 RANGE = "ROS_AUTOMATIC_DISCOVERY_RANGE"
-"""ROS's variable for how far discovery goes: LOCALHOST, SUBNET, SYSTEM_DEFAULT or OFF."""
+"""ROS variable for the range of discovery: LOCALHOST, SUBNET, SYSTEM_DEFAULT or OFF."""
 _PEERS, _LOCAL_ONLY = "ROS_STATIC_PEERS", "ROS_LOCALHOST_ONLY"
 _PROFILES = ("FASTRTPS_DEFAULT_PROFILES_FILE", "FASTDDS_DEFAULT_PROFILES_FILE")
 _FOLDER = Path(__file__).with_name("profiles")
@@ -26,13 +26,13 @@ LOOPBACK, NETWORK = str(_FOLDER / "loopback.xml"), str(_FOLDER / "network.xml")
 
 
 def choose_transport(environment: MutableMapping[str, str] = os.environ) -> None:
-    """Choose the transport of this process and its children; a profile of the user's own wins.
+    """Choose the transport of this process and its children; a user's own profile has priority.
 
-    To be called before the middleware is started. By default, and with LOCALHOST, nothing is sent to or heard from
-    other machines. Middlewares other than Fast DDS get the range alone.
+    Must be called before the middleware is started. By default, and with LOCALHOST, nothing is sent to or received
+    from other machines. For middlewares other than Fast DDS only the range is set.
 
     Args:
-        environment: Variables, which are changed in place.
+        environment: Variables; changed in place.
     """
     if _profile(environment):
         return
@@ -42,15 +42,15 @@ def choose_transport(environment: MutableMapping[str, str] = os.environ) -> None
             environment[RANGE] = "LOCALHOST"
         return
     if is_local:
-        # With LOCALHOST rmw_fastrtps adds shared memory and sockets on all interfaces to those of
-        # the profile; the profile itself says what the range means.
+        # With LOCALHOST, rmw_fastrtps adds shared memory and sockets on all interfaces to the profile's transports.
+        # Therefore only the profile sets the range.
         environment[RANGE] = "SYSTEM_DEFAULT"
         environment.pop(_LOCAL_ONLY, None)
     environment.update(dict.fromkeys(_PROFILES, LOOPBACK if is_local else NETWORK))
 
 
 def _is_local(environment: Mapping[str, str]) -> bool:
-    """Whether nothing that is said reaches beyond this machine."""
+    """Whether no message leaves this machine."""
     if environment.get(_LOCAL_ONLY) == "1":
         return True
     is_said = environment.get(RANGE, "").upper()
@@ -62,7 +62,7 @@ def _profile(environment: Mapping[str, str]) -> str:
 
 
 def beyond_this_machine(environment: Mapping[str, str] = os.environ) -> str:
-    """Who else may take part, in one line; empty if it is this machine alone.
+    """One line about other machines that may take part; empty if only this machine can.
 
     Args:
         environment: Variables, after :func:`choose_transport`.

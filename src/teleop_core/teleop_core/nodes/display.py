@@ -1,7 +1,7 @@
-"""Display: the newest samples of some streams, thirty times a second, for pages that only look.
+"""Display: the newest samples of some streams, thirty times a second, for pages that only display them.
 
-A reader of a stream costs its sender a message a tick, in the loop that must not be late. The
-recorder has all of them already, and says again what people can see.
+Each additional reader of a stream costs the sender one message per tick, in the loop that must not be late. The
+recorder already receives all streams, so it republishes them at a rate for displays.
 """
 
 from dataclasses import replace
@@ -31,18 +31,18 @@ SEEN = (
     SLAVE_MEASURED_CP, SLAVE_MEASURED_CF, SLAVE_JAW_MEASURED_JS, SLAVE_JAW_OBJECT_CP,
     SLAVE_JAW_BOARD, MASTER_ENERGY, SLAVE_ENERGY, TASK_STATE, DISPLAY_MEASURED_CP,
 )  # fmt: skip
-"""Streams that are said again."""
+"""Streams that are republished."""
 PERIOD_NS = 25_000_000
-"""Time from one sample of a stream to the next, at least [ns]."""
+"""Shortest time between two republished samples of a stream [ns]."""
 
 
 def displayed(topic: Topic) -> Topic:
-    """Topic on which a stream, in its arm's namespace, is said again."""
+    """Topic on which a stream is republished, in its arm's namespace."""
     return replace(topic, name=f"/display/{topic.name}")
 
 
 class LiveDisplay:
-    """Slow copies of the streams of one arm, published while somebody subscribes.
+    """Slow copies of the streams of one arm, published while there are subscribers.
 
     Args:
         node: Node that publishes them.

@@ -1,9 +1,9 @@
-"""Feed: messages on their way from a loop to the recorder of its machine, past the middleware.
+"""Feed: sends messages from a loop to the recorder of the same machine, without the middleware.
 
-A loop writes all messages of a tick to a socket at once, and never waits: what the socket does not
-take waits here, up to :data:`MOST` bytes. What exceeds that is lost, and the recorder sees it in
-the numbers of the messages that follow. A loop looks for a recorder once a second. Without one, or
-from another machine, the recorder hears by the middleware.
+A loop writes all messages of a tick to a socket at once, and never waits. Messages that the socket does not accept are
+queued, up to :data:`MOST` bytes. Further messages are lost; the recorder detects this by the numbers of later
+messages. A loop looks for a recorder once a second. Without a feed, and from other machines, the recorder gets
+messages by the middleware.
 """
 
 import json
@@ -15,19 +15,19 @@ from typing import Protocol
 from teleop_core.middleware.world import Line, Listener, World
 
 MOST = 16 << 20
-"""Bytes that wait for a recorder that takes nothing; about 7 s of a session of one arm."""
+"""Largest queue for a recorder that reads nothing [bytes]; about 7 s of a session of one arm."""
 _HEAD = struct.Struct("<IHHIq")  # size, topic, word, number, time [ns]
 _NAMES, _MESSAGE, _JOINED, _LEFT, _END = 0, 1, 2, 3, 4
-_AGAIN_NS = 1_000_000_000  # from one look for a recorder to the next
+_AGAIN_NS = 1_000_000_000  # time between two searches for a recorder
 _READ = 1 << 20  # bytes at once
 
 
 class Channel:
-    """Topic that a loop feeds.
+    """Topic whose messages a loop feeds to the recorder.
 
     Args:
-        feed: Its feed.
-        index: Its place there.
+        feed: Feed of the loop.
+        index: Index of the topic in the feed.
     """
 
     def __init__(self, feed: "Feed", index: int) -> None:
@@ -41,29 +41,29 @@ class Channel:
             self._feed.put(self._index, _MESSAGE, data, self._number, sent_ns)
 
     def join(self, is_inside: bool) -> None:
-        """Tell the recorder whether this process sends the topic, or another one does."""
+        """Tell the recorder whether this process sends the topic; False if another process does."""
         if is_inside is not self._is_inside:
             self._is_inside = is_inside
             self.tell()
 
     def tell(self) -> None:
-        """Say it again, to a recorder that does not know."""
+        """Tell it again to a new recorder."""
         if self._feed.is_open:
             word = _JOINED if self._is_inside else _LEFT
             self._feed.put(self._index, word, time_ns=self._feed.world.time_ns())
 
 
 class Feed:
-    """A loop's way to the recorder.
+    """A loop's connection to the recorder.
 
     Args:
-        names: Topics that it may send, as the recorder knows them.
-        world: Where the loop is.
+        names: Topics that the loop may send, with the names that the recorder uses.
+        world: World of the loop.
 
     Attributes:
         world: As given.
-        channels: Where the messages of each topic go, by its name.
-        waiting: What is to be written.
+        channels: Channel of each topic, by its name.
+        waiting: Bytes that are still to be written.
         is_open: Whether a recorder listens.
     """
 
@@ -75,12 +75,12 @@ class Feed:
         self.channels = {name: Channel(self, index) for index, name in enumerate(self._names)}
 
     def put(self, index: int, word: int, data: bytes = b"", number: int = 0, time_ns: int = 0) -> None:
-        """Append a frame to what waits."""
+        """Append a frame to the queue."""
         self.waiting += _HEAD.pack(len(data), index, word, number, time_ns)
         self.waiting += data
 
     def flush(self) -> None:
-        """Write what waits, as far as the socket takes it; look for a recorder now and then."""
+        """Write as much of the queue as the socket accepts; at intervals, look for a recorder."""
         if self._line is None and self._names:
             now_ns = self.world.monotonic_ns()
             if now_ns - self._looked_ns > _AGAIN_NS:
@@ -91,13 +91,13 @@ class Feed:
                 written = self._line.send(self.waiting)
             except BlockingIOError:
                 return
-            except OSError:  # the recorder has ended; another one may come
+            except OSError:  # the recorder has ended; a new recorder may start
                 self.close()
                 return
             del self.waiting[:written]
 
     def close(self) -> None:
-        """Write the rest as far as it goes, and leave the recorder."""
+        """Write as much of the rest as the socket accepts, and disconnect from the recorder."""
         if self._line is not None:
             self.put(0, _END)
             with suppress(OSError):
@@ -118,24 +118,24 @@ class Feed:
 
 
 class Fed(Protocol):
-    """Who takes the messages of one topic."""
+    """Receiver of the messages of one topic."""
 
     def take(self, data: bytes, sent_ns: int, lost: int) -> None:
-        """Take a message, before which so many were lost."""
+        """Receive a message; ``lost`` messages before it were lost."""
 
     def join(self, is_inside: bool, since_ns: int) -> None:
-        """Take messages from the feed or from the middleware, from those sent at ``since_ns`` on [ns]."""
+        """Receive messages sent from ``since_ns`` on [ns] from the feed, or from the middleware again."""
 
 
 class FeedReader:
-    """The recorder's ends of all feeds of its machine; it hears loops of its own user alone.
+    """The recorder's ends of all feeds of its machine. It accepts only loops of the same user.
 
     Args:
-        channels: Who takes the messages of each topic, by its name.
-        world: Where it is; where another recorder listens already, it hears none.
+        channels: Receiver of the messages of each topic, by its name.
+        world: World of the recorder. If another recorder already listens in it, this one gets no feeds.
 
     Attributes:
-        cut: Feeds that ended without a word: what waited in a process that was killed is lost.
+        cut: Number of feeds that ended without notice: the queued messages of a killed process are lost.
     """
 
     def __init__(self, channels: Mapping[str, Fed], world: World) -> None:
@@ -155,7 +155,7 @@ class FeedReader:
         self._loops = [one for one in self._loops if one.is_open]
 
     def close(self) -> None:
-        """Hear nobody any more."""
+        """Close all feeds."""
         for one in self._loops:
             one.close()
         if self._opened is not None:
@@ -164,7 +164,7 @@ class FeedReader:
 
 
 class _Source:
-    """What one loop feeds; where it ends, its topics are left to others."""
+    """Feed of one loop. When it ends, other senders may send its topics."""
 
     def __init__(self, line: Line, channels: Mapping[str, Fed], world: World) -> None:
         self._line, self._known, self._world, self._came = line, channels, world, bytearray()
@@ -189,7 +189,7 @@ class _Source:
         self._hand_on()
 
     def close(self) -> None:
-        """Leave its topics to others."""
+        """Give its topics back to the middleware."""
         self._line.close()
         self.is_open = False
         for channel in self._channels:
@@ -197,7 +197,7 @@ class _Source:
                 channel.join(False, self._world.time_ns())
 
     def _hand_on(self) -> None:
-        """Hand on whole frames. A sender of malformed frames is no loop of ours and is cut off."""
+        """Pass on whole frames. A sender of malformed frames is not a loop of this package; it is disconnected."""
         try:
             self._take_frames()
         except (IndexError, ValueError, TypeError):

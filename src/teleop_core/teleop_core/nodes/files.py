@@ -1,4 +1,4 @@
-"""Parameter files of a process: checked, made to hold in any namespace, and read for the graph."""
+"""Parameter files of a process: they are checked, adapted to any namespace, and read for the graph."""
 
 import atexit
 import os
@@ -17,10 +17,10 @@ _FLAG = "--params-file"
 
 
 def checked_arguments(arguments: list[str]) -> list[str]:
-    """Arguments in which parameter files are readable, and hold in whatever namespace.
+    """Arguments whose parameter files are readable and apply in any namespace.
 
-    A file names nodes by their bare names, as ours do; the middleware would silently pass it over
-    for a node in a namespace. Such a file is copied with names that hold in every namespace.
+    A file may name nodes without namespace, like the files of this package. The middleware would silently ignore such
+    names for a node in a namespace. Such a file is copied, with names that match in every namespace.
 
     Raises:
         TeleopError: A file is missing or is not YAML.
@@ -31,7 +31,7 @@ def checked_arguments(arguments: list[str]) -> list[str]:
             continue
         content = load(Path(file))
         if isinstance(content, dict) and any(not str(key).startswith("/") for key in content):
-            # Of two names that a node matches the later one wins: the one that says more.
+            # If a node matches two names, the later name applies. Therefore more specific names come later.
             named = {str(key): value for key, value in content.items()}
             keys = sorted(named, key=lambda key: (key.startswith("/"), key.count("/")))
             out[index + 1] = _copy({_anywhere(key): named[key] for key in keys})
@@ -44,11 +44,11 @@ def _anywhere(key: str) -> str:
 
 
 def _copy(content: dict[str, Any]) -> str:
-    """Place of a copy for this process, in a file without a name: nothing can stay of it."""
+    """Path of a copy for this process, in a file without a name, so that nothing of it can remain."""
     file = tempfile.TemporaryFile("w+", encoding="utf-8")  # noqa: SIM115
     file.write(written(content))
     file.flush()
-    _copies.append(file)  # it is there as long as it is open
+    _copies.append(file)  # the file exists as long as it is open
     return f"/dev/fd/{file.fileno()}"
 
 
@@ -78,7 +78,7 @@ def _session_values(arguments: list[str]) -> Iterator[dict[str, Any]]:
 
 
 def session_of(arguments: list[str]) -> SessionParameters:
-    """What the group ``teleop`` of the parameter files says of the graph.
+    """Parameters of the graph in the group ``teleop`` of the parameter files.
 
     Raises:
         TeleopError: A file or a value is wrong.

@@ -1,4 +1,4 @@
-"""Guest: a node that looks at the nodes of a session, or commands them, and is none of them."""
+"""Guest: a node that observes or commands the nodes of a session, but does not belong to it."""
 
 from typing import Any, Self
 
@@ -10,16 +10,16 @@ spare_generator()  # before the first node
 
 
 class Guest:
-    """Owner of a node with a middleware context of its own, to be used with ``with``.
+    """Owner of a node with its own middleware context; a context manager for ``with``.
 
     Args:
-        name: What the node is called.
-        domain: ROS domain; None for that of the environment.
-        world: Where it is.
-        options: Further ones of the node, as rclpy has them.
+        name: Name of the node.
+        domain: ROS domain; None for the domain of the environment.
+        world: World of the session.
+        options: Further options of the node, as in rclpy.
 
     Attributes:
-        world: Where it is, as a guest.
+        world: World of the guest.
         ros: The node.
     """
 
@@ -34,6 +34,6 @@ class Guest:
         self.close()
 
     def close(self) -> None:
-        """Leave."""
+        """Destroy the node."""
         self.ros.destroy_node()
         self.world.shutdown()

@@ -13,9 +13,9 @@ from teleop_core.slave.operation.states import TABLE, Answer, Event, State, answ
 class CrtkMaster:
     """Operating state of the device in the hand.
 
-    It is enabled from the start and needs no homing: its encoders know where it is. In all other states than ENABLED
-    its motors give no force, and the hand moves it freely. An emergency stop of the
-    session makes it FAULT until it is released.
+    The device is enabled from the start and needs no homing, because its encoders are absolute. In all states except
+    ENABLED its motors give no force, and the hand moves it freely. An emergency stop of the session sets the state
+    FAULT until the stop is released.
 
     Args:
         node: Node that owns the topics.
@@ -33,7 +33,7 @@ class CrtkMaster:
         return self._state is State.ENABLED and not self._is_stopped
 
     def request(self, name: str) -> tuple[Answer, str]:
-        """Take a command by name; the answer comes in words as well.
+        """Execute a command by name; the answer includes a text.
 
         Raises:
             UnknownNameError: There is no such command.
@@ -49,13 +49,13 @@ class CrtkMaster:
         return answer, answer_text(event, answer, before)
 
     def press(self, *, is_pressed: bool) -> None:
-        """Take a message of the stop button."""
+        """Process a message of the stop button."""
         if is_pressed is not self._is_stopped:
             self._is_stopped = is_pressed
             self._note()
 
     def close(self) -> None:
-        """Withdraw the topics."""
+        """Close the topics."""
         if self._topics is not None:
             self._topics.close()
 
@@ -82,7 +82,7 @@ class HapticMasterNode(TickingNode):
         self._operation = self.stage.signals[SLAVE_OPERATION.field]
 
     def stop(self) -> None:
-        """Forget the force: the next activation starts without."""
+        """Set the force to zero, so that the next activation starts without force."""
         self._force[:] = 0.0
 
     def teardown(self) -> None:
@@ -92,7 +92,7 @@ class HapticMasterNode(TickingNode):
         super().teardown()
 
     def read_ports(self, trigger: Topic | None = None) -> None:
-        """Bring the signals up to date; a source of force that fell silent adds none."""
+        """Update the signals; a silent source of force counts as zero force."""
         for entry in self.ports.inputs[MASTER_SERVO_CF.name]:
             if entry.age() > self.parameters.force_timeout:
                 entry.zero()
@@ -111,7 +111,7 @@ class HapticMasterNode(TickingNode):
         self._crtk.press(is_pressed=is_pressed)
 
     def concerns(self) -> list[str]:
-        """A stylus that nobody holds; motors that are too warm."""
+        """Texts about a stylus that nobody holds, and about motors that are too warm."""
         found = []
         if not self.stage.is_held:
             found.append(f"waits for {HAND_SERVO_CP.name}: nobody holds the stylus")

@@ -1,4 +1,4 @@
-"""Interrupt: signals that end a live session in order, where its main thread looks for them."""
+"""Interrupt: signals that end a live session in order; its main thread checks for them."""
 
 import os
 import signal
@@ -11,13 +11,13 @@ from teleop_core.nodes.watch import ENDS
 
 
 class Interrupt:
-    """Whether Ctrl-C or another ending signal came. Work goes on until it calls :meth:`check`.
+    """Notes Ctrl-C and other ending signals. The running code continues until it calls :meth:`check`.
 
-    SIGTERM, SIGQUIT, and SIGHUP of a closed terminal act like Ctrl-C. An exception raised by the handler itself could
-    leave a lock of the middleware taken, and the end of the session would wait for it.
+    SIGTERM, SIGQUIT, and SIGHUP of a closed terminal act like Ctrl-C. The handler itself raises no exception: an
+    exception could leave a lock of the middleware locked, and the end of the session would wait for this lock.
 
     Attributes:
-        has_come: Whether one did.
+        has_come: Whether such a signal came.
     """
 
     def __init__(self) -> None:
@@ -30,23 +30,23 @@ class Interrupt:
             _leave_terminal()
 
     def ask(self) -> None:
-        """Do as a signal does, from another thread."""
+        """Request the end like a signal, from another thread."""
         self.has_come = True
 
     def check(self) -> None:
-        """End what runs now, if a signal came.
+        """End the running code if a signal came.
 
         Raises:
-            KeyboardInterrupt: It did.
+            KeyboardInterrupt: A signal came.
         """
         if self.has_come:
             raise KeyboardInterrupt
 
     @contextmanager
     def caught(self) -> Iterator[None]:
-        """Take the signals meanwhile; outside the main thread nothing changes.
+        """Handle the signals within this context; outside the main thread nothing changes.
 
-        What is ignored stays so, such as SIGHUP under ``nohup``.
+        Ignored signals stay ignored, such as SIGHUP under ``nohup``.
         """
         if threading.current_thread() is not threading.main_thread():
             yield
@@ -62,7 +62,7 @@ class Interrupt:
 
 
 def _leave_terminal() -> None:
-    """Write to nowhere from now on: the terminal is gone, and writing to it would raise."""
+    """Discard all further output: the terminal is closed, and writing to it would raise an exception."""
     with open(os.devnull, "w") as nowhere:
         for file in (sys.stdout, sys.stderr):
             with suppress(OSError, ValueError):

@@ -10,19 +10,19 @@ from collections.abc import Callable
 
 STOP = " "
 """Key that stops all arms."""
-_PERIOD = 0.2  # of looking whether the session has ended [s]
+_PERIOD = 0.2  # period of checking whether the session has ended [s]
 
 
 class Keys:
-    """Reader of key presses in a thread of its own; silent where there is no terminal.
+    """Reader of key presses in a separate thread; without a terminal it reads nothing.
 
-    To be used with ``with``.
+    A context manager for ``with``.
 
     Args:
         stop: Called at once, in that thread, when :data:`STOP` is pressed.
 
     Attributes:
-        is_there: Whether somebody can press a key.
+        is_there: Whether there is a terminal to read keys from.
         waiting: Other keys that were pressed, oldest first.
     """
 

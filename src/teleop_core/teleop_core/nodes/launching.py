@@ -1,6 +1,6 @@
-"""Launching: what the launch files start, as plain values, and its description for ``launch``.
+"""Launching: the processes that the launch files start, as plain values, and their description for ``launch``.
 
-``launch`` is not on PyPI: it is imported where a description is made, on a full ROS 2.
+``launch`` is not on PyPI. It is imported only when a description is made, on a full ROS 2.
 """
 
 from collections.abc import Mapping
@@ -40,8 +40,8 @@ TWO_ARMS = {
 
 
 _ONCE = (RECORDER_NAME, "slave", "slave_sim")
-"""Nodes that are not started again: a recording that exists stays as it is, and an arm that broke
-down moves again on purpose only."""
+"""Nodes that are not restarted: an existing recording is not changed, and an arm that failed must not move again by
+itself."""
 _RESPAWN_DELAY = 2.0
 
 
@@ -50,13 +50,13 @@ class Process:
     """One process to start.
 
     Attributes:
-        executable: Of this package.
-        arguments: Before ROS arguments.
-        name: Name of its node; empty if it holds several.
-        namespace: Where it is, with the slash before it.
+        executable: Executable of this package.
+        arguments: Arguments before the ROS arguments.
+        name: Name of its node; empty if it contains several nodes.
+        namespace: Its namespace, with leading slash.
         parameters: Parameter file, kept until the launching process ends.
         log_level: Lowest level of its log.
-        respawns: Whether it is started again when it ends.
+        respawns: Whether it is restarted when it ends.
     """
 
     executable: str
@@ -69,11 +69,11 @@ class Process:
 
 
 def processes(given: Mapping[str, str], namespace: str = "") -> list[Process]:
-    """Processes of a session, the recorder first and masters last: nothing that is sent is missed.
+    """Processes of a session, the recorder first and masters last, so that no message is missed.
 
     Args:
-        given: Arguments by name, as :data:`COMMON` and one of the others have them.
-        namespace: Of an including launch file.
+        given: Arguments by name, as in :data:`COMMON` and in the arguments of one launch file.
+        namespace: Namespace of an including launch file.
 
     Raises:
         TeleopError: An argument is wrong.
@@ -119,7 +119,7 @@ def describe(own: Mapping[str, tuple[str, str]]) -> "LaunchDescription":
     """Description of a launch file.
 
     Args:
-        own: Its arguments beside :data:`COMMON`: name to default and meaning.
+        own: Its arguments in addition to :data:`COMMON`: name to default and meaning.
     """
     from launch.actions import DeclareLaunchArgument, OpaqueFunction
     from launch_ros.actions import Node

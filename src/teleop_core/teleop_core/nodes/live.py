@@ -1,4 +1,4 @@
-"""Live session: the graph as one process per node, started, watched, recorded and stopped."""
+"""Live session: runs the graph as several processes, which are started, watched, recorded and stopped."""
 
 import tempfile
 import time
@@ -31,22 +31,23 @@ from teleop_core.session.notes import notes_of
 from teleop_core.slave.slave import SlaveParameters
 
 SILENCE = 30.0
-"""A node at work that has not reported for this long serves nobody [s].
+"""A working node that has not reported for this time counts as failed [s].
 
-Whether its process stands still, and whether its loop does, is found within seconds by others:
-:mod:`teleop_core.nodes.children` and :mod:`teleop_core.nodes.watch`.
+Whether its process or its loop hangs is detected within seconds by :mod:`teleop_core.nodes.children` and
+:mod:`teleop_core.nodes.watch`.
 """
 _LOOK = 0.5
-"""Whoever sends setpoints this soon after processes were started is not one of them [s]."""
+"""A sender of setpoints that is found this soon after the processes were started is not one of them [s]."""
 _ALONE = 1.0
-"""Who has been alone in its domain for this long, all at work, owns it; later ones end [s]."""
+"""A session that has been alone in its domain for this time, with all nodes at work, owns the domain; later sessions
+end [s]."""
 
 _TRANSPORT = dict.fromkeys(Processes, 0.3e-3) | {Processes.NODES: 1.4e-3}
-"""From a sample of the device to its force and back [s], as `make bench` measures: within a process
-on the hand's side, or two of the three hops from master to slave."""
+"""Time from a sample of the device to the force on it [s], as measured by `make bench`: within a process on the hand's
+side, or over two of the three hops from master to slave."""
 _PRIORITY = 20
-"""SCHED_FIFO priority of loops where a session does not name one and the system grants it."""
-_NEWS_PERIOD = 5.0  # from line to line about a node that is long in starting [s]
+"""SCHED_FIFO priority of loops if a session does not set one and the system allows it."""
+_NEWS_PERIOD = 5.0  # time between two lines about a node that starts slowly [s]
 
 
 def live(
@@ -61,23 +62,23 @@ def live(
 ) -> None:
     """Run and record a session as ROS 2 nodes, for the configured duration or until Ctrl-C.
 
-    With ``teleop.ends_with_task`` it ends once no task has a goal left.
+    With ``teleop.ends_with_task`` the session ends when no task has a goal left.
 
     Args:
-        configuration: What runs, and for how long.
+        configuration: Configuration of the session, with its duration.
         out: Directory of the recording, made here.
-        console: Where the progress is shown.
-        processes: How the nodes are shared out.
-        without: Nodes that are not started: others stand in their place, such as an arm bridge in
-            that of ``slave_sim``.
-        interrupt: What ends it from another thread; None for signals alone.
-        domain: ROS domain; None for that of ``ROS_DOMAIN_ID``, or else a free one.
+        console: Console that shows the progress.
+        processes: Distribution of the nodes over processes.
+        without: Nodes that are not started because other nodes replace them, for example an arm bridge instead of
+            ``slave_sim``.
+        interrupt: Object that ends the session from another thread; None for signals only.
+        domain: ROS domain; None for ``ROS_DOMAIN_ID``, or a free domain if that is not set.
 
     Raises:
         RecordingError: The directory exists.
-        UnknownNameError: A node that is to be left out is not there.
-        SessionError: The ROS domain has a session already; or a node did not start, died or
-            hangs, and then the recording is closed nevertheless.
+        UnknownNameError: ``without`` names a node that does not exist.
+        SessionError: The ROS domain already has a session; or a node did not start, died or hangs. The recording is
+            closed even then.
     """
     out = Path(out).absolute()
     if out.exists():
@@ -85,7 +86,7 @@ def live(
     shared = crews(configuration.graph, processes, without)
     env = environment(domain)
     interrupt = interrupt or Interrupt()
-    # A file without a name: there is nothing to remove, however this ends.
+    # A file without a name needs no removal, however this process ends.
     with (
         tempfile.TemporaryFile("w+") as parameters,
         Starter(configuration.text(), env) as starter,
@@ -120,7 +121,7 @@ _UNGRANTED = (
 def _priority(configuration: Configuration, processes: Processes) -> int | None:
     """Priority of the loops; None: as configured.
 
-    With a process for each node it stays 0: together they need more than two processors.
+    With one process per node it stays 0, because these processes together need more than two processors.
     """
     if configuration.groups[SESSION].real_time.priority >= 0 or processes is Processes.NODES:
         return None
@@ -128,7 +129,7 @@ def _priority(configuration: Configuration, processes: Processes) -> int | None:
 
 
 class _Session:
-    """Processes of one session and what they report."""
+    """Processes of one session and their reports."""
 
     def __init__(
         self,
@@ -152,13 +153,13 @@ class _Session:
         self.crews = crews(self._graph)
 
     def tell_where(self, out: Path) -> None:
-        """Say how others find the nodes, and where they are recorded."""
+        """Print how to find the nodes, and the path of the recording."""
         domain = self._env["ROS_DOMAIN_ID"]
         self.say(f"ROS domain {domain}; others join it with ROS_DOMAIN_ID={domain}")
         self.say(f"recording to {out}")
 
     def run(self, keys: Keys) -> None:
-        """Start, watch and stop all nodes; the recorder comes first and goes last."""
+        """Start, watch and stop all nodes; the recorder starts first and stops last."""
         self._keys = keys
         try:
             self._work()
@@ -187,7 +188,7 @@ class _Session:
             self.say("stopped")
 
     def _await_starter(self) -> None:
-        """Wait until all that the nodes share is loaded."""
+        """Wait until the starter has loaded everything that the nodes share."""
         progress = _Progress({"nodes": self._starter})
         while not self._starter.is_ready(0.1):
             self._interrupt.check()
@@ -219,13 +220,13 @@ class _Session:
         self._ready = time.monotonic()
 
     def _insist_on_one_owner(self, own: int) -> None:
-        """Refuse a domain in which arms of the same names run, on whatever machine.
+        """Refuse a domain in which arms with the same names already run, on any machine.
 
         Args:
-            own: Senders of an arm's setpoints that are ours.
+            own: Number of senders of an arm's setpoints in this session.
 
         Raises:
-            SessionError: There are more.
+            SessionError: There are more senders.
         """
         for arm in self._graph.namespaces:
             topic = SLAVE_SETPOINT_JS.of_arm(arm).name
@@ -236,7 +237,7 @@ class _Session:
                 )
 
     def _await_operator(self) -> None:
-        """Wait until the hand moves, which it does after a while even if no arm follows."""
+        """Wait until the hand moves. After some time the hand moves even if no arm follows."""
         hands = [m.name for m in self._graph.members if m.stage.name == HAND]
         operators = [name for name in hands if name in self._observer.statuses]
         while not all(self._observer.statuses[m].number("has_begun") for m in operators):
@@ -262,7 +263,7 @@ class _Session:
             child.check()
 
     def _obey(self) -> None:
-        """Do what pressed keys ask for. The stop key does not come here: it is sent at once."""
+        """Execute the pressed keys, except the stop key, whose stop is sent at once in another thread."""
         while self._keys.waiting:
             if self._keys.waiting.popleft() != "e":
                 continue
@@ -296,7 +297,7 @@ class _Session:
                 raise SessionError(reason + child.last_words())
 
     def _line(self) -> str:
-        """How the session is, in one line."""
+        """One line about the state of the session."""
         statuses = self._observer.statuses
         refused = sum(status.number("refused") for status in statuses.values())
         parts = []
@@ -319,19 +320,19 @@ class _Session:
         ]
 
     def say(self, text: str) -> None:
-        """Say a line to whoever looks on."""
-        with suppress(OSError):  # who closed the terminal is not to hold up the end
+        """Print a line on the console."""
+        with suppress(OSError):  # a closed terminal must not block the end
             self._console.print(printable(text), highlight=False, markup=False, soft_wrap=True)
 
     def _stop(self) -> list[str]:
-        """End all nodes in order, whatever signals come; returns what is to be told of it."""
+        """End all nodes in order, whatever signals come; returns texts about problems."""
         recorder = self._children.pop(RECORDER_NAME, None)
         failures = end_all(self._children.values())
         return failures + end_all([recorder] if recorder else [])
 
 
 class _Progress:
-    """What processes say while they start."""
+    """Progress that processes report while they start."""
 
     def __init__(self, children: Mapping[str, Child | Starter]) -> None:
         self._children = children
@@ -343,7 +344,7 @@ class _Progress:
         return time.monotonic() - self._begin
 
     def news(self) -> list[str]:
-        """Lines about what takes long, now and then."""
+        """Lines about processes that take long, printed at intervals."""
         seen = {name: child.doing for name, child in self._children.items()}
         now = time.monotonic()
         if seen != self._seen:
@@ -354,7 +355,7 @@ class _Progress:
         return [f"{name}: {doing}" for name, doing in seen.items() if "compiling" in doing]
 
     def age(self) -> float:
-        """Time since any of them got further [s]."""
+        """Time since the last progress of any of them [s]."""
         return time.monotonic() - self._last
 
 
@@ -366,15 +367,15 @@ def session_parameters(
     starts_recorder: bool = True,
     priority: int | None = None,
 ) -> dict[str, Any]:
-    """Parameters of all nodes, as a ROS 2 parameter file has them; ``out`` is that of the recorder.
+    """Parameters of all nodes, as the text of a ROS 2 parameter file; ``out`` is the recorder's parameter.
 
-    Every node is named with its namespace. What feeds its ports, where that is not the topic of
-    the port's name, stands in its ``links``.
+    Every node is named with its namespace. A port that is not fed by the topic of its own name has an entry in the
+    node's ``links``.
 
     Args:
         configuration: The session.
-        out: Directory of the recording; empty: bags/ and the time.
-        namespace: Where all nodes are, without slashes before and after it.
+        out: Directory of the recording; empty: a directory in bags/ named by the time.
+        namespace: Namespace of all nodes, without leading and trailing slash.
         priority: Priority of the loops; None: as configured.
         starts_recorder: Whether the recorder configures and activates itself.
     """

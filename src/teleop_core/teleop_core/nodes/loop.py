@@ -1,4 +1,4 @@
-"""Loop: the thread of a node that does its work, beside the executor that serves its parameters."""
+"""Loop: the working thread of a node; the executor serves the node's parameters in another thread."""
 
 import sys
 import traceback
@@ -11,26 +11,24 @@ _END_PATIENCE = 8.0  # the last turn may compile a kernel, or wait for a slow di
 
 
 class Loop:
-    """Thread that takes one turn after another until it is stopped.
+    """Thread that makes one turn after another until it is stopped.
 
     Args:
-        world: Where it is.
+        world: World of the loop.
         name: Name of the thread.
-        turn: One turn; blocks for a tenth of a second at most.
-        fail: Told in words, and whether it was expected, why a turn could not be finished; the
-            loop has ended then.
-        prepare: Called once in the thread before the first turn, may take long; None if the turns
-            do it themselves.
-        patience: Time without any progress after which it counts as hung, less the time for which
-            it waited for a processor [s]; 0: it never does.
+        turn: Makes one turn; blocks for at most a tenth of a second.
+        fail: Called when a turn failed and the loop has ended, with the reason and whether it was expected.
+        prepare: Called once in the thread before the first turn, may take long; None if the turns prepare themselves.
+        patience: Time without progress after which the loop counts as hung, without the time for which it waited for a
+            processor [s]; 0: never.
 
     Attributes:
         name: Name of the thread.
         turns: Number of turns taken.
         patience: As given.
-        is_running: Whether it goes on; False once it is to stop.
+        is_running: Whether the loop continues; False after it was told to stop.
         is_ready: Whether it is prepared.
-        is_hung: Whether a watchdog has found it so.
+        is_hung: Whether a watchdog found that it hangs.
     """
 
     def __init__(
@@ -53,7 +51,7 @@ class Loop:
         self._thread.start()
 
     def stop(self) -> bool:
-        """End after the present turn; returns whether it did. A loop that hangs is left behind."""
+        """End after the current turn; returns whether the loop has ended. A loop that hangs is abandoned."""
         self.is_running = False
         if self._world.thread_ident() == self._thread.ident:
             return True
@@ -62,16 +60,16 @@ class Loop:
 
     @property
     def is_alive(self) -> bool:
-        """Whether it takes turns still."""
+        """Whether the loop still makes turns."""
         return self._thread.is_alive()
 
     @property
     def thread(self) -> int:
-        """Number by which the system knows its thread; 0 before it has begun."""
+        """Number of its thread in the operating system; 0 before the thread has begun."""
         return self._thread.native_id or 0
 
     def place(self) -> str:
-        """Where its thread is now: the innermost calls, the last one last."""
+        """Current position of its thread in the code: the innermost calls, the most recent call last."""
         frame = sys._current_frames().get(self._thread.ident or 0)
         if frame is None:
             return "  it has ended"
@@ -88,5 +86,5 @@ class Loop:
                 self.turns += 1
         except TeleopError as error:
             self._fail(str(error), True)
-        except Exception:  # a thread would die without a word
+        except Exception:  # the thread would end without a message
             self._fail(traceback.format_exc(), False)

@@ -1,4 +1,4 @@
-"""Making: the node of a stage, of a class of its own or of a general one."""
+"""Making: makes the node of a stage, of its own class or of a generic class."""
 
 from importlib import import_module
 from typing import Any
@@ -18,6 +18,6 @@ def node_class(stage: Stage) -> Any:
 
 
 def make_node(stage: Stage, **options: Any) -> CoreNode:
-    """Node of a stage; ``options`` as of :class:`~teleop_core.nodes.tuned.TunedNode`."""
+    """Node of a stage; ``options`` are those of :class:`~teleop_core.nodes.tuned.TunedNode`."""
     node: CoreNode = node_class(stage)(stage, **options)
     return node

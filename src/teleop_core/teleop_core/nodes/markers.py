@@ -1,4 +1,4 @@
-"""Live markers: what RViz and Foxglove draw beside the robot, while somebody looks."""
+"""Live markers: shapes that RViz and Foxglove draw beside the robot, published while there are subscribers."""
 
 from typing import Any
 
@@ -30,7 +30,7 @@ class LiveMarkers:
     Args:
         node: Node that publishes them.
         arm: Namespace of the arm.
-        axes: Rotation (3, 3) from its master's base to its slave's axes; None for the published.
+        axes: Rotation (3, 3) from its master's base to its slave's axes; None for the published rotation.
     """
 
     def __init__(self, node: CoreNode, arm: str, axes: Array | None = None) -> None:
@@ -40,7 +40,7 @@ class LiveMarkers:
         self._time_ns = node.world.time_ns
 
     def show(self, newest: Newest) -> None:
-        """Publish what is due while somebody listens."""
+        """Publish the markers that are due, if there are subscribers."""
         if not self._cadence.is_due():
             return
         if not self._publisher.get_subscription_count():

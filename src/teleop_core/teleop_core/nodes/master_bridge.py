@@ -1,4 +1,4 @@
-"""Node ``master_bridge``: a real device in the place of ``haptic_master``."""
+"""Node ``master_bridge``: a real device instead of ``haptic_master``."""
 
 from collections.abc import Callable, Iterable
 from typing import Any
@@ -12,20 +12,19 @@ from teleop_core.nodes.news import Trouble
 from teleop_core.nodes.streams import Subscription, message_type
 from teleop_core.nodes.ticking import TickingNode
 
-_WAITING = 20  # messages of the device that wait while the loop is late
-_BUTTONS_AGAIN_NS = 20_000_000  # silent buttons are lost ones: they are said again after this
+_WAITING = 20  # number of the device's messages that are queued while the loop is late
+_BUTTONS_AGAIN_NS = 20_000_000  # button states are sent again after this time, since silent buttons count as lost
 
 
 class MasterBridgeNode(TickingNode):
-    """Passes on what the device says, and sends it the newest force.
+    """Passes on the device's poses and buttons, and sends it the newest force.
 
-    ``master/measured_cp`` goes out for each sound pose, under the time at which that was taken, and
-    never otherwise: its silence makes the slave hold. The buttons are said again as long as the
-    device is heard.
+    The node publishes ``master/measured_cp`` for each valid pose, with the time of that pose as stamp, and never
+    otherwise: its silence makes the slave hold. The buttons are repeated as long as messages of the device come.
     """
 
     def setup(self, parameters: MasterBridgeParameters) -> None:
-        """Make the stage, open its topics and those of the device."""
+        """Make the stage, open its topics and the topics of the device."""
         super().setup(parameters)
         p = parameters
         heard = Topic(p.pose_topic, Kind.POSE, message=p.pose_message)
@@ -50,7 +49,7 @@ class MasterBridgeNode(TickingNode):
         super().teardown()
 
     def work(self, ticks: Iterable[int], report: Callable[[int], None] | None = None) -> None:
-        """Pass on what the device has said, and send it the force of the newest tick."""
+        """Pass on the device's messages, and send it the force of the newest tick."""
         self.read_ports()
         now_ns = self.epoch_ns + max(ticks)
         with self.lock:
@@ -69,7 +68,7 @@ class MasterBridgeNode(TickingNode):
             self._forces.publish(self._wrench)
 
     def _listen(self) -> bool:
-        """Take what has come; whether the buttons were pressed or released."""
+        """Read the received messages; return whether a button was pressed or released."""
         while (taken := self._poses.take()) is not None:
             message = read_message(taken.data, self._poses.type)
             has_stamp = self.parameters.pose_stamps == "header" and hasattr(message, "header")
@@ -94,13 +93,13 @@ class MasterBridgeNode(TickingNode):
         return bool(self.stage.hear(pose_of(message), stamp_ns, now_ns))
 
     def values(self) -> dict[str, str]:
-        """How many poses of the device were refused."""
+        """Number of refused poses of the device."""
         refused = self.stage.refused.items()
         return {f"refused.device.{reason}": str(count) for reason, count in refused}
 
 
 def pose_of(message: Any) -> Any:
-    """Pose (7,) that a PoseStamped, TransformStamped or Pose holds, in its own unit."""
+    """Pose (7,) in a PoseStamped, TransformStamped or Pose message, in the message's unit."""
     pose = getattr(message, "pose", None) or getattr(message, "transform", message)
     place = pose.position if hasattr(pose, "position") else pose.translation
     turn = pose.orientation if hasattr(pose, "orientation") else pose.rotation

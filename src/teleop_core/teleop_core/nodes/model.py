@@ -17,11 +17,11 @@ _NOWHERE = np.zeros(7)
 class LiveModel:
     """Frames of the robots of a running session.
 
-    The robot's description comes with the first joints that are its own: a session of another
-    robot, recorded alone, is not drawn as this one.
+    The robot's description is sent with the first joints that match the robot. If the recorder records the session of
+    another robot, that robot is thus not drawn as this one.
 
     Args:
-        model: What is drawn.
+        model: Model that is drawn.
     """
 
     def __init__(self, model: Model) -> None:
@@ -31,11 +31,11 @@ class LiveModel:
         self._read = [topic for arm in self._arms for topic in (_joints(arm), _stylus(arm))]
 
     def forget(self) -> None:
-        """Describe the robots again, as at the beginning of a recording."""
+        """Send the robots' descriptions again, for example at the beginning of a recording."""
         self._described.clear()
 
     def messages(self, newest: Newest) -> list[tuple[Topic, bytes, int]]:
-        """What is due: topic, bytes, and the time of arrival [ns] of the newest that is drawn."""
+        """Messages that are due: topic, bytes, and the time of arrival [ns] of the newest drawn sample."""
         latest_ns = max(map(newest.received_ns, self._read), default=0)
         if not latest_ns or latest_ns // self._period_ns == self._slot:
             return []
@@ -58,10 +58,10 @@ class LiveModel:
 
 
 class ModelTopics:
-    """Publishers of the frames, as far as their messages are installed: ``tf2_msgs`` is with ROS.
+    """Publishers of the frames whose message types are installed: ``tf2_msgs`` is part of ROS.
 
     Args:
-        node: Node that owns them.
+        node: Node that owns the publishers.
         topics: Topics of the model.
     """
 
@@ -75,7 +75,7 @@ class ModelTopics:
             self._publishers[topic.name] = publisher
 
     def send(self, topic: Topic, data: bytes) -> None:
-        """Publish a message: frames while somebody listens, what is latched always."""
+        """Publish a message: frames only if there are subscribers, latched messages always."""
         publisher = self._publishers.get(topic.name)
         if publisher is not None and (topic is not TF or publisher.get_subscription_count()):
             publisher.publish(data)
@@ -90,5 +90,5 @@ def _stylus(arm: ArmModel) -> Topic:
 
 
 def absolute(topic: Topic) -> Topic:
-    """The topic by its full name: its arm's namespace holds that of the node already."""
+    """The topic with its full name: the arm's namespace already includes the node's namespace."""
     return replace(topic, name=f"/{topic.name}")

@@ -1,4 +1,4 @@
-"""Node ``network``: delays and loses what goes between both sides, whoever publishes it."""
+"""Node ``network``: delays and loses messages between both sides, whichever node publishes them."""
 
 from typing import Any
 
@@ -12,9 +12,9 @@ _THERE = (topics.NETWORK_SERVO_CP, topics.NETWORK_MASTER_ENERGY, topics.NETWORK_
 
 
 class NetworkNode(TickingNode):
-    """Passes on what arrives in a tick; where nothing does, nothing is sent.
+    """Passes on the messages that arrive in a tick; if none arrives, nothing is sent.
 
-    A stamp is passed on once, except of the slave's setpoint, which may move under one stamp.
+    Each stamp is passed on once, except stamps of the slave's setpoint, which may move while its stamp stays the same.
     """
 
     def setup(self, parameters: NetworkParameters) -> None:
@@ -23,7 +23,7 @@ class NetworkNode(TickingNode):
         self._passed = {topic: 0 for topic in self.description.writes if topic is not topics.NETWORK_STATE}
 
     def turn(self) -> None:
-        """Make all steps that are due; a packet is sent when it is read, however late that is."""
+        """Make all steps that are due; a packet counts as sent when this node reads it, however late that is."""
         due, state = list(self.schedule.due()), self.stage.state
         for tick_ns in due[:-1]:
             self.make_tick(tick_ns, self.send_report)
@@ -32,13 +32,13 @@ class NetworkNode(TickingNode):
         self.make_tick(due[-1], self.send_report)
 
     def send(self, now_ns: int) -> None:
-        """Send what arrived in the step, and now and then how much did."""
+        """Send the messages that arrived in the step and, at intervals, the counts."""
         has_come = self.stage.state["arrived"]
         silent = {topic.name for topic in self._passed if not self._is_due(topic, has_come)}
         self.ports.send(now_ns, silent)
 
     def _is_due(self, topic: topics.Topic, has_come: Any) -> bool:
-        """Whether a topic arrived, and anew."""
+        """Whether a new message of a topic arrived."""
         if not has_come[THERE if topic in _THERE else BACK]:
             return False
         before_ns, stamp_ns = self._passed[topic], self.row[f"{topic.field}_ns"]

@@ -1,4 +1,4 @@
-"""Newest: the last message of each topic that the recorder has, for those who show them."""
+"""Newest: the last message of each topic that the recorder received, for displays."""
 
 from collections.abc import Callable
 
@@ -18,22 +18,22 @@ class Newest:
         self._messages: dict[str, Arrival] = {}
 
     def take(self, came: list[Arrival]) -> None:
-        """Take what came, in its order."""
+        """Add the received messages, in their order."""
         for message in came:
             self._messages[message[1].name] = message
 
     def data(self, topic: Topic) -> bytes:
-        """Newest message of a topic, the same object until the next comes; empty before any."""
+        """Newest message of a topic; the same object until the next message comes; empty before the first message."""
         message = self._messages.get(topic.name)
         return b"" if message is None else message[2]
 
     def received_ns(self, topic: Topic) -> int:
-        """When it came [ns]; 0 before any."""
+        """Time of arrival of the newest message [ns]; 0 before the first message."""
         message = self._messages.get(topic.name)
         return 0 if message is None else message[0]
 
     def values(self, topic: Topic, joint_names: tuple[str, ...] = ()) -> tuple[int, Array] | None:
-        """Stamp [ns] and values of the newest message; None without a sound one."""
+        """Stamp [ns] and values of the newest message; None if there is no valid message."""
         data = self.data(topic)
         if not data:
             return None
@@ -43,18 +43,18 @@ class Newest:
 
 
 class Cadence:
-    """When it is time again.
+    """Tells when a period has passed.
 
     Args:
-        clock: Monotonic time [ns].
-        period_ns: From one time to the next, at least [ns].
+        clock: Returns the monotonic time [ns].
+        period_ns: Shortest time between two due times [ns].
     """
 
     def __init__(self, clock: Callable[[], int], period_ns: int) -> None:
         self._clock, self._period_ns, self._last_ns = clock, period_ns, 0
 
     def is_due(self) -> bool:
-        """Whether it is time; it is not again before the period is over."""
+        """Whether the period has passed; if so, a new period begins."""
         now_ns = self._clock()
         if now_ns - self._last_ns < self._period_ns:
             return False

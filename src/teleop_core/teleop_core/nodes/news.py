@@ -1,4 +1,4 @@
-"""News: lines for the log, said once, where something that matters has changed."""
+"""News: log lines about relevant changes, each logged once."""
 
 import re
 from collections.abc import Iterable
@@ -12,13 +12,13 @@ _COMMANDS = ("servo_", "move_", "interpolate_")
 
 
 def introduction(stage: Stage, inputs: Iterable[Input], outputs: Iterable[str], robot: str) -> str:
-    """What a node does, in one line.
+    """One line about the task of a node.
 
     Args:
-        stage: What it is in the graph.
-        inputs: What it reads.
+        stage: Stage of the node in the graph.
+        inputs: Inputs that the node reads.
         outputs: Names of the topics that it writes.
-        robot: Name of its robot; empty without one.
+        robot: Name of its robot; empty without a robot.
     """
     read = ", ".join(f"/{entry.topic.name}" for entry in inputs) or "nothing"
     written = ", ".join(f"/{name}" for name in outputs) or "nothing"
@@ -28,11 +28,11 @@ def introduction(stage: Stage, inputs: Iterable[Input], outputs: Iterable[str], 
 
 
 class Commanders:
-    """Who sends the commands that a node reads, as the middleware knows it.
+    """Senders of the commands that a node reads, as known to the middleware.
 
     Args:
         owner: The node.
-        stage: What it is in the graph: its trigger is a command too.
+        stage: Stage of the node in the graph; its trigger counts as a command.
     """
 
     def __init__(self, owner: Owner, stage: Stage) -> None:
@@ -41,7 +41,7 @@ class Commanders:
         self._known: dict[str, list[str]] = {}
 
     def news(self, inputs: Iterable[Input]) -> list[str]:
-        """One line for each command topic whose senders are others than at the last call."""
+        """One line for each command topic whose senders have changed since the last call."""
         found = []
         for entry in inputs:
             if entry.subscription is None or not self._is_command(entry.topic.name):
@@ -58,11 +58,13 @@ class Commanders:
 
 
 class Trouble:
-    """Log of why a bridge holds: each reason once, whatever numbers it contains, and when it is over.
+    """Log of the reasons why a bridge holds.
+
+    Each reason is logged once, even if numbers in it change, and again when it is over.
 
     Args:
         owner: The node.
-        well: What is logged when nothing is wrong any more.
+        well: Text that is logged when nothing is wrong any more.
     """
 
     def __init__(self, owner: Owner, well: str) -> None:
@@ -70,14 +72,14 @@ class Trouble:
         self._told, self._told_ns = "", 0
 
     def tell(self, concerns: list[str]) -> None:
-        """Log what is wrong now, unless that is known; returns at once."""
+        """Log current problems that are not logged yet; returns at once."""
         text = "; ".join(concerns)
         words = re.sub(r"[\d.]+", "", text)
         now_ns = self._owner.world.monotonic_ns()
         if words == self._told or now_ns - self._told_ns < _CALM_NS:
             return
         self._told, self._told_ns = words, now_ns
-        self._owner.ros.defer(self._log, text)  # a line takes milliseconds, which no loop has
+        self._owner.ros.defer(self._log, text)  # a log line takes milliseconds, too long for a loop
 
     def _log(self, text: str) -> None:
         log = self._owner.ros.get_logger()

@@ -1,4 +1,4 @@
-"""Observer: what all nodes of a graph say in ``diagnostics``."""
+"""Observer: reads the ``diagnostics`` of all nodes of a graph."""
 
 import math
 from dataclasses import dataclass, field
@@ -38,15 +38,15 @@ class Observer(Guest):
 
     Args:
         domain: ROS domain.
-        name: What its node is called.
-        button: Stop button of its own, which outlives it; None: it makes one.
-        world: Where it is.
-        options: Further ones of the node, as rclpy has them.
+        name: Name of its node.
+        button: Stop button to use, which outlives the observer; None makes a new button.
+        world: World of the session.
+        options: Further options of the node, as in rclpy.
 
     Attributes:
         statuses: Newest report of each node.
-        malformed: Messages that were no reports.
-        has_heartbeat: Whether an arm expects its stop buttons to speak again and again.
+        malformed: Number of messages that were not valid reports.
+        has_heartbeat: Whether an arm expects regular messages from its stop buttons.
     """
 
     def __init__(
@@ -64,24 +64,24 @@ class Observer(Guest):
         self._button = button or StopButton(self)
 
     def close(self) -> None:
-        """Leave."""
+        """Destroy the node."""
         self._reports.close()
         super().close()
 
     def listen(self, timeout: float) -> None:
-        """Take all reports that come within ``timeout`` [s] of the first one or of now."""
+        """Read all reports until ``timeout`` [s] after the call or after the first report."""
         self._reports.wait(timeout)
         self.take()
 
     def take(self) -> bool:
-        """Take all reports that have come; whether there were any."""
+        """Read all received reports; return whether there were any."""
         if self.has_heartbeat:
             self._button.beat()
         is_new = False
         while (taken := self._reports.take()) is not None:
             try:
                 reports = read_reports(taken.data)
-            except ValueError:  # bytes of anybody, that are no report
+            except ValueError:  # bytes from an unknown sender that are not a report
                 self.malformed += 1
                 continue
             for one in reports:
@@ -90,11 +90,11 @@ class Observer(Guest):
         return is_new
 
     def press(self, *, is_pressed: bool = True) -> None:
-        """Press the emergency stop of all arms, or let this button go; from any thread."""
+        """Press the emergency stop of all arms, or release this button; may be called from any thread."""
         self._button.say(is_pressed=is_pressed)
 
     def senders(self, topic: str) -> int:
-        """Publishers of a topic that were found."""
+        """Number of discovered publishers of a topic."""
         return int(self.ros.count_publishers(f"/{topic}"))
 
     def is_active(self, name: str) -> bool:

@@ -12,29 +12,30 @@ from teleop_core.slave.operation.presses import Presses
 from teleop_core.slave.operation.states import COMMANDS, Answer
 
 STOP_TOPIC = "/teleop/stop"
-"""Emergency stop of all arms, std_msgs/Bool: true stops; false says that it is alive."""
+"""Emergency stop of all arms, std_msgs/Bool: true stops; false means that the button is alive and not pressed."""
 RELEASE = "release"
-"""Service that overrides stop buttons which are pressed; it is no command of the arm's state."""
+"""Service that overrides pressed stop buttons; it is not a command of the arm's state."""
 _EVERY = 4
 _BEAT_NS = 100_000_000
-"""A button of this package that has spoken says its state again so often [ns]."""
+"""Period at which a button of this package repeats its state, after its first message [ns]."""
 _LOOK = 0.1
-"""A slave looks for buttons that it has not heard so often [s]."""
+"""Period at which a slave looks for buttons that have sent nothing yet [s]."""
 _GRACE_NS = 500_000_000
-"""A button that was found so long ago and has said nothing counts as pressed [ns].
+"""A button that has sent nothing for this time after its discovery counts as pressed [ns].
 
-Who sends again and again is heard within it, for reader and sender find each other about a tenth of a second apart.
+A button that repeats its state is heard within this time, because reader and sender discover each other within about a
+tenth of a second.
 """
 _BYTES = 5
 """A Bool as CDR: four bytes of encapsulation, one of data."""
 READERS = (Qos(keeps_all=True), Qos(keeps_all=True, is_latched=True), Qos(keeps_all=True, is_reliable=False))
-"""Readers of the stop: for all who send reliably; for the state that a button had before it was
-found; for those who send at best effort, whom a reliable reader does not hear. They keep all, for a
-press must not make room for a release."""
+"""Readers of the stop: the first for all reliable senders; the second for the state that a button had before it was
+discovered; the third for best-effort senders, which a reliable reader does not receive. They keep all messages,
+because a release must not replace an unread press in the queue."""
 
 
 class StopButton:
-    """Emergency stop button: says its state, and tells it to whoever comes later too.
+    """Emergency stop button: publishes its state, also to readers that are discovered later.
 
     Args:
         owner: Node that owns it.
@@ -47,17 +48,17 @@ class StopButton:
         self._said_ns = 0
 
     def say(self, *, is_pressed: bool) -> None:
-        """Say that it is pressed, or that it is not; from any thread.
+        """Publish that the button is pressed or released; may be called from any thread.
 
-        A release is said once: the middleware sends the last message again until it has arrived,
-        and one that is missing before it would count as a press.
+        A release is published once: the middleware repeats the last message until it has arrived, and a missing
+        message before it would count as a press.
         """
         if self._is_pressed is False and not is_pressed:
             return
         self._say(is_pressed)
 
     def beat(self) -> None:
-        """Repeat its state, if it has one and was silent for a while.
+        """Repeat the button's state, if it has a state and was silent for some time.
 
         A slave with ``operation.heartbeat`` counts the silence of a known button as a press.
         """
@@ -71,31 +72,30 @@ class StopButton:
 
     @property
     def listeners(self) -> int:
-        """Readers that were found."""
+        """Number of discovered readers."""
         return int(self._own.get_subscription_count())
 
 
 class StopInput:
-    """The emergency stop, looked at in every tick: 1 µs, and no executor on the way.
+    """The emergency stop, read in every tick, which takes 1 µs and needs no executor.
 
-    The first reader is looked at in every tick, the two others in every fourth. No press is lost:
-    readers keep all messages, and what is missing counts as a press
-    (:class:`~teleop_core.slave.operation.presses.Presses`), by the numbers of messages and by the
-    account of the first reader, which hears all who send reliably. The second reader hears what was
-    said long ago, too. A button that is there and says nothing counts as pressed after half a second: nobody knows
-    whether it was pressed before it was found.
+    The first reader is read in every tick, the other two in every fourth tick. No press is lost: readers keep all
+    messages, and missing messages count as a press (:class:`~teleop_core.slave.operation.presses.Presses`). Missing
+    messages are found by the message numbers and by the loss count of the first reader, which receives all reliable
+    senders. The second reader also receives earlier states. A button that exists but sends nothing counts as pressed
+    after half a second, because it may have been pressed before its discovery.
 
     Args:
-        owner: Node that owns it; its executor looks for such buttons.
+        owner: Node that owns it; its executor looks for buttons that send nothing.
 
     Attributes:
-        has_new: Whether a button was heard for the first time; set it back before :meth:`learn`.
+        has_new: Whether a new button was heard; reset it before calling :meth:`learn`.
     """
 
     def __init__(self, owner: Owner) -> None:
         self._ros, self.has_new = owner.ros, False
         self._now_ns = owner.world.monotonic_ns
-        self._found_ns: dict[bytes, int] = {}  # of buttons that have said nothing yet
+        self._found_ns: dict[bytes, int] = {}  # buttons that have sent nothing yet
         self._silent: tuple[bytes, ...] = ()
         self._timer = self._ros.create_timer(_LOOK, self._look_for_silent)
         self._takers = [self._ros.create_taker(Bool, STOP_TOPIC, qos) for qos in READERS]
@@ -103,11 +103,11 @@ class StopInput:
         self._names: dict[bytes, str] = {}
 
     def take(self, now_ns: int = 0, *, is_idle: bool = False) -> list[bool]:
-        """What the stop was since the last call, oldest first: pressed or not; mostly nothing.
+        """States of the stop since the last call, oldest first: pressed or not; usually empty.
 
         Args:
-            now_ns: Time, of any clock that never goes back [ns].
-            is_idle: Whether a press before the first message of a new button stops nothing.
+            now_ns: Time of any monotonic clock [ns].
+            is_idle: Whether a possible press before a new button's first message would stop nothing.
         """
         found: list[bool] = []
         self._ticks += 1
@@ -123,7 +123,7 @@ class StopInput:
                     found += presses.overhear(taken.sender, now_ns, is_pressed=is_pressed)
                 else:
                     found += presses.take(taken.sender, taken.number, now_ns, is_pressed=is_pressed, is_idle=is_idle)
-        if looks_at_all and self._silent:  # now that all they have said is read
+        if looks_at_all and self._silent:  # after all their messages are read
             found += [said for one in self._silent for said in presses.doubt(one)]
         return [*presses.lose(self._takers[0].lost), *found]
 
@@ -139,7 +139,7 @@ class StopInput:
 
     @property
     def lost(self) -> int:
-        """Messages of stop buttons that were lost; each counted as a press."""
+        """Number of lost messages of stop buttons; each counted as a press."""
         return self._presses.lost
 
     def holders(self, silent_since_ns: int = 0) -> tuple[bytes, ...]:
@@ -148,7 +148,7 @@ class StopInput:
         return tuple(dict.fromkeys((*presses.holders, *presses.silent(silent_since_ns))))
 
     def learn(self) -> None:
-        """Look up the names of new buttons before they are gone; takes longer than a tick."""
+        """Look up the names of new buttons while they exist; takes longer than a tick."""
         self._look_up()
 
     def names(self, buttons: Iterable[bytes]) -> str:
@@ -157,9 +157,9 @@ class StopInput:
         return " and ".join(self._names.get(one, "a button") + ("" if one in there else " (gone)") for one in buttons)
 
     def unheard(self) -> str:
-        """Names of buttons whose state nobody knows; takes longer than a tick.
+        """Names of buttons whose state is unknown; takes longer than a tick.
 
-        They are there, have said nothing yet, and do not repeat their state for late readers.
+        These buttons exist, have sent nothing yet, and do not send their last state to late readers.
         """
         return " and ".join(self._unheard().values())
 
@@ -171,7 +171,7 @@ class StopInput:
         }
 
     def release(self) -> None:
-        """Override all buttons that hold the stop pressed, or are missed."""
+        """Override all buttons that are pressed or missing."""
         self._presses.release()
 
     def close(self) -> None:
@@ -181,33 +181,33 @@ class StopInput:
             taker.close()
 
     def _look_up(self) -> dict[bytes, tuple[str, bool]]:
-        """Name of each button that is there, and whether it tells its state to who comes late."""
+        """Name of each existing button, and whether it sends its last state to late readers."""
         there = {end.sender: (end.node, end.is_latched) for end in self._ros.publishers(STOP_TOPIC)}
         self._names |= {sender: name for sender, (name, _) in there.items()}
         return there
 
 
 class Commanded(Protocol):
-    """Taker of the stop and of named commands, each of which is answered with a text."""
+    """Receiver of the stop and of named commands; each command is answered with a text."""
 
     def request(self, event: str) -> tuple[Answer, str]:
-        """Take a command."""
+        """Execute a command."""
 
     def press(self, *, is_pressed: bool, heard_ns: int) -> None:
-        """Take what stop buttons said."""
+        """Process a state of the stop buttons."""
 
 
 class CommandServices:
     """Services ``slave/enable``, ``slave/stop``, … and ``slave/release`` of one arm.
 
-    All are std_srvs/Trigger. ``slave/release`` overrides the stop buttons that are pressed or
-    missed, and its answer names them; the stop stays latched until ``slave/reset``.
+    All are std_srvs/Trigger. ``slave/release`` overrides the stop buttons that are pressed or missing, and its answer
+    names them; the stop stays latched until ``slave/reset``.
 
     Args:
-        node: Node that owns them; its ``lock`` is held while a command is taken.
-        arm: What takes the commands.
+        node: Node that owns the services; its ``lock`` is held while a command is processed.
+        arm: Receiver of the commands.
         stop: Its emergency stop.
-        holders: Which buttons hold the stop now.
+        holders: Returns the buttons that are pressed or missing now.
     """
 
     def __init__(self, node: Any, arm: Commanded, stop: StopInput, holders: Callable[[], tuple[bytes, ...]]) -> None:
@@ -238,6 +238,6 @@ class CommandServices:
         return response
 
     def close(self) -> None:
-        """Withdraw them."""
+        """Close the services."""
         for service in self._own:
             self._node.ros.destroy(service)

@@ -1,4 +1,4 @@
-"""Node ``operator``: the hand on the stylus, of a simulated person or of one at a device."""
+"""Node ``operator``: the hand on the stylus, of a simulated person or of a person at a device."""
 
 from dataclasses import replace
 from typing import Any
@@ -16,18 +16,18 @@ from teleop_core.nodes.streams import Input
 from teleop_core.nodes.ticking import TickingNode
 
 _SELDOM = 4
-"""Buttons are looked at in every so many ticks."""
+"""Number of ticks between two readings of the buttons."""
 
 
 class HandInput:
-    """``operator/servo_cp``, ``buttons`` and ``jaw``, looked at in every tick: 2 µs, no executor.
+    """Inputs ``operator/servo_cp``, ``buttons`` and ``jaw``, read in every tick, in 2 µs and without executor.
 
-    They stand among the ports of the node, which reports, forgets and closes them.
+    The inputs are added to the ports of the node, which reports, resets and closes them.
 
     Args:
-        node: Node that owns them, configured.
-        hand: Who gets what they say.
-        has_poses: Whether poses are read; else the buttons alone.
+        node: Configured node that owns the inputs.
+        hand: Hand that gets their values.
+        has_poses: Whether poses are read; if False, only the buttons.
     """
 
     def __init__(self, node: Any, hand: RemoteHand, *, has_poses: bool) -> None:
@@ -45,7 +45,7 @@ class HandInput:
         return entry
 
     def read(self) -> None:
-        """Hand on what has come: the newest pose, every press and release of a button, and the jaw."""
+        """Pass on the received values: the newest pose, every press and release of a button, and the jaw."""
         if self._poses is not None and self._poses.newest():
             self._hand.want(self._pose)
         self._ticks += 1
@@ -64,7 +64,7 @@ class HandInput:
         return [f"waits for {topics.OPERATOR_SERVO_CP.name}: nobody holds the stylus"]
 
     def values(self) -> dict[str, str]:
-        """Whether somebody holds the stylus, and who sends the poses."""
+        """Whether somebody holds the stylus, and the sender of the poses."""
         if self._poses is None:
             return {}
         found = self._node.ros.publishers(f"/{self._poses.topic.name}")
@@ -73,13 +73,13 @@ class HandInput:
 
 
 _FULL = 3.3
-"""Force that is told a person in full [N]; a rumble has no more."""
+"""Force that is shown to a person at full strength [N]; a rumble cannot be stronger."""
 _LOOK = 10
-"""Ticks from one look at the state to the next, of operators who answer to nothing."""
+"""Ticks between two readings of the state, for operators that do not react to measurements."""
 
 
 class OperatorNode(TickingNode):
-    """Publishes the wanted place of the hand, once per millisecond."""
+    """Publishes the wanted pose of the hand, once per millisecond."""
 
     _hand: HandInput | None = None
     _device: DeviceHand | None = None
@@ -91,7 +91,7 @@ class OperatorNode(TickingNode):
         self._force = self.stage.signals[topics.MASTER_MEASURED_CF.field]
         self._hand, self._device = None, None
         self._sees = self.stage.ahead <= MOST
-        if not self._sees:  # whoever plans so far ahead answers to nothing
+        if not self._sees:  # an operator that plans so far ahead does not react to measurements
             for port in (topics.SLAVE_MEASURED_CP, topics.MASTER_MEASURED_CP, topics.MASTER_MEASURED_CF):
                 self.input(port).close()
         kind, hand = parameters.kind, self.stage.hand
@@ -108,11 +108,11 @@ class OperatorNode(TickingNode):
         self._hand = HandInput(self, hand, has_poses=operator.opens is None)
 
     def _share(self) -> float:
-        """Force that the person shall feel, as a share of the largest."""
+        """Force that the person should feel, as a share of the largest force."""
         return min(float(np.linalg.norm(self._force[:3])) / _FULL, 1.0)
 
     def stop(self) -> None:
-        """Let go: the next activation starts without a hand."""
+        """Release the stylus, so that the next activation starts without a hand."""
         if self.stage.hand is not None:
             self.stage.hand.let_go()
 
@@ -123,7 +123,7 @@ class OperatorNode(TickingNode):
         super().teardown()
 
     def read_ports(self, trigger: topics.Topic | None = None) -> None:
-        """Bring the signals up to date, and read the pose that a person or program commands."""
+        """Update the signals, and read the pose that a person or program commands."""
         self._ticks += 1
         if self._sees or not self.has_own_loop or self._ticks % _LOOK == 0:
             super().read_ports(trigger)
@@ -131,7 +131,7 @@ class OperatorNode(TickingNode):
             self._hand.read()
 
     def concerns(self) -> list[str]:
-        """An operator who waits for the slave, or for a person."""
+        """Texts about an operator that waits for the slave or for a person."""
         found = []
         if not self.stage.has_begun:
             found.append("waits until teleop/state says that the slave follows")
@@ -139,7 +139,7 @@ class OperatorNode(TickingNode):
         return found + [text for one in people if one is not None for text in one.concerns()]
 
     def values(self) -> dict[str, str]:
-        """Whether the operator moves yet, and whose hand it is."""
+        """Whether the operator already moves, and whose hand it is."""
         begun = {"has_begun": str(int(self.stage.has_begun))}
         people = (self._hand, self._device)
         return begun | {k: v for one in people if one is not None for k, v in one.values().items()}

@@ -1,9 +1,9 @@
 """Parent: the line between a node's process and the live session that started it.
 
-Both ends are sockets of one pair. The system closes an end when its process is gone, however it
-went: so a node knows at once that nobody watches it any more. The other way it says ten times a
-second, from a thread of its own, what it is doing: a process that is busy starting, even compiling,
-is heard, and one that stands still is not. Started by hand, a process has no such line.
+Both ends are sockets of one pair. The system closes an end when its process has ended for any reason, so a node
+detects the end of its parent at once. In the other direction, a separate thread of the node reports ten times a second
+what the process is doing. A process that is starting or compiling thus still reports; a stopped process does not. A
+process that was started by hand has no such line.
 """
 
 import os
@@ -26,9 +26,9 @@ class Parent:
 
     @classmethod
     def of_environment(cls) -> "Parent | None":
-        """Line that the parent left open for this process; None if it was started by hand.
+        """Line that the parent opened for this process; None if it was started by hand.
 
-        It is for this process alone: what it starts itself does not get it.
+        Only this process has the line; its own children do not inherit it.
         """
         number = os.environ.pop(VARIABLE, "")
         if not number.isdecimal():
@@ -37,7 +37,7 @@ class Parent:
         return cls(socket.socket(fileno=int(number)))
 
     def fileno(self) -> int:
-        """Number of the file, to wait for."""
+        """File descriptor of the line, to wait on."""
         return self._line.fileno()
 
     def has_gone(self) -> bool:
@@ -50,11 +50,11 @@ class Parent:
             return True
 
     def close(self) -> None:
-        """Let go of the line."""
+        """Close the line."""
         self._line.close()
 
     def tell(self, word: str) -> None:
-        """Say what this process is doing; lost if the parent stands still itself."""
+        """Report what this process is doing; the report is lost if the parent itself is stopped."""
         try:
             self._line.send(f"{word}\n".encode())
         except OSError:

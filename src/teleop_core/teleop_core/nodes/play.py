@@ -1,4 +1,4 @@
-"""Play: publish a recording on live topics, for machines without ``ros2 bag``."""
+"""Play: publishes a recording on live topics, for machines without ``ros2 bag``."""
 
 import math
 import os
@@ -24,9 +24,9 @@ from teleop_core.nodes.streams import message_type
 
 _KNOWN = BY_NAME | {topic.name: topic for topic in (TF, ROBOT_DESCRIPTION)}
 _DISCOVERY_NS = 1_000_000_000
-"""Time for subscribers to be found before the first message."""
+"""Waiting time for the discovery of subscribers before the first message."""
 _EARLY_NS = 100_000
-"""By how much a message may come too early."""
+"""Largest time by which a message may be published too early."""
 
 
 def play(
@@ -37,15 +37,15 @@ def play(
     world: World = ROS,
     interrupt: Interrupt | None = None,
 ) -> int:
-    """Publish a recording with its own bytes and spacing, until its end or a signal that ends it.
+    """Publish a recording with its original bytes and time intervals, until its end or an ending signal.
 
     Args:
         bag: The recording.
-        topics: Topics to publish; None for all, without ``/tf`` where its type is not installed.
-        rate: Times real time, > 0.
-        console: Where the progress is shown, if it is a terminal.
-        world: Where it is published.
-        interrupt: What ends it beside signals of this process.
+        topics: Topics to publish; None for all, except ``/tf`` if its type is not installed.
+        rate: Speed relative to real time, > 0.
+        console: Console that shows the progress, if it is a terminal.
+        world: World in which it is published.
+        interrupt: Object that ends it, in addition to signals of this process.
 
     Returns:
         Number of messages published.
@@ -101,7 +101,7 @@ def _publishers(bag: Bag, names: list[str], world: World) -> Iterator[dict[str, 
 
 
 def _is_installed(bag: Bag, name: str) -> bool:
-    """Whether messages of a topic can be published; ``tf2_msgs`` comes with ROS alone."""
+    """Whether messages of a topic can be published; ``tf2_msgs`` is available only with ROS."""
     try:
         _type_in(bag, name)
     except RecordingError:

@@ -1,4 +1,4 @@
-"""Ports: what a node reads and writes, on the fields of its stage's signals."""
+"""Ports: connect the topics that a node reads and writes to the fields of its stage's signals."""
 
 from collections.abc import Callable, Collection
 from dataclasses import replace
@@ -19,25 +19,25 @@ from teleop_core.middleware.world import Publisher
 from teleop_core.nodes.streams import Input, Output
 
 Feeds = Callable[[str], list[tuple[str, float]]]
-"""Port to the topics that feed it, each with its delay [s]."""
+"""Function from a port to the topics that feed it, each with its delay [s]."""
 
 
 class Ports:
     """Inputs and outputs of one stage.
 
     Args:
-        owner: Node that owns them.
-        arm: Its namespace, without the slash before it.
-        stage: What they are the ports of.
+        owner: Node that owns the ports.
+        arm: Its namespace, without leading slash.
+        stage: Stage to which the ports belong.
         signals: Record of the stage.
         joint_names: Order of the joints.
-        feeds: What feeds a port.
+        feeds: Returns the topics that feed a port.
         publisher: Opens the publisher of a topic.
-        buttons: Which buttons of a message are clutch, fixture and mode; -1: it has none.
+        buttons: Indices of clutch, fixture and mode among a message's buttons; -1 if the message lacks a button.
 
     Attributes:
-        inputs: Per port, by its name, what feeds it; where there are several they are added.
-        outputs: What is written, by the topic in its namespace.
+        inputs: Inputs of each port, by its name; values of several inputs are added.
+        outputs: Outputs, by the topic in its namespace.
         row: The signals, by the names of their fields.
     """
 
@@ -55,7 +55,7 @@ class Ports:
         self._arm, self._stage, self.row = arm, stage, Cells(signals)
         self._must_check = stage.name not in BUILT_IN
         self.refused = 0
-        """Steps whose outputs were not sent, because they held NaN or infinity."""
+        """Number of steps whose outputs were not sent because they contained NaN or infinity."""
         self.inputs: dict[str, list[Input]] = {}
         self.outputs: dict[Topic, Output] = {}
         self._summed: list[tuple[str, list[Array]]] = []
@@ -69,11 +69,11 @@ class Ports:
             ]
             if len(targets) > 1:
                 self._summed.append((port.field, targets))
-        # Bound once: a tick goes through them a thousand times a second.
+        # Built once, because every tick uses them, a thousand times a second.
         self._ports = [(p.name, f"{p.field}_ns", self.inputs[p.name]) for p in stage.reads]
         self._stamped: list[tuple[Output, str]] = []
-        self._passed_on: dict[Output, int] = {}  # stamps that went out last
-        self._seldom: dict[Output, tuple[bytes, int]] = {}  # what went out last, and its stamp
+        self._passed_on: dict[Output, int] = {}  # stamps that were sent last
+        self._seldom: dict[Output, tuple[bytes, int]] = {}  # values that were sent last, and their stamp
         for topic in stage.writes:
             if topic.kind is not Kind.REPORT:
                 form = layout(topic.of_arm(arm), joint_names)
@@ -93,19 +93,19 @@ class Ports:
         return f"{ports[0].field}_ns" if ports else ""
 
     def input(self, port: Topic) -> Input:
-        """Input of a port; where several topics are added up, the one that the others are added to."""
+        """Input of a port. If the values of several topics are added, the input of the first topic."""
         return self.inputs[port.name][0]
 
     def output(self, topic: Topic) -> Output:
-        """What is written to a topic of the stage."""
+        """Output of a topic of the stage."""
         return self.outputs[topic.of_arm(self._arm)]
 
     def all_inputs(self) -> list[Input]:
-        """What is read at all ports."""
+        """Inputs of all ports."""
         return [entry for entries in self.inputs.values() for entry in entries]
 
     def read(self, trigger: Topic | None = None) -> None:
-        """Bring the signals up to date, all ports but that of the trigger."""
+        """Update the signals of all ports except the trigger's port."""
         own = trigger.name if trigger is not None else ""
         for name, stamp_field, entries in self._ports:
             if name != own:
@@ -118,10 +118,10 @@ class Ports:
             self.row[name] = np.sum(parts, axis=0)
 
     def send(self, now_ns: int, silent: Collection[str] = ()) -> None:
-        """Send what the stage wrote, each under the stamp that its topic says, but for some topics.
+        """Send the stage's outputs, except the topics in ``silent``. Each gets the stamp that its topic declares.
 
-        An output whose stamp was sent already is no new answer and is not sent. Nor is a value of a user's stage that
-        is not finite.
+        An output whose stamp was already sent is not a new answer and is not sent. Values of a user's stage that are
+        not finite are not sent either.
         """
         row = self.row
         if self._must_check and not all(output.is_sound() for output, _ in self._stamped):
@@ -133,7 +133,7 @@ class Ports:
             self.send_one(output, row[stamp_field] if stamp_field else now_ns)
 
     def send_one(self, output: Output, stamp_ns: int) -> None:
-        """Send the present values of one output under a stamp [ns], as :meth:`send` does."""
+        """Send the current values of one output with a stamp [ns], as :meth:`send` does."""
         if output in self._passed_on:
             if self._passed_on[output] == stamp_ns:
                 return
@@ -146,11 +146,11 @@ class Ports:
         output.send(stamp_ns)
 
     def mute(self) -> None:
-        """Send nothing: somebody else does."""
+        """Send nothing from now on, because another node publishes these topics."""
         self._stamped, self.outputs = [], {}
 
     def concerns(self) -> list[str]:
-        """What is wrong with what the stage writes, in words."""
+        """Texts about problems of the stage's outputs."""
         lost = f"{self.refused} steps wrote NaN or infinity: not sent"
         return [lost] if self.refused else []
 
@@ -177,7 +177,7 @@ def _name_for(owner: Any, name: str) -> str:
 
 
 def _nothing(*_: object) -> Any:
-    """Stand in for feeds and publishers that nobody asks for."""
+    """Placeholder for feeds and publishers that are never used."""
 
 
 NO_PORTS = Ports(None, "", Stage("none", NoParameters, (), ()), make_signals((), 0)[0], (), _nothing, _nothing)

@@ -24,7 +24,7 @@ def run(make_crew: Callable[[], Crew]) -> int:
     SIGINT, SIGTERM, SIGHUP and SIGQUIT end it in order.
 
     Args:
-        make_crew: The node's class, or that of what holds several.
+        make_crew: Class of the node, or of a crew of several nodes.
 
     Returns:
         Exit code: 0; 1 after a failure at work; 2 if a parameter or file is wrong.
@@ -57,7 +57,7 @@ def run(make_crew: Callable[[], Crew]) -> int:
 
 
 class Watching(Protocol):
-    """Who sees to the end of a process.
+    """Watcher that ends a process.
 
     Attributes:
         word: What the process is doing: starting, at work, ending, leaving.
@@ -67,18 +67,18 @@ class Watching(Protocol):
 
 
 def serve(crew: Crew, watch: Watching, world: World) -> int:
-    """Start, work and end; returns the exit code."""
+    """Start the nodes, serve them until the end, and end them; returns the exit code."""
     executor, nodes = world.executor(), crew.nodes
     first = nodes[0]
     for node in nodes:
         executor.add_node(node.ros)
         node.ended, node.ending = first.ended, first.ending
     first.ended.add_done_callback(lambda _: executor.wake())
-    with ExitStack() as end:  # last first, and each whatever becomes of the others
+    with ExitStack() as end:  # in reverse order, and each node even if another one fails
         end.callback(executor.shutdown)
         for node in reversed(nodes):
-            end.callback(node.flush)  # which blocks all threads of the process
-        for node in nodes:  # the one that was started first sees all others end
+            end.callback(node.flush)  # this blocks all threads of the process
+        for node in nodes:  # the node that was started first ends last
             end.callback(node.finish)
         end.callback(_begin_end, crew, watch)
         code = _autostart(nodes, world)
@@ -94,13 +94,13 @@ def _spin_once(executor: Executor, node: CoreNode) -> None:
         executor.spin_once()
     except WorldEndedError:
         node.end(1)
-    except Exception:  # of a request that cannot be read, such as one that others forged
+    except Exception:  # for a request that cannot be read, such as a forged one
         node.ros.get_logger().error(f"a request failed:\n{traceback.format_exc()}", throttle_duration_sec=10.0)
 
 
 def _begin_end(crew: Crew, watch: Watching) -> None:
     watch.word = "ending"
-    with crew.nodes[0].ending:  # who asked for the end uses the executor no longer
+    with crew.nodes[0].ending:  # the thread that asked for the end no longer uses the executor
         pass
     crew.halt()
 
@@ -125,11 +125,11 @@ def _finish(code: int) -> int:
 
 
 def _leave(code: int) -> None:
-    """End the process, whatever its other threads are doing, and without what Python tidies up.
+    """End the process, whatever its other threads are doing, and without Python's cleanup.
 
-    After a failure topics are not even closed one by one: Fast DDS 2.14 crashes now and then
-    (StatefulWriter::matched_reader_add) when a writer goes while others are being discovered, as
-    in a node that fails right after its start; its exit code would be lost.
+    After a failure, topics are not closed one by one either. Fast DDS 2.14 sometimes crashes
+    (StatefulWriter::matched_reader_add) if a writer is closed while others are being discovered. This happens in a
+    node that fails right after its start, and its exit code would be lost.
     """
     sys.stdout.flush()
     sys.stderr.flush()

@@ -1,8 +1,8 @@
-"""Quality: how topics are transported, by default and as ``qos_overrides`` parameters say.
+"""Quality: QoS of topics, by default and with ``qos_overrides`` parameters.
 
-ROS's own way: ``qos_overrides./slave/measured_js.publisher.reliability: best_effort`` in a
-parameter file or behind ``--ros-args -p`` changes one policy of the publisher or subscription that
-a node has for a topic, by its full name.
+Overrides are those of ROS: ``qos_overrides./slave/measured_js.publisher.reliability: best_effort`` in a parameter file
+or after ``--ros-args -p`` changes one policy of a node's publisher or subscription of a topic. The topic has its full
+name.
 """
 
 from collections.abc import Mapping
@@ -26,15 +26,15 @@ _DEPTH_MAX = 100_000
 
 
 def profile(topic: Topic, depth: int | None = None, side: Side = "publisher") -> Qos:
-    """How a topic is transported, before overrides.
+    """QoS of a topic, before overrides.
 
-    A stream is offered reliable, so that subscribers of both kinds get it, and asked for best
-    effort by our own readers, which want the newest sample alone and hear senders of both kinds.
+    A stream is offered as reliable, so that reliable and best-effort subscribers get it. Readers of this package
+    subscribe with best effort: they need only the newest sample and receive senders of both kinds.
 
     Args:
         topic: The topic.
-        depth: In place of the topic's own, for deep queues.
-        side: Which end of it.
+        depth: Queue length instead of the topic's own, for long queues.
+        side: Publisher or subscription.
     """
     is_best_effort = topic.quality is Quality.STREAM and side == "subscription"
     return Qos(
@@ -51,7 +51,7 @@ class QualityOverrides:
         given: All parameters that the node was given.
 
     Raises:
-        ParameterError: One has another form, or another value, than there can be.
+        ParameterError: An override has an invalid form or value.
     """
 
     def __init__(self, given: Mapping[str, object]) -> None:
@@ -59,7 +59,7 @@ class QualityOverrides:
         self._used: set[str] = set()
 
     def apply(self, name: str, side: Side, base: Qos) -> Qos:
-        """Quality of one end of a topic with its full name, as overrides change it."""
+        """QoS of one end of a topic with its full name, after overrides."""
         for key, (policy, value) in self._values.items():
             if key.startswith(f"{PREFIX}{name}.{side}."):
                 base = replace(base, **{policy: value})
@@ -71,13 +71,13 @@ class QualityOverrides:
         return sorted(set(self._values) - self._used)
 
     def concerns(self) -> list[str]:
-        """What was given and has no effect, in words."""
+        """Texts about overrides that have no effect."""
         unused = self.unused()
         return [f"no effect of {', '.join(unused)}: no such topic is open here"] if unused else []
 
 
 NO_OVERRIDES = QualityOverrides({})
-"""Those of a node that was given none."""
+"""Overrides of a node that was given none."""
 
 
 def _checked(name: str, value: object) -> tuple[str, Any]:

@@ -1,4 +1,4 @@
-"""Rate: the schedule of a 1 kHz loop, with the clock and the sleep handed in."""
+"""Rate: the schedule of a 1 kHz loop; clock and sleep are passed as functions."""
 
 import zlib
 from collections.abc import Callable, Sequence
@@ -9,18 +9,19 @@ import numpy as np
 from teleop_core.graph.signals import TICK_NS
 
 REPORT_PERIOD = 1.0
-"""From one report of a node to the next [s]."""
+"""Time between two reports of a node [s]."""
 
 
 def report_phase(stage: str, stages: Sequence[str], arm: str = "") -> float:
-    """Remainder of the times of a node's reports by their period [s].
+    """Phase of a node's reports: their times modulo the period [s].
 
-    A report takes milliseconds: no two of a session are due at once, in whatever processes.
+    A report takes milliseconds. The phases are chosen so that no two nodes of a session report at the same time, in
+    any process.
 
     Args:
         stage: Name of the node's stage.
         stages: Names of all stages.
-        arm: Name of the node's arm, which puts it between two others.
+        arm: Name of the node's arm, which shifts the phase to between two stages.
     """
     place = stages.index(stage) if stage in stages else len(stages)
     between = zlib.crc32(arm.encode()) / 2**32 if arm else 0.0
@@ -29,14 +30,14 @@ def report_phase(stage: str, stages: Sequence[str], arm: str = "") -> float:
 
 @dataclass
 class TickCounts:
-    """What became of the ticks of a loop so far.
+    """Counts of the ticks of a loop so far.
 
     Attributes:
-        ticks: Ticks executed.
-        late: Wake-ups later than half a period.
-        missed: Ticks that were not begun before the next one was due.
-        caught_up: Missed ticks that were executed all the same, in the next wake-up.
-        dropped: Missed ticks that never will be.
+        ticks: Executed ticks.
+        late: Wake-ups that were late by more than half a period.
+        missed: Ticks that did not begin before the next tick was due.
+        caught_up: Missed ticks that were executed later, in the next wake-up.
+        dropped: Missed ticks that are never executed.
     """
 
     ticks: int = 0
@@ -50,7 +51,7 @@ class Recent:
     """The last numbers of a stream, for their median and extremes.
 
     Args:
-        size: How many are kept.
+        size: Number of values that are kept.
     """
 
     def __init__(self, size: int = 1000) -> None:
@@ -76,16 +77,16 @@ class Recent:
 
 
 class Schedule:
-    """Absolute schedule of ticks: one for every elapsed period, however late the wake-ups are.
+    """Absolute schedule of ticks: one tick for every elapsed period, however late the wake-ups are.
 
     Args:
-        clock: Monotonic time [ns].
-        sleep: Waits for some seconds, perhaps longer, perhaps shorter.
-        max_catch_up: Largest number of missed ticks that one wake-up makes up for; what is
-            missed beyond it is dropped and counted.
-        period_ns: Time from tick to tick [ns].
-        phase_ns: Remainder of the times of all ticks by the period, by which loops of one machine
-            keep their order [ns]; None: whenever it starts.
+        clock: Returns the monotonic time [ns].
+        sleep: Waits for some seconds; it may wait too long or too short.
+        max_catch_up: Largest number of missed ticks that are executed in one wake-up; further missed ticks are dropped
+            and counted.
+        period_ns: Time between two ticks [ns].
+        phase_ns: Times of all ticks modulo the period, which keeps loops of one machine in order [ns]; None: the phase
+            of the start.
     """
 
     def __init__(
@@ -101,11 +102,11 @@ class Schedule:
         self._phase_ns = phase_ns
         self.counts = TickCounts()
         self.lateness = Recent()
-        """Wake-up after the tick it was for, [ns]."""
+        """Delay of each wake-up after the time of its tick, [ns]."""
         self.start()
 
     def start(self) -> None:
-        """Begin now: the first tick is due one period from here, or at the next phase after it."""
+        """Begin now: the first tick is due after one period, or at the next phase after that time."""
         self._next_ns = self._clock() + self._period_ns
         if self._phase_ns is not None:
             self._next_ns += (self._phase_ns - self._next_ns) % self._period_ns

@@ -1,4 +1,4 @@
-"""Node ``recorder``: every message of the graph as it came, in an MCAP recording."""
+"""Node ``recorder``: records every message of the graph, as received, in MCAP files."""
 
 import sys
 import time
@@ -34,15 +34,15 @@ from teleop_core.session.model import Model
 from teleop_core.session.runner import describe
 
 DEPTH = 2000
-"""Messages of one topic that wait while the disk or another process is slow: two seconds."""
+"""Queue length of a topic while the disk or another process is slow [messages]: two seconds."""
 HOLD_NS = 100_000_000
-"""Longest time for which messages wait before they go to the disk [ns]: what a loss of power or the
-end of the process costs is this time and that of writing one chunk, together below 0.2 s."""
+"""Longest time for which messages are collected before they are written [ns]. A loss of power or the end of the
+process loses the messages of this time plus the time of writing one chunk, together below 0.2 s."""
 DISCOVERY_NS = 3_000_000_000
-"""Time within which two nodes that are there have found each other [ns]; most take a tenth."""
+"""Time within which two existing nodes discover each other [ns]; most need a tenth of it."""
 _PAUSE = 5e-3
 _RECENT = 1000
-"""Messages of a topic that may have come by the middleware before its feed tells of itself."""
+"""Number of messages of a topic that may come by the middleware before its feed announces itself."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,22 +58,22 @@ class RecorderParameters(RecordingParameters):
 
 
 class _Channel:
-    """One recorded topic: how much came, and how much the middleware lost on the way."""
+    """One recorded topic, with counts of received messages and of messages that the middleware lost."""
 
     def __init__(self, node: CoreNode, topic: Topic) -> None:
         self.topic, self._node, self._world = topic, node, node.world
         self.received = self.lost = 0
-        self._numbers: dict[bytes, int] = {}  # the last one of each publisher
+        self._numbers: dict[bytes, int] = {}  # last number of each publisher
         self._since_ns = 0  # since when it listens
         self._given: deque[Arrival] = deque()
         self._subscription: Subscription | None = None
         self._inside_ns: int | None = None
-        self._recent: deque[int] = deque(maxlen=_RECENT)  # when what the topic brought was sent
-        self._twice = 0  # messages of a feed that the topic has brought already
+        self._recent: deque[int] = deque(maxlen=_RECENT)  # times of sending of messages that came by the topic
+        self._twice = 0  # messages of a feed that already came by the topic
         self._follow()
 
     def join(self, is_inside: bool, since_ns: int | None = None) -> None:
-        """Take messages from :meth:`give`, or from the topic, that were sent since then [ns].
+        """Receive messages from :meth:`give`, or from the topic again, beginning with those sent at ``since_ns`` [ns].
 
         Messages that already came by the topic are not recorded twice.
         """
@@ -84,14 +84,14 @@ class _Channel:
         self._twice = sum(sent_ns >= since_ns for sent_ns in self._recent) if is_inside else 0
 
     def give(self, data: bytes, sent_ns: int) -> None:
-        """Take a message from a sender in this process, whose thread may be another one.
+        """Receive a message from a sender in this process, which may be in another thread.
 
-        It came when it was given to the next stage, before it was published.
+        Its time of arrival is the time at which it was given to the next stage, before it was published.
         """
         self._given.append((sent_ns, self.topic, data, sent_ns))
 
     def take(self, data: bytes, sent_ns: int, lost: int) -> None:
-        """Take a message of a feed, before which so many were lost."""
+        """Receive a message of a feed; ``lost`` messages before it were lost."""
         self.lost += lost
         if self._twice:
             self._twice -= 1
@@ -99,7 +99,7 @@ class _Channel:
         self.give(data, sent_ns)
 
     def drain(self, came: list[Arrival]) -> None:
-        """Append what has come since the last call."""
+        """Append the messages received since the last call to ``came``."""
         while self._given:
             came.append(self._given.popleft())
             self.received += 1
@@ -108,13 +108,14 @@ class _Channel:
             if inside_ns is None or taken.sent_ns < inside_ns:
                 self.count(taken.sender, taken.number)
                 self._recent.append(taken.sent_ns)
-                # A feed's messages come when they are sent: what arrives later would stand behind newer ones.
+                # Messages of a feed arrive when they are sent. A message of the topic that arrives later would be
+                # recorded after newer ones.
                 came_ns = taken.came_ns if inside_ns is None else min(taken.came_ns, inside_ns)
                 came.append((came_ns, self.topic, taken.data, taken.sent_ns))
         self._follow()
 
     def _follow(self) -> None:
-        """Listen to the topic or not, in the thread that takes from it."""
+        """Open or close the subscription as needed, in the thread that reads it."""
         if self._inside_ns is not None:
             self.close()
         elif self._subscription is None:
@@ -130,9 +131,9 @@ class _Channel:
             self._subscription = None
 
     def count(self, sender: bytes, number: int) -> None:
-        """Note a message by its publisher and its number in that one's sequence.
+        """Count a message, by its publisher and its number in the publisher's sequence.
 
-        A restarted node sends for 0.1 s, seldom 1 s, before the recorder discovers it. Messages that a late publisher
+        A restarted node sends for 0.1 s, rarely 1 s, before the recorder discovers it. Messages that a late publisher
         sent before its first recorded one therefore count as lost.
         """
         self.received += 1
@@ -148,7 +149,7 @@ class _Channel:
 
 
 class RecorderNode(CoreNode):
-    """Takes what has come, some hundred times a second, and hands it to the writer unread."""
+    """Reads the received messages some hundred times a second, and passes their bytes to the writer."""
 
     def __init__(self, stage: Stage = RECORDER, graph: Graph | None = None, **options: Any) -> None:
         super().__init__(stage, RecorderParameters, **options)
@@ -158,9 +159,9 @@ class RecorderNode(CoreNode):
         self._feeds: FeedReader | None = None
         self.stages: dict[str, Any] = {}
         """Parameters of the stages of the process, by their names in the graph."""
-        self._writing = self.world.lock()  # held while something is written, or the file changes
+        self._writing = self.world.lock()  # locked while something is written, or the file changes
         self._is_recording, self._part, self._marks = False, 0, 0
-        self._last: dict[Topic, bytes] = {}  # of latched topics, for the next recording
+        self._last: dict[Topic, bytes] = {}  # last messages of latched topics, for the next recording
         serve(self, self, self.fail)
 
     def setup(self, parameters: RecorderParameters) -> None:
@@ -195,7 +196,7 @@ class RecorderNode(CoreNode):
         self._is_broken = False
 
     def _begin_recording(self, path: Path) -> None:
-        """Make a recording, which begins with the last messages of latched topics."""
+        """Begin a recording with the last messages of latched topics."""
         now_ns = self.world.time_ns()
         self._writer = self.stage = self._open(path, start_ns=now_ns)
         self._is_recording = True
@@ -204,7 +205,7 @@ class RecorderNode(CoreNode):
             self._writer.write(topic, now_ns, data, now_ns)
 
     def _configuration(self, parameters: RecorderParameters) -> Configuration:
-        """Configuration of the session: as given, as its stages have it, or the defaults."""
+        """Configuration of the session: the given one, the one of its stages, or the defaults."""
         if self._graph is not None and not parameters.configuration:
             own = {spec.name for spec in specs(RecordingParameters)}
             values = {k: v for k, v in values_of(parameters).items() if k in own}
@@ -215,7 +216,7 @@ class RecorderNode(CoreNode):
         return Configuration.from_layers([layer], parameters.scenario)
 
     def _model_of(self, configuration: Configuration, parameters: RecorderParameters) -> LiveModel:
-        """Frames to record beside the topics; none for a robot that is not installed."""
+        """Model whose frames are recorded in addition to the topics; without frames if the robot is not installed."""
         try:
             return LiveModel(Model(configuration, parameters.tf_rate, self.arm))
         except TeleopError as error:
@@ -223,24 +224,24 @@ class RecorderNode(CoreNode):
             return LiveModel(Model(configuration, 0.0))
 
     def _about(self, configuration: Configuration) -> dict[str, str]:
-        """What is kept with the recording, and below which namespace all arms are."""
+        """Metadata of the recording, and the namespace of all arms."""
         about = describe(configuration)
         return about | {NAMESPACE_KEY: self.arm} if self.arm else about
 
     def start(self) -> None:
-        """Open the topics; latched ones send what they have."""
+        """Open the topics; latched topics send their last message."""
         self.channels = {topic.name: _Channel(self, topic) for topic in self._recorded}
         self._feeds = FeedReader(self.channels, self.world)
 
     def turn(self) -> None:
-        """Record what has come."""
+        """Record the received messages."""
         self.world.sleep(_PAUSE)
         with self._writing:
             self._drain()
         self.counts.ticks += 1
 
     def stop(self) -> None:
-        """Record what came last, and close the topics."""
+        """Record the last received messages, and close the topics."""
         try:
             if not self._is_broken:
                 with self._writing:
@@ -261,7 +262,7 @@ class RecorderNode(CoreNode):
                 raise
 
     def abandon(self) -> None:
-        """Close the recording where an orderly end has become impossible, in any thread."""
+        """Close the recording when an orderly end is no longer possible. May be called in any thread."""
         if self._loop is not None:
             self._loop.stop()
         if self.stage is not None:
@@ -270,7 +271,7 @@ class RecorderNode(CoreNode):
             self._writer.close()
 
     def news(self, word: str) -> str:
-        """Where it records."""
+        """Log line with the path of the recording."""
         return f"{word}: records to {self._writer.path}" if word == "at work" else word
 
     def _drain(self) -> None:
@@ -296,14 +297,14 @@ class RecorderNode(CoreNode):
                 self._writer.write(topic, received_ns, data)
             self._writer.flush_older(self.world.time_ns())
         except RecordingError:
-            self._is_broken = True  # said once; what is safe has been closed
+            self._is_broken = True  # reported once; the written part is closed and safe
             self.exit_code = self.exit_code or 1
             raise
 
     # -- services --------------------------------------------------------------------------------
 
     def start_recording(self) -> str:
-        """Record again, in a new directory; raises as :class:`Recorder` says."""
+        """Record again, in a new directory. Raises the errors of :class:`Recorder`."""
         if self.stage is None:
             for transition in ("configure", "activate"):
                 if self.ros.trigger(transition) is not Outcome.SUCCESS:
@@ -315,14 +316,14 @@ class RecorderNode(CoreNode):
         return f"records to {self._writer.path}"
 
     def stop_recording(self) -> str:
-        """Close the recording; raises as :class:`Recorder` says."""
+        """Close the recording. Raises the errors of :class:`Recorder`."""
         self._insist(is_recording=True)
         with self._writing:
             self._end_recording()
         return f"stopped; recorded in {self._writer.path}"
 
     def split_recording(self) -> str:
-        """Close the recording and go on in a new directory; raises as :class:`Recorder` says."""
+        """Close the recording and continue in a new directory. Raises the errors of :class:`Recorder`."""
         self._insist(is_recording=True)
         with self._writing:
             closed = self._writer.path
@@ -331,7 +332,7 @@ class RecorderNode(CoreNode):
         return f"{closed} is closed; goes on in {self._writer.path}"
 
     def mark_recording(self) -> str:
-        """Note that something happens now; raises as :class:`Recorder` says."""
+        """Record a mark with the current time. Raises the errors of :class:`Recorder`."""
         self._insist(is_recording=True)
         with self._writing:
             self._drain()
@@ -360,7 +361,7 @@ class RecorderNode(CoreNode):
             raise
 
     def _next_path(self) -> Path:
-        """First directory after the last one that is not there: bag_1, bag_2."""
+        """Next directory name that does not exist: bag_1, bag_2."""
         while True:
             self._part += 1
             path = self._path.with_name(f"{self._path.name}_{self._part}")
@@ -370,7 +371,7 @@ class RecorderNode(CoreNode):
     # -- diagnostics -----------------------------------------------------------------------------
 
     def concerns(self) -> list[str]:
-        """Topics of which messages were lost before they came here."""
+        """Texts about topics with messages that were lost before they reached the recorder."""
         lost, cut = sum(channel.lost for channel in self.channels.values()), self._cut
         found = [f"the middleware lost {lost} messages on the way here"] if lost else []
         if cut:
@@ -382,7 +383,7 @@ class RecorderNode(CoreNode):
         return self._feeds.cut if self._feeds is not None else 0
 
     def values(self) -> dict[str, str]:
-        """What came, what was lost, and where it is recorded."""
+        """Counts of received and lost messages, and the path of the recording."""
         values = {"out": str(self._writer.path), "is_recording": str(int(self._is_recording))}
         values["cut_feeds"] = str(self._cut)
         for channel in self.channels.values():

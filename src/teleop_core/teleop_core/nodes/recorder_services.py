@@ -1,4 +1,4 @@
-"""Services of the recorder: start, stop, split and mark, by anybody who may call a Trigger."""
+"""Services of the recorder: start, stop, split and mark; any client can call them, since they are Triggers."""
 
 from collections.abc import Callable
 from typing import Protocol
@@ -10,10 +10,10 @@ from teleop_core.middleware.world import Owner
 
 
 class Recorder(Protocol):
-    """What the services ask for; each answers in one line.
+    """Functions behind the services; each returns one line of text.
 
     Raises:
-        SessionError: It cannot be done in the present state.
+        SessionError: The function is not possible in the current state.
         RecordingError: The recording could not be written.
     """
 
@@ -21,22 +21,22 @@ class Recorder(Protocol):
         """Record again, in a new directory."""
 
     def stop_recording(self) -> str:
-        """Close the recording; what comes is thrown away until the next start."""
+        """Close the recording; messages are discarded until the next start."""
 
     def split_recording(self) -> str:
-        """Close the recording and go on in a new directory."""
+        """Close the recording and continue in a new directory."""
 
     def mark_recording(self) -> str:
-        """Note that something happens now."""
+        """Record a mark with the current time."""
 
 
 def serve(owner: Owner, recorder: Recorder, fail: Callable[[str, bool], None]) -> None:
     """Offer the services below the node's name, in its executor.
 
     Args:
-        owner: Whose they are.
-        recorder: Who does it.
-        fail: Told why the recording cannot be written any more.
+        owner: Node that owns the services.
+        recorder: Recorder that executes them.
+        fail: Called with the reason when the recording cannot be written any more.
     """
     actions = {
         "start": recorder.start_recording,

@@ -1,4 +1,4 @@
-"""Remote control: stops and commands the arms of a ROS domain, and tells how they are."""
+"""Remote control: stops and commands the arms of a ROS domain, and reports their states."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -18,18 +18,17 @@ from teleop_core.slave.operation import State, operation_text
 from teleop_core.slave.operation.states import AT_REST_ONLY
 
 _PERIOD = 0.01
-"""A stop is said again this often until every arm has answered [s]."""
+"""Period at which a stop is repeated until every arm has answered [s]."""
 
 
 @dataclass
 class ArmState:
-    """What an arm has said last.
+    """Last reported state of an arm.
 
     Attributes:
         values: Numbers of ``slave/operation`` by name; empty before the first report.
-        text: The same in words.
-        stopped_after: Time from the first stop message to the report that it is in force [s];
-            negative before.
+        text: The state as text.
+        stopped_after: Time from the first stop message to the report that the stop is in force [s]; negative before.
     """
 
     values: dict[str, float] = field(default_factory=dict)
@@ -38,16 +37,16 @@ class ArmState:
 
 
 class RemoteControl(Guest):
-    """Hand on the arms of one ROS domain.
+    """Remote control of the arms of one ROS domain.
 
     Args:
         domain: ROS domain.
-        patience: Time that an arm has to be found, and to answer [s].
-        world: Where it is.
+        patience: Longest time for the discovery of an arm, and for its answer [s].
+        world: World of the session.
 
     Attributes:
         domain: ROS domain.
-        arms: State of every arm that was found, by its namespace.
+        arms: State of every discovered arm, by its namespace.
     """
 
     def __init__(self, domain: int, patience: float = 3.0, world: World = ROS) -> None:
@@ -60,7 +59,7 @@ class RemoteControl(Guest):
         self._reports: dict[str, Subscription] = {}
 
     def close(self) -> None:
-        """Leave the arms as they are."""
+        """Close the remote control; the arms stay in their states."""
         self._executor.shutdown()
         super().close()
 
@@ -68,10 +67,10 @@ class RemoteControl(Guest):
         return 1e-9 * self.world.monotonic_ns()
 
     def look(self) -> dict[str, ArmState]:
-        """State of every arm, by its namespace, as soon as each has reported.
+        """Wait until each arm has reported, and return the states by namespace.
 
         Raises:
-            SessionError: There is none on this domain.
+            SessionError: There is no arm on this domain.
         """
         self._until(lambda: bool(self.arms) and all(arm.values for arm in self.arms.values()), must=False)
         if not self.arms:
@@ -82,10 +81,10 @@ class RemoteControl(Guest):
         return self.arms
 
     def stop(self) -> dict[str, ArmState]:
-        """Press the emergency stop until every arm has said that it is in force and that it rests.
+        """Press the emergency stop until every arm has reported that the stop is in force and that the arm rests.
 
         Raises:
-            SessionError: There is no arm, or one did not answer; the stop was sent nevertheless.
+            SessionError: There is no arm, or an arm did not answer. The stop was sent nevertheless.
         """
         begin = self._now()
 
@@ -105,10 +104,10 @@ class RemoteControl(Guest):
         return self.arms
 
     def go_on(self) -> list[str]:
-        """Reset and enable, or resume, every arm; what they answer.
+        """Reset and enable, or resume, every arm; returns the arms' answers.
 
-        An arm that was stopped before it was homed homes then. An arm whose stop is being released
-        is waited for; one whose stop stays pressed says who presses it.
+        An arm that was stopped before it was homed is then homed. This waits for an arm whose stop is being released.
+        An arm whose stop stays pressed answers with the pressed buttons.
         """
         self.look()
         self._until(lambda: not any(arm.values["is_pressed"] for arm in self.arms.values()), must=False)
@@ -121,7 +120,7 @@ class RemoteControl(Guest):
         return told
 
     def _command_at_rest(self, name: str, arm: str) -> str:
-        """Send a command again until the arm has come to rest for it; what it answers."""
+        """Repeat a command until the arm rests and accepts it; returns the arm's answer."""
         deadline = self._now() + self._patience
         while (answer := self.command(name, arm)[1]).endswith(AT_REST_ONLY):
             if self._now() > deadline:
@@ -130,7 +129,7 @@ class RemoteControl(Guest):
         return answer
 
     def command(self, name: str, arm: str = "") -> tuple[bool, str]:
-        """Send a state command to an arm; whether it was taken, and the arm's answer.
+        """Send a state command to an arm; returns whether it was accepted, and the arm's answer.
 
         Args:
             name: One of :data:`~teleop_core.slave.operation.states.COMMANDS`, or ``release``, which
@@ -149,7 +148,7 @@ class RemoteControl(Guest):
         return answer.success, answer.message
 
     def _until(self, condition: Callable[[], Any], what: str = "", *, must: bool = True) -> bool:
-        """Wait until something is so, as long as there is patience."""
+        """Wait until a condition is true, at most for the time ``patience``."""
         deadline = self._now() + self._patience
         while not condition():
             if self._now() > deadline:
@@ -160,7 +159,7 @@ class RemoteControl(Guest):
         return True
 
     def listen(self) -> None:
-        """Take what has come; look for arms."""
+        """Read the received reports; look for arms."""
         for name, kinds in self.ros.get_topic_names_and_types():
             if name.endswith(f"/{SLAVE_OPERATION.name}") and name not in self._reports and kinds:
                 self._reports[name] = Subscription(self, SLAVE_OPERATION, name)
@@ -173,7 +172,7 @@ class RemoteControl(Guest):
 
 
 def _note(arm: ArmState, data: bytes) -> None:
-    """Take a report of an arm; bytes that are none are passed over."""
+    """Store a report of an arm; bytes that are not a report are ignored."""
     try:
         report = read_reports(data)[0]
         values = {name: float(report.values[name]) for name in OPERATION}

@@ -1,8 +1,8 @@
-"""Sender: what the numbers and stamps of a topic's messages tell about who sends them.
+"""Sender: information about a topic's sender from the numbers and stamps of its messages.
 
-The middleware says which publisher a message is from, and numbers the messages of each from 1 on.
-The owner of a topic is who was first; messages of others are refused until the owner has been
-silent for a while. A number that is missing is a message that was lost.
+The middleware identifies the publisher of each message, and numbers each publisher's messages from 1 on. The first
+publisher is the owner of a topic; messages of other publishers are refused until the owner has been silent for some
+time. A missing number means a lost message.
 """
 
 from enum import Enum
@@ -12,11 +12,11 @@ from teleop_core.nodes.rate import Recent
 
 SECOND_NS = 1_000_000_000
 AHEAD_NS = SECOND_NS
-"""Stamps that lie farther in the future are those of another clock [ns]."""
+"""A stamp that is farther in the future than this is from another clock [ns]."""
 
 
 class StampFault(Enum):
-    """What is wrong with the stamps of a sender, and what to do about it."""
+    """Fault of a sender's stamps, with advice."""
 
     ZERO = "its stamps are 0: stamp each message with the time of its sample"
     FROZEN = "its stamps do not move: stamp each message with the time of its sample"
@@ -24,17 +24,17 @@ class StampFault(Enum):
 
 
 class Sender:
-    """What is known of the sender of one topic.
+    """Data about the sender of one topic.
 
     Args:
-        limit: Messages a second beyond which the rest is refused as a flood.
+        limit: Largest number of messages per second; further messages are refused as a flood.
         silence: Time without a message after which another sender may take the topic [s].
 
     Attributes:
         gaps: Messages of the owner that did not arrive.
-        repeats: Messages with the stamp of the one before.
-        reordered: Messages with an older stamp than the one before.
-        owners: How many senders have owned the topic.
+        repeats: Messages with the same stamp as the previous message.
+        reordered: Messages with an older stamp than the previous message.
+        owners: Number of senders that have owned the topic.
         conflict: Whether two senders were heard at once, until :meth:`forget`.
         ages: Time from the stamp of a message to its arrival [ns], of the last thousand.
     """
@@ -46,7 +46,7 @@ class Sender:
         self.forget()
 
     def forget(self) -> None:
-        """Let the next message be that of the owner, whoever sends it."""
+        """Make the sender of the next message the owner."""
         self._owner, self._number, self._heard_ns = b"", 0, 0
         self._window_ns = self._in_window = 0
         self.has_other = self.conflict = False
@@ -54,16 +54,16 @@ class Sender:
         self.clear_ages()
 
     def clear_ages(self) -> None:
-        """Forget ages, which compare two clocks, because one of the clocks was stepped."""
+        """Delete the ages, which compare two clocks, because one of the clocks was stepped."""
         self.ages.clear()
         self.newest_age_ns = 0
 
     def admit(self, sender: bytes, number: int, now_ns: int) -> Refusal | None:
-        """Reason to refuse a message before it is read; None for one of the owner.
+        """Reason to refuse a message before it is read; None for a message of the owner.
 
         Args:
-            sender: Which publisher sent it.
-            number: Its number in the publisher's sequence; 0 where the middleware has none.
+            sender: Publisher that sent it.
+            number: Its number in the publisher's sequence; 0 if the middleware has no numbers.
             now_ns: Monotonic time [ns].
         """
         if now_ns - self._window_ns >= SECOND_NS:
@@ -78,18 +78,18 @@ class Sender:
             self._owner, self._number, self.has_other = sender, 0, False
             self.owners += 1
         self._heard_ns = now_ns
-        if number > self._number:  # one that was overtaken on the way is no loss
+        if number > self._number:  # a message that was only overtaken is not lost
             self.gaps += number - self._number - 1 if self._number else 0
             self._number = number
         self.conflict = self.conflict or self.has_other  # the owner is still there
         return None
 
     def release(self) -> None:
-        """Free the topic for another sender: the owner's publisher is gone."""
+        """Free the topic for another sender, because the owner's publisher no longer exists."""
         self._owner = b""
 
     def note_stamp(self, stamp_ns: int, now_ns: int) -> None:
-        """Note the age of a sound message; ``now_ns`` is the time of the system's clock [ns]."""
+        """Note the age of a valid message; ``now_ns`` is the time of the system's clock [ns]."""
         self.newest_age_ns = now_ns - stamp_ns
         self.ages.put(self.newest_age_ns)
         self.fault = None
@@ -106,7 +106,7 @@ class Sender:
             self.fault = StampFault.ZERO
 
     def concerns(self, name: str) -> list[str]:
-        """What is wrong with the sender now, in words that say what to do."""
+        """Texts about current problems of the sender, with advice."""
         found = []
         if self.fault is not None:
             found.append(f"{name}: {self.fault.value}")

@@ -1,7 +1,7 @@
-"""Sessions: which live sessions run on this machine, one at most on each ROS domain.
+"""Sessions: the live sessions on this machine, at most one on each ROS domain.
 
-A session holds a lock on a file of its domain (``flock``), which ends with its process however
-that ends: a file whose lock is free belongs to nobody.
+A session locks a file of its domain (``flock``). The lock ends with the session's process, however that ends: a file
+that is not locked belongs to no session.
 """
 
 import fcntl
@@ -16,12 +16,12 @@ from teleop_core.base.errors import SessionError
 
 
 def _folder() -> Path:
-    """Where sessions of this user leave their mark."""
+    """Folder of the lock files of this user's sessions."""
     return Path(tempfile.gettempdir()) / f"teleop_core_{os.getuid()}"
 
 
 def _holds(file: IO[str]) -> bool:
-    """Whether the lock of a mark could be had."""
+    """Lock a file without waiting; return whether this succeeded."""
     try:
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
@@ -31,15 +31,15 @@ def _holds(file: IO[str]) -> bool:
 
 @contextmanager
 def announced(domain: int) -> Iterator[None]:
-    """Own a ROS domain of this machine, and let others find its session, meanwhile.
+    """Own a ROS domain of this machine within this context, so that other programs find its session.
 
     Raises:
-        SessionError: Another session has it.
+        SessionError: Another session owns the domain.
     """
     mark = _folder() / f"{domain}.domain"
     try:
         file = _held(mark)
-    except OSError:  # nobody loses a session because of a mark
+    except OSError:  # a problem with a lock file must not end a session
         yield
         return
     with file:
@@ -60,7 +60,7 @@ def announced(domain: int) -> Iterator[None]:
 
 
 def _held(mark: Path) -> IO[str]:
-    """Open mark, locked if nobody else holds it; never one that was removed meanwhile."""
+    """Open lock file, locked if no other session has locked it; never a file that was removed meanwhile."""
     mark.parent.mkdir(mode=0o700, exist_ok=True)
     while True:
         file = mark.open("a+")
@@ -73,7 +73,7 @@ def _held(mark: Path) -> IO[str]:
 
 
 def domains() -> tuple[int, ...]:
-    """ROS domains of the sessions that run here."""
+    """ROS domains of the sessions on this machine."""
     found = set()
     for mark in _folder().glob("*.domain"):
         with suppress(OSError, ValueError), mark.open("r") as file:

@@ -15,19 +15,19 @@ from teleop_core.slave.slave import SlaveParameters
 
 _SERVO = SLAVE_SERVO_JP.name
 _SELDOM = 10
-"""Turns from one look at clocks and publishers to the next."""
+"""Number of turns between two checks of clocks and publishers."""
 _ANSWERS = 50
-"""Samples of the arm that are answered in one turn, which takes less than a tick."""
+"""Largest number of the arm's samples that are answered in one turn, so that it takes less than a tick."""
 _CLOCK_STEP_NS = 100_000_000
-"""A clock that moves by more against the monotonic one between two turns was stepped [ns]."""
+"""The system clock was stepped if it moves by more than this relative to the monotonic clock between two turns [ns]."""
 
 
 class SlaveNode(TickingNode):
-    """Follows the newest ``slave/servo_jp`` while it is enabled and homed; stops when told to.
+    """Follows the newest ``slave/servo_jp`` while it is enabled and homed; stops on command.
 
-    Nothing is sent before the arm has said where it is: any setpoint could move it. The emergency
-    stop is looked at before every tick. Faults that only a node can see, such as a clock that was
-    stepped, are handed to the stage, whose reaction is that of all others.
+    Nothing is sent before the arm has reported its position, because any setpoint could move it. The emergency stop is
+    read before every tick. Faults that only a node can detect, such as a stepped clock, are passed to the stage, which
+    reacts as to all other faults.
     """
 
     def setup(self, parameters: SlaveParameters) -> None:
@@ -54,7 +54,7 @@ class SlaveNode(TickingNode):
         self._seen, self._missed = self.counts, self.counts.missed
 
     def work(self, ticks: Iterable[int], report: Callable[[int], None] | None = None) -> None:
-        """Take the newest command and the steps of some ticks [ns, monotonic]."""
+        """Read the newest command and make the steps of some ticks [ns, monotonic]."""
         if not self._is_told:
             self.read_ports()
             self._is_told = self.input(SLAVE_MEASURED_JS).stamp_ns is not None
@@ -68,11 +68,10 @@ class SlaveNode(TickingNode):
             self.delay.put(self.world.time_ns() - stamp_ns)
 
     def read_ports(self, trigger: Topic | None = None) -> None:
-        """Bring the signals up to date, and answer every sample of the arm.
+        """Update the signals, and answer every sample of the arm.
 
-        The next step answers the newest one; of several that came meanwhile the others are
-        answered here. After a standstill the stop comes first: of what came then, only the last
-        are answered.
+        The next step answers the newest sample. If several samples came meanwhile, the older ones are answered here.
+        After a standstill the stop comes first: only the last of the samples that came then are answered.
         """
         measured, *others = self.ports.inputs[SLAVE_MEASURED_JS.name]
         if others or not self._is_told:
@@ -92,7 +91,7 @@ class SlaveNode(TickingNode):
 
     def advance(self, now_ns: int) -> None:
         """Read the emergency stop, then make one step; also before each of several late steps."""
-        with self.lock:  # over both: a reset between them would find a silent button released
+        with self.lock:  # held for both: a reset in between would treat a silent button as released
             is_idle = self._state[0] == State.DISABLED
             for is_pressed in self._stop.take(now_ns, is_idle=is_idle):
                 heard_ns = self._stop.heard_ns
@@ -100,9 +99,10 @@ class SlaveNode(TickingNode):
             self.stage.step()
 
     def _look(self) -> None:
-        """Find the faults that only a node can see."""
+        """Detect faults that only a node can detect."""
         longest, counts = self.parameters.operation.longest_outage, self.counts
-        # Composed, the ticks of one late wake-up come one by one: only its counts tell of them all.
+        # In a composed session, the ticks of one late wake-up come one by one; only the tick counts show how many were
+        # missed.
         missed = (counts.missed - self._missed) * TICK_NS * 1e-9 if counts is self._seen else 0.0
         self._seen, self._missed = counts, counts.missed
         if 0.0 < longest < missed:
@@ -115,7 +115,7 @@ class SlaveNode(TickingNode):
             self._look_around()
 
     def _look_around(self) -> None:
-        """Find a clock that was stepped, and two publishers of commands."""
+        """Detect a stepped clock, and a second publisher of commands."""
         offset_ns = self.world.time_ns() - self.world.monotonic_ns()
         if abs(offset_ns - self._offset_ns) > _CLOCK_STEP_NS:
             step = 1e-9 * (offset_ns - self._offset_ns)
@@ -131,7 +131,10 @@ class SlaveNode(TickingNode):
             self._fail(Fault.FLOOD)
 
     def _relate_anew(self, offset_ns: int) -> None:
-        """Take the present offset if the clock was behind at the start: else commands seem to come from the future."""
+        """Use the current clock offset if the clock was behind at the start.
+
+        Otherwise commands would seem to come from the future.
+        """
         stamp_ns, now_ns = int(self.row["slave_servo_jp_ns"]), int(self.row["now_ns"])
         behind_ns = offset_ns - self.epoch_ns
         if stamp_ns - now_ns > SECOND_NS > abs(stamp_ns - now_ns - behind_ns):
@@ -139,7 +142,7 @@ class SlaveNode(TickingNode):
             self._fail(Fault.CLOCK, 1e-9 * behind_ns, 1e-9 * _CLOCK_STEP_NS)
 
     def _holders(self) -> tuple[bytes, ...]:
-        """Stop buttons that are pressed, or missed."""
+        """Stop buttons that are pressed or missing."""
         heartbeat_ns = round(self.parameters.operation.heartbeat * SECOND_NS)
         since_ns = int(self.row["now_ns"]) - heartbeat_ns if heartbeat_ns else 0
         return self._stop.holders(since_ns)
@@ -149,7 +152,7 @@ class SlaveNode(TickingNode):
             self.stage.fail(fault, value, bound)
 
     def send_report(self, stamp_ns: int) -> None:
-        """Report the operation where it changes, and log what people want to know."""
+        """Report the operation when it changes, and log changes that matter to users."""
         before = self._reported
         super().send_report(stamp_ns)
         if self._reported is not before:
@@ -158,7 +161,7 @@ class SlaveNode(TickingNode):
         if state != self._told_state:
             self._told_state = state
             text = operation_text(self.stage.operation, self.stage.robot.joint_names)
-            # A line in the log takes milliseconds, which the loop has not.
+            # A log line takes milliseconds, too long for the loop.
             self.ros.defer(self._tell, text, state == State.FAULT)
 
     def _tell(self, text: str, is_bad: bool) -> None:
@@ -166,7 +169,7 @@ class SlaveNode(TickingNode):
         log.error(text) if is_bad else log.info(text)
 
     def concerns(self) -> list[str]:
-        """Reasons why it holds still; stop buttons that say nothing."""
+        """Texts with the reasons why the arm holds still, and about stop buttons that send nothing."""
         return [*self._standstills(), *self._unknown_buttons()]
 
     def _unknown_buttons(self) -> list[str]:
@@ -198,7 +201,7 @@ class SlaveNode(TickingNode):
         return ["slave/servo_jp jumped: holds"] if status is CommandStatus.REFUSED else []
 
     def values(self) -> dict[str, str]:
-        """State, what moves the arm, how many commands were refused."""
+        """State, the command that moves the arm, and the number of refused commands."""
         text = operation_text(self.stage.operation, self.stage.robot.joint_names)
         jumped = {"refused.slave/servo_jp.jump": str(self.stage.refused)}
         lost = {"stop_messages_lost": str(self._stop.lost)}

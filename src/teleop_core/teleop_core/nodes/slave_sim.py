@@ -5,10 +5,10 @@ from teleop_core.nodes.ticking import TickingNode
 
 
 class SlaveSimNode(TickingNode):
-    """Holds the newest ``slave/setpoint_js``; before the first it stands at home."""
+    """Moves to and holds the newest ``slave/setpoint_js``; before the first setpoint the arm is at home."""
 
     def concerns(self) -> list[str]:
-        """An arm that nobody leads."""
+        """Text about an arm that gets no setpoints."""
         setpoint = self.input(SLAVE_SETPOINT_JS)
         if setpoint.stamp_ns is None:
             return ["waits for slave/setpoint_js and stands"]

@@ -1,4 +1,4 @@
-"""Start: the node of any stage, ours or a user's, from the command line.
+"""Start: starts the node of any stage, of this package or of a user, from the command line.
 
 ``ros2 run teleop_core slave_sim`` starts a built-in stage by the name of its executable;
 ``ros2 run teleop_core stage NAME`` starts any registered one, such as that of another package.
@@ -61,12 +61,12 @@ def _start() -> int:
 def taken_names(arguments: list[str]) -> tuple[list[str], dict[str, str]]:
     """Remove remapping rules that would give all nodes of a process the same name.
 
-    The middleware applies ``__node:=arm``, as launch files give it, to every node of a process,
-    and ``__ns:=/lab`` in place of the namespaces of arms. A process of several nodes takes them
-    out, and puts the namespace before those of its nodes itself.
+    The middleware applies ``__node:=arm``, which launch files pass, to every node of a process, and ``__ns:=/lab``
+    replaces the namespaces of arms. A process of several nodes removes these rules, and adds the namespace before the
+    namespaces of its nodes itself.
 
     Returns:
-        The other arguments, and what was given: ``__ns``, ``__node``.
+        The other arguments, and the removed values: ``__ns``, ``__node``.
     """
     kept, names = list[str](), dict[str, str]()
     is_ros = False
@@ -82,10 +82,10 @@ def taken_names(arguments: list[str]) -> tuple[list[str], dict[str, str]]:
 
 
 def help_text(name: str) -> str:
-    """What an executable is, reads and writes, and how it is set.
+    """Help text of an executable: its purpose, its topics and its parameters.
 
     Args:
-        name: Of a stage, :data:`SESSION`, or :data:`ANY` for all of them.
+        name: Name of a stage, :data:`SESSION`, or :data:`ANY` for all stages.
 
     Raises:
         UnknownNameError: There is no such stage.

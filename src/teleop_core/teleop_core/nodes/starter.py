@@ -1,13 +1,12 @@
-"""Starter: a process that has loaded what nodes need, and starts each as a copy of itself.
+"""Starter: a process that has loaded all modules that nodes need, and starts each node as a copy of itself.
 
-Python, numba, the middleware and a node's kernels take two seconds of processor time and 200 MB to
-load. A copy of a process that has loaded them begins at once, and shares that memory as long as it
-does not write there. The starter itself takes no part in the middleware and has a single thread,
-so that it can be copied at any time.
+Python, numba, the middleware and a node's kernels take two seconds of processor time and 200 MB to load. A copy of a
+process that has loaded them begins at once, and shares that memory as long as it does not write to it. The starter
+itself does not use the middleware and has a single thread, so that it can be copied at any time.
 
-It obeys over one socket: each message tells what to start, with the files that the new process
-gets. Over another, which came with that message, it tells the process's number and, later, its exit
-code. It ends when the first socket does; what it started goes on.
+The starter receives commands over one socket: each message names the program to start and contains the files for the
+new process. Each message also contains a second socket, over which the starter returns the process number and, later,
+the exit code. The starter ends when the first socket is closed; the processes that it started continue.
 """
 
 import faulthandler
@@ -34,26 +33,25 @@ from setproctitle import setproctitle
 from teleop_core.base.errors import SessionError
 
 NODE = "teleop_core.nodes.start:main"
-"""What runs a node: a function without arguments, which reads ``sys.argv``."""
+"""Function that runs a node: it has no arguments and reads ``sys.argv``."""
 START_TIMEOUT = 180.0
-"""Time without any news after which what starts is given up [s]."""
+"""Time without a report after which a starting process is given up [s]."""
 LOST = 255
-"""Exit code of a process whose starter ended before it: nobody knows the true one."""
-_KIND = socket.SOCK_SEQPACKET  # messages stay whole, and an end is seen
+"""Exit code of a process whose starter ended earlier, so that the true exit code is unknown."""
+_KIND = socket.SOCK_SEQPACKET  # messages stay whole, and the end is detected
 _LARGEST = 1 << 20  # bytes of a message
-_TELLS = 0.1  # from word to word while loading [s]
+_TELLS = 0.1  # time between two reports while loading [s]
 
 
 class Starter:
-    """Starts processes that have loaded already what they need.
+    """Starts processes whose modules are already loaded.
 
-    It loads while the caller goes on; the first :meth:`start` waits for it.
+    The starter loads in the background; the first :meth:`start` waits for it.
 
     Args:
-        configuration: Text of the configuration whose stages and kernels are loaded; empty: of
-            none.
+        configuration: Text of the configuration whose stages and kernels are loaded; empty: none.
         env: Environment in which it loads.
-        patience: Time for which it may get no further before it is given up [s].
+        patience: Longest time without progress before it is given up [s].
     """
 
     def __init__(self, configuration: str, env: Mapping[str, str], patience: float = START_TIMEOUT) -> None:
@@ -81,10 +79,10 @@ class Starter:
         return self._process.pid
 
     def is_ready(self, timeout: float) -> bool:
-        """Whether it has loaded; waits so long for news of it [s].
+        """Whether the starter has loaded; waits at most ``timeout`` [s] for its report.
 
         Raises:
-            SessionError: It has ended, with what it wrote, or got no further for too long.
+            SessionError: The starter has ended (the error contains its output), or made no progress for too long.
         """
         while not self._is_ready and select.select([self._line], (), (), timeout)[0]:
             word = self._line.recv(_LARGEST).decode()
@@ -104,19 +102,17 @@ class Starter:
     def start(
         self, command: Sequence[str], env: Mapping[str, str], files: Mapping[str, int], main: str = ""
     ) -> "Started":
-        """Start a process in a session of its own; nothing is on its standard input.
+        """Start a process in its own session, with empty standard input.
 
         Args:
-            command: What it runs, as in ``sys.argv``.
+            command: Command of the process, as in ``sys.argv``.
             env: Its environment.
-            files: Files that it gets: ``out`` and ``err`` for what it writes, and others, whose
-                numbers take the place of their names in angle brackets (``<parameters>``) in
-                ``command`` and in ``env``.
-            main: ``module:function`` that runs in the copy; empty: the program that ``command``
-                names, in place of the copy.
+            files: Files that it gets: ``out`` and ``err`` for its output, and others. Names in angle brackets
+                (``<parameters>``) in ``command`` and ``env`` are replaced by the file descriptors.
+            main: ``module:function`` that runs in the copy; empty: the program in ``command`` replaces the copy.
 
         Raises:
-            SessionError: The starter has ended, or has got no further for too long.
+            SessionError: The starter has ended, or made no progress for too long.
         """
         while not self.is_ready(1.0):
             pass
@@ -144,7 +140,7 @@ class Starter:
         self.close()
 
     def close(self) -> None:
-        """End it; what it has started goes on."""
+        """End the starter; the processes that it started continue."""
         self._line.close()
         self._process.terminate()  # it may be loading
         self._process.wait()
@@ -152,14 +148,14 @@ class Starter:
 
 
 class Started:
-    """A process that a :class:`Starter` started, to be used as a :class:`subprocess.Popen`.
+    """A process that a :class:`Starter` started, with the interface of :class:`subprocess.Popen`.
 
     Args:
-        line: Where the starter tells of it.
+        line: Socket on which the starter reports about the process.
 
     Attributes:
         pid: Process id.
-        returncode: Exit code; None while it runs; minus the number of the signal that ended it.
+        returncode: Exit code; None while the process runs; minus the signal number if a signal ended it.
     """
 
     def __init__(self, line: socket.socket) -> None:
@@ -175,10 +171,10 @@ class Started:
         return self._look(0.0)
 
     def wait(self, timeout: float | None = None) -> int:
-        """Exit code, once it has ended.
+        """Wait for the end of the process and return its exit code.
 
         Raises:
-            subprocess.TimeoutExpired: It still runs after so long [s].
+            subprocess.TimeoutExpired: The process still runs after ``timeout`` [s].
         """
         code = self._look(timeout)
         if code is None:
@@ -194,11 +190,11 @@ class Started:
     def send_signal(self, number: int) -> None:
         """Send a signal, unless it has ended."""
         if self.poll() is None:
-            with suppress(ProcessLookupError):  # it has, and the starter is about to tell
+            with suppress(ProcessLookupError):  # it has ended, and the starter will report this soon
                 os.kill(self.pid, number)
 
     def terminate(self) -> None:
-        """Ask it to end."""
+        """Ask the process to end."""
         self.send_signal(signal.SIGTERM)
 
     def kill(self) -> None:
@@ -210,10 +206,10 @@ class Started:
 
 
 class _Copies:
-    """What the starter's process does, once it has loaded.
+    """Work of the starter's process, after it has loaded.
 
     Args:
-        line: Where it is told what to start.
+        line: Socket that receives the commands.
     """
 
     def __init__(self, line: socket.socket) -> None:
@@ -225,7 +221,7 @@ class _Copies:
         signal.signal(signal.SIGCHLD, lambda *_: None)
 
     def serve(self) -> None:
-        """Start what is asked for, and tell of what ends, until nobody asks any more."""
+        """Start the requested processes and report their ends, until the socket is closed."""
         self._line.send(b"ready")
         while True:
             waited: list[int] = [self._line.fileno(), self._ended]
@@ -272,7 +268,7 @@ def _tell(line: socket.socket, text: str) -> None:
 
 
 def _become(request: dict[str, Any], files: dict[str, int]) -> None:
-    """Be the process that is asked for; does not return."""
+    """Become the requested process; does not return."""
     code = 1
     try:
         os.setsid()
@@ -293,7 +289,7 @@ def _become(request: dict[str, Any], files: dict[str, int]) -> None:
             signal.signal(signal.SIGPIPE, signal.SIG_DFL)
             os.execvpe(command[0], command, env)
         module, _, function = request["main"].partition(":")
-        # Before the environment changes, by whose place in memory the title's is found.
+        # Before the environment changes: the memory of the process title is found by the position of the environment.
         setproctitle(" ".join([sys.executable, "-m", module.removesuffix(".start"), *command[1:]]))
         if env.get("PYTHONFAULTHANDLER"):
             faulthandler.enable()
@@ -303,7 +299,7 @@ def _become(request: dict[str, Any], files: dict[str, int]) -> None:
         code = int(getattr(import_module(module), function)() or 0)
     except SystemExit as error:
         code = error.code if isinstance(error.code, int) else int(error.code is not None)
-    except BaseException:  # whatever it is: this process ends here, and says why
+    except BaseException:  # any exception: this process ends here and reports the reason
         traceback.print_exc()
     finally:
         sys.stdout.flush()
@@ -312,7 +308,7 @@ def _become(request: dict[str, Any], files: dict[str, int]) -> None:
 
 
 def _load(configuration: str) -> None:
-    """Load what the nodes of a session use. What fails to load is reported later, by its own node."""
+    """Load the modules and kernels that a session's nodes use. A failure is reported later, by the node concerned."""
     from teleop_core.bags.ros_types import typestore
     from teleop_core.base.own_parts import load_own_parts
     from teleop_core.graph.layers import parse_text
@@ -328,20 +324,20 @@ def _load(configuration: str) -> None:
         return
     load_own_parts()
     typestore()
-    inspect.getmodule(inspect.currentframe())  # rclpy asks for it with a node's first line
+    inspect.getmodule(inspect.currentframe())  # rclpy needs it for a node's first log line
     loaded = Configuration.from_layers([parse_text(configuration, "the configuration")])
     for member in loaded.graph.members:
         node_class(member.stage)
         load_type_support([message_type(topic.ros_type) for topic in member.stage.ports])
         try:
             member.stage.run(loaded.groups[member.name], DT).load()
-        except Exception:  # of a part, ours or a user's: its node meets it again
+        except Exception:  # an error of a part, of this package or of a user: its node will get the same error
             traceback.print_exc()
     Model(loaded)
 
 
 def _loaded(configuration: str, line: socket.socket) -> None:
-    """Load, and report that it is busy meanwhile; leaves no other thread running."""
+    """Load, and report progress meanwhile; afterwards no other thread is running."""
     from teleop_core.kernels.progress import in_work
 
     is_done = threading.Event()
@@ -360,7 +356,7 @@ def _loaded(configuration: str, line: socket.socket) -> None:
 
 
 def main() -> None:
-    """Load, then start what is asked for: ``starter LINE CONFIGURATION``, both numbers of files."""
+    """Load, then start the requested processes: ``starter LINE CONFIGURATION``, both file descriptors."""
     line = socket.socket(fileno=int(sys.argv[1]))
     line.set_inheritable(False)
     with open(int(sys.argv[2]), encoding="utf-8") as file:
@@ -368,7 +364,7 @@ def main() -> None:
         configuration = file.read()
     _loaded(configuration, line)
     gc.collect()
-    gc.freeze()  # a copy looks through none of it, so that its memory stays shared
+    gc.freeze()  # the garbage collector of a copy skips these objects, so that their memory stays shared
     _Copies(line).serve()
 
 

@@ -1,8 +1,7 @@
-"""Streams: raw messages in and out of the signals of a stage, without executor and conversion.
+"""Streams: transfer raw messages to and from the signals of a stage, without executor and conversion.
 
-A message that has exactly the bytes our own nodes send is decoded at fixed places; any other
-message of the type (another frame, other names, another order) is deserialised and read by name.
-Both give the same values.
+A message with exactly the layout of this package's nodes is decoded at fixed positions. Any other message of the type
+(another frame, other names, another order) is deserialised and read by name. Both give the same values.
 """
 
 from collections import Counter, deque
@@ -22,12 +21,12 @@ from teleop_core.nodes.quality import profile as profile  # noqa: PLC0414  for i
 from teleop_core.nodes.sender import Sender
 
 SILENCE_NS = 2_000_000_000
-"""After this long without a sound message a sender may start anew with any stamp [ns]."""
+"""After this time without a valid message, a sender may restart with any stamp [ns]."""
 _WAITING = 20
-"""Messages that wait for a late reader at least; else what a late sender of its kind makes up for
-in one wake-up."""
+"""Smallest queue length for a late reader [messages]. A longer queue is used if a late sender of its kind may catch up
+more ticks in one wake-up."""
 _PRESSES = 500
-"""The same of buttons: who presses one while a reader stands still for half a second is heard."""
+"""Queue length for buttons [messages]: a press is not lost even if the reader stands still for half a second."""
 
 
 def message_type(ros_type: str) -> Any:
@@ -46,11 +45,11 @@ def message_type(ros_type: str) -> Any:
 
 
 class Subscription:
-    """Messages of a topic of the graph, taken by hand.
+    """Subscription to a topic of the graph whose messages are read without an executor.
 
     Args:
         owner: Node that owns it.
-        topic: What it listens to.
+        topic: Topic of the subscription.
         name: Its name for the middleware.
         depth: Length of the queue; None for the topic's own.
 
@@ -69,29 +68,29 @@ class Subscription:
         self.take: Callable[[], Taken | None] = own.take
         """Oldest waiting message; None if there is none."""
         self.wait: Callable[[float], None] = own.wait
-        """Return when there is a message, or after some time [s]."""
+        """Wait for a message, at most for some time [s]."""
         self.close: Callable[[], None] = own.close
         """Stop listening."""
 
 
 class Input:
-    """Newest sound message of one topic, for a port of a stage.
+    """Newest valid message of one topic, for a port of a stage.
 
     Args:
         owner: Node that owns it.
-        topic: What it listens to, in its namespace.
+        topic: Topic of the input, in its namespace.
         name: Its name for the middleware, below the node's namespace.
         joint_names: Order of the joints in the signals.
-        target: Where the values are written, shape (width,).
-        delay: Time for which each message is held back, as on a slow link [s].
-        buttons: Which buttons of a message are clutch, fixture and mode; -1: it has none.
+        target: Array into which the values are written, shape (width,).
+        delay: Time for which each message is delayed, as on a slow link [s].
+        buttons: Indices of clutch, fixture and mode among a message's buttons; -1 if the message lacks a button.
 
     Attributes:
-        stamp_ns: Stamp of the newest sound message; None before the first.
-        arrival_ns: Monotonic time at which it was taken [ns].
-        received: Number of messages taken, sound or not.
-        refused: Number of unsound messages, by reason.
-        sender: What is known of who sends them.
+        stamp_ns: Stamp of the newest valid message; None before the first.
+        arrival_ns: Monotonic time at which it was read [ns].
+        received: Number of messages read, valid or not.
+        refused: Number of invalid messages, by reason.
+        sender: Data about the sender of the messages.
     """
 
     def __init__(
@@ -126,16 +125,16 @@ class Input:
 
     @property
     def conflict(self) -> bool:
-        """Whether a second publisher was heard where that is a fault, until :meth:`forget`."""
+        """Whether a second publisher was heard although that is a fault; reset by :meth:`forget`."""
         return self._is_fault and self.sender.conflict
 
     @property
     def delay(self) -> float:
-        """Time for which each message is held back [s]."""
+        """Time for which each message is delayed [s]."""
         return self._delay_ns * 1e-9
 
     def take(self) -> bool:
-        """Write the next sound message that waits into the signals; whether there was one."""
+        """Write the next valid message in the queue into the signals; return whether there was one."""
         if self._delay_ns:
             return self._take_held()
         if self.subscription is None:
@@ -147,9 +146,9 @@ class Input:
         return False
 
     def newest(self) -> bool:
-        """Write the newest sound message into the signals; whether there was one.
+        """Write the newest valid message into the signals; return whether there was one.
 
-        Of buttons it is the first that presses or releases one, so that no press goes unseen.
+        For buttons, the first message that presses or releases a button is written, so that no press is missed.
         """
         has_buttons = self.topic.kind is Kind.BUTTONS
         before = self._target.tobytes() if has_buttons else b""
@@ -176,7 +175,7 @@ class Input:
         return None
 
     def _take_held(self) -> bool:
-        """As :meth:`take`, of messages whose time has come."""
+        """The same as :meth:`take`, for delayed messages that are due."""
         while (found := self._next()) is not None:
             self._held.append((self._world.monotonic_ns() + self._delay_ns, *found))
         now_ns = self._world.monotonic_ns()
@@ -208,19 +207,19 @@ class Input:
         return True
 
     def _read(self, data: bytes) -> tuple[int, messages.Values] | messages.Refusal:
-        """Stamp and values of a message with other bytes than ours, or of a report."""
+        """Stamp and values of a message with another layout than this package's, or of a report."""
         if self._layout is None:
             return messages.read_numbers(data, self.topic.columns)
         return messages.read_any(self.topic.kind, data, self._joint_names, self._buttons)
 
     def age(self) -> float:
-        """Time since the last sound message was taken [s]; infinite before the first."""
+        """Time since the last valid message was read [s]; infinite before the first."""
         if self.stamp_ns is None:
             return float("inf")
         return (self._world.monotonic_ns() - self.arrival_ns) * 1e-9
 
     def forget(self) -> None:
-        """Throw away what waits and start anew: the first message may have any stamp."""
+        """Discard the queue and restart: the next message may have any stamp."""
         while self.subscription is not None and self.subscription.take() is not None:
             pass
         self._held.clear()
@@ -230,24 +229,24 @@ class Input:
         self.arrival_ns = 0
 
     def zero(self) -> None:
-        """Write zeros in place of the newest values, as for a force that ended."""
+        """Overwrite the newest values with zeros, for example for a force that ended."""
         self._target[:] = 0.0
 
     def publishers(self) -> int:
-        """How many publishers the topic has now."""
+        """Current number of publishers of the topic."""
         return self._owner.ros.count_publishers(self._name)
 
     # -- within a process that holds the sender too ----------------------------------------------
 
     def join(self, is_inside: bool) -> None:
-        """Take values from :meth:`give` alone, or again from the topic."""
+        """Receive values only from :meth:`give`, or from the topic again."""
         if is_inside and self.subscription is not None:
             self.close()
         elif not is_inside and self.subscription is None:
             self.subscription = Subscription(self._owner, self.topic, self._name, self._waiting)
 
     def give(self, stamp_ns: int, values: messages.Values) -> None:
-        """Take a sound sample from a sender in this process."""
+        """Receive a valid sample from a sender in this process."""
         self.received += 1
         if self._delay_ns:
             self._held.append((self._world.monotonic_ns() + self._delay_ns, stamp_ns, values.copy()))
@@ -268,17 +267,17 @@ class Output:
 
     Args:
         owner: Node that owns it.
-        publisher: Where the bytes go.
+        publisher: Publisher of the bytes.
         form: Layout of the messages.
-        source: Where the values stand, shape (width,).
-        name: Of the topic, below the node's namespace.
+        source: Array with the values, shape (width,).
+        name: Name of the topic, below the node's namespace.
 
     Attributes:
         sent: Number of messages.
-        inputs: Readers of the topic in this process, which get the values beside the topic.
-        tap: Called with the bytes of every message and the time at which it was sent [ns], in
-            place of a subscription in this process.
-        pending: Where messages wait for :meth:`publish` of their session; None to publish at once.
+        inputs: Readers of the topic in this process, which get the values directly.
+        tap: Called with the bytes of every message and the time at which it was sent [ns], instead of a subscription
+            in this process.
+        pending: Queue of messages that the session will :meth:`publish`; None to publish at once.
     """
 
     def __init__(
@@ -292,7 +291,7 @@ class Output:
         self.pending: list[tuple[Output, bytes, int]] | None = None
 
     def send(self, stamp_ns: int) -> None:
-        """Hand on the present values under a stamp [ns], inside the process first."""
+        """Send the current values with a stamp [ns], first to the readers in this process."""
         for entry in self.inputs:
             entry.give(stamp_ns, self._source)
         data = self._encode(stamp_ns, self._source)  # the next sample may be of the same tick
@@ -302,16 +301,16 @@ class Output:
             self.pending.append((self, data, self._time_ns()))
 
     def publish(self, data: bytes, sent_ns: int) -> None:
-        """Publish a message that was handed on inside at ``sent_ns`` [ns]."""
+        """Publish a message that was already sent within the process at ``sent_ns`` [ns]."""
         self._send(data)
         if self.tap is not None:
             self.tap(data, sent_ns)
         self.sent += 1
 
     def bits(self) -> bytes:
-        """The present values, to be compared."""
+        """The current values as bytes, for comparison."""
         return self._source.tobytes()
 
     def is_sound(self) -> bool:
-        """Whether the present values are finite."""
+        """Whether the current values are finite."""
         return bool(np.isfinite(self._source).all())

@@ -1,4 +1,4 @@
-"""Task end: whether any task of a session has a goal left, heard by who may end the session then."""
+"""Task end: detects that no task of a session has a goal left, so that the session may end."""
 
 import numpy as np
 
@@ -11,11 +11,11 @@ _OVER = TASK_STATE.columns.index("is_over")
 
 
 class TaskEnd:
-    """Hears ``task/state`` of each arm that has a task.
+    """Reads ``task/state`` of each arm that has a task.
 
     Args:
-        owner: Node that owns the subscriptions, and closes them.
-        graph: The session's.
+        owner: Node that owns the subscriptions and closes them.
+        graph: Graph of the session.
     """
 
     def __init__(self, owner: Owner, graph: Graph) -> None:
@@ -26,7 +26,7 @@ class TaskEnd:
         ]
 
     def is_there(self) -> bool:
-        """Whether there are tasks, and by what they said last none has a goal left."""
+        """Whether there are tasks, and none of them has a goal left according to its last message."""
         for heard in self._inputs:
             heard.newest()
         return len(self._told) > 0 and bool((self._told[:, _OVER] > 0.0).all())

@@ -1,9 +1,9 @@
-"""Session: all nodes of the graph in one process, with one loop that goes through the stages.
+"""Session: all nodes of the graph in one process, with one loop that runs all stages in turn.
 
-The nodes are the same as in processes of their own: names, topics, parameters, lifecycle. Inside,
-a value goes from stage to stage as soon as it is there, within the same tick; every message is
-published as well, so that others can listen. While a stage is not active, its readers listen to
-the topic instead: a real device, or a node elsewhere, takes its place.
+The nodes are the same as in separate processes: names, topics, parameters, lifecycle. Within the process, a value goes
+directly from stage to stage, in the same tick. Every message is also published, so that other processes can listen.
+While a stage is not active, its readers listen to the topic instead: a real device, or a node elsewhere, then replaces
+the stage.
 """
 
 import sys
@@ -27,22 +27,22 @@ from teleop_core.nodes.streams import Output
 from teleop_core.session.links import link_texts
 
 _AFTER_NS = 700_000
-"""Phase of the slave's side in the millisecond: commands of the hand's side, whose phase is 0, have
-come by then, at p99 of its lateness."""
+"""Phase of the slave's side within the millisecond. The hand's side has phase 0; its commands have arrived by then,
+even at the p99 of its lateness."""
 
 
 class TeleopSession:
-    """The nodes of a graph and the loop that works for all but the recorder.
+    """The nodes of a graph and the loop that runs all nodes except the recorder.
 
-    The real-time options and the catch-up of that loop are those of the last stage, the slave. The
-    graph is what the group ``teleop`` of the parameter files says.
+    The loop has the real-time options and the catch-up limit of the last stage, the slave. The group ``teleop`` of the
+    parameter files defines the graph.
 
     Args:
-        namespace: Where all of it is, without the slash before it; arms are below.
-        names: Nodes of this process, with the namespaces of their arms; empty: all, and the
-            recorder. What others do, these hear of by topics.
-        world: Where it is.
-        graph: What runs; None: what the parameter files of the command line say.
+        namespace: Namespace of the whole session, without leading slash; the arms are below it.
+        names: Nodes of this process, with the namespaces of their arms; empty: all nodes and the recorder. Nodes in
+            other processes are connected by topics.
+        world: World of the session.
+        graph: Graph of the session; None: the graph of the parameter files on the command line.
 
     Raises:
         UnknownNameError: The graph has no such node.
@@ -83,26 +83,26 @@ class TeleopSession:
 
     @property
     def nodes(self) -> tuple[CoreNode, ...]:
-        """The nodes, recorder first and masters last: nothing that is sent is missed."""
+        """The nodes, recorder first and masters last, so that no message is missed."""
         return (*self._recorder, *reversed(self._stages))
 
     def watched(self) -> list[tuple[Loop, int]]:
-        """The loop of all stages, and that of the recorder."""
+        """The loop of all stages, and the loop of the recorder."""
         own = [(self._loop, self._loop.turns + self._ticks)] if self._loop.is_ready else []
         return [*own, *(one for recorder in self._recorder for one in recorder.watched())]
 
     def halt(self) -> None:
-        """Stop the loop; where it hangs, its nodes end without it."""
+        """Stop the loop; if it hangs, its nodes end without waiting for it."""
         if not self._loop.stop():
             for node in self._stages:
                 node.gate = self._world.lock()
         self._feed.close()
 
     def _turn(self) -> None:
-        """All ticks that are due, each through all stages."""
+        """Run all stages for each tick that is due."""
         if not self._loop.is_ready and self._are_all_there():
-            self._stages[-1].prepare()  # now that all kernels are there
-            self._schedule.start()  # what passed meanwhile is not to be made up for
+            self._stages[-1].prepare()  # after all kernels are compiled
+            self._schedule.start()  # ticks that passed meanwhile must not be caught up
             self._loop.is_ready = True
         with self._gate:
             at_work = tuple(node.is_at_work for node in self.nodes)
@@ -114,24 +114,24 @@ class TeleopSession:
             self._schedule.start()
             return
         for tick_ns in self._schedule.due():
-            if not self._loop.is_running:  # there may be a thousand ticks to make up for
+            if not self._loop.is_running:  # there may be a thousand ticks to catch up
                 return
             self._tick(tick_ns)
 
     def _are_all_there(self) -> bool:
-        """Whether every node has been at work that was to begin by itself: no sample is missed."""
+        """Whether every node that starts by itself has been at work, so that no sample is missed."""
         waited_for = [n for n in self.nodes if n.options.autostart and not n.has_ended]
         return any(n.has_worked for n in self.nodes) and all(n.has_worked for n in waited_for)
 
     def _tick(self, tick_ns: int) -> None:
-        """One tick [ns, monotonic]; the gate keeps all nodes open until all is published."""
+        """Make one tick [ns, monotonic]. The gate keeps all nodes open until all messages are published."""
         self._ticks += 1
         waiting: list[tuple[Output, bytes, int]] = []
         with self._gate:
             for node in self._stages:
                 if node.is_at_work:
                     node.tick(tick_ns)
-                    # What travels furthest goes first: the slave's setpoint, the master's sample
+                    # Messages with the longest way are sent first: the slave's setpoint, the master's sample
                     # last.
                     waiting[:0] = self._pending
                     self._pending.clear()
@@ -143,9 +143,9 @@ class TeleopSession:
                     node.tell()
 
     def _link(self) -> None:
-        """Lead every stage's output to its readers in here, as far as both are at work."""
+        """Connect every stage's output to its readers in this process, if both are at work."""
         active = [node for node in self._stages if node.is_at_work]
-        for node in self._stages:  # what is late for one is for all that tick
+        for node in self._stages:  # if a tick is late for one of them, it is late for all that tick
             if node.description.trigger is None:
                 node.schedule = self._schedule
         outputs = {topic.name: out for node in active for topic, out in node.ports.outputs.items()}
@@ -161,11 +161,11 @@ class TeleopSession:
             entry.join(entry.topic.name in outputs)
         for name, channel in channels.items():
             channel.join(name in outputs)
-        self._feed.flush()  # before the first message goes out by the middleware too
+        self._feed.flush()  # before the middleware publishes the first message
 
 
 def _fed(stages: Sequence[CoreNode]) -> list[str]:
-    """Names of the topics that nodes feed to a recorder: reports go by the middleware alone."""
+    """Names of the topics that nodes feed to a recorder. Reports are sent only by the middleware."""
     return [
         topic.of_arm(node.arm).name
         for node in stages

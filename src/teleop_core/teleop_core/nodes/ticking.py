@@ -1,4 +1,4 @@
-"""Ticking node: one step of its stage per millisecond, on a clock of its own."""
+"""Ticking node: makes one step of its stage per millisecond, with its own clock."""
 
 from collections.abc import Callable, Iterable
 
@@ -17,22 +17,22 @@ class TickingNode(CoreNode):
         self.work(self.schedule.due(), self.send_report)
 
     def tick(self, tick_ns: int) -> None:
-        """Make the step of one tick [ns, monotonic]; its session has the state reported later."""
+        """Make the step of one tick [ns, monotonic]; the session calls :meth:`tell` later."""
         self.work((tick_ns,))
 
     def work(self, ticks: Iterable[int], report: Callable[[int], None] | None = None) -> None:
-        """Take what has come, then make the steps of some ticks [ns, monotonic].
+        """Read the received messages, then make the steps of some ticks [ns, monotonic].
 
         Args:
-            ticks: Their times [ns, monotonic].
-            report: Told the stamp of each step [ns] when all its topics are sent.
+            ticks: Times of the ticks [ns, monotonic].
+            report: Called with the stamp of each step [ns] when all its topics are sent.
         """
         self.read_ports()
         for tick_ns in ticks:
             self.make_tick(tick_ns, report)
 
     def make_tick(self, tick_ns: int, report: Callable[[int], None] | None = None) -> None:
-        """Make the step of one tick [ns, monotonic] with what was taken, and send what it wrote."""
+        """Make the step of one tick [ns, monotonic] with the messages already read, and send its outputs."""
         now_ns = tick_ns + self.epoch_ns
         self.row["now_ns"] = now_ns
         self.advance(now_ns)
@@ -41,7 +41,7 @@ class TickingNode(CoreNode):
             report(now_ns)
 
     def tell(self) -> None:
-        """Report the state that the last step led to, if it has changed."""
+        """Report the state after the last step, if it has changed."""
         self.send_report(self.row["now_ns"])
 
     def advance(self, now_ns: int) -> None:
@@ -50,5 +50,5 @@ class TickingNode(CoreNode):
             self.stage.step()
 
     def send(self, now_ns: int) -> None:
-        """Send what a step wrote that started at ``now_ns`` [ns]."""
+        """Send the outputs of a step that started at ``now_ns`` [ns]."""
         self.ports.send(now_ns)

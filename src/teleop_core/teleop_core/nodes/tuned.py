@@ -1,4 +1,4 @@
-"""Tuned node: a lifecycle node whose parameters are those of its stage, set before and at work."""
+"""Tuned node: a lifecycle node with the parameters of its stage, which can be set before and during work."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -21,7 +21,7 @@ spare_generator()  # before the first node
 
 @dataclass(frozen=True, kw_only=True)
 class NodeParameters:
-    """Parameters that every node has beside those of its stage."""
+    """Parameters that every node has in addition to the parameters of its stage."""
 
     autostart: bool = parameter(True, fixed=True, doc="node configures and activates itself; false: a supervisor does")
     max_catch_up: int = parameter(
@@ -67,14 +67,14 @@ class NodeParameters:
     real_time: RealTimeParameters = field(default_factory=RealTimeParameters)
 
     def sender(self) -> Sender:
-        """Check of the sender of one topic that is read."""
+        """New check of the sender of an input topic."""
         return Sender(self.flood_rate, self.owner_silence)
 
     def feeds(self, port: str) -> list[tuple[str, float]]:
         """Topics that feed a port, each with its delay [s].
 
         Raises:
-            ParameterError: A link has another form.
+            ParameterError: A link has an invalid form.
         """
         found = []
         for text in self.links:
@@ -92,13 +92,13 @@ class NodeParameters:
 
 
 class TunedNode(Hooks):
-    """Lifecycle node that declares and takes parameters: its own, and those of a stage.
+    """Lifecycle node that declares and accepts parameters: its own, and those of a stage.
 
     Args:
-        stage: What the node is in the graph.
-        group: Parameters in place of the stage's own.
-        world: Where it is.
-        options: Of :meth:`~teleop_core.middleware.world.World.lifecycle_node`.
+        stage: Stage of the node in the graph.
+        group: Parameters instead of the stage's own.
+        world: World of the node.
+        options: Options of :meth:`~teleop_core.middleware.world.World.lifecycle_node`.
 
     Attributes:
         ros: Node of the middleware.
@@ -111,8 +111,8 @@ class TunedNode(Hooks):
         self.world = world
         self.ros: LifecycleNode = world.lifecycle_node(stage.name, self, **options)
         self.runner: Runner | None = None
-        """The stage at work; None before it is made, and for a node without one."""
-        self.lock = world.lock()  # held while the stage works or takes parameters
+        """The running stage; None before it is made, and for a node without a stage."""
+        self.lock = world.lock()  # locked while the stage works or accepts parameters
         self._groups = (NodeParameters, group or stage.parameters)
         self._specs = {spec.name: spec for entry in self._groups for spec in specs(entry)}
         self.overrides = QualityOverrides(self.ros.given)
@@ -132,12 +132,12 @@ class TunedNode(Hooks):
         return f"{self.arm}/{self.ros.get_name()}".strip("/")
 
     def show_present(self) -> None:
-        """Have the executor publish parameters that the stage changed by itself; that is too slow for the loop."""
+        """Let the executor publish parameters that the stage changed by itself; publishing is too slow for the loop."""
         if self._changes_itself():
             self._present.trigger()
 
     def _overrides(self) -> dict[str, Any]:
-        """What the command line and parameter files say of these parameters."""
+        """Values of these parameters on the command line and in parameter files."""
         return {
             name: () if value is None and name in self._specs else value
             for name, value in self.ros.given.items()
@@ -154,7 +154,7 @@ class TunedNode(Hooks):
         )
 
     def _accept(self, changes: Mapping[str, Value]) -> str:
-        """Take all changes or none: the group is built anew, and the stage must take it."""
+        """Accept all changes or none: a new group is built, and the stage must accept it."""
         self._take_present()
         values = values_of(self.options) | values_of(self.parameters) | dict(changes)
         try:
@@ -166,7 +166,7 @@ class TunedNode(Hooks):
         return ""
 
     def _take_present(self) -> None:
-        """Take parameters that the stage has changed by itself, as the mode button does."""
+        """Copy parameters that the stage has changed by itself, for example by the mode button."""
         if self._changes_itself() and self.lock.acquire(True, _LOCK_PATIENCE):
             assert self.runner is not None
             self.parameters = self.runner.present()
@@ -188,7 +188,7 @@ class TunedNode(Hooks):
     def _retune(self, parameters: Any) -> None:
         if self.runner is None:
             return
-        self.runner.examine(parameters)  # takes long: beside the loop, which goes on meanwhile
+        self.runner.examine(parameters)  # takes long; runs outside of the loop, which continues meanwhile
         if not self.lock.acquire(True, _LOCK_PATIENCE):
             raise SessionError(f"{self.member_name} is in a step that takes too long; try again")
         try:

@@ -1,8 +1,8 @@
-"""Watch: the thread that sees to the end of a process, whatever its other threads are doing.
+"""Watch: the thread that ends a process, whatever its other threads are doing.
 
-It waits for signals and for the end of the parent, tells the parent what the process is doing, and
-finds loops that hang. An end is asked of the main thread, which brings it about in order. Where
-that thread does not come to it, the recording is closed from here, and the process left.
+It waits for signals and for the end of the parent, reports to the parent what the process is doing, and detects loops
+that hang. It asks the main thread to end the process in order. If the main thread does not react, this thread closes
+the recording and ends the process.
 """
 
 import os
@@ -22,13 +22,13 @@ from teleop_core.nodes.parent import Parent
 ENDS = tuple(number for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT))
 """Signals that ask for an orderly end: Ctrl-C, a supervisor, a closed terminal, Ctrl-\\."""
 _PERIOD = 0.1
-_END_PATIENCE = 4.0  # until the main thread turns to the end
-_LEAVE_PATIENCE = 5.0  # until the middleware has let go
-_FLUSH_PATIENCE = 20.0  # until it has brought it about; a slow disk may need some
+_END_PATIENCE = 4.0  # until the main thread begins the end
+_LEAVE_PATIENCE = 5.0  # until the middleware is closed
+_FLUSH_PATIENCE = 20.0  # until the main thread has finished it; a slow disk needs time
 
 
 class Crew(Protocol):
-    """What works in one process: a node, or several that are started in this order."""
+    """Nodes of one process: one node, or several nodes that are started in this order."""
 
     @property
     def nodes(self) -> tuple[CoreNode, ...]:
@@ -36,20 +36,20 @@ class Crew(Protocol):
         ...
 
     def watched(self) -> list[tuple[Loop, int]]:
-        """The loops that work now, each with a number that grows while it does."""
+        """The running loops, each with a number that grows as long as the loop makes progress."""
         ...
 
     def halt(self) -> None:
-        """Stop what works for several nodes."""
+        """Stop the loop that several nodes share."""
         ...
 
 
 def signal_pipe() -> int:
-    """File that signals of :data:`ENDS` write to.
+    """Pipe to which the signals of :data:`ENDS` are written.
 
-    Nothing is interrupted half-way, and the middleware is still there for an orderly end; the
-    main thread waits in C, where a handler in Python would not run. What is ignored from the
-    start stays so, such as SIGHUP under ``nohup``.
+    Thus no work is interrupted halfway, and the middleware still exists for an orderly end. A handler in Python would
+    not run while the main thread waits in C code. Signals that are ignored from the start stay ignored, such as SIGHUP
+    under ``nohup``.
     """
     reading, writing = os.pipe()
     os.set_blocking(writing, False)
@@ -62,7 +62,7 @@ def signal_pipe() -> int:
 
 @dataclass
 class _Stillness:
-    """How long a loop has made no progress: its last count, and the processor time it could have used since [s]."""
+    """Time without progress of a loop: its last count, and the processor time it could have used since then [s]."""
 
     chances: Chances
     number: int
@@ -70,10 +70,10 @@ class _Stillness:
 
 
 class Watch:
-    """Watching thread of a process; works from its making to the end of the process.
+    """Watching thread of a process; runs from its construction to the end of the process.
 
     Args:
-        crew: What is watched.
+        crew: Nodes to watch.
         signals: File of :func:`signal_pipe`.
         parent: Line to the parent, if there is one.
 
@@ -108,7 +108,7 @@ class Watch:
                 self._look()
 
     def _look(self) -> None:
-        """What is done ten times a second."""
+        """Do the periodic checks, ten times a second."""
         if self._parent is not None:
             self._parent.tell(self._doing())
         if self._asked is None and self._first.ended.done():  # a loop of its own failed
@@ -125,7 +125,7 @@ class Watch:
                 self._leave()
 
     def _await_leave(self) -> None:
-        """Exit with success if the middleware blocks the end: everything that matters is done."""
+        """Exit with success if the middleware blocks the end, because all important work is already done."""
         self._leaving += 1
         if self._leaving * _PERIOD > _LEAVE_PATIENCE:
             os._exit(0)
@@ -136,7 +136,7 @@ class Watch:
     def _find_hung(self) -> None:
         """Find loops that made no progress although they had processor time."""
         still: dict[Loop, _Stillness] = {}
-        own = threading.get_native_id()  # runs now, whatever its account says
+        own = threading.get_native_id()  # the thread runs now, whatever its account shows
         threads = {t.native_id or own for t in threading.enumerate()} - {own}
         for loop, number in self._crew.watched():
             one = self._still.get(loop) or _Stillness(Chances(os.getpid(), loop.thread), number)

@@ -1,1 +1,1 @@
-"""Session: a graph run in virtual time, what is recorded of it, replayed, imported and exported."""
+"""Session: a graph that runs in virtual time, and its recordings: recording, replay, import and export."""

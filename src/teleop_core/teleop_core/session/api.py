@@ -43,9 +43,9 @@ Progress = Callable[[int, int], None]
 OperatorLike: TypeAlias = Union[
     str, Path, Operator, Motion, NDArray[np.float64], tuple[Array, Array], "pandas.DataFrame"
 ]
-"""An operator: its name; a CSV table or recording; a part; ``motion(times)``; an array whose
-columns are time [s] and what :data:`~teleop_core.hand.operators.Motion` says; times and rows; or a
-data frame with columns called as those of such a table."""
+"""An operator, given in one of these forms: a name; the path of a CSV table or recording; a part; a function
+``motion(times)``; an array; a pair (times, rows); or a data frame. Columns of an array are the time [s] and the
+columns of :data:`~teleop_core.hand.operators.Motion`. A data frame has the column names of a CSV table."""
 Setting = float | str | bool | Sequence[float] | Sequence[str]
 """Value of a parameter."""
 
@@ -66,21 +66,21 @@ def configuration(
     delays: Mapping[str, float] | None = None,
     **parameters: Setting,
 ) -> Configuration:
-    """What a session runs, from a scenario, files, parameters and own parts.
+    """Configuration of a session, from a scenario, files, parameters and parts of your own.
 
     Args:
         scenario: One of ``teleop scenarios``; the defaults alone if None.
-        files: ROS 2 parameter files over the scenario.
-        settings: Parameters by name over all files: ``{"motion_scaling.fine_gain": 0.2}``; a bare
-            name sets every stage that has it, ``left/...`` that arm alone.
-        texts: The same as ``key=value``, as the command line takes them, over the settings.
+        files: ROS 2 parameter files. They override the scenario.
+        settings: Parameters by name, which override all files: ``{"motion_scaling.fine_gain": 0.2}``. A name without a
+            stage sets every stage that has this parameter; ``left/...`` sets the arm ``left`` only.
+        texts: Parameters as texts ``key=value``, as on the command line. They override ``settings``.
         operator: Who moves the hand; see :data:`OperatorLike`.
         fixture: Shape around the hand: a name, or a part of your own.
         controller: Control law of the slave's joints: a name, or a part of your own.
-        plant: What the slave simulator moves: a name, or a part of your own.
+        plant: Plant that the slave simulator moves: a name, or a part of your own.
         robot: The slave: a name, a table's file, or a robot of your own.
         stages: Further stages of every arm, one or several: names, or stages of your own.
-        arms: Names of the arms, the first of which is the default one.
+        arms: Names of the arms; the first is the default arm.
         delays: Delays on links [s]: ``{"slave/servo_jp": 0.02}``.
         **parameters: Parameters by name, with ``__`` for each dot: ``fixture__box__size=...``.
 
@@ -144,12 +144,12 @@ def run(
     """Run a session in virtual time.
 
     Args:
-        scenario: One of ``teleop scenarios``; or a whole configuration, which then is all.
-        duration: Simulated time [s], in place of the scenario's.
+        scenario: One of ``teleop scenarios``, or a complete configuration, to which no further settings may be given.
+        duration: Simulated time [s]; replaces the scenario's duration.
         seed: Seed of everything random.
         out: Directory of the recording, made here; None keeps it in memory (2 MB a second).
-        progress: Told how far it is.
-        files: As in :func:`configuration`, and so all that follow.
+        progress: Called with the progress of the run.
+        files: As in :func:`configuration`, like all arguments from here to ``delays``.
         settings: As there.
         operator: As there.
         fixture: As there.
@@ -159,12 +159,12 @@ def run(
         stages: As there.
         arms: As there.
         delays: As there.
-        keep: Streams that are kept in memory, of all arms, such as ``task/state``: faster; None: all.
-            Whoever reads another one is told that it was not kept.
+        keep: Streams of all arms that are kept in memory, such as ``task/state``; None keeps all streams. A run that
+            keeps few streams is faster. Reading a stream that was not kept raises an error.
         **parameters: As there.
 
     Returns:
-        What happened.
+        The recorded session.
 
     Raises:
         TeleopError: Something is wrong; the text names it, before anything runs if possible.
@@ -192,7 +192,7 @@ def run(
 
 
 _BEGINS = {"device": DEVICE, "hand": HAND}
-"""Where a replay may begin, with the stage whose output is taken from the recording."""
+"""Names of the points at which a replay may begin; each maps to the stage whose output is taken from the recording."""
 
 
 def replay(
@@ -208,17 +208,18 @@ def replay(
 ) -> Recording:
     """Run the recorded masters of a session through the graph again, in virtual time.
 
-    Without changes a recording of virtual time gives the same slave motion, bit for bit, wherever it begins.
+    If nothing is changed, the replay of a recording in virtual time gives exactly the same slave motion, bit for bit,
+    for each ``begin``.
 
     Args:
-        recording: What was recorded; its own configuration is the start.
+        recording: Recording to replay. Its own configuration is used, and the arguments below override it.
         out: As in :func:`run`.
         progress: As in :func:`run`.
-        files: Parameter files over its configuration.
-        settings: Parameters over the files, as in :func:`configuration`.
+        files: Parameter files. They override the recorded configuration.
+        settings: Parameters, which override the files, as in :func:`configuration`.
         texts: As there.
-        begin: What is taken from the recording: what the device measured, or where the hand wanted
-            it, which forces of the new session then act on.
+        begin: ``device`` takes the measured motion of the device from the recording. ``hand`` takes the motion that
+            the hand wanted; forces of the new session then act on the hand.
         **parameters: As in :func:`configuration`.
 
     Raises:
@@ -260,7 +261,7 @@ def _kept(
 
 
 class _Memory:
-    """A recording in memory, which takes blocks as a writer of bags does."""
+    """A recording in memory. It accepts blocks like a writer of bags."""
 
     def __init__(self, session: virtual.VirtualTime, keep: Collection[str] | None) -> None:
         self._session, self._reports = session, runner.StateReports(session)
@@ -309,7 +310,7 @@ def _known(registry: object, part: object) -> str:
 
 
 def _operator_settings(operator: OperatorLike) -> dict[str, object]:
-    """Settings that choose an operator; own ones are registered under a name of theirs."""
+    """Settings that choose an operator. An operator given as an object is registered under a new name."""
     if isinstance(operator, Path):
         return _file_settings(operator)
     if isinstance(operator, str):
@@ -339,10 +340,10 @@ def _operator_settings(operator: OperatorLike) -> dict[str, object]:
 
 
 def _of_frame(frame: "pandas.DataFrame") -> tuple[Array, Array]:
-    """Times (N,) [s] and motion (N, 3, 6 or 9) of a frame that is called as an operator's file.
+    """Times (N,) [s] and motion (N, 3, 6 or 9) of a data frame that has the column names of an operator's CSV file.
 
     Raises:
-        ParameterError: It has no time, no place, or columns of another name.
+        ParameterError: The frame has no time, no position, or columns with unknown names.
     """
     from teleop_core.session.recorded_hand import COLUMNS
 
@@ -364,7 +365,7 @@ def _file_settings(path: Path) -> dict[str, object]:
 
 
 def _plain(value: object) -> object:
-    """Value of a setting without the types of NumPy."""
+    """Value of a setting, with NumPy types converted to Python types."""
     if isinstance(value, np.generic):
         return value.item()
     if isinstance(value, list | tuple | np.ndarray):

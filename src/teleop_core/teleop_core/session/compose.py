@@ -1,8 +1,9 @@
 """Compose: the tick of a graph as one compiled kernel, from generated source.
 
 The source is a loop over ticks. It copies values from record to record along the links, calls the kernel of each stage,
-stamps what it wrote and copies it to the row that is recorded. Stages that are plain Python cut it into segments,
-between which they are called. What was compiled once is loaded from disk by every later session of the same graph.
+stamps the topics that the stage wrote and copies them to the row that is recorded. Stages in plain Python divide the
+source into segments and are called between the segments. Compiled kernels are stored on disk, where later sessions of
+the same graph load them.
 """
 
 import traceback
@@ -23,7 +24,7 @@ __all__ = ["Tick", "block_dtype", "compose"]
 
 
 def block_dtype(graph: Graph, joints: Mapping[str, int]) -> Any:
-    """Record of everything that happens in a tick: ``now_ns``, all topics with stamps, and notes.
+    """NumPy record type of all data of a tick: ``now_ns``, all topics with stamps, and the stages' notes.
 
     Args:
         graph: The graph.
@@ -44,19 +45,19 @@ Call = Callable[[], None]
 
 @dataclass
 class _Text:
-    """Source being written: segments, and between them calls of plain stages."""
+    """Source under construction: segments, and calls of plain-Python stages between the segments."""
 
     parts: list[Segment | Call] = field(default_factory=lambda: [[]])
     objects: dict[str, Any] = field(default_factory=dict)
 
     def say(self, *lines: str) -> None:
-        """Add lines to the present segment."""
+        """Add lines to the current segment."""
         segment = self.parts[-1]
         assert isinstance(segment, list)
         segment += lines
 
     def call(self, call: Call) -> None:
-        """End the segment with the call of a plain stage."""
+        """End the current segment, add a call of a plain-Python stage and begin a new segment."""
         self.parts += [call, []]
 
 
@@ -67,19 +68,19 @@ _CLOCK = [("first_ns", "i8"), ("tick_ns", "i8"), ("count", "i8")]
 
 
 class Tick:
-    """The composed tick: :meth:`run` it over rows.
+    """The composed tick of a graph; :meth:`run` executes it for each row.
 
-    Kernels are bound once to buffers of this object: looking at the types of all that a tick is
-    given would take as long as a hundred ticks.
+    Kernels are bound once to the buffers of this object. To check the types of all arguments in each call would take
+    as long as a hundred ticks.
 
     Args:
-        text: What was said of the graph.
+        text: Generated source of the graph, with its objects.
         dtype: Record of :func:`block_dtype`.
         dt: Length of a tick [s].
-        size: Ticks that are made at once, at most.
+        size: Largest number of ticks per call of the kernel.
 
     Attributes:
-        source: The generated source, for the curious.
+        source: The generated source, for inspection.
     """
 
     def __init__(self, text: _Text, dtype: Any, dt: float, size: int) -> None:
@@ -102,16 +103,17 @@ class Tick:
         ]
 
     def run(self, first_ns: int, tick_ns: int, samples: Any, block: Any) -> None:
-        """Make one tick for each row of ``block``, which is filled.
+        """Run one tick for each row of ``block`` and write the results into ``block``.
 
         Args:
             first_ns: Time of the first tick [ns].
-            tick_ns: From tick to tick [ns].
-            samples: Recorded rows in place of stages that are played, as long as ``block``; None where none is.
-            block: Rows of :func:`block_dtype`.
+            tick_ns: Length of a tick [ns].
+            samples: Recorded rows, as many as in ``block``, which replace the output of played stages; None if no
+                stage is played.
+            block: Output rows of the type of :func:`block_dtype`.
 
         Raises:
-            TeleopError: A part in plain Python raised; its own exception is the cause.
+            TeleopError: A part in plain Python raised an exception, which is the cause of this error.
         """
         clock, rows, found = self._clock, _bytes(self._rows), _bytes(block)
         clock["tick_ns"] = tick_ns
@@ -135,12 +137,15 @@ class Tick:
 
 
 def _bytes(rows: Any) -> Any:
-    """The same rows without their fields: NumPy copies field by field otherwise, which takes five times as long."""
+    """View of the rows as plain bytes.
+
+    NumPy would copy rows with fields field by field, which takes five times as long.
+    """
     return np.ndarray.view(rows, np.dtype((np.void, rows.itemsize)))
 
 
 def raised_by(error: Exception) -> PartError:
-    """What a part in plain Python raised, in one line that names function, file and line."""
+    """Error about an exception in a part in plain Python: one line that names function, file and line."""
     frames = traceback.extract_tb(error.__traceback__)
     own = [frame for frame in frames if _PACKAGE not in Path(frame.filename).parents]
     trace = (own or frames)[-1]
@@ -165,16 +170,16 @@ def _source(given: Iterable[str], lines: Sequence[str]) -> str:
 def compose(
     graph: Graph, runners: Mapping[str, Runner], dtype: Any, dt: float, size: int, played: frozenset[str], rings: Rings
 ) -> Tick:
-    """Tick of a graph.
+    """Compose the tick of a graph.
 
     Args:
         graph: The graph.
-        runners: Stages at work, by the names of their members.
+        runners: Running stages, by the names of their members.
         dtype: Record of :func:`block_dtype`.
         dt: Length of a tick [s].
-        size: Ticks that are made at once, at most.
+        size: Largest number of ticks per call of the kernel.
         played: Members whose topics come from recorded samples; they need no runner.
-        rings: What is on its way on delayed links; an earlier tick's, or empty and filled.
+        rings: Values in transit on delayed links. Pass those of an earlier tick to keep them; missing rings are added.
     """
     text = _Text()
     places = {member.name: i for i, member in enumerate(graph.members)}
@@ -210,13 +215,13 @@ def _say_link(
     dt: float,
     rings: Rings,
 ) -> None:
-    """Lead a value to the port of its reader, through a ring of past ones if it is delayed."""
+    """Add the lines that copy a value to its reader's port; a delayed value passes through a ring of past values."""
     reader, port = f"r{places[link.reader.name]}", link.port.field
     writer, plain = places[link.writer.name], _plain_field(link)
     source, stamp = f"r{writer}.{plain}", f"r{writer}.{plain}_ns"
     if link.writer.name in played:
         source, stamp = f"row.{link.topic.field}", f"row.{link.topic.field}_ns"
-    is_after = writer > places[link.reader.name]  # what it holds is of the last tick already
+    is_after = writer > places[link.reader.name]  # its value is one tick old
     ticks = round(link.delay / dt) + link.is_late - is_after
     how = "add" if link.adds else "copy"
     if ticks <= 0:
@@ -240,13 +245,13 @@ def _say_link(
 
 
 def _plain_field(link: Link) -> str:
-    """Field of the topic in its writer's record, which knows no namespaces."""
+    """Field of the link's topic in the writer's record; these records have no namespaces."""
     own = {t.name: plain for t, plain in zip(link.writer.writes, link.writer.stage.writes, strict=True)}
     return own[link.topic.name].field
 
 
 def _ring(ticks: int, link: Link, runners: Mapping[str, Runner]) -> Any:
-    """Past values of a link, full of what its writer holds at the start."""
+    """Ring of past values of a link, filled with the writer's initial value."""
     writer = runners.get(link.writer.name)
     reader = runners[link.reader.name].signals[link.port.field]
     begin = writer.signals[_plain_field(link)] if writer is not None else reader
@@ -256,7 +261,7 @@ def _ring(ticks: int, link: Link, runners: Mapping[str, Runner]) -> Any:
 
 
 def _say_step(text: _Text, number: int, member: Member, count: int, *, is_compiled: bool) -> None:
-    """Call the kernel where there is something new to answer; stamp and record what it wrote."""
+    """Add the lines that call the kernel if its trigger is new, and stamp and record its outputs."""
     stage, row = member.stage, f"r{number}"
     lines = []
     if is_compiled:
@@ -284,7 +289,7 @@ def _say_step(text: _Text, number: int, member: Member, count: int, *, is_compil
 
 
 def _caller(member: Member, runner: Runner, dt: float) -> Callable[[], None]:
-    """Call of a plain stage, which answers only what is new."""
+    """Function that calls a plain-Python stage if its trigger is new."""
     trigger = member.stage.trigger
     arguments, row, step = runner.arguments, runner.signals, runner.kernel
 

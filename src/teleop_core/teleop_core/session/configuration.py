@@ -31,8 +31,8 @@ class Configuration:
 
     Attributes:
         groups: Parameter groups: ``teleop``, ``recorder`` and one for each member of the graph.
-        scenario: Name of the session, for the record.
-        graph: What runs.
+        scenario: Name of the session, stored in the recording.
+        graph: Graph that runs.
     """
 
     groups: dict[str, Any]
@@ -41,13 +41,13 @@ class Configuration:
 
     @staticmethod
     def from_layers(layers: Iterable[Layer], scenario: str = "") -> "Configuration":
-        """Later layers over earlier ones over the defaults.
+        """Merge layers: later layers override earlier layers, and all of them override the defaults.
 
-        What is said of a stage holds for all arms, unless the arm's own group says otherwise.
+        Parameters of a stage apply to all arms, unless the arm's own group sets them.
 
         Raises:
             UnknownNameError: A name is not declared.
-            ParameterError: A value breaks its declaration.
+            ParameterError: A value violates its declaration.
             PartError: The graph cannot run.
         """
         merged: Layer = {}
@@ -71,11 +71,11 @@ class Configuration:
         return Configuration(groups, scenario, graph)
 
     def group(self, stage: str, arm: str = "") -> Any:
-        """Parameters of a stage of an arm, by the arm's namespace."""
+        """Parameters of a stage of the arm with the namespace ``arm``."""
         return self.groups[f"{arm}/{stage}" if arm else stage]
 
     def value(self, name: str, arm: str = "") -> Any:
-        """Parameter of the first stage of an arm that has it; None if none has.
+        """Value of a parameter from the first stage of an arm that has this parameter; None if no stage has it.
 
         Args:
             name: A parameter, such as ``robot`` or ``seed``.
@@ -85,11 +85,11 @@ class Configuration:
         return next((getattr(group, name) for group in groups if hasattr(group, name)), None)
 
     def text(self) -> str:
-        """All values as a ROS 2 parameter file, which :func:`parse_layer` reads back."""
+        """All values as the text of a ROS 2 parameter file, which :func:`parse_layer` reads back."""
         return written(self.content())
 
     def content(self) -> dict[str, Any]:
-        """The same as mappings, lists and plain values, by nodes."""
+        """All values as mappings, lists and plain values, by nodes."""
         return {
             name: {
                 "ros__parameters": {k: (list(v) if isinstance(v, tuple) else v) for k, v in values_of(group).items()}
@@ -99,14 +99,14 @@ class Configuration:
 
 
 _SHARED = ("seed", "device.workspace", "device.start")
-"""What operator and haptic master both know: said of one alone, it holds for both."""
+"""Parameters that operator and haptic master share: a value set for only one of them applies to both."""
 
 _SAID_TO_ALL = ("seed", "robot", "geometry")
-"""What is said to every stage that has it, also to those that a session leaves out."""
+"""Parameters that a file may set for every stage that has them, even for stages that the session leaves out."""
 
 
 def _values_for(member: Member, merged: Layer, graph: Graph) -> dict[str, object]:
-    """What is said of the stage, then of the stage of this arm."""
+    """Values of a member: values for the stage, overridden by values for the stage of this arm."""
     named = dict(zip(graph.namespaces, graph.arms, strict=True))[member.arm]
 
     def said(stage: str) -> dict[str, object]:
@@ -120,12 +120,12 @@ def _values_for(member: Member, merged: Layer, graph: Graph) -> dict[str, object
 
 
 def _check_names(merged: Layer, graph: Graph) -> None:
-    """Refuse groups that nobody has, but for those of nodes that stand in place of the session's.
+    """Refuse groups of unknown arms and stages, except stages that replace a stage of the session.
 
-    A file for a whole machine speaks of its bridge too, which is a node of its own.
+    The file of a whole machine also contains the parameters of its bridge, which is a separate node.
 
     Raises:
-        UnknownNameError: An arm or stage that is not in the graph.
+        UnknownNameError: A group names an arm or stage that is not in the graph.
     """
     stages = [stage.name for stage in graph.stages]
     written = {topic for stage in graph.stages for topic in stage.writes}
@@ -145,10 +145,10 @@ def _check_names(merged: Layer, graph: Graph) -> None:
 
 
 def _check_robots(graph: Graph, groups: Mapping[str, Any], arm: str) -> None:
-    """Make sure that all stages of an arm are for the same robot.
+    """Make sure that all stages of an arm have the same robot.
 
     Raises:
-        ParameterError: Two differ.
+        ParameterError: Two stages have different robots.
     """
     members = [Member(stage, arm) for stage in graph.stages]
     named = [m.name for m in members if hasattr(groups[m.name], "robot")]
@@ -159,10 +159,10 @@ def _check_robots(graph: Graph, groups: Mapping[str, Any], arm: str) -> None:
 
 
 def _check_sides(graph: Graph, groups: Mapping[str, Any], arm: str) -> None:
-    """Make sure that what works from both sides has both, and that both agree.
+    """Make sure that methods that need a master side and a slave side have both, and that both sides match.
 
     Raises:
-        ParameterError: The slave's side is not there, or does what another kind does.
+        ParameterError: The slave's side is missing or belongs to another method.
     """
     names = [stage.name for stage in graph.stages]
     for stage in graph.stages:
@@ -188,10 +188,10 @@ def _check_sides(graph: Graph, groups: Mapping[str, Any], arm: str) -> None:
 
 
 def _check_operator(graph: Graph, groups: Mapping[str, Any], arm: str) -> None:
-    """Make sure that an operator has what it answers to.
+    """Make sure that the session has all stages that its operator needs.
 
     Raises:
-        ParameterError: A stage is not there.
+        ParameterError: A stage is missing.
     """
     kind = groups[Member(STAGES.find(HAND), arm).name].kind.kind
     names = [stage.name for stage in graph.stages]
@@ -201,7 +201,7 @@ def _check_operator(graph: Graph, groups: Mapping[str, Any], arm: str) -> None:
 
 
 def _check_order(stages: Iterable[str]) -> None:
-    """Make sure that the slave yields on its own side, and passivity counts how it does.
+    """Make sure that the impedance stage is on the slave's side of the network, and that passivity comes after it.
 
     Raises:
         PartError: The stages are named in another order.
@@ -218,7 +218,7 @@ def configure(scenario: str | None = None, files: Iterable[Path] = (), settings:
     """Configuration as the command line gives it: scenario, then files, then settings.
 
     Raises:
-        TeleopError: Any of them is wrong; the text names it.
+        TeleopError: The scenario, a file or a setting is wrong; the error text names it.
     """
     layers = [load_file(config_folder() / "teleop.yaml")]
     if scenario is not None:
@@ -229,7 +229,7 @@ def configure(scenario: str | None = None, files: Iterable[Path] = (), settings:
 
 
 def parameter_rows(stages: Iterable[str]) -> list[tuple[str, str, str, str]]:
-    """Name, default, what is allowed and meaning of every parameter of some stages."""
+    """Name, default, allowed values and meaning of every parameter of some stages."""
     rows = []
     groups = declared_groups()
     for stage in stages:

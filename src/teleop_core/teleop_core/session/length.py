@@ -1,4 +1,4 @@
-"""Length of a session: that of the recordings which its hands follow, if nothing else is said."""
+"""Length of a session: as long as the recordings that its hands follow, unless a duration is set."""
 
 from collections.abc import Iterable
 from dataclasses import fields, replace
@@ -16,12 +16,12 @@ from teleop_core.session.configuration import Configuration
 def as_long_as_followed(made: Configuration, given: Iterable[Layer]) -> Configuration:
     """The same session, as long as the recordings that its operators follow.
 
-    If the scenario itself names such an operator, its own duration is the least: that leaves the slave time to arrive
-    where the hand ends.
+    If the scenario itself chooses such an operator, the session lasts at least the scenario's duration. The slave then
+    has time to arrive where the hand ends.
 
     Args:
         made: The session.
-        given: What was said of it beside defaults and scenario; a duration there holds.
+        given: Layers of the session without defaults and scenario; a duration in them is kept.
 
     Raises:
         TeleopError: A recording cannot be read.
@@ -41,13 +41,13 @@ def as_long_as_followed(made: Configuration, given: Iterable[Layer]) -> Configur
 
 
 def _chooses_operator(layer: Layer) -> bool:
-    """Whether a layer says who moves a hand."""
+    """Whether a layer sets the kind of an operator."""
     operators = (said for name, said in layer.items() if name.rpartition("/")[2] == OPERATOR.name)
     return any("kind" in said for said in operators)
 
 
 def _length(made: Configuration, name: str) -> float | None:
-    """How long the motion of an operator lasts [s]; None of other stages, or without end."""
+    """Duration of an operator's motion [s]; None for other stages, and for a motion without end."""
     operator = made.groups[name]
     if not isinstance(operator, OperatorParameters):
         return None

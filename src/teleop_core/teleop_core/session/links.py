@@ -1,14 +1,15 @@
-"""Links as texts: how a graph tells a node in another process what feeds its ports."""
+"""Links as texts: they tell a node in another process which topics feed its ports."""
 
 from teleop_core.graph.graph import Graph, Member
 
 
 def link_texts(graph: Graph, member: Member) -> list[str]:
-    """Links of a member that differ from "every port is fed by the topic of its name".
+    """Links of a member, except for ports that are fed by the topic of the same name.
 
     Returns:
-        Texts ``port=topic`` or ``port=topic@delay``, below the arm's namespace, with the delay in seconds; ``../topic``
-        is one beside that namespace. Topics of one port are added, the first is the one whose stamp counts.
+        Texts ``port=topic`` or ``port=topic@delay``, with the delay in seconds. Topics are relative to the arm's
+        namespace; ``../topic`` is outside of it. If a port has several topics, their values are added, and the stamp
+        of the first topic is used.
     """
     texts = []
     for port in member.stage.reads:
@@ -24,5 +25,5 @@ def link_texts(graph: Graph, member: Member) -> list[str]:
 
 
 def _below(arm: str, topic: str, of: str) -> str:
-    """Name of an arm's topic as it is seen from the namespace of another, or from its own."""
+    """Name of a topic of the arm ``of``, relative to the namespace of ``arm``."""
     return topic.removeprefix(f"{arm}/") if of == arm or not arm else f"../{topic}"

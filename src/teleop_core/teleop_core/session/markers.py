@@ -18,10 +18,10 @@ TAIL = 200
 """Points of a path."""
 FORCE_SCALE = 0.02
 """Length of the arrow of a force [m/N]."""
-_TOUCH = 0.05  # force of a wall that somebody touches [N]
+_TOUCH = 0.05  # force from which on a wall counts as touched [N]
 _FREE: Color = (0.26, 0.52, 0.96, 0.25)
 _TOUCHED: Color = (0.90, 0.20, 0.15, 0.40)
-_WIDTH = 0.001  # of the lines of a fixture [m]
+_WIDTH = 0.001  # width of a fixture's lines [m]
 _BODIES = {box.BOX.name: Shape.CUBE, sphere.SPHERE.name: Shape.SPHERE}
 _FORCE: Color = (0.90, 0.45, 0.10, 1.0)
 _MEASURED: Color = (0.76, 0.22, 0.04, 1.0)
@@ -29,11 +29,11 @@ _COMMANDED: Color = (0.26, 0.52, 0.96, 1.0)
 
 
 class ArmMarkers:
-    """Markers of one arm, which remembers the ends of its paths.
+    """Markers of one arm. This class stores the latest points of the arm's paths.
 
     Args:
-        arm: Its namespace; empty for that of plain topics.
-        axes: Rotation (3, 3) from the master's base to the slave's axes; None for the published.
+        arm: Its namespace; empty for the arm of plain topics.
+        axes: Rotation (3, 3) from the master's base to the slave's axes; None for the published rotation.
     """
 
     def __init__(self, arm: str = "", axes: Array | None = None) -> None:
@@ -46,19 +46,19 @@ class ArmMarkers:
         self._tails = {name: deque[Array](maxlen=TAIL) for name in ("measured", "commanded")}
 
     def forget(self) -> None:
-        """Let the paths begin anew."""
+        """Delete the stored points, so that new paths begin."""
         for tail in self._tails.values():
             tail.clear()
 
     def fixture(self, state: Mapping[str, float], told: Mapping[str, str], force: float = 0.0) -> Marker:
-        """Virtual fixture around the slave, red while it is touched; taken away when it is off.
+        """Virtual fixture around the slave, red while it is touched, and removed while it is off.
 
-        A box and a sphere are bodies, other shapes are lines along their edges. A shape that is not known here is
-        drawn as the box around it.
+        Boxes and spheres are drawn as solids, other shapes as lines along their edges. An unknown shape is drawn as
+        its bounding box.
 
         Args:
-            state: Numbers of ``teleop/state`` by name; empty before the first.
-            told: Names and texts of the same report, which say what the fixture is.
+            state: Numbers of ``teleop/state`` by name; empty before the first message.
+            told: Names and texts of the same report, which describe the fixture.
             force: Size of the force on the hand [N].
         """
         is_on, pose = bool(state.get("is_fixture_on")), np.array([0.0, 0, 0, 1, 0, 0, 0])
@@ -75,21 +75,27 @@ class ArmMarkers:
                       (*color[:3], 1.0), self._edges(fixture, state["gain"]))  # fmt: skip
 
     def _edges(self, fixture: ReportedFixture, gain: float) -> Array:
-        """Ends (N, 3) [m] of segments along its edges, two by two; found anew where it changes."""
+        """End points (N, 3) [m] of segments along the fixture's edges, two for each segment.
+
+        They are computed only when the fixture or the gain changes.
+        """
         if self._told != (fixture, gain):
             self._segments = segments_of(fixture.outline(gain, self._axes)).reshape(-1, 3)
             self._told = fixture, gain
         return self._segments
 
     def force(self, stylus: Array, force: Array) -> Marker:
-        """Force (3,) [N] on the hand at a stylus (7,), in master_base; no arrow for none."""
+        """Arrow of the force (3,) [N] on the hand at a stylus pose (7,), in master_base.
+
+        The arrow is hidden if the force is near zero.
+        """
         ends = np.stack((stylus[:3], stylus[:3] + FORCE_SCALE * force))
         is_shown = float(length(force)) > _TOUCH
         scale = (0.004, 0.009, 0.01)
         return Marker("force", self._master, Shape.ARROW, scale=scale, color=_FORCE, points=ends, is_shown=is_shown)
 
     def path(self, name: str, point: Array) -> Marker:
-        """Path of the tip, ``measured`` or ``commanded``, longer by a point (3,) [m]."""
+        """Append a point (3,) [m] to the tip's path ``measured`` or ``commanded``, and return the path's marker."""
         tail = self._tails[name]
         tail.append(point.copy())
         color, width = (_MEASURED, 0.002) if name == "measured" else (_COMMANDED, 0.001)

@@ -1,6 +1,6 @@
-"""Master bag: any recording as one whose masters can be replayed and followed.
+"""Master bag: converts any recording into one whose masters can be replayed and followed.
 
-Recordings that are sound are taken as they are; an installed reader takes others, and tables.
+Valid recordings are used unchanged. For other recordings and for tables an installed reader is used.
 """
 
 from importlib.metadata import entry_points
@@ -18,21 +18,20 @@ READERS = "teleop_core.readers"
 
 
 def as_master_bag(recording: Path | str | reader.Bag) -> reader.Bag:
-    """Recording with ``master/measured_cp`` of its arms, and ``master/buttons`` where it has some.
+    """Recording with ``master/measured_cp`` of its arms, and ``master/buttons`` if the recording contains buttons.
 
-    What had to be guessed, changed or left out is told as a warning.
+    A warning names everything that had to be guessed, changed or left out.
 
     Args:
-        recording: A recording, opened or where it is; with ``teleop_exchange`` also ROS 1, CSV
-            or Parquet, other topics, and recordings of damaged rows.
+        recording: An open recording, or its path. With ``teleop_exchange`` installed also ROS 1, CSV or Parquet, other
+            topics, and recordings with damaged rows.
 
     Returns:
-        The recording itself if it has what is needed, else a copy in memory of these topics, with
-        the same stamps and metadata.
+        The recording itself if it is valid, else a copy of these topics in memory, with the same stamps and metadata.
 
     Raises:
-        RecordingError: It cannot be read, holds no motion, or needs a reader that is not installed.
-        ParameterError: It has several topics of poses.
+        RecordingError: The recording cannot be read, contains no motion, or needs a reader that is not installed.
+        ParameterError: The recording has several topics of poses.
     """
     if isinstance(recording, memory.MemoryBag):
         return recording
@@ -49,7 +48,7 @@ def as_master_bag(recording: Path | str | reader.Bag) -> reader.Bag:
 
 
 def _ours(path: Path) -> reader.Bag | None:
-    """The recording as we read it; None for other files."""
+    """The recording as opened by this package; None if the file has another format."""
     if not path.exists() or not (path.is_dir() or path.suffix == ".mcap"):
         return None
     try:
@@ -59,17 +58,17 @@ def _ours(path: Path) -> reader.Bag | None:
 
 
 def _prefixes(bag: reader.Bag) -> list[str]:
-    """What stands before ``master/measured_cp`` of each arm that has such poses."""
+    """Prefix before ``master/measured_cp``, for each arm that has such poses."""
     name, kind = MASTER_MEASURED_CP.name, MASTER_MEASURED_CP.kind.ros_type
     ends = [n for n, info in bag.topics.items() if info.count and info.type == kind]
     return [n.removesuffix(name) for n in ends if n == name or n.endswith(f"/{name}")]
 
 
 def is_sound(bag: reader.Bag, prefix: str) -> bool:
-    """Whether an arm's poses and buttons can be taken as they are.
+    """Whether an arm's poses and buttons can be used unchanged.
 
-    Poses are finite, of unit quaternions, and their stamps do not go back or stand still; buttons
-    are three, and their stamps do not go back.
+    Poses must be finite and have unit quaternions and increasing stamps. Buttons must be three, and their stamps must
+    not decrease.
     """
     last, first = -1, -1
     name = prefix + MASTER_MEASURED_CP.name
@@ -88,7 +87,7 @@ def is_sound(bag: reader.Bag, prefix: str) -> bool:
 
 
 def _are_sound(bag: reader.Bag, name: str) -> bool:
-    """Whether buttons can be taken as they are; true if there are none."""
+    """Whether buttons can be used unchanged; True if there are no buttons."""
     info = bag.topics.get(name)
     if info is None or not info.count:
         return True

@@ -1,7 +1,8 @@
-"""Model: robots and frames of a session as other tools draw them, from the recording alone.
+"""Model: robots and frames of a session, recorded so that other tools can draw them from the recording alone.
 
-Frames stand in ``world``: each slave's base, its links and its tip, the master's base beside it, turned so that stylus
-and tip move alike, and its stylus. Where bases stand to each other nobody measures: it is a picture.
+All frames are in ``world``: each slave's base, links and tip, and the base and stylus of its master. The master's base
+is beside the slave and is turned so that stylus and tip move in the same direction. The positions of the bases
+relative to each other are not measured; they are chosen for the drawing.
 """
 
 from dataclasses import dataclass
@@ -23,10 +24,10 @@ from teleop_core.robots.robot import Robot
 from teleop_core.session.configuration import Configuration
 
 SLAVE, MASTER = "slave_", "master_"
-"""What stands before the names of frames."""
+"""Prefixes of the names of frames."""
 _HERE = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
-_ASIDE = 0.3  # m, from a robot's reach to the middle of its master
-_APART = 2.0  # reaches between two slaves
+_ASIDE = 0.3  # m, from the end of a robot's reach to the middle of its master
+_APART = 2.0  # distance between two slaves, in reaches
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,7 +35,7 @@ class ArmModel:
     """Robot, master and frames of one arm.
 
     Args:
-        arm: Its namespace, empty for that of plain topics.
+        arm: Its namespace, empty for the arm of plain topics.
         robot: Its robot.
         base: Pose (7,) of slave_base in the world.
         master: Pose (7,) of master_base in the world.
@@ -68,12 +69,12 @@ class ArmModel:
         return text_message(urdf_of(self.robot, self.robot.name, prefix + SLAVE))
 
     def transforms(self, stamp_ns: NDArray[np.int64], joints: Array, stylus: Array) -> list[bytes]:
-        """Messages of where all its frames are.
+        """Messages with the poses of all its frames.
 
         Args:
             stamp_ns: Stamps (N,) [ns].
             joints: Joint vectors (N, n) [rad, m].
-            stylus: Poses (N, 7) in master_base; those that are none count as its origin.
+            stylus: Poses (N, 7) in master_base; invalid poses are replaced by its origin.
         """
         count = len(stamp_ns)
         poses = np.empty((count, len(self._messages.frames), 7))  # type: ignore[attr-defined]
@@ -88,9 +89,9 @@ class Model:
     """Robots of a session that other tools can draw.
 
     Args:
-        configuration: What runs.
-        rate: Messages of ``/tf`` a second; 0 for no model at all, None for that of the recorder.
-        namespace: Where all of the session is, without the slash before it; arms are below.
+        configuration: Configuration of the session.
+        rate: Messages of ``/tf`` per second; 0 for no model, None for the recorder's rate.
+        namespace: Namespace of the whole session, without leading slash; the arms' namespaces are below it.
 
     Attributes:
         arms: Arms with a robot, the default one first.
@@ -108,7 +109,7 @@ class Model:
 
     @property
     def topics(self) -> tuple[Topic, ...]:
-        """Topics that it writes."""
+        """Topics that this model writes."""
         return (*(arm.description for arm in self.arms), TF) if self.arms else ()
 
 
@@ -174,12 +175,12 @@ class ModelRecords:
 
 
 def write_model_of(bag: Bag, model: Model, writer: BagWriter) -> None:
-    """Record the model of a session that was kept in memory, as it would have been on disk.
+    """Record the model of a session that was kept in memory, with the same messages as in a session recorded to disk.
 
     Args:
-        bag: Its streams.
-        model: Its robots.
-        writer: Where it goes; it knows the topics of the model.
+        bag: Streams of the session.
+        model: Robots of the session.
+        writer: Writer of the messages; the topics of the model must be announced to it.
     """
     found: list[tuple[int, bytes]] = []
     for arm in model.arms:

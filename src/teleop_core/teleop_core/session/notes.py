@@ -1,4 +1,4 @@
-"""Notes: what runs but may not be meant, of a configuration before its session begins."""
+"""Notes: warnings about a valid configuration that may not be intended, made before its session begins."""
 
 from teleop_core.coupling.mapping import gains, walls
 from teleop_core.graph import BUILT_IN, DT, topics
@@ -14,11 +14,11 @@ _MASTER, _MAPPING = BUILT_IN[1:3]
 
 
 def notes_of(configuration: Configuration, transport: float = 0.0) -> list[str]:
-    """One line for each thing that may not be meant; none where all is well.
+    """One line for each setting that may not be intended; empty if there is none.
 
     Args:
-        configuration: Of the session.
-        transport: Time that a sample takes from the device to the wall and back, beside declared delays [s].
+        configuration: Configuration of the session.
+        transport: Time that a sample takes from the device to the wall and back, without the declared delays [s].
     """
     found = list(configuration.graph.notes)
     for arm in configuration.graph.namespaces:
@@ -38,7 +38,7 @@ def notes_of(configuration: Configuration, transport: float = 0.0) -> list[str]:
 
 
 def _delay(configuration: Configuration, arm: str) -> float:
-    """Declared delays on the way from the device's samples to its force [s]."""
+    """Sum of the declared delays between the device's samples and its force [s]."""
     around = (topics.MASTER_MEASURED_CP.name, topics.MASTER_SERVO_CF.name)
     ends = {topics.MASTER_MEASURED_CP.name: _MAPPING, topics.MASTER_SERVO_CF.name: _MASTER}
     return sum(
@@ -49,12 +49,12 @@ def _delay(configuration: Configuration, arm: str) -> float:
 
 
 def passive_note(device: DeviceParameters, fixture: gains.FixtureParameters, delay: float) -> str:
-    """What a wall gives back that is stiffer than passive; empty where it is not.
+    """Note on a wall that is too stiff to be passive; empty if the wall is passive.
 
     Args:
         device: The device.
         fixture: The wall.
-        delay: Of its force beyond the tick [s].
+        delay: Delay of its force in addition to the tick [s].
     """
     wall = walls.WALLS[fixture.wall]
     stiffness = wall.spring(fixture.stiffness, fixture.max_force)
@@ -69,9 +69,11 @@ def passive_note(device: DeviceParameters, fixture: gains.FixtureParameters, del
 
 
 def rendered_note(device: DeviceParameters, fixture: gains.FixtureParameters) -> str:
-    """What becomes of a wall that is stiffer than the device; empty where none is.
+    """Note on a wall that is stiffer than the device, with the stiffness that the hand feels.
 
-    The device bends by force over its stiffness, so wall and device are two springs in series.
+    The text is empty if the wall is not stiffer.
+
+    The device bends by force divided by its stiffness, so wall and device are two springs in series.
     """
     stiffness = walls.WALLS[fixture.wall].spring(fixture.stiffness, fixture.max_force)
     soft = [i for i in range(3) if stiffness > device.stiffness[i]]

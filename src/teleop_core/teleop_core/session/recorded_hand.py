@@ -1,8 +1,8 @@
 """Recorded operators: a hand that follows a recording or a table of numbers.
 
-The motion is taken as it is, relative to its first sample, which the hand reaches by a smooth
-approach to ``operator.center``; where that is zero, it is there from the start. Between samples the
-hand moves and turns along straight lines; over gaps it waits.
+The motion is used unchanged, relative to its first sample. The hand first moves smoothly to ``operator.center``, where
+the motion begins; if ``operator.center`` is zero, the motion begins at once. Between samples, position and orientation
+are interpolated linearly; during gaps the hand waits.
 """
 
 import warnings
@@ -26,12 +26,12 @@ from teleop_core.session.master_bag import as_master_bag
 COLUMNS = ("t", "x", "y", "z", "rx", "ry", "rz", "clutch", "fixture", "mode")
 """Columns of a table: time [s], position [m], rotation vector [rad], buttons (1 pressed)."""
 _PERIODS = 5.0
-"""A gap is longer than so many periods of the recording, whatever ``longest_gap`` says."""
+"""Shortest gap in periods of the recording: a shorter pause is interpolated even if it exceeds ``longest_gap``."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class FileParameters:
-    """A table of what the hand wants."""
+    """Parameters of a hand that follows a table."""
 
     path: str = parameter(
         "",
@@ -46,12 +46,12 @@ class Samples(NamedTuple):
 
     Attributes:
         at: Times (N,) [s] since the first sample.
-        moves: Places (N, 3) [m], in the master's axes.
-        turns: Turns since the first sample, quaternions (N, 4) in the master's axes; their signs do not jump.
+        moves: Positions (N, 3) [m], in the master's axes.
+        turns: Rotations since the first sample, quaternions (N, 4) in the master's axes, without jumps of sign.
         pressed_at: Times (K,) [s] at which buttons change.
-        pressed: Clutch, fixture, mode from then on (K, 3).
-        closed_at: Times (M,) [s] at which the hand closes the jaw farther or less far.
-        closed: How far from then on (M, 1), 0 open to 1 closed.
+        pressed: Values of clutch, fixture and mode from these times on (K, 3).
+        closed_at: Times (M,) [s] at which the closing of the jaw changes.
+        closed: Closing of the jaw from these times on (M, 1), 0 open to 1 closed.
     """
 
     at: Array
@@ -67,8 +67,8 @@ def _bag(parameters: object, setting: Setting) -> Motion:
     """Motion of a recording.
 
     Raises:
-        RecordingError: It is missing or holds no motion.
-        ParameterError: It has several topics of poses.
+        RecordingError: The recording is missing or contains no motion.
+        ParameterError: The recording has several topics of poses.
     """
     return _motion(Path(setting.common.bag), setting)
 
@@ -77,7 +77,7 @@ def _file(parameters: FileParameters, setting: Setting) -> Motion:
     """Motion of a table.
 
     Raises:
-        RecordingError: The file cannot be read, or its numbers are no motion.
+        RecordingError: The file cannot be read, or its numbers are not a valid motion.
         ParameterError: No file is named, or its columns cannot be guessed.
     """
     return _motion(_named(parameters), setting)
@@ -90,12 +90,12 @@ def _named(parameters: FileParameters) -> Path:
 
 
 def _bag_length(parameters: object, setting: Setting) -> float:
-    """Time of the approach and of the recording [s]."""
+    """Duration of the approach plus the recording [s]."""
     return _length(samples_of(Path(setting.common.bag)), setting)
 
 
 def _file_length(parameters: FileParameters, setting: Setting) -> float:
-    """Time of the approach and of the table [s]."""
+    """Duration of the approach plus the table [s]."""
     return _length(samples_of(_named(parameters)), setting)
 
 
@@ -104,16 +104,16 @@ def _length(samples: Samples, setting: Setting) -> float:
 
 
 def _approach(setting: Setting) -> float:
-    """Time of the approach [s]: none where there is nothing to approach."""
+    """Duration of the approach [s]; 0 if ``operator.center`` is zero."""
     return float(setting.common.approach_time) if any(setting.common.center) else 0.0
 
 
 def samples_of(path: Path) -> Samples:
-    """Samples of a recording or table; what was left out or guessed is told as a warning.
+    """Samples of a recording or table. A warning names everything that was left out or guessed.
 
     Raises:
-        RecordingError: It cannot be read, or holds no motion.
-        ParameterError: What the hand is cannot be guessed.
+        RecordingError: The file cannot be read, or contains no motion.
+        ParameterError: The columns or topics of the hand cannot be guessed.
     """
     try:
         changed = path.stat().st_mtime_ns
@@ -137,7 +137,7 @@ def _read(path: Path, changed_ns: int) -> Samples:
 
 
 def _changes(bag: Bag, topic: topics.Topic, start_ns: int) -> tuple[Array, Array]:
-    """Times (K,) [s] since a stamp [ns], and values (K, width) of a topic; none without it."""
+    """Times (K,) [s] since a stamp [ns], and values (K, width) of a topic; empty if the bag lacks the topic."""
     if topic.name not in bag.topics or not bag.topics[topic.name].count:
         return np.zeros(0), np.zeros((0, topic.width(0)))
     series = bag.read(topic)
@@ -145,7 +145,7 @@ def _changes(bag: Bag, topic: topics.Topic, start_ns: int) -> tuple[Array, Array
 
 
 def _motion(path: Path, setting: Setting) -> Motion:
-    """Motion that approaches the centre and follows the samples there."""
+    """Motion that first approaches the centre and then follows the samples."""
     samples = samples_of(path)
     _tell_stops(path, samples, setting)
     approach, center = _approach(setting), np.array(setting.common.center)
@@ -168,10 +168,10 @@ def _motion(path: Path, setting: Setting) -> Motion:
 
 
 def between(samples: Samples, times: Array, longest: float) -> tuple[Array, Array]:
-    """Places (N, 3) [m] and turns (N, 4), on straight lines between samples.
+    """Positions (N, 3) [m] and rotations (N, 4), linearly interpolated between samples.
 
-    Before the first sample and after the last one they rest, and so they do over longer gaps until
-    the next sample is there.
+    Before the first sample and after the last sample they are constant. In gaps longer than ``longest`` they keep the
+    last sample until the next sample.
 
     Args:
         samples: The recording.
@@ -191,19 +191,21 @@ def between(samples: Samples, times: Array, longest: float) -> tuple[Array, Arra
 
 
 def held(changed_at: Array, values: Array, times: Array) -> Array:
-    """Values (N, width) at times (N,) [s]: each as it became last; zero before the first.
+    """Values (N, width) at times (N,) [s], from the latest change at or before each time.
+
+    Values are zero before the first change.
 
     Args:
         changed_at: Times (K,) of the changes [s].
-        values: From then on (K, width).
-        times: Times [s].
+        values: Values from each change on (K, width).
+        times: Times (N,) at which values are wanted [s].
     """
     known = np.vstack((np.zeros(values.shape[1]), values))
     return np.asarray(known[np.searchsorted(changed_at, times, side="right")])
 
 
 def _in_axes_of(rest: Array, turns: Array) -> Array:
-    """Rotation vectors (N, 3) in the axes of an attitude, of turns (N, 4) in the base's."""
+    """Rotation vectors (N, 3) of ``turns`` (N, 4), from the axes of the base to the axes of ``rest``."""
     own = quaternion_products(quaternion_products(rest * (1.0, -1.0, -1.0, -1.0), turns), rest)
     sine = length(own[:, 1:])
     angle = 2.0 * arctangent(sine, own[:, 0])
@@ -211,7 +213,7 @@ def _in_axes_of(rest: Array, turns: Array) -> Array:
 
 
 def _tell_stops(path: Path, samples: Samples, setting: Setting) -> None:
-    """Tell a motion that leaves the device's workspace, and how it would not."""
+    """Warn of a motion that leaves the device's workspace, with a hint how to keep it inside."""
     device = setting.common.device
     size, start = np.array(device.workspace), np.array(device.start)
     places = samples.moves + np.array(setting.common.center) + start  # from the middle

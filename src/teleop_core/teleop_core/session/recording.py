@@ -37,7 +37,7 @@ class Stream:
         stamp_ns: Stamps of the headers (N,) [ns].
         log_ns: Times of recording (N,) [ns].
         values: Rows (N, columns) in SI units.
-        start_ns: Where the recording begins [ns].
+        start_ns: Start time of the recording [ns].
     """
 
     topic: str
@@ -56,10 +56,10 @@ class Stream:
         return len(self.stamp_ns)
 
     def __getitem__(self, column: str | Sequence[str]) -> Array:
-        """One column (N,) by its name, or several (N, k) by theirs.
+        """One column (N,) by its name, or several columns (N, k) by a list of names.
 
         Raises:
-            UnknownNameError: There is no such column; the alternatives are listed.
+            UnknownNameError: There is no such column; the error lists the alternatives.
         """
         if isinstance(column, str):
             found: Array = self.values[:, self._index(column)]
@@ -73,13 +73,13 @@ class Stream:
         return self.columns.index(column)
 
     def part(self, rows: slice) -> "Stream":
-        """Some of its messages."""
+        """Stream with the selected messages only."""
         stamp_ns, log_ns = self.stamp_ns[rows], self.log_ns[rows]
         values = self.values[rows]
         return Stream(self.topic, self.columns, stamp_ns, log_ns, values, self.start_ns)
 
     def frame(self) -> "pandas.DataFrame":
-        """The stream as a pandas data frame over the time [s], with its stamps."""
+        """The stream as a pandas data frame, indexed by time [s], with a column of stamps."""
         import pandas
 
         frame = pandas.DataFrame(self.values, columns=list(self.columns))
@@ -92,13 +92,13 @@ class Stream:
 
 
 class Recording:
-    """A recorded session: its topics as arrays, what was recorded, and what it is worth.
+    """A recorded session: its topics as arrays, its metadata and its scores.
 
-    Topics are named as in ROS, without a leading slash; those of a further arm begin with its name:
+    Topics are named as in ROS, without a leading slash. Topics of a further arm begin with the arm's name:
     ``recording["left/slave/measured_cp"]``.
 
     Args:
-        bag: Where it is, in memory or on disk.
+        bag: The recording, in memory or on disk.
     """
 
     def __init__(self, bag: reader.Bag) -> None:
@@ -111,7 +111,7 @@ class Recording:
 
     @property
     def path(self) -> Path | None:
-        """Where it is on disk; None if it is in memory."""
+        """Path of the recording on disk; None if it is in memory."""
         return None if isinstance(self._bag, memory.MemoryBag) else self._bag.path
 
     @property
@@ -121,7 +121,7 @@ class Recording:
 
     @property
     def arms(self) -> tuple[str, ...]:
-        """Names of the arms, the default one first; ``("",)`` if they have none."""
+        """Names of the arms, the default arm first; ``("",)`` if the only arm has no name."""
         return arm_names(self._bag)
 
     @property
@@ -133,8 +133,8 @@ class Recording:
     def duration(self) -> float:
         """Time from the first to the last message [s].
 
-        The slave moves to its start first, so it is longer than the ``duration`` of
-        :func:`teleop_core.run`, which counts from when the hand may begin.
+        This is longer than the ``duration`` of :func:`teleop_core.run`: the slave first moves to its start, and
+        ``duration`` is counted from the time at which the hand may begin.
         """
         return (self._bag.end_ns - self._bag.start_ns) * 1e-9
 
@@ -142,8 +142,8 @@ class Recording:
         """All messages of a topic.
 
         Raises:
-            UnknownNameError: There is no such topic; the alternatives are listed.
-            RecordingError: It cannot be read as numbers, or the file is damaged.
+            UnknownNameError: There is no such topic; the error lists the alternatives.
+            RecordingError: The topic cannot be read as numbers, or the file is damaged.
         """
         name = topic.removeprefix("/")
         if name not in self.topics:
@@ -165,7 +165,7 @@ class Recording:
         return Stream(name, columns, series.stamp_ns, series.log_ns, series.values, start_ns)
 
     def _reports(self, name: str) -> Stream:
-        """Numbers of a report, a row per message."""
+        """Stream of the numbers in a topic's reports, with one row per message."""
         plain = next((t for n, t in BY_NAME.items() if name == n or name.endswith(f"/{n}")), None)
         columns = plain.columns if plain is not None else ()
         if not columns:
@@ -180,8 +180,8 @@ class Recording:
         """Some topics side by side over the time [s], each column as ``topic.column``.
 
         Args:
-            *topics: Names; all streams of numbers if none is given. A row stands wherever one of
-                them has a message; what has none there is NaN.
+            *topics: Names; all streams of numbers if none is given. There is one row for each time at which any of
+                them has a message; columns of topics without a message at that time are NaN.
 
         Raises:
             UnknownNameError: There is no such topic.
@@ -204,27 +204,27 @@ class Recording:
 
         Args:
             arm: Its name; empty for the default arm.
-            further: Metrics beside the registered ones.
-            span: Begin and end [s] of what is scored, since the first message; None for all of it.
+            further: Metrics in addition to the registered metrics.
+            span: Begin and end [s] of the scored part, since the first message; None for the whole recording.
 
         Raises:
-            TeleopError: Nothing can be scored; the text says why.
+            TeleopError: Nothing can be scored; the error text gives the reason.
         """
         from teleop_core.evaluation import evaluate
 
         return evaluate(self._bag, arm, further, span)
 
     def scores(self, further: "Sequence[type[Metric]]" = (), span: tuple[float, float] | None = None) -> "list[Score]":
-        """Scores of all arms, the default one first; as :meth:`score`."""
+        """Scores of all arms, the default arm first; see :meth:`score`."""
         from teleop_core.evaluation import scores
 
         return scores(self._bag, further, span)
 
     def save(self, path: Path | str) -> "Recording":
-        """Write it to a new directory, as ``ros2 bag`` reads it.
+        """Write the recording to a new directory, in the format of ``ros2 bag``.
 
         Returns:
-            The recording there.
+            The written recording.
 
         Raises:
             RecordingError: The directory exists or cannot be written.
@@ -275,7 +275,7 @@ class Recording:
 
 
 def _model_of(bag: reader.Bag) -> "Model":
-    """Robots of a recording of ours, by the configuration that is stored with it; else none."""
+    """Robots of a recording, from the configuration stored in it; no robots for recordings of other writers."""
     from teleop_core.session.configuration import Configuration
     from teleop_core.session.model import Model
     from teleop_core.session.runner import recorded_configuration
@@ -285,7 +285,7 @@ def _model_of(bag: reader.Bag) -> "Model":
     try:
         layer, scenario = recorded_configuration(bag)
         return Model(Configuration.from_layers([layer], scenario), None if is_ours else 0.0)
-    except TeleopError:  # made with parts that are not here: numbers are kept, nothing is drawn
+    except TeleopError:  # made with parts that are not installed: numbers are kept, nothing is drawn
         return Model(Configuration.from_layers([]), 0.0)
 
 
@@ -305,19 +305,19 @@ def _seconds(start_ns: int, logs: list[NDArray[np.int64]]) -> list[tuple[int, in
 
 
 def _between(series: Series, begin_ns: int, end_ns: int) -> tuple[NDArray[np.int64], Array, NDArray[np.int64]]:
-    """Stamps, values and log times of a second of a stream."""
+    """Stamps, values and log times of the part of a stream that was recorded between two times."""
     first, last = np.searchsorted(series.log_ns, (begin_ns, end_ns))
     part = slice(int(first), int(last))
     return series.stamp_ns[part], series.values[part], series.log_ns[part]
 
 
 def open_recording(path: Path | str) -> Recording:
-    """Open a recording of ours or of others.
+    """Open a recording made by this package or by others.
 
     Args:
         path: Its directory, or one ``.mcap`` file.
 
     Raises:
-        RecordingError: The path is missing, or is no recording, or was cut off, or is empty.
+        RecordingError: The path does not exist or is no recording, or the recording was cut off or is empty.
     """
     return Recording(reader.Bag(path))

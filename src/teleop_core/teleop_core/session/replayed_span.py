@@ -1,4 +1,4 @@
-"""Replayed span: which samples of a recorded hand belong together, whatever single stamps say."""
+"""Replayed span: the samples of a recorded hand that belong together; single wrong stamps are left out."""
 
 import warnings
 from pathlib import Path
@@ -11,21 +11,21 @@ from teleop_core.base.errors import RecordingError, TeleopWarning
 from teleop_core.graph.signals import TICK_NS
 
 LONGEST_GAP_NS = 60_000_000_000
-"""Longest pause of a hand within one session [ns]; a stamp beyond it is a mistake of a clock, and
-replaying the way there would take as long as the recording says that it took."""
+"""Longest pause of a hand within one session [ns]. A longer pause means that a clock was wrong. To replay such a pause
+would take as long as the wrong stamps state."""
 
 
 def in_order(series: Series) -> Series:
-    """The samples in the order of their stamps; as they are if that is their order already."""
+    """The samples sorted by stamp; the same series if it is already sorted."""
     if not (np.diff(series.stamp_ns) < 0).any():
         return series
     return series[np.argsort(series.stamp_ns, kind="stable")]
 
 
 def replayed_span(path: Path, name: str, stamp_ns: NDArray[np.int64]) -> tuple[int, int]:
-    """First and last stamp [ns] of the longest stretch of samples without a gap.
+    """First and last stamp [ns] of the longest sequence of samples without a gap.
 
-    Samples before and behind it are left out with a warning.
+    A warning reports samples before and after this sequence, which are left out.
 
     Args:
         path: Recording, for messages.
@@ -37,7 +37,7 @@ def replayed_span(path: Path, name: str, stamp_ns: NDArray[np.int64]) -> tuple[i
     """
     if not len(stamp_ns):
         raise RecordingError(path, f"has no readable sample of {name} to replay")
-    # As real numbers: the difference of two wrong stamps can be beyond 64 bits.
+    # Floating point, because the difference of two wrong stamps can exceed 64 bits.
     ends = np.flatnonzero(np.diff(stamp_ns.astype(np.float64)) > LONGEST_GAP_NS) + 1
     stretches = np.split(stamp_ns, ends)
     longest = max(stretches, key=len)
@@ -53,5 +53,5 @@ def replayed_span(path: Path, name: str, stamp_ns: NDArray[np.int64]) -> tuple[i
 
 
 def tick_times(begin_ns: int, count: int) -> NDArray[np.int64]:
-    """Times of so many ticks from the first one on (count,) [ns]."""
+    """Times of ``count`` ticks, the first at ``begin_ns`` (count,) [ns]."""
     return begin_ns + TICK_NS * np.arange(count, dtype=np.int64)

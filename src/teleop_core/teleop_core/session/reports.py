@@ -1,4 +1,4 @@
-"""Reports of a session's stages: their numbers, and the same in words."""
+"""Reports of a session's stages: as messages with numbers, and as text."""
 
 from collections.abc import Mapping
 
@@ -15,7 +15,7 @@ def report_of(topic: topics.Topic, stamp_ns: int, row: Array, described: Mapping
         topic: Such as :data:`~teleop_core.graph.topics.TELEOP_STATE`.
         stamp_ns: Stamp [ns].
         row: Its numbers (columns,).
-        described: Further names and texts, such as what the fixture is.
+        described: Further names and texts, such as a description of the fixture.
     """
     values = {name: repr(float(value)) for name, value in zip(topic.columns, row, strict=True)}
     more, name, level, text = dict(described or {}), topic.name, 0, ""
@@ -29,7 +29,7 @@ def report_of(topic: topics.Topic, stamp_ns: int, row: Array, described: Mapping
 
 
 def state_text(state: Array, fixture: str = "box") -> str:
-    """State in words: CLUTCHED or FOLLOWING or ALIGNING, mode, fixture, limit."""
+    """State as text: CLUTCHED, FOLLOWING or ALIGNING, then mode, fixture and limit."""
     named = dict(zip(STATE_FIELDS, state, strict=True))
     doing = "CLUTCHED" if named["is_clutched"] else "FOLLOWING"
     if not named["is_following"]:

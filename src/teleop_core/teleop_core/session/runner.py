@@ -52,14 +52,14 @@ def simulate(configuration: Configuration, out: Path, progress: Progress = silen
 
 
 def session_ticks(configuration: Configuration, session: virtual.VirtualTime) -> int:
-    """Ticks until the hand has moved for the configured duration; it waits for the arms first."""
+    """Number of ticks until the hand has moved for the configured duration. The hand first waits for the arms."""
     return session.lead + max(1, round(configuration.groups[SESSION].duration * 1e9 / TICK_NS))
 
 
 def run_blocks(session: virtual.VirtualTime, ticks: int) -> Iterator[Any]:
-    """Rows of the next ticks, a block at a time; each block takes the place of the one before.
+    """Rows of the next ticks, block by block. Each block overwrites the block before it.
 
-    With ``teleop.ends_with_task`` the last block is the first one at whose end no task has a goal left.
+    With ``teleop.ends_with_task`` the session ends after the first block at whose end no task has a goal left.
     """
     rows = session.rows(min(virtual.BLOCK, ticks))
     tasks = [t.field for t in session.graph.streams if t == topics.TASK_STATE.of_arm(t.arm)]
@@ -73,16 +73,16 @@ def run_blocks(session: virtual.VirtualTime, ticks: int) -> Iterator[Any]:
 
 
 def replay(bag: Bag, configuration: Configuration, out: Path, progress: Progress = silent, begin: str = DEVICE) -> int:
-    """Run recorded masters, or hands, through the graph again, in virtual time, and record it.
+    """Run recorded masters, or hands, through the graph again in virtual time, and record the result.
 
-    Ticks are 1 ms apart, from the first to the last recorded sample; each sample is answered once, at the first tick
-    that is not before it. For a recording of virtual time every tick has its own sample, so the same configuration
-    gives the same slave motion, bit for bit. Recordings that are not ours, or whose hand did not wait as long, begin
-    with the time that the arms need to get ready.
+    Ticks are 1 ms apart, from the first to the last recorded sample. Each sample is processed once, at the first tick
+    that is not before it. In a recording of virtual time every tick has its own sample, so the same configuration
+    gives exactly the same slave motion, bit for bit. If the recording is from another writer, or its hand did not wait
+    long enough, the replay begins with the time that the arms need to get ready.
 
     Args:
         bag: Recording with master/measured_cp of every arm, or hand/servo_cp.
-        configuration: What the samples run through.
+        configuration: Configuration of the session that processes the samples.
         out: Directory of the new recording, made here.
         progress: As in :func:`simulate`.
         begin: Stage whose recorded output is played: ``haptic_master``, or ``operator``, the hand.
@@ -99,7 +99,7 @@ def replay(bag: Bag, configuration: Configuration, out: Path, progress: Progress
 
 
 def replayed_blocks(session: virtual.VirtualTime, bag: Bag) -> tuple[Iterator[Any], int]:
-    """Rows of a replay, a block at a time, and the number of ticks; raises as :func:`replay`."""
+    """Rows of a replay, block by block, and the number of ticks. Raises the same errors as :func:`replay`."""
     played = session.played_topics
     needed = session.needed_topics
     bag.require(needed)
@@ -126,24 +126,27 @@ def replayed_blocks(session: virtual.VirtualTime, bag: Bag) -> tuple[Iterator[An
 
 
 def _lead_ns(session: virtual.VirtualTime, bag: Bag, first_ns: int) -> int:
-    """Time [ns] that arms need before the first sample; none where the hand waited as long."""
+    """Time [ns] that the arms still need before the first sample; 0 if the recorded hand waited long enough."""
     lead_ns = session.lead * TICK_NS
     states = [topics.TELEOP_STATE.of_arm(arm) for arm in session.graph.namespaces]
     is_known = all(state.name in bag.topics for state in states)
     if not lead_ns or "configuration" not in bag.metadata or not is_known:
         return lead_ns
-    begins = [_follows_ns(bag, state) for state in states]  # of an arm that is near its start, soon
+    begins = [_follows_ns(bag, state) for state in states]  # early if an arm is near its start
     return lead_ns if None in begins else max(0, lead_ns - (max(filter(None, begins)) - first_ns))
 
 
 def _follows_ns(bag: Bag, state: topics.Topic) -> int | None:
-    """When an arm began to follow its hand [ns]; None if it never did."""
+    """Time at which an arm began to follow its hand [ns]; None if it never followed."""
     told = (r.stamp_ns for r in bag.reports(state) if r.values.get("is_following") == "1.0")
     return min(told, default=None)
 
 
 def _hold(series: Series, later_ns: int, samples: Any, field: str) -> None:
-    """Write the newest sample at each tick, and its stamp; before the first: as they are."""
+    """Write the newest recorded sample and its stamp into ``samples`` at each tick.
+
+    Ticks before the first sample are not changed.
+    """
     stamps = series.stamp_ns + later_ns
     at = np.searchsorted(stamps, samples["now_ns"], side="right") - 1
     is_known = at >= 0
@@ -152,13 +155,13 @@ def _hold(series: Series, later_ns: int, samples: Any, field: str) -> None:
 
 
 def recorded_configuration(bag: Bag) -> tuple[Layer, str]:
-    """Configuration and scenario that a recording was made with; empty ones for foreign bags.
+    """Configuration and scenario that a recording was made with; both empty for bags of other writers.
 
-    Files of a robot, its drives, a mesh and a field of heights are as they were then, see
+    Files of a robot, its drives, a mesh and a height field have the content that was recorded, see
     :mod:`teleop_core.bags.kept_files`.
 
     Raises:
-        TeleopError: The stored configuration is not one.
+        TeleopError: The stored configuration is invalid.
     """
     text, arms = bag.metadata.get("configuration"), bag.metadata.get(ARMS_KEY, "").split()
     layer = present_layer(parse_text(text, f"{bag.path}: configuration")) if text else {}
@@ -178,7 +181,7 @@ def recorded_configuration(bag: Bag) -> tuple[Layer, str]:
 
 
 def _begin_at_home(layer: Layer) -> None:
-    """Let slaves of versions that knew no other start begin where they did, at home."""
+    """Let slaves of old recordings begin at home. Old versions had no parameter ``start``."""
     for name, values in layer.items():
         is_old = name.rpartition("/")[2] == "slave" and "start" not in values
         if is_old and isinstance(robot := values.get("robot"), str):
@@ -195,21 +198,21 @@ def record_blocks(
     ticks: int,
     progress: Progress = silent,
 ) -> int:
-    """Record blocks of rows as they come.
+    """Record blocks of rows while the session makes them.
 
     Args:
-        session: Where they come from.
-        configuration: What is stored with them.
+        session: Session that makes the blocks.
+        configuration: Configuration that is stored in the recording.
         out: Directory of the recording, made here.
         blocks: Rows of the session.
-        ticks: How many there will be, for the progress.
+        ticks: Total number of ticks, for the progress.
         progress: Called with ticks done and ticks in all.
 
     Returns:
         Number of ticks.
 
     Raises:
-        RecordingError: The directory exists, cannot be written, or there are no ticks.
+        RecordingError: The directory exists or cannot be written, or there are no ticks.
     """
     done, model = 0, Model(configuration)
     with open_writer(session, configuration, out, model.topics) as writer:
@@ -229,7 +232,7 @@ def record_blocks(
 def open_writer(
     session: virtual.VirtualTime, configuration: Configuration, out: Path, further: tuple[topics.Topic, ...] = ()
 ) -> BagWriter:
-    """Writer of everything that a session's stages write, and of further topics."""
+    """Writer for all topics of a session's stages, and for further topics."""
     return BagWriter(
         out,
         (*session.graph.topics, *further),
@@ -248,7 +251,7 @@ def describe(configuration: Configuration) -> dict[str, str]:
     about = {"version": __version__, "scenario": configuration.scenario}
     if graph.arms != ("",):
         about["arms"] = " ".join(graph.arms)
-    for arm, prefix in prefixes.items():  # before what only is looked at
+    for arm, prefix in prefixes.items():  # before the robots' meshes, which are only drawn
         for name, kind in (("world", kept_files.TOUCHED), ("fixture", kept_files.FIXTURE)):
             part = configuration.value(name, arm)
             for place, file in enumerate(files_of(part.kind.parameters) if part else ()):
@@ -261,10 +264,10 @@ def describe(configuration: Configuration) -> dict[str, str]:
 
 
 class NewSamples:
-    """Finder of the rows of a session that hold a new message.
+    """Finds the rows of a session that contain a new message.
 
-    A stage that answers a slow master writes one message per sample, not one per tick. What tells
-    the stamp in force is a message every tick.
+    A stage that is triggered by a slow master writes one message per sample, not one per tick. Topics whose stamp the
+    writer itself sets (``is_in_force``) have a message in every tick.
     """
 
     def __init__(self) -> None:
@@ -290,11 +293,11 @@ class NewSamples:
         return stamps[is_new], values[is_new], log_ns[is_new]
 
     def _is_due(self, topic: topics.Topic, values: Array, stamps: NDArray[np.int64]) -> NDArray[np.bool_]:
-        """Which rows (N,) change, or come when it is time to say it again."""
+        """Mask (N,) of the recorded rows of a seldom topic: rows that change, and the first row of each period."""
         before = self._values.get(topic.name, np.full((1, values.shape[1]), np.nan))
         self._values[topic.name] = values[-1:].copy()
         changes = (np.concatenate((before, values[:-1])) != values).any(axis=1)
-        # Stamps of a session that was live are no whole periods.
+        # Stamps of a live session are not multiples of the period.
         periods = stamps // topics.SELDOM_NS
         last = self._periods.get(topic.name, int(periods[0]))
         self._periods[topic.name] = int(periods[-1])
@@ -306,11 +309,11 @@ class ReportWriter(Protocol):
     """Writer of single messages."""
 
     def write(self, topic: topics.Topic, log_ns: int, data: bytes) -> None:
-        """Take one message."""
+        """Write one message."""
 
 
 class StateReports:
-    """Recorder of the reports of a session's stages, where they change."""
+    """Records the reports of a session's stages whenever they change."""
 
     def __init__(self, session: virtual.VirtualTime) -> None:
         self._reports = [

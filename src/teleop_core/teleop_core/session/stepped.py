@@ -1,4 +1,4 @@
-"""Stepped: a session as a program sees it that leads the hand, step by step, in named values."""
+"""Stepped: a session for a program that moves the hand step by step and reads named values."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -16,17 +16,17 @@ from teleop_core.slave.operation import State
 
 _NUMBERS = count()
 _STATE = topics.OPERATION.index("state")
-_PATIENCE = 60.0  # an arm that does not follow by then will not [s]
+_PATIENCE = 60.0  # time after which an arm that does not follow counts as failed [s]
 
 
 @dataclass(frozen=True, eq=False)
 class Space:
-    """Box that values lie in, as ``gymnasium.spaces.Box(space.low, space.high)`` takes it.
+    """Bounds of values, in the form of ``gymnasium.spaces.Box(space.low, space.high)``.
 
     Attributes:
         low: Lower bounds (n,).
         high: Upper bounds (n,).
-        names: What each value is (n,).
+        names: Name of each value (n,).
     """
 
     low: Array
@@ -36,10 +36,10 @@ class Space:
 
 @dataclass(frozen=True, eq=False)
 class Observation:
-    """What a session tells after a step; arrays are copies, in SI units.
+    """State of a session after a step; arrays are copies, in SI units.
 
     Attributes:
-        time: Since the session began [s].
+        time: Time since the session began [s].
         measured_jp: Joints of the slave (n,) [rad or m].
         measured_jv: Their speeds (n,) [rad/s or m/s].
         measured_cp: Pose (7,) of its tip in its base: x, y, z [m], quaternion w, x, y, z.
@@ -47,8 +47,8 @@ class Observation:
         servo_cp: Pose (7,) that the hand commands, in the slave's base.
         master_cp: Pose (7,) of the stylus in the master's base.
         master_cf: Force and moment (6,) on the hand, in the master's base [N, N·m].
-        gain: Motion of the tip per motion of the hand.
-        is_following: Whether the arm goes where the hand leads.
+        gain: Ratio of the tip's motion to the hand's motion.
+        is_following: Whether the arm follows the hand.
         state: Operating state of the arm.
     """
 
@@ -66,27 +66,27 @@ class Observation:
 
 
 class Session:
-    """A session whose hand a program leads: :meth:`command`, :meth:`step`, :meth:`observe`.
+    """A session whose hand a program moves: :meth:`command`, :meth:`step`, :meth:`observe`.
 
     >>> session = Session("free_motion")
     >>> begin = session.reset().measured_cp[:3]
     >>> session.command([0.0, 0.01, 0.0])  # the hand goes up by a centimetre
     >>> end = session.step(50).measured_cp[:3]  # within the first 20 ms of this second
 
-    It begins, after :meth:`reset` too, when the arm follows the hand. Its other stages run as in
-    every session, and the same commands give the same bits.
+    When the session begins, and after :meth:`reset`, the arm already follows the hand. All other stages run as in
+    every session. The same commands give bit-identical results.
 
     Args:
         scenario: One of ``teleop scenarios``; the defaults alone if None.
         files: ROS 2 parameter files over the scenario.
-        settings: Parameters by name over all files, ``{"robot": "puma560"}``. The hand is the
-            program's: it trembles only if ``tremor_amplitude`` is set.
+        settings: Parameters by name, which override all files: ``{"robot": "puma560"}``. The program moves the hand,
+            so the hand has tremor only if ``tremor_amplitude`` is set.
         period: Time of a step [s], in whole milliseconds.
 
     Attributes:
-        command_space: What :meth:`command` takes: place [m] and turn [rad] of the stylus, relative
-            to where it began, in the master's base.
-        runner: The session below, with the rows of all its topics.
+        command_space: Bounds of the values of :meth:`command`: position [m] and rotation [rad] of the stylus, relative
+            to its start, in the master's base.
+        runner: The underlying session, with the rows of all its topics.
 
     Raises:
         TeleopError: Something is wrong; the text names it.
@@ -125,19 +125,19 @@ class Session:
         mode: bool = False,
         jaw: float = 0.0,
     ) -> None:
-        """Say where the hand is a step from now; it goes there evenly.
+        """Set the pose of the hand at the end of the next step; the hand moves there at constant speed.
 
         Args:
-            place: Of the stylus (3,), relative to where it began, in the master's base [m].
+            place: Position of the stylus (3,), relative to its start, in the master's base [m].
             turn: Rotation vector (3,) of the stylus [rad].
-            clutch: Whether the clutch is pressed, and the slave left where it is.
+            clutch: Whether the clutch is pressed, so that the slave stays where it is.
             fixture: Whether the button of the fixture is pressed.
             mode: Whether the button of coarse and fine is pressed.
             jaw: How far the jaw is closed, 0 to 1.
 
         Raises:
-            ShapeError: Place or turn have another shape.
-            ParameterError: One is not finite, or not in :attr:`command_space`.
+            ShapeError: ``place`` or ``turn`` does not have the shape (3,).
+            ParameterError: A value is not finite, or not in :attr:`command_space`.
         """
         for name, values in (("place", place), ("turn", turn)):
             if np.shape(values) != (3,):
@@ -153,17 +153,17 @@ class Session:
         self._next = np.array([*wanted, clutch, fixture, mode, 0.0, 0.0, 0.0, jaw])
 
     def step(self, count: int = 1) -> Observation:
-        """Make some steps, and tell what came of them.
+        """Run some steps and return the observation after them.
 
         Args:
-            count: How many; the hand reaches its command in the first, and stays there.
+            count: Number of steps. The hand reaches its command in the first step and stays there.
         """
         for _ in range(count):
             self._row = self.runner.run(self._ticks)[-1]
         return self.observe()
 
     def reset(self) -> Observation:
-        """Begin anew: the hand at rest where it began, and the arm following it.
+        """Restart the session: the hand is at rest at its start, and the arm follows it.
 
         Raises:
             SessionError: The arm does not follow.
@@ -177,7 +177,7 @@ class Session:
         return found
 
     def observe(self) -> Observation:
-        """What the last step told."""
+        """Observation after the last step."""
         row, state = self._row, self.values("teleop/state")
         places, speeds, _ = self.values("slave/measured_js").reshape(3, -1)
         return Observation(
@@ -195,7 +195,7 @@ class Session:
         )
 
     def values(self, topic: str) -> Array:
-        """Newest values of a topic, shape (width,), as its columns name them.
+        """Newest values of a topic, shape (width,), in the order of its columns.
 
         Args:
             topic: Such as ``task/state``, or ``left/slave/measured_cp`` of another arm.
@@ -210,7 +210,7 @@ class Session:
         return np.array(self._row[field], dtype=np.float64)
 
     def _motion(self, times: Array) -> Array:
-        """Rows (N, 13) of the hand, evenly from its last command to the next."""
+        """Rows (N, 13) of the hand, at constant speed from its last command to the next command."""
         share = np.arange(self._made + 1, self._made + len(times) + 1)[:, None] / self._ticks
         self._made += len(times)
         rows = self._last + np.minimum(share, 1.0) * (self._next - self._last)

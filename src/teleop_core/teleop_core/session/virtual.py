@@ -1,4 +1,4 @@
-"""Virtual time: a graph in one process, tick by tick, as fast as the machine allows."""
+"""Virtual time: runs a graph in one process, tick by tick, as fast as the machine allows."""
 
 from typing import Any
 
@@ -15,28 +15,28 @@ from teleop_core.session.compose import Rings, Tick, block_dtype, compose
 from teleop_core.session.configuration import Configuration
 
 BLOCK = 1000
-"""Ticks that are made at once, at most."""
+"""Largest number of ticks per call."""
 
 
 class VirtualTime:
-    """A session in virtual time, in rows of everything that happens in a tick.
+    """A session in virtual time. Each tick gives one row with all topics.
 
-    Between two runs a program may read the rows, and command or retune the stages; to lead the
-    hand, :class:`~teleop_core.session.stepped.Session` is simpler.
+    Between two runs a program may read the rows, and command or retune the stages. For a program that moves the hand,
+    :class:`~teleop_core.session.stepped.Session` is simpler.
 
     Args:
-        configuration: What runs.
+        configuration: Configuration of the session.
         tick_ns: Length of a tick [ns].
-        played: Stage up to which topics come from recorded samples, ``operator`` or
-            ``haptic_master``; see :meth:`replay`. Empty: none.
+        played: Last stage whose topics come from recorded samples, ``operator`` or ``haptic_master``, see
+            :meth:`replay`; empty if no stage is played.
 
     Attributes:
         configuration: As given.
-        graph: What runs.
-        stages: Stages at work, by the names of their members.
+        graph: Graph of the session.
+        stages: Running stages, by the names of their members.
         joint_names: Joint names of each arm by its namespace; empty for an arm without a robot.
         now_ns: Time of the last tick [ns]; the first tick is one tick after 0.
-        plays_file: Whether what is played was made elsewhere, with holes of its own.
+        plays_file: Whether the played samples were not made by a simulated session, so that they may have gaps.
     """
 
     plays_file = False
@@ -65,13 +65,13 @@ class VirtualTime:
         self.now_ns = 0
 
     def _composed(self) -> Tick:
-        """The tick of the stages as they are now."""
+        """Composed tick of the stages with their current arguments."""
         self._arguments = [stage.arguments for stage in self.stages.values()]
         dt = self._tick_ns / 1e9
         return compose(self.graph, self.stages, self._dtype, dt, self._ahead, self._played, self._rings)
 
     def _is_stale(self) -> bool:
-        """Whether a stage was given other arguments, as by another kind of fixture."""
+        """Whether a stage has new arguments since the tick was composed, for example another kind of fixture."""
         now = (stage.arguments for stage in self.stages.values())
         return any(old is not new for old, new in zip(self._arguments, now, strict=True))
 
@@ -81,7 +81,7 @@ class VirtualTime:
 
     @property
     def lead(self) -> int:
-        """Ticks until all arms can follow, such as for the move to where they start."""
+        """Number of ticks until all arms can follow, for example because they first move to their start."""
         return max(stage.lead for stage in self.stages.values())
 
     @property
@@ -91,13 +91,13 @@ class VirtualTime:
 
     @property
     def needed_topics(self) -> tuple[topics.Topic, ...]:
-        """Those of :attr:`played_topics` without which there is nothing to replay."""
+        """Topics of :attr:`played_topics` that a recording must contain for a replay."""
         members = [m for m in self.graph.members if m.stage.name == self._last_played]
         return tuple(t for member in members for t in member.writes if t.kind is topics.Kind.POSE)
 
     @property
     def about(self) -> dict[str, str]:
-        """What is stored with a recording of it, beside its configuration."""
+        """Metadata for a recording of this session, in addition to its configuration."""
         return {PLAYED_KEY: self._last_played} if self.plays_file else {}
 
     @property
@@ -107,25 +107,25 @@ class VirtualTime:
         return tuple(topic for member in members for topic in member.writes)
 
     def rows(self, count: int) -> NDArray[np.void]:
-        """Rows (count,) of everything that happens in a tick, all zero."""
+        """New rows (count,) for the data of ticks, all zero."""
         rows: NDArray[np.void] = records(self._dtype, count)
         return rows
 
     def run(self, ticks: int, out: NDArray[np.void] | None = None) -> NDArray[np.void]:
-        """Next ``ticks`` ticks of the session.
+        """Run the next ``ticks`` ticks of the session.
 
         Args:
-            ticks: How many.
-            out: Rows (ticks,) to fill, of :meth:`rows`; None for new ones.
+            ticks: Number of ticks.
+            out: Output rows (ticks,) from :meth:`rows`; None allocates new rows.
 
         Returns:
             Rows (ticks,): ``now_ns``, the fields and stamps of all topics, and the stages' notes.
-            A field is called as its topic, ``slave_measured_cp`` of ``slave/measured_cp``, with
-            the topic's columns in SI units; ``slave_measured_cp_ns`` is its stamp.
+            Each topic is one field, for example ``slave_measured_cp`` for ``slave/measured_cp``, with the topic's
+            columns in SI units; ``slave_measured_cp_ns`` is its stamp.
 
         Raises:
-            TeleopError: A part cannot go on, or writes NaN.
-            ShapeError: ``out`` has other rows.
+            TeleopError: A part cannot continue, or writes NaN.
+            ShapeError: ``out`` does not have ``ticks`` rows of the type of :meth:`rows`.
         """
         if out is None:
             out = self.rows(ticks)
@@ -134,9 +134,9 @@ class VirtualTime:
         return self._run(out, None)
 
     def reset(self) -> None:
-        """Back to before the first tick, so that the session repeats itself to the bit.
+        """Go back to before the first tick, so that the session repeats itself exactly, bit for bit.
 
-        Parameters that were changed since stay changed; a stage of your own begins anew as far as its ``reset`` does.
+        Changed parameters stay changed. A stage of your own is reset only by its own ``reset``.
         """
         for name, stage in self.stages.items():
             assign(stage.signals, self._begin[name])
@@ -146,14 +146,14 @@ class VirtualTime:
         self.now_ns = 0
 
     def replay(self, samples: NDArray[np.void]) -> NDArray[np.void]:
-        """Ticks with recorded samples in place of the simulated hands or masters.
+        """Run ticks with recorded samples instead of simulated hands or masters.
 
         Args:
             samples: Rows (N,) of which ``now_ns``, steps of one tick, and the fields and stamps of
                 :attr:`played_topics` are used.
 
         Returns:
-            Rows (N,) as :meth:`run` gives them.
+            Rows (N,), as :meth:`run` returns them.
         """
         self.now_ns = int(samples["now_ns"][0]) - self._tick_ns
         return self._run(self.rows(len(samples)), samples)
@@ -170,16 +170,18 @@ class VirtualTime:
                 self._tick.run(self.now_ns + self._tick_ns, self._tick_ns, taken, part)
                 self.now_ns += len(part) * self._tick_ns
         except TeleopError:
-            self._check(block[:begin])  # what was written before may be the cause
+            self._check(block[:begin])  # an earlier output of a user's stage may be the cause
             raise
         self._check(block)
         return block
 
     def _check(self, part: Any) -> None:
-        """Make sure that a user's stages wrote finite numbers; called once a block, whose length hardly counts.
+        """Make sure that a user's stages wrote finite numbers.
+
+        This is called once per block; the time hardly depends on its length.
 
         Raises:
-            PartError: One wrote NaN or infinity; the text says where and when.
+            PartError: A stage wrote NaN or infinity; the error text names topic and time.
         """
         for member in self.graph.members:
             if member.stage.name in BUILT_IN:

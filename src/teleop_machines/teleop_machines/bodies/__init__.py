@@ -1,1 +1,1 @@
-"""Bodies of robots with loops, as they are drawn; each robot names its own as ``describe``."""
+"""Bodies of robots with loops, for drawing. Each robot names its function of this folder as ``describe``."""

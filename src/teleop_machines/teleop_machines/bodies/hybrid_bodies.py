@@ -12,7 +12,7 @@ from teleop_core.robots.robot import Robot
 from teleop_machines.bodies import parallel, planar
 from teleop_machines.scara_stewart_legs import layout
 
-_LEGS = slice(4, 9)  # of the geometry: what the leg kernels take
+_LEGS = slice(4, 9)  # part of the geometry that the leg kernels use
 _UP = np.array([0.0, 0.0, 1.0])
 
 
@@ -25,7 +25,7 @@ def joint_points(g: Array, points: Array) -> None:
 def scara_stewart_bodies(robot: Robot) -> Bodies:
     """Arm, rod, Stewart base, telescopes, platform and tool.
 
-    The Stewart base turns with link 2 where it is carried by it, else it keeps the base's heading.
+    If link 2 carries the Stewart base, the Stewart base turns with link 2; otherwise it keeps the base's heading.
     """
     points = np.empty((2, 6, 3))
     joint_points(robot.geometry_row[_LEGS], points)

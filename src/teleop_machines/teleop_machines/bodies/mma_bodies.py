@@ -1,7 +1,7 @@
-"""MMA: bodies of the arm with a parallelogram, whose branch over link 3 is a chain.
+"""MMA: bodies of the arm with a parallelogram. The branch over link 3 is modelled as a serial chain.
 
-The chain runs over joints 1, 2, 3', then a turn of link 4 by θ3 - θ3', which the parallelogram
-makes, then the wrist. Links 3a and 3b close it on the other side.
+The chain has the joints 1, 2, 3', then a rotation of link 4 by θ3 - θ3', which the parallelogram causes, then the
+wrist. Links 3a and 3b close the parallelogram on the other side.
 """
 
 import math
@@ -17,9 +17,9 @@ from teleop_machines.bodies.planar import pivoted
 from teleop_machines.mma_models import SHORT_SIDE
 
 _NAMES = ("link1", "link2", "link3", "link4", "link6", "link8", "link10")
-# Coordinates of the chain: joints, then θ3 - θ3'; the last of all is θ3' - θ3 of link 3b.
+# Coordinates of the chain: joints, then θ3 - θ3'. The last coordinate is θ3' - θ3 of link 3b.
 _CHAIN = (0, 1, 3, 7, 4, 5, 6)
-_ELBOW, _ANKLE = 3, 4  # bodies that turn about these: link 3, link 4
+_ELBOW, _ANKLE = 3, 4  # bodies that rotate about these axes: link 3, link 4
 
 
 def mma_bodies(robot: Robot) -> Bodies:
@@ -48,7 +48,7 @@ def _coordinates(q: Array) -> tuple[Array, Array]:
 
 def _other_side(bodies: Sequence[Body], long_side: float) -> tuple[Body, Body]:
     """Link 3a on link 2, about the axis of link 3, and link 3b on it, parallel to link 3."""
-    x, y = bodies[_ANKLE].origin[:2]  # link 3 runs there, in its own frame
+    x, y = bodies[_ANKLE].origin[:2]  # end of link 3 in its own frame
     root = frames.moved(bodies[_ELBOW].origin, Joint.REVOLUTE, math.atan2(y, x))
     radius = 0.03 * long_side
     count = len(bodies)

@@ -12,13 +12,13 @@ from teleop_core.robots.bodies.solids import Solid, along, ball, capsule, rim
 from teleop_core.robots.robot import Robot
 from teleop_machines.rps3_loop import COSINES, SINES
 
-_SHARE = 0.95  # of the shortest leg: length of a tube
-_THINNER = 0.72  # radius of a tube over that of the one around it
+_SHARE = 0.95  # length of a tube as a share of the shortest leg
+_THINNER = 0.72  # radius of a tube divided by the radius of the tube around it
 
 
 @dataclass(frozen=True)
 class Telescope:
-    """Tubes of legs that are all alike.
+    """Tubes of legs with equal dimensions.
 
     Args:
         shortest: Length of the shortest leg [m], > 0.
@@ -37,11 +37,11 @@ class Telescope:
 
     @property
     def tubes(self) -> int:
-        """Number of tubes of a leg, two at least."""
+        """Number of tubes of a leg, at least two."""
         return max(2, math.ceil(self.longest / self.tube))
 
     def bodies(self, legs: int, first: int = 0) -> list[Body]:
-        """Bodies of all legs, those of the first leg first, the tube at the base first.
+        """Bodies of all legs, leg by leg; in each leg, the tube at the base comes first.
 
         Args:
             legs: Number of legs.
@@ -75,7 +75,7 @@ def plate(points: Array, radius: float, is_base: bool = False) -> tuple[Solid, .
     return (*rim(points[order], radius, "base" if is_base else "platform"), *balls)
 
 
-_RADIUS = 0.06  # of a leg's outer tube, over the platform's size
+_RADIUS = 0.06  # radius of a leg's outer tube, as a share of the platform's size
 
 
 def stewart_bodies(robot: Robot) -> Bodies:
@@ -93,7 +93,7 @@ def rps3_bodies(robot: Robot) -> Bodies:
 def _platform_on_legs(robot: Robot, base: Array, platform: Array) -> Bodies:
     """Bodies of a platform, which is the tip, on legs whose lengths are the joints.
 
-    Joint points (n, 3) [m] are those of the base in the base and of the platform in the platform.
+    Joint points (n, 3) [m] of the base are in base coordinates, those of the platform in platform coordinates.
     """
     radius = _RADIUS * float(length(platform).max())
     legs = Telescope(float(robot.lower.min()), float(robot.upper.max()), radius)

@@ -15,9 +15,9 @@ _UP = np.array([0.0, 0.0, 1.0])
 
 
 def four_bar_bodies(robot: Robot) -> Bodies:
-    """Crank, coupler and rocker; where they do not meet, the coupler's far end is off the rocker's.
+    """Crank, coupler and rocker; if the loop does not close, the coupler's end is not at the rocker's end.
 
-    Coordinates beside the crank: coupler against crank, rocker against base [rad].
+    Further coordinates: angle of the coupler relative to the crank, and of the rocker relative to the base [rad].
     """
     g = robot.geometry
     loop, mode = FourBar(g["l0"], g["l1"], g["l2"], g["l3"]), 0 if g["mode"] > 0.0 else 1
@@ -31,7 +31,7 @@ def four_bar_bodies(robot: Robot) -> Bodies:
 
 
 def parallelogram_bodies(robot: Robot) -> Bodies:
-    """Crank, coupler and rocker; the coupler never turns, the rocker turns with the crank."""
+    """Crank, coupler and rocker; the coupler never rotates, the rocker rotates like the crank."""
     g = robot.geometry
 
     def coordinates(q: Array) -> tuple[Array, Array]:

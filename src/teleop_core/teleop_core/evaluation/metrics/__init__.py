@@ -1,5 +1,5 @@
-"""Metrics: what is measured on every recording, a file for each, or for those of one kind.
+"""Metrics: the quantities measured on every recording, one file for each metric or for metrics of one kind.
 
-A further metric is one more such file and one line in :mod:`teleop_core.evaluation.registry`, or,
-outside of this package, a class that is added to its ``METRICS``.
+To add a metric, add a file here and one line in :mod:`teleop_core.evaluation.registry`. Outside of this package, add a
+class to ``METRICS`` of that module.
 """

@@ -1,4 +1,4 @@
-"""Asked error: how far the slave's tip is from where the hand would have brought it."""
+"""Asked error: distance between the slave's tip and the pose that the hand asked for."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,36 +19,36 @@ _FIRST_NS = -(2**62)
 class Asked:
     """Accumulator of the poses that the hand asks for, window by window.
 
-    The hand asks for where the slave was when it was last engaged or the clutch let go, plus all
-    that the hand has moved since, by the gain, and turned since.
+    The asked pose is the slave's pose when it was last engaged or the clutch was released, plus the hand's motion
+    since then, scaled by the gain, and the hand's rotation since then.
     """
 
     def __init__(self, context: Context) -> None:
         context.read(ASKED_TOPICS)
         self._history, self._origin = context.history, context.origin
         self._until_ns = _FIRST_NS
-        # Of the last command: the hand [m] in the slave's axes, the command [m], what was cut off,
-        # and the alignment that was latched last.
+        # State at the last command: the hand [m] in the slave's axes, the command [m], the part that limits cut off,
+        # and the latched alignment.
         self._hand, self._command, self._cut = np.zeros(3), np.zeros(3), np.full(3, np.nan)
         self._alignment, self._pose = np.full(4, np.nan), np.full(7, np.nan)
         self._stamps, self._asked = np.empty(0, np.int64), np.empty((0, 7))
 
     def add(self, window: Window) -> None:
-        """Take one window."""
-        # The last command of the window before is in force until the first of this one.
+        """Process one window."""
+        # The last command of the previous window stays valid until the first command of this window.
         before_ns, before = self._until_ns, self._pose
         stamps, asked = self._poses(window)
         self._stamps = np.concatenate(([before_ns], stamps))
         self._asked = np.concatenate((before[None], asked))
 
     def at(self, stamp_ns: Integers) -> Array:
-        """Poses (N, 7) asked for at stamps (N,) [ns] of this window; NaN where nothing is."""
+        """Asked poses (N, 7) at stamps (N,) [ns] of this window; NaN where no pose is asked for."""
         at = latest(stamp_ns, self._stamps)
         found: Array = np.where((at == NONE)[:, None], np.nan, self._asked[at])
         return found
 
     def _poses(self, window: Window) -> tuple[Integers, Array]:
-        """Stamps (N,) and asked poses (N, 7) of a window's commands; NaN if nothing is."""
+        """Stamps (N,) and asked poses (N, 7) of a window's commands; NaN where no pose is asked for."""
         hand, command = window.around(MASTER_MEASURED_CP), window.samples(SLAVE_SERVO_CP)
         is_new = command.stamp_ns > self._until_ns
         stamps, commands = command.stamp_ns[is_new], command.values[is_new]
@@ -59,7 +59,7 @@ class Asked:
         hands = hand.values[partner[partner != NONE]]
         rows = self._history.at(stamps).rows
         is_held = (rows[:, STATE["is_following"]] == 0.0) | (rows[:, STATE["is_clutched"]] > 0.0)
-        # A stretch begins with the sample after one that is held, which only latches.
+        # A sequence begins with the sample after a held sample: this first sample only latches the alignment.
         was_held = np.concatenate(([np.isnan(self._cut).any()], is_held[:-1]))
         asked = np.empty((len(stamps), 7))
         places = hands[:, :3] @ self._origin.axes.T
@@ -73,7 +73,7 @@ class Asked:
         return stamps, asked
 
     def _cuts(self, gain: Array, hands: Array, commands: Array, begins: NDArray[np.bool_]) -> Array:
-        """What was cut off each command since the slave was last engaged (N, 3) [m]."""
+        """Sum of what limits cut off the commands since the slave was last engaged, at each command (N, 3) [m]."""
         moved = np.diff(hands, axis=0, prepend=self._hand[None])
         cut = np.diff(commands, axis=0, prepend=self._command[None]) - gain * moved
         cut[begins] = 0.0
@@ -84,7 +84,7 @@ class Asked:
         return found
 
     def _turned(self, stylus: Array, commands: Array, begins: NDArray[np.bool_]) -> Array:
-        """Asked orientations (N, 4): the tool turns as the stylus since it was engaged."""
+        """Asked orientations (N, 4): since it was engaged, the tool rotates like the stylus."""
         if self._origin.tool is None:
             return np.full((len(stylus), 4), np.nan)
         slave_master, stylus_tool = self._origin.tool
@@ -97,7 +97,7 @@ class Asked:
 
 
 def _last(begins: NDArray[np.bool_]) -> Integers:
-    """Index of the last one of the samples (N,) that begins a stretch; -1 before the first."""
+    """For each sample (N,), index of the latest sample that begins a sequence; -1 before the first such sample."""
     found: Integers = np.maximum.accumulate(np.where(begins, np.arange(len(begins)), -1))
     return found
 
@@ -107,7 +107,7 @@ _MEANING = "slave/measured_cp to where the hand has asked it to be since it was 
 
 
 class _AskedMetric(SpreadMetric):
-    """Spread of an error against what was asked for."""
+    """Spread of an error relative to the asked pose."""
 
     group, topics = _GROUP, ASKED_TOPICS
 
@@ -117,10 +117,10 @@ class _AskedMetric(SpreadMetric):
 
 
 class AskedErrorMetric(_AskedMetric):
-    """Spread of the distance between tip and asked place, [mm].
+    """Spread of the distance between tip and asked position, [mm].
 
-    What limits cut off stays in the error until the next clutch stroke, and the lag of filters and
-    interpolation is in it.
+    Motion that limits cut off stays in this error until the next clutch stroke. The error also includes the lag of
+    filters and interpolation.
     """
 
     name, meaning = "asked_error_mm", _MEANING
@@ -135,7 +135,7 @@ class AskedErrorMetric(_AskedMetric):
 class AskedTurnMetric(_AskedMetric):
     """Spread of the angle between the tool and its asked orientation, [deg].
 
-    None where ``rotation_gain`` is not 1: the tool then has no orientation that is asked for.
+    None if ``rotation_gain`` is not 1, because no orientation of the tool is then asked for.
     """
 
     name, label, unit = "asked_error_deg", "rotation", "deg"

@@ -16,7 +16,7 @@ class ClutchesMetric(Metric):
     _last, _samples, _down = np.inf, 0, 0
 
     def add(self, window: Window) -> None:
-        """Take one window."""
+        """Process one window."""
         if len(is_down := window.samples(MASTER_BUTTONS).values[:, 0] > 0.5):
             self.count = (self.count or 0) + int((np.diff(is_down, prepend=self._last > 0.5) & is_down).sum())
             self._last, self._samples, self._down = (

@@ -1,4 +1,4 @@
-"""Contact: the energy that the device's force took from the hand, and what it gave back."""
+"""Contact: the energy that the device's force took from the hand and gave back to it."""
 
 from dataclasses import dataclass
 
@@ -11,15 +11,15 @@ from teleop_core.graph.topics import MASTER_CONTACT
 from teleop_core.kernels.geometry import Array
 
 TOUCH_J = 14e-6
-"""What takes less energy is a touch [J]: less than the device's dry friction, 0.26 N, takes over a
-step of its reading, 0.055 mm. A force that begins and ends a period late may give back tenths of a
-microjoule more than it took there, whatever the law of the wall."""
+"""A contact that takes less energy than this is a touch [J]. The limit is the energy that the device's dry friction,
+0.26 N, takes over one encoder step, 0.055 mm. In a touch, a force that begins and ends one period late may give back
+tenths of a microjoule more than it took, for any law of the wall."""
 _NUMBER, _TAKEN, _RETURNED, _FRICTION, _MOST = range(len(MASTER_CONTACT.columns))
 
 
 @dataclass(frozen=True)
 class ContactScore:
-    """Energy of the contacts of the hand with walls; None where there is none, or none known."""
+    """Energy of the contacts of the hand with walls; None if there was no contact, or contacts were not recorded."""
 
     count: int | None = figure("1", "stretches in which the device pushed and took 14 µJ or more; null if not recorded")
     touches: int | None = figure("1", "those that took less")
@@ -28,7 +28,7 @@ class ContactScore:
     )
     feeding: int | None = figure("1", "contacts whose wall gave back more than it took")
     feeding_device: int | None = figure(
-        # Only then the hand gets more energy than it spent.
+        # Only in this case the hand gets more energy than it spent.
         "1",
         "contacts that gave back more than wall and dry friction of the device took",
     )
@@ -41,7 +41,7 @@ class ContactScore:
 
 
 class ContactMetric(Metric):
-    """Returned beside taken energy of each contact, as the simulated device tells it."""
+    """Returned and taken energy of each contact, as the simulated device reports them."""
 
     name = "contact"
     keys = keys_of("contact", ContactScore)
@@ -49,13 +49,13 @@ class ContactMetric(Metric):
 
     def __init__(self, context: Context) -> None:
         self._start_ns = context.bag.start_ns
-        # Contacts that are over (N, 6): the topic's columns, when it began [s]; the present one.
+        # Finished contacts (N, 6): the topic's columns and the begin of the contact [s]. Then the current contact.
         self._over: list[Array] = []
         self._present = np.empty((0, len(MASTER_CONTACT.columns) + 1))
         self._most = np.inf
 
     def add(self, window: Window) -> None:
-        """Take one window: the last sample of each contact holds its energies."""
+        """Process one window. The last sample of each contact contains its energies."""
         samples = window.samples(MASTER_CONTACT)
         if not len(samples.values):
             return
@@ -94,7 +94,7 @@ class ContactMetric(Metric):
         )
 
     def rows(self) -> list[TableRow]:
-        """Contacts and the worst of them; "none" where the recording does not tell."""
+        """Contacts and the worst contact; "none" if the recording does not contain contacts."""
         score = self.values()
         if score.count is None:
             return [TableRow(GROUP, "energy of contacts", "", "none recorded")]

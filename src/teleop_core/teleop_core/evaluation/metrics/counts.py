@@ -1,4 +1,4 @@
-"""Counts: samples that were scored, ticks, messages, and what nodes of a live session counted."""
+"""Counts: scored samples, ticks, messages, and the counts of the nodes of a live session."""
 
 from dataclasses import dataclass
 
@@ -15,7 +15,7 @@ Counts = dict[str, dict[str, int]]
 
 
 class NodesMetric(Metric):
-    """Counts that each node reported last; none in virtual time, where no node reports."""
+    """Last reported counts of each node; empty in virtual time, where nodes do not report."""
 
     name = "nodes"
     keys = (Key("nodes.<node>.<name>", "1", "counts that the nodes reported last on diagnostics"),)
@@ -24,7 +24,7 @@ class NodesMetric(Metric):
         self._counts = _read_counts(context.bag)
 
     def add(self, window: Window) -> None:
-        """Nothing: reports are no streams."""
+        """Do nothing: reports are not streams."""
 
     def values(self) -> Counts:
         """Counts per node and name."""
@@ -46,7 +46,7 @@ def _is_whole(text: str) -> bool:
 
 
 GROUP = "counts"
-_FORMER = "slave_sim"  # which counted the ticks before the slave had a server
+_FORMER = "slave_sim"  # the node that counted the ticks in versions without an arm server
 
 
 @dataclass(frozen=True)
@@ -55,9 +55,9 @@ class Ticks:
 
     Attributes:
         executed: Ticks executed.
-        late: Ticks begun late; None if nobody counted them (virtual time, foreign slaves).
-        made_up: Ticks executed after the next one was due; None if nobody counted them.
-        dropped: Ticks that were due and never executed.
+        late: Ticks that began late; None if they were not counted (virtual time, foreign slaves).
+        made_up: Ticks executed after the next tick was due; None if they were not counted.
+        dropped: Ticks that were due but never executed.
     """
 
     executed: int
@@ -67,7 +67,7 @@ class Ticks:
 
 
 class TicksMetric(Metric):
-    """Ticks from the slave's own report if there is one, else from the samples it published."""
+    """Ticks from the slave's own report if it exists, else from the samples that the slave published."""
 
     name = "ticks"
     keys = (
@@ -86,7 +86,7 @@ class TicksMetric(Metric):
         self._slave = context.origin.writer(SLAVE_MEASURED_CP)
 
     def add(self, window: Window) -> None:
-        """Nothing: stamps and reports are counted by others."""
+        """Do nothing: other accumulators count stamps and reports."""
 
     def values(self) -> Ticks:
         """Ticks of the whole recording."""
@@ -98,7 +98,7 @@ class TicksMetric(Metric):
         return Ticks(own.get("ticks", self._samples), own.get("late"), made_up, dropped)
 
     def rows(self) -> list[TableRow]:
-        """A row for each way in which a tick is not in time."""
+        """One row for each kind of tick that was not in time."""
         ticks = self.values()
         late, made_up = (MISSING if n is None else str(n) for n in (ticks.late, ticks.made_up))
         return [
@@ -112,10 +112,10 @@ class TopicScore:
     """Messages of a topic.
 
     Attributes:
-        count: Those that are there.
-        gaps: Those that are missing by their stamps; None if it is not a stream.
-        lost: Those of them that were sent and lost on the way to the recorder; None if nobody
-            counted them. The others were never sent: a stage takes only the newest.
+        count: Number of recorded messages.
+        gaps: Number of missing messages, found by the stamps; None if the topic is not a stream.
+        lost: Number of the missing messages that were sent but lost on the way to the recorder; None if they were not
+            counted. The other missing messages were never sent, because a stage processes only the newest sample.
     """
 
     count: int
@@ -124,7 +124,7 @@ class TopicScore:
 
 
 class TopicsMetric(Metric):
-    """Counts and gaps of everything that was recorded."""
+    """Counts and gaps of all recorded topics."""
 
     name = "topics"
     keys = (
@@ -148,7 +148,7 @@ class TopicsMetric(Metric):
         self._nodes = context.shared(NodesMetric)
 
     def add(self, window: Window) -> None:
-        """Nothing: stamps are counted by others too."""
+        """Do nothing: another accumulator counts the stamps."""
 
     def values(self) -> dict[str, TopicScore]:
         """Score of each topic, in the order of their names."""
@@ -178,7 +178,7 @@ class TopicsMetric(Metric):
 
 @dataclass(frozen=True)
 class Samples:
-    """How many slave poses were scored, and why others were not."""
+    """Number of scored slave poses, and of poses that were not scored, by reason."""
 
     scored: int = figure("1", "slave poses with their reference")
     unpaired: int = figure("1", "slave poses whose reference was lost on the way")
@@ -186,7 +186,7 @@ class Samples:
 
 
 class SamplesMetric(Metric):
-    """Counts the poses that the errors are of."""
+    """Counts the poses from which the errors are computed."""
 
     name = "samples"
     keys = keys_of("samples", Samples)
@@ -196,7 +196,7 @@ class SamplesMetric(Metric):
         self._scored = self._unpaired = self._invalid = 0
 
     def add(self, window: Window) -> None:
-        """Take one window."""
+        """Process one window."""
         found = tracked(window)
         has_angle = np.isfinite(found.against.angle_deg)
         is_valid = np.isfinite(found.against.position_mm) & has_angle
@@ -209,5 +209,5 @@ class SamplesMetric(Metric):
         return Samples(self._scored, self._unpaired, self._invalid)
 
     def rows(self) -> list[TableRow]:
-        """None: tables count messages and ticks."""
+        """No rows: tables show counts of messages and ticks only."""
         return []

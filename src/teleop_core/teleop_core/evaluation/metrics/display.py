@@ -1,4 +1,4 @@
-"""Display: how late the operator saw the slave, and how often."""
+"""Display: delay and rate of the picture in which the operator saw the slave."""
 
 import numpy as np
 
@@ -8,7 +8,7 @@ from teleop_core.graph.topics import DISPLAY_MEASURED_CP, NO_COMMAND_NS
 
 
 class DisplayMetric(Metric):
-    """Age of what the operator saw, from when the slave was there to the end of each frame; None without a display."""
+    """Age of the displayed slave pose, from its measurement to the end of each frame; None without a display."""
 
     name, topics = "display", (DISPLAY_MEASURED_CP,)
     age_mean_ms = figure("ms", "mean age of the newest frame that was on the screen", "age of what is seen, mean")
@@ -19,9 +19,9 @@ class DisplayMetric(Metric):
         self._frames, self._span_s, self._seen = 0, 0.0, 0.0
 
     def add(self, window: Window) -> None:
-        """Take one window."""
+        """Process one window."""
         shown = window.samples(DISPLAY_MEASURED_CP)
-        # A stamp that is none is of a screen that is dark yet.
+        # A sample without a valid stamp means that the screen is still dark.
         is_new = np.diff(shown.stamp_ns, prepend=self._stamp_ns) > 0
         if not is_new.any():
             return
@@ -29,7 +29,7 @@ class DisplayMetric(Metric):
         stamps = np.append(self._stamp_ns, shown.stamp_ns[is_new])
         first = int(self._frames == 0)  # nothing was shown before it
         until = 1e-9 * np.diff(logs)[first:]
-        # An age grows from the frame's arrival to that of the next one.
+        # The age grows from the arrival of a frame to the arrival of the next frame.
         ages = 1e-9 * (logs[:-1] - stamps[:-1])[first:] + 0.5 * until
         self._seen += float((ages * until).sum())
         self._span_s += float(until.sum())

@@ -1,4 +1,4 @@
-"""Economy: how direct the tip's ways to its goals were."""
+"""Economy: how direct the tip's paths to its goals were."""
 
 import numpy as np
 
@@ -10,7 +10,7 @@ _ATTEMPTS, _WAY = TASK_STATE.columns.index("attempts"), TASK_STATE.columns.index
 
 
 class EconomyMetric(Metric):
-    """Sum of the straight ways to the goals of a task over the path of the tip; 1 is straight."""
+    """Sum of the straight distances to a task's goals divided by the length of the tip's path; 1 is straight."""
 
     name, topics = "economy", (SLAVE_TRUE_CP, TASK_STATE)
     path_mm = figure("mm", "path of the tip, of places 0.1 s apart")
@@ -18,7 +18,7 @@ class EconomyMetric(Metric):
     _path, _slot, _straight, _tried = np.empty((0, 3)), -1, 0.0, 0.0
 
     def add(self, window: Window) -> None:
-        """Take one window."""
+        """Process one window."""
         for row in window.samples(TASK_STATE).values:
             self._straight += row[_WAY] * (row[_ATTEMPTS] > self._tried)
             self._tried = row[_ATTEMPTS]

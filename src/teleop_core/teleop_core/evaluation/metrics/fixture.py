@@ -1,4 +1,4 @@
-"""Fixture: how far hand and slave got out of the virtual fixture while it was on."""
+"""Fixture: how far hand and slave left the virtual fixture while it was on."""
 
 from collections import Counter
 from dataclasses import dataclass
@@ -17,9 +17,9 @@ from teleop_core.shapes.box import BOX
 
 
 def fixture_depth(positions: Array, states: States, axes: Array) -> Array:
-    """Distance (N,) [m] of points outside of their fixture to the nearest point of it; zero inside.
+    """Distance (N,) [m] of points outside of the fixture to the fixture's nearest point; zero inside.
 
-    It is NaN for points that are no numbers, and where the fixture's shape is not known here.
+    It is NaN for points that are not finite, and for fixtures of unknown shape.
 
     Args:
         positions: Points in the slave's base, shape (N, 3), [m].
@@ -40,7 +40,7 @@ GROUP = "virtual fixture"
 
 @dataclass(frozen=True)
 class FixtureScore:
-    """What happened while a fixture was on; None where none ever was."""
+    """Score of the time in which a fixture was on; None if no fixture was ever on."""
 
     on_s: float = figure("s", "time with the fixture on")
     outside_share: float | None = figure("1", "share of that time with the slave's tip outside")
@@ -56,7 +56,10 @@ class FixtureScore:
 
 
 class FixtureMetric(Metric):
-    """Penetration of the slave's tip, and of the hand, which is that of the command by the gain."""
+    """Penetration of the slave's tip, and of the hand.
+
+    The hand's penetration is the command's penetration divided by the gain.
+    """
 
     name = "fixture"
     keys = keys_of("fixture", FixtureScore)
@@ -69,7 +72,7 @@ class FixtureMetric(Metric):
         self._on: Counter[ReportedFixture] = Counter()
 
     def add(self, window: Window) -> None:
-        """Take one window."""
+        """Process one window."""
         depth, held = self._depth(window, SLAVE_MEASURED_CP)
         self._outside += int((depth > 0.0).sum())
         self._slave.add(depth * 1e3)
@@ -79,7 +82,7 @@ class FixtureMetric(Metric):
             self._hand.add(depth * 1e3 / held.column("gain"))
 
     def _depth(self, window: Window, topic: Topic) -> tuple[Array, States]:
-        """Distance (N,) [m] from the fixture at the samples with it on, and their states."""
+        """Distance (N,) [m] from the fixture at the samples with the fixture on, and the states at these samples."""
         states, positions = window.states(topic), window.samples(topic).values[:, :3]
         is_on = states.is_fixture_on
         held = states.only(is_on)
@@ -105,9 +108,9 @@ class FixtureMetric(Metric):
         )
 
     def rows(self) -> list[TableRow]:
-        """All of it, the slave beside the overshoot that was published of a box.
+        """Rows of all values; the slave's penetration is shown beside the published overshoot of a box.
 
-        None if no fixture ever was on.
+        Empty if no fixture was ever on.
         """
         score = self.values()
         if not score.on_s:

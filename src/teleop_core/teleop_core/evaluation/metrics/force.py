@@ -23,7 +23,7 @@ class ForceMetric(Metric):
         self._trace = Envelope(context.bag.start_ns, context.bag.end_ns, columns=4)
 
     def add(self, window: Window) -> None:
-        """Take one window."""
+        """Process one window."""
         samples = window.samples(MASTER_MEASURED_CF)
         force = samples.values[:, :3]
         magnitude = np.sqrt(np.einsum("ij,ij->i", force, force))
@@ -35,7 +35,7 @@ class ForceMetric(Metric):
         return self._magnitude.spread()
 
     def rows(self) -> list[TableRow]:
-        """The maximum, beside the penetration that caused it."""
+        """Row of the maximum, in the group of the penetration that caused the force."""
         return [row(GROUP, "force on hand, max", "N", self.values().max)]
 
     def figures(self) -> list[Figure]:

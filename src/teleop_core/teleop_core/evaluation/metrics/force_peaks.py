@@ -6,18 +6,18 @@ from teleop_core.evaluation import Metric, Window
 from teleop_core.evaluation.metric import figure
 from teleop_core.graph.topics import SLAVE_TRUE_CF
 
-_STEP = 0.1  # by which the force rises before a peak, and falls after it [N]
+_STEP = 0.1  # smallest rise of the force before a peak, and fall after it [N]
 
 
 class ForcePeaksMetric(Metric):
-    """Peaks of the force on the tip that stand out by 0.1 N on both sides."""
+    """Number of peaks of the force on the tip that are at least 0.1 N higher than both sides."""
 
     name, topics = "force_peaks", (SLAVE_TRUE_CF,)
     count = figure("1", "peaks of the force on the tip, 0.1 N above both sides")
     _turn, _rises = 0.0, True
 
     def add(self, window: Window) -> None:
-        """Take one window; ``turn`` is the extreme force since the last turn that counted."""
+        """Process one window; ``turn`` is the extreme force since the last counted turning point."""
         force = np.linalg.norm(window.samples(SLAVE_TRUE_CF).values[:, :3], axis=1)
         for one in force[np.diff(force, prepend=np.nan) != 0.0].tolist():
             is_turned = abs(one - self._turn) >= _STEP and (one < self._turn) == self._rises

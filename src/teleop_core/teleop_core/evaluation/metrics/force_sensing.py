@@ -1,4 +1,4 @@
-"""Force sensing: how far measured and estimated forces are from that on the tip, in touch."""
+"""Force sensing: errors of measured and estimated forces during contact, relative to the true force on the tip."""
 
 import numpy as np
 
@@ -9,9 +9,11 @@ from teleop_core.kernels.geometry import Array
 
 
 class ForceSensingMetric(Metric):
-    """Distance of told forces from the true one; None where nothing was touched, or nobody knows the true force.
+    """Distance of measured and estimated forces from the true force.
 
-    All three are sent where they change, so each holds until its next sample.
+    Values are None if there was no contact, or the true force is unknown.
+
+    All three topics are sent only when they change, so each value is valid until its next sample.
     """
 
     name, group = "force_sensing", "force on the tip as it was told"
@@ -34,7 +36,7 @@ class ForceSensingMetric(Metric):
         self._is_estimated = False
 
     def add(self, window: Window) -> None:
-        """Take one window."""
+        """Process one window."""
         self._measured.add(force_errors(window, SLAVE_MEASURED_CF))
         self._estimated.add(force_errors(window, SLAVE_ESTIMATED_CF))
         self._is_estimated |= bool(window.samples(SLAVE_ESTIMATED_CF).values.any())
@@ -46,7 +48,7 @@ class ForceSensingMetric(Metric):
 
 
 def force_errors(window: Window, told: Topic) -> Array:
-    """Distances (N,) [N] of told forces from the true one, at the samples of both in touch."""
+    """Distances (N,) [N] of the forces on topic ``told`` from the true force, at all samples during contact."""
     true, said = window.around(SLAVE_TRUE_CF), window.around(told)
     own = [window.samples(topic).stamp_ns for topic in (SLAVE_TRUE_CF, told)]
     stamps = np.unique(np.concatenate(own))

@@ -1,4 +1,4 @@
-"""Insertion: how deep the slave's tip came into a hole, and what resisted it."""
+"""Insertion: how deep the slave's tip went into a hole, and which force and torque resisted."""
 
 from teleop_core.evaluation.metric import figure
 from teleop_core.evaluation.objects import ObjectMetric
@@ -7,7 +7,7 @@ from teleop_core.shapes.hole import HoleParameters
 
 
 class InsertionMetric(ObjectMetric):
-    """Depth of the tip in a hole, and force and torque of the contact, of where they truly are."""
+    """Depth of the tip in a hole, and force and torque of the contact, from the true pose and the true wrench."""
 
     name, kind = "insertion", HoleParameters
     depth_mm = figure(
@@ -19,7 +19,7 @@ class InsertionMetric(ObjectMetric):
     torque_nm = figure("N·m", "largest torque about the slave's tip", "largest torque about the tip")
 
     def meet(self, shape: HoleParameters, ways: Array, wrench: Array) -> None:
-        """Take the largest of each."""
+        """Update the maxima of depth, force and torque."""
         against = wrench[:, :3] @ shape.out
         self.depth_mm = max(self.depth_mm or 0.0, 1e3 * shape.depth(ways))
         self.resistance_n = float(against.max(initial=self.resistance_n or 0.0))

@@ -1,4 +1,4 @@
-"""Jaw: how often it gripped, what slid or fell, and how hard it pressed."""
+"""Jaw: number of grips, slips and drops, and the largest force."""
 
 from teleop_core.evaluation import Context, Metric, Window
 from teleop_core.evaluation.changes import Changes
@@ -7,7 +7,7 @@ from teleop_core.graph.topics import SLAVE_JAW_GRIP
 
 
 class JawMetric(Metric):
-    """Grips of a simulated jaw, by what its simulator tells."""
+    """Grips of a simulated jaw, as its simulator reports them."""
 
     name, group, topics = "jaw", "the jaw", (SLAVE_JAW_GRIP,)
     grips = figure("1", "how often the jaw closed on the object", "grips")
@@ -20,7 +20,7 @@ class JawMetric(Metric):
         self._grip = Changes(SLAVE_JAW_GRIP)
 
     def add(self, window: Window) -> None:
-        """Take one window."""
+        """Process one window."""
         if self._grip.add(window):
             self.grips, self.slips, self.drops = self._grip.risen("grips", "slips", "drops")
             self.peak_force_n = self._grip.peak("force")

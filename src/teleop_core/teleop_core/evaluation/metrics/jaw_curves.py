@@ -13,7 +13,7 @@ _CURVES = {
 
 
 class JawCurvesMetric(Metric):
-    """Draws what the jaw did; it measures nothing of its own."""
+    """Draws angle and force of the jaw; this metric has no values."""
 
     name, topics = "jaw_curves", tuple(_CURVES)
 
@@ -24,7 +24,7 @@ class JawCurvesMetric(Metric):
         self._drawn = {topic: Envelope(bag.start_ns, bag.end_ns, columns=1) for topic in _CURVES}
 
     def add(self, window: Window) -> None:
-        """Take one window."""
+        """Process one window."""
         for topic, envelope in self._drawn.items():
             found = window.samples(topic)
             envelope.add(found.log_ns, found.values[:, :1])

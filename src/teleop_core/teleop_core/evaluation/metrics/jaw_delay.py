@@ -1,4 +1,4 @@
-"""Delay of the jaw: how long after the hand began to close it gripped."""
+"""Delay of the jaw: time from the moment at which the hand begins to close the jaw to the grip."""
 
 from teleop_core.evaluation import Context, Metric, Window
 from teleop_core.evaluation.changes import Changes
@@ -22,6 +22,6 @@ class JawDelayMetric(Metric):
         self._asked, self._grip = Changes(SLAVE_JAW_SERVO_JP, "jaw"), Changes(SLAVE_JAW_GRIP, "is_gripped")
 
     def add(self, window: Window) -> None:
-        """Take one window."""
+        """Process one window."""
         if self._asked.add(window) & self._grip.add(window):
             self.delay_s = mean_wait_s(self._asked.falls("jaw"), self._grip.rises("is_gripped"))

@@ -1,4 +1,4 @@
-"""Latency: what each stage of the chain adds to the way from the hand's sample to the slave."""
+"""Latency: the delay that each stage of the chain adds between the hand's sample and the slave."""
 
 from itertools import cycle
 
@@ -14,15 +14,15 @@ _NEVER = 2**62
 _BINS = 150
 _COLORS = (FIRST, "#e69f00", SECOND, THIRD, DARK)
 TOTAL, ASKED = "total", "asked"
-"""Names of the delay of the whole chain, and of what was asked for of it."""
+"""Names of the delay of the whole chain, and of its configured part."""
 
 
 class LatencyMetric(Metric):
     """Delays of every stage.
 
-    A stage's own delay is the time between the first arrivals, at the recorder, of what it
-    answers and of its answer; both carry the same stamp. Transport to the recorder is in the first
-    stage, the only one that is measured against the stamp itself.
+    The delay of a stage is the time between two first arrivals at the recorder: of the stage's input and of its output
+    with the same stamp. The first stage is measured against the stamp itself, so its delay includes the transport to
+    the recorder.
     """
 
     name = "latency_ms"
@@ -39,7 +39,7 @@ class LatencyMetric(Metric):
 
     def __init__(self, context: Context) -> None:
         self._chain = context.origin.chain
-        self._command = self._chain[:2][-1][1]  # what is made of the hand's sample first
+        self._command = self._chain[:2][-1][1]  # the first topic that is computed from the hand's sample
         self._delays = {stage: Distribution() for stage, _ in self._chain}
         self._delays[TOTAL] = Distribution()
         self._asked_ms = 1e3 * context.origin.chain_delay
@@ -47,19 +47,19 @@ class LatencyMetric(Metric):
         context.read(topic for _, topic in self._chain)
 
     def add(self, window: Window) -> None:
-        """Take one window."""
+        """Process one window."""
         before: Topic | None = None
         for stage, topic in self._chain:
             stamps, logs = _first_arrivals(window, topic)
             arrivals = logs - (stamps if before is None else _arrivals(window, before, stamps))
             self._delays[stage].add(arrivals[arrivals > -_NEVER // 2])
             before = topic
-        # The last stage holds what nobody sent when it starts: only commands count.
+        # At its start, the last stage holds a pose that nobody commanded; only commands count.
         is_command = same_stamp(stamps, window.around(self._command).stamp_ns) != NONE
         self._delays[TOTAL].add((logs - stamps)[is_command])
 
     def values(self) -> dict[str, Delay]:
-        """Delay of each stage; what was asked for, if anything was."""
+        """Delay of each stage, and the configured delay if there is one."""
         found = {stage: distribution.delay() for stage, distribution in self._delays.items()}
         own = found.get(self._network, Delay(0.0, 0.0, 0.0))
         parts = (own.median, own.p99, own.max)
@@ -107,7 +107,7 @@ def _first_arrivals(window: Window, topic: Topic) -> tuple[Integers, Integers]:
 
 
 def _arrivals(window: Window, topic: Topic, stamps: Integers) -> Integers:
-    """Log times [ns] of another topic's samples with these stamps; never is far in the future."""
+    """Log times [ns] of another topic's samples with the given stamps; far in the future if missing."""
     series = window.around(topic)
     if not len(series):
         return np.full(len(stamps), _NEVER)
@@ -123,7 +123,7 @@ def _short(value: float | None) -> str:
 
 
 def _bin_width(delays: list[Distribution]) -> int:
-    """Width of bins [µs] that is the same for all, so that their heights compare."""
+    """Common width of bins [µs] for all stages, so that the heights of bins are comparable."""
     spans = [(delay.quantile_us(0.99) or 0) - int(delay.values_us[0]) for delay in delays]
     return max(1, -(-max(spans) // _BINS))
 

@@ -1,4 +1,4 @@
-"""Looks: how often a hand that rested began to move, as after a look at what it did."""
+"""Looks: how often the hand began to move after a rest, as if the operator had looked at the result."""
 
 import numpy as np
 
@@ -9,10 +9,10 @@ from teleop_core.graph.topics import MASTER_MEASURED_CP
 
 
 class LooksMetric(Metric):
-    """Begins of motion after a rest in which what was seen can be used: 0.1 s, a shortest time of the eye.
+    """Number of times the hand begins to move after a rest of at least 0.1 s, the shortest time to use what was seen.
 
-    Nobody tells a look; it is found by the hand, of people as of simulated operators. Submovements with no such rest
-    between them count as one look.
+    A look itself is not recorded. It is inferred from the hand's motion, for persons and for simulated operators.
+    Submovements without such a rest between them count as one look.
     """
 
     name, topics = "looks", (MASTER_MEASURED_CP,)
@@ -20,7 +20,7 @@ class LooksMetric(Metric):
     _place, _slot, _still = np.full((1, 3), np.inf), -1, 0
 
     def add(self, window: Window) -> None:
-        """Take one window, of which one sample in each fiftieth of a second is looked at."""
+        """Process one window; one sample per 0.02 s is used."""
         slots = (at := window.samples(MASTER_MEASURED_CP)).stamp_ns // 20_000_000
         places = np.concatenate((self._place, at.values[np.diff(slots, prepend=self._slot) > 0, :3]))
         for has_moved in (np.linalg.norm(np.diff(places, axis=0), axis=1) >= 0.02 * IDLE_SPEED).tolist():

@@ -19,10 +19,10 @@ from teleop_core.hand.operators.behaviour import OperatorParameters
 
 
 def approach_end_ns(context: Context) -> int:
-    """Time at which the approach is over [ns].
+    """Time at which the approach ends [ns].
 
-    The approach begins when teleop/state first says that the slave follows, and takes as long as
-    the stored configuration says. Recordings of others have none, and begin at once.
+    The approach begins when teleop/state first reports that the slave follows; its duration is in the stored
+    configuration. Recordings of other writers have no approach: this returns their start.
     """
     history, start_ns = context.history, context.bag.start_ns
     begin_ns = start_ns
@@ -33,14 +33,14 @@ def approach_end_ns(context: Context) -> int:
 
 
 def approach_time(context: Context) -> float:
-    """How long the operator approached the centre of its motion [s]; 0 if nothing is known."""
+    """Duration of the operator's approach to the centre of its motion [s]; 0 if unknown."""
     values = context.origin.operator
     try:
         common = build(OperatorParameters, values, "operator.")
         operator = OPERATORS.find(common.kind.kind)
     except TeleopError:
         return 0.0
-    # A recorded motion is approached where it has been moved to a centre.
+    # A recorded motion has an approach only if it was moved to a centre.
     is_moved = operator.length is not None and any(common.center)
     return common.approach_time if values and (operator.approaches or is_moved) else 0.0
 
@@ -55,7 +55,7 @@ SEGMENTS, FIXTURE = "between clutch strokes", "hand with the fixture on"
 
 @dataclass(frozen=True)
 class Clutch:
-    """Strokes of the clutch, and how long it was pressed [s]."""
+    """Number of clutch strokes, and the time for which the clutch was pressed [s]."""
 
     count: int
     time_s: float
@@ -63,14 +63,14 @@ class Clutch:
 
 @dataclass(frozen=True)
 class MotionScore:
-    """What :class:`MotionMetric` finds.
+    """Results of :class:`MotionMetric`.
 
     Attributes:
         hand: Motion of the master's tip.
         slave: Motion of the slave's tip.
         in_fixture: Motion of the master's tip while a fixture was on.
         clutch: Strokes of the clutch.
-        segments: Hand between clutch strokes, by number from 1: ``begin_s``, ``end_s`` from the
+        segments: Motion of the hand between clutch strokes, by number from 1: ``begin_s`` and ``end_s`` since the
             start of the recording, and figures.
         segment_median: ``count``, and the median of each figure over the segments.
     """
@@ -86,7 +86,7 @@ class MotionScore:
 class MotionMetric(Metric):
     """Figures of the motion of hand and slave, after the approach.
 
-    With a span, all of it counts, the approach too.
+    If a span is scored, the whole span counts, including the approach.
     """
 
     name = "motion"
@@ -114,14 +114,14 @@ class MotionMetric(Metric):
         self._score: MotionScore | None = None
 
     def add(self, window: Window) -> None:
-        """Take one window."""
+        """Process one window."""
         self._score = None
         self._found.clear()
         for stream in self._streams.values():
             stream.add(window)
 
     def _kinematics(self, topic: Topic) -> tuple[Kinematics, Mask]:
-        """Velocities of a tip, and which of them count."""
+        """Velocities of a tip, and a mask of the samples that count."""
         if topic not in self._found:
             self._found[topic] = Kinematics(self._streams[topic].samples)
         found = self._found[topic]
@@ -132,7 +132,7 @@ class MotionMetric(Metric):
         return self._context.history.at(stamps)
 
     def values(self) -> MotionScore:
-        """Figures of the whole, with the fixture on, and between clutch strokes."""
+        """Figures of the whole motion, of the time with the fixture on, and between clutch strokes."""
         self._score = self._score or self._scored()
         return self._score
 
@@ -152,7 +152,7 @@ class MotionMetric(Metric):
         )
 
     def rows(self) -> list[TableRow]:
-        """What tables show."""
+        """Rows of tables."""
         found = self.values()
         hand, fixture, middle = found.hand, found.in_fixture, found.segment_median
         has_fixture = fixture.time_s > 0.0
@@ -227,7 +227,7 @@ class _Stream:
         series = window.samples(self._topic)
         if not len(series):
             return
-        if self._has_stamps is None:  # others may leave stamps empty
+        if self._has_stamps is None:  # other writers may leave stamps empty
             self._has_stamps = bool(0 < series.stamp_ns[0] < series.stamp_ns[-1])
         stamps = series.stamp_ns if self._has_stamps else series.log_ns
         times = np.asarray((stamps - self._start_ns) * 1e-9, np.float64)
@@ -258,7 +258,7 @@ def _medians(segments: dict[str, dict[str, float | None]]) -> dict[str, float | 
 
 
 def _strokes(mask: Mask) -> int:
-    """How often a mask begins to hold."""
+    """Number of times a mask changes to True."""
     return int((mask & ~np.concatenate(([False], mask[:-1]))).sum())
 
 

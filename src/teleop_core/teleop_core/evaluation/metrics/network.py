@@ -1,7 +1,7 @@
-"""Network: how old what arrives is at its reader, and how much never does.
+"""Network: age of the received packets at their reader, and share of lost packets.
 
-What the slave samples has stamps of its own clock. They are turned back into the master's by what
-``network/state`` says of the two, which is right within drift times delay.
+The slave's samples have stamps of the slave's clock. They are converted to the master's clock with the clock offset in
+``network/state``. The error of this conversion is at most drift times delay.
 """
 
 from dataclasses import dataclass
@@ -18,12 +18,12 @@ from teleop_core.graph.topics import NETWORK_MEASURED_CP, NETWORK_SERVO_CP, NETW
 GROUP = "network"
 _WAYS = (("to the slave", NETWORK_SERVO_CP), ("from the slave", NETWORK_MEASURED_CP))
 _ROUND_NS = 100_000
-"""To so much an age is rounded down [ns]: live ones have all values."""
+"""Ages are rounded down to multiples of this time [ns], because live ages can have any value."""
 
 
 @dataclass(frozen=True)
 class WayScore:
-    """Ages at the reader in one direction, and losses; None where nothing was recorded."""
+    """Ages at the reader in one direction, and losses; None if nothing was recorded."""
 
     age_mean_ms: float | None = figure("ms", "mean age of the newest packet that its reader has")
     age_p99_ms: float | None = figure("ms", "the age that is exceeded for 1 % of the time")
@@ -40,19 +40,19 @@ class NetworkScore:
 
 
 class _Ages:
-    """Ages of what arrived on one topic, looked at every tick."""
+    """Ages of the newest message of one topic, sampled at every tick."""
 
     def __init__(self) -> None:
         self.ages, self.sum_ns, self.count = Distribution(), 0, 0
 
     def add(self, logs: Integers, stamps: Integers, after_ns: int, until_ns: int) -> Integers:
-        """Take arrivals; returns the ages (N,) [ns] right after each.
+        """Process arrivals, and return the age (N,) [ns] right after each arrival.
 
         Args:
-            logs: When they came [ns]; the one before ``after_ns`` may be the first.
-            stamps: When they were sent [ns].
-            after_ns: Where the time begins that counts [ns].
-            until_ns: Where it ends [ns].
+            logs: Times of arrival [ns]; the first may be the last arrival before ``after_ns``.
+            stamps: Times of sending [ns].
+            after_ns: Begin of the counted time [ns].
+            until_ns: End of the counted time [ns].
         """
         begins = np.maximum(logs, after_ns)
         lengths = np.diff(np.append(begins, max(until_ns, int(begins[-1]) + TICK_NS)))
@@ -73,7 +73,7 @@ class _Ages:
 
 
 def _clock_ahead_ns(window: Window, logs: Integers) -> Integers:
-    """By how much the slave's clock was ahead at these times (N,) [ns]; 0 where nobody says."""
+    """Offset of the slave's clock at the given times (N,) [ns], positive if it was ahead; 0 if unknown."""
     told, column = window.around(NETWORK_STATE), NETWORK_STATE.columns.index("clock_ahead")
     if not len(told) or told.values.shape[1] <= column:
         return np.zeros_like(logs)
@@ -98,7 +98,7 @@ class NetworkMetric(Metric):
         self._last: list[float] = []
 
     def add(self, window: Window) -> None:
-        """Take one window."""
+        """Process one window."""
         for ages, trace, (_, topic) in zip(self._ways, self._traces, _WAYS, strict=True):
             around, own = window.around(topic), window.own(topic)
             known = slice(max(own.start - 1, 0), own.stop)
@@ -120,7 +120,7 @@ class NetworkMetric(Metric):
             self._last = [int(stamps[-1]), *told[-1].tolist()]
 
     def _packets(self, k: int) -> tuple[float | None, float | None]:
-        """Share that was lost, and packets sent in a second; None where nothing is known."""
+        """Share of lost packets, and packets sent per second; None if unknown."""
         if self._first is None:
             return None, None
         ns = self._last[0] - self._first[0]
@@ -133,7 +133,7 @@ class NetworkMetric(Metric):
         return NetworkScore(there, back)
 
     def rows(self) -> list[TableRow]:
-        """Ages and losses of both directions; nothing without a network."""
+        """Ages and losses of both directions; empty without a network."""
         found, score = [], self.values()
         for (name, _), way in zip(_WAYS, (score.there, score.back), strict=True):
             if way.lost_share is None:

@@ -1,4 +1,4 @@
-"""Orientation error: by which angles the slave's tip is off, from reference and from command."""
+"""Orientation error: angles between the slave's tip and its reference, and between the tip and its command."""
 
 from dataclasses import dataclass
 
@@ -17,10 +17,10 @@ class OrientationError:
     """Spread of the orientation errors, [deg].
 
     Attributes:
-        roll: Of the difference of the fixed angles about x; None near pitch ±90°.
-        pitch: The same about y.
-        yaw: The same about z; None near pitch ±90°.
-        angle: Of the angle of the one rotation between the two.
+        roll: Spread of the difference of the fixed angles about x; None near pitch ±90°.
+        pitch: Spread of the difference about y.
+        yaw: Spread of the difference about z; None near pitch ±90°.
+        angle: Spread of the angle of the single rotation between both orientations.
         degenerate_share: Share of samples with pitch near ±90°, 0 to 1.
     """
 
@@ -40,7 +40,7 @@ class _Orientation:
         self._degenerate = 0
 
     def add(self, errors: PoseErrors) -> None:
-        """Take the errors of N poses."""
+        """Add the errors of N poses."""
         self._angle.add(errors.angle_deg)
         self._degenerate += int(errors.is_degenerate.sum())
         for moments, column in zip(self._turns, errors.roll_pitch_yaw_deg.T, strict=True):
@@ -55,7 +55,7 @@ class _Orientation:
 
 
 class OrientationErrorMetric(Metric):
-    """Errors against the reference of the same tick."""
+    """Orientation errors relative to the reference of the same tick."""
 
     name = "orientation_error_deg"
     keys = (
@@ -74,7 +74,7 @@ class OrientationErrorMetric(Metric):
         self._trace = context.shared(ErrorTrace)
 
     def add(self, window: Window) -> None:
-        """Take one window."""
+        """Process one window."""
         self._error.add(tracked(window).against)
 
     def values(self) -> OrientationError:
@@ -124,7 +124,7 @@ def _sentence(error: OrientationError) -> str:
 
 
 class CommandOrientationErrorMetric(Metric):
-    """Errors against the newest command."""
+    """Orientation errors relative to the newest command."""
 
     name = "command_orientation_error_deg"
     keys = (
@@ -147,7 +147,7 @@ class CommandOrientationErrorMetric(Metric):
         self._error = _Orientation()
 
     def add(self, window: Window) -> None:
-        """Take one window."""
+        """Process one window."""
         self._error.add(tracked(window).behind)
 
     def values(self) -> OrientationError:
@@ -155,5 +155,5 @@ class CommandOrientationErrorMetric(Metric):
         return self._error.error()
 
     def rows(self) -> list[TableRow]:
-        """Root mean square and maximum of the one rotation."""
+        """Root mean square and maximum of the angle of the single rotation."""
         return error_rows(COMMAND_GROUP, "rotation", "deg", self.values().angle)

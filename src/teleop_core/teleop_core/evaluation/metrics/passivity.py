@@ -1,4 +1,4 @@
-"""Passivity: the energy that went in and out at hand and slave, and what keeping it cost."""
+"""Passivity: the energy that went in and out at hand and slave, and the cost of keeping the session passive."""
 
 from dataclasses import dataclass, fields
 
@@ -19,7 +19,7 @@ _COLUMNS = [IN, OUT, HEARD, WITHHELD]
 
 @dataclass(frozen=True)
 class PortScore:
-    """Energies of one port in the slave's scale; None where none were recorded."""
+    """Energies of one port in the slave's scale; None if they were not recorded."""
 
     in_mj: float | None = figure("mJ", "energy that went in")
     out_mj: float | None = figure("mJ", "energy that went out")
@@ -31,7 +31,7 @@ class PortScore:
 
 @dataclass(frozen=True)
 class PassivityScore:
-    """Both ports, and what passivity cost."""
+    """Energies of both ports, and the cost of passivity."""
 
     hand: PortScore
     slave: PortScore
@@ -52,7 +52,7 @@ class _Port:
         self.drifts: tuple[float, float] = (0.0, 0.0)
 
     def add(self, times: Integers, values: Array) -> None:
-        """Take samples (N, columns) of a port's energies."""
+        """Add samples (N, columns) of a port's energies."""
         if not len(values):
             return
         rows = values if self._last is None else np.vstack((self._last, values))
@@ -75,7 +75,7 @@ class _Port:
 
     @property
     def law(self) -> int:
-        """Kind of passivity at the end, by its place among all."""
+        """Kind of passivity at the end, as its index among all kinds."""
         return int(self._last[LAW]) if self._last is not None else 0
 
     def score(self) -> PortScore:
@@ -108,7 +108,7 @@ class PassivityMetric(Metric):
         self._variation = 0.0
 
     def add(self, window: Window) -> None:
-        """Take one window."""
+        """Process one window."""
         for port, topic in zip(self._ports, (MASTER_ENERGY, SLAVE_ENERGY), strict=True):
             samples = window.samples(topic)
             port.add(samples.log_ns, samples.values)
@@ -128,7 +128,7 @@ class PassivityMetric(Metric):
         return PassivityScore(hand.score(), slave.score(), chatter, *(1e3 * drift for drift in slave.drifts))
 
     def rows(self) -> list[TableRow]:
-        """Energies of both ports and the costs; nothing without a stage ``passivity``."""
+        """Energies of both ports and the costs; empty without a stage ``passivity``."""
         score, found = self.values(), []
         if score.chatter_ns is None:
             return []

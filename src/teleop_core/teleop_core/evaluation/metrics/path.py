@@ -1,4 +1,4 @@
-"""Path: where the tip went, in space, per plane and against time; drawn only."""
+"""Path: plots of the tip's path in space, per plane and against time. This metric has no values."""
 
 from typing import Any, NamedTuple
 
@@ -23,7 +23,7 @@ _CAMERA = {"eye": {"x": 1.4, "y": -1.7, "z": 0.85}, "center": {"x": 0, "y": 0, "
 
 
 class _Path(NamedTuple):
-    """Where reference and tip were: times (N,) [s], points (N, 3) [mm], and when they are drawn."""
+    """Paths of reference and tip: times (N,) [s], points (N, 3) [mm], and the intervals in which they are drawn."""
 
     times: figure.Numbers
     reference: figure.Numbers
@@ -54,14 +54,14 @@ class PathMetric(Metric):
         self._position = Envelope(context.bag.start_ns, context.bag.end_ns, columns=9)
 
     def add(self, window: Window) -> None:
-        """Take one window."""
+        """Process one window."""
         found = tracked(window)
         poses = (found.commands, found.setpoints, found.poses)
         rows = np.concatenate([pose[:, :3] for pose in poses], axis=1) * 1e3
         self._position.add(found.log_ns, rows)
 
     def values(self) -> Values:
-        """Nothing: it only draws."""
+        """No values: this metric only draws."""
         return {}
 
     def figures(self) -> list[figure.Figure]:
@@ -75,7 +75,7 @@ class PathMetric(Metric):
         ]
 
     def _path(self, outlines: list[Outline]) -> _Path:
-        """All of it, to be drawn with a fixture on, or always if none ever was."""
+        """The whole path. It is drawn while a fixture is on, or always if no fixture was ever on."""
         times, values = self._position.line()
         during = [(outline.begin_s, outline.end_s) for outline in outlines]
         return _Path(times, values[:, 3:6], values[:, 6:], _in_a_row(during) or None)
@@ -122,7 +122,7 @@ class PathMetric(Metric):
         return figure.Figure("Position against time", sentence, traces, layout, 640)
 
     def _interesting(self, outlines: list[Outline]) -> list[float]:
-        """Time [s] that is shown first: with a fixture on, or else from when the slave follows."""
+        """Time [s] that is shown first: the time with a fixture on, else the time since the slave began to follow."""
         bag, history = self._context.bag, self._context.history
         if outlines:
             return [outlines[0].begin_s, outlines[-1].end_s]
@@ -132,7 +132,7 @@ class PathMetric(Metric):
 
 
 def _in_a_row(stretches: list[tuple[float, float]]) -> list[tuple[float, float]]:
-    """Stretches of time in order, those that touch as one."""
+    """Time intervals in order; adjacent intervals are joined."""
     found: list[tuple[float, float]] = []
     for begin, end in stretches:
         if found and begin <= found[-1][1]:
@@ -156,11 +156,11 @@ def _in_space(path: _Path, outlines: list[Outline], sentence: str) -> figure.Fig
             (path.measured, "measured", figure.MEASURED),
         )
     )
-    measured |= {"showlegend": False}  # its colours are told by the bar
+    measured |= {"showlegend": False}  # the colour bar explains its colours
     measured["line"] |= {"colorscale": "Viridis", "showscale": True, "colorbar": _TIME_BAR}
     traces = [
         {**figure.along(whole, path.times, path.during, whole=True), "opacity": 0.5, "hoverinfo": "skip"},
-        # Both lines at once would hide each other in turns.
+        # If both lines were drawn, each would hide parts of the other.
         {**figure.along(reference, path.times, path.during), "visible": "legendonly"},
         figure.along(measured, path.times, path.during, colored=True),
     ]
@@ -191,7 +191,7 @@ def _line3(points: figure.Numbers, name: str, color: str, width: int, *, hidden:
 
 
 def _in_planes(path: _Path, outlines: list[Outline]) -> figure.Figure:
-    """The same along each axis; behind it all of the path, or where it spent its time."""
+    """The same paths seen along each axis; behind them the whole path, or the time spent in each area."""
     shown = path.shown
     fixtures = largest(outlines)
     every = np.concatenate([shown, path.reference[np.isfinite(shown[:, 0])], *(outline.points for outline in fixtures)])
@@ -231,7 +231,7 @@ def _plane_lines(path: _Path, across: int, up: int) -> list[dict[str, Any]]:
 def _surroundings(
     path: _Path, shown: figure.Numbers, across: int, up: int, ranges: tuple[list[float], list[float]], is_dense: bool
 ) -> dict[str, Any]:
-    """What stays behind the visible part of a path: all of it, or the time it spent anywhere."""
+    """Background of the visible part of a path: the whole path, or the time spent in each area."""
     if is_dense:
         duration_s = float(path.times[-1] - path.times[0])
         sample_s = duration_s / max(1, len(path.times) - 1)

@@ -1,7 +1,7 @@
-"""Position error: how far the slave's tip is from reference and command, and how far it really is.
+"""Position error: distance of the slave's tip from reference and command, and of the true tip from the reference.
 
-The reference is that of the same tick; the newest command is ahead of it by the filters' lag; the
-true tip is behind what the encoders see.
+The reference is the setpoint of the same tick. The newest command is ahead of the reference by the filters' lag. The
+true tip differs from the tip that the encoders measure.
 """
 
 import numpy as np
@@ -42,7 +42,7 @@ class TrueErrorMetric(SpreadMetric):
         context.read((SLAVE_TRUE_CP,))
 
     def errors(self, window: Window) -> Array:
-        """Distances (N,) [mm]; none where no true tip was recorded."""
+        """Distances (N,) [mm]; empty if no true tip was recorded."""
         found, true = tracked(window), window.around(SLAVE_TRUE_CP)
         if not len(true):
             return np.empty(0)

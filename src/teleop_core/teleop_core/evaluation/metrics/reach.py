@@ -1,4 +1,4 @@
-"""Reach: for how much of the time the slave could do what the hand asked for, and why not."""
+"""Reach: share of the time in which the slave could follow the hand, and the causes of the rest."""
 
 import math
 from dataclasses import dataclass
@@ -15,16 +15,16 @@ from teleop_core.kernels.geometry import Array
 
 GROUP = "slave follows the hand"
 COMPARABLE = 0.99
-"""Least share of the time followed with which published figures are compared."""
+"""Smallest share of followed time for a comparison with published figures."""
 _RESIDUAL = SLAVE_REACH.columns.index("position_residual")
 _LIMIT = SLAVE_REACH.columns.index("limit")
-# Beside the limits: while the slave is aligned, or nothing was sent for longer than this [s].
+# One more cause besides the limits: the slave is being aligned, or no command came for longer than this time [s].
 _ALIGNING, _SILENT_S = len(Limit), 0.5
 
 
 @dataclass(frozen=True)
 class ReachScore:
-    """How far the slave followed, since it first did; None without what says so."""
+    """How well the slave followed, since it first followed; None if slave/reach was not recorded."""
 
     followed_share: float | None = figure(
         "1",
@@ -48,7 +48,7 @@ class ReachScore:
 
 
 class ReachMetric(Metric):
-    """Shares of time and residuals by slave/reach."""
+    """Shares of time and residuals, from slave/reach."""
 
     name = "reach"
     keys = keys_of("reach", ReachScore)
@@ -58,24 +58,24 @@ class ReachMetric(Metric):
         self._distance, self._angle = Moments(), Moments()
         self._stamps = context.shared(StampTallies)
         self._interpolation = context.origin.interpolation
-        self._time = np.zeros(len(Limit) + 1)  # in each limit, and while aligning [s]
+        self._time = np.zeros(len(Limit) + 1)  # time in each limit, and while aligning [s]
         self._longest_s = self._open_s = 0.0
         self._last: tuple[int, int] | None = None  # stamp [ns] of the last command, and its limit
 
     def add(self, window: Window) -> None:
-        """Take one window."""
+        """Process one window."""
         found, states = window.samples(SLAVE_REACH), window.states(SLAVE_REACH)
         follows = states.column("is_following") > 0.0
         left = found.values[follows, _RESIDUAL : _RESIDUAL + 2]
         self._distance.add(left[:, 0] * 1e3)
         self._angle.add(np.degrees(left[:, 1]))
-        if self._last is None:  # what was before the slave first followed does not count
+        if self._last is None:  # time before the slave first followed does not count
             first = int(np.argmax(follows)) if follows.any() else len(follows)
             found, follows = found.only(np.arange(len(follows)) >= first), follows[first:]
         self._add_times(found.stamp_ns, np.where(follows, found.values[:, _LIMIT], _ALIGNING))
 
     def _add_times(self, stamp_ns: Integers, limits: Array) -> None:
-        """Take commands: each counts until the next one, silence as alignment."""
+        """Add commands. Each counts until the next command; a long time without a command counts as alignment."""
         kinds = limits.astype(np.int64)
         if self._last is not None:
             stamp_ns = np.concatenate(([self._last[0]], stamp_ns))
@@ -89,12 +89,15 @@ class ReachMetric(Metric):
         self._add_stretches(spans, kinds != Limit.NONE)
 
     def _add_stretches(self, spans: Array, is_off: NDArray[np.bool_]) -> None:
-        """Take spans of time [s] that are off or not; a stretch may have begun before them."""
+        """Add times [s] in which the slave was limited or not, to find the longest limited stretch.
+
+        A stretch may have begun before these times.
+        """
         if not len(spans):
             return
         stretch = np.cumsum(np.diff(is_off, prepend=True) != 0)
         sums = np.bincount(stretch, weights=np.where(is_off, spans, 0.0))
-        sums[0] += self._open_s  # before the first change the stretch from before goes on
+        sums[0] += self._open_s  # until the first change, the earlier stretch continues
         self._longest_s = max(self._longest_s, float(sums.max()))
         self._open_s = float(sums[-1]) if is_off[-1] else 0.0
 
@@ -126,7 +129,7 @@ class ReachMetric(Metric):
         return period_us * 1e-3 if is_slow else 0.0
 
     def rows(self) -> list[TableRow]:
-        """Shares in percent, the longest stretch, residuals, and whether figures compare."""
+        """Shares in percent, the longest stretch, residuals, and whether figures are comparable."""
         score = self.values()
         return [
             TableRow(GROUP, "followed, time", "%", _percent(score.followed_share)),
@@ -144,7 +147,7 @@ class ReachMetric(Metric):
 
 
 def _way(score: ReachScore) -> str:
-    """How the slave goes from command to command, with the delay of it."""
+    """Interpolation of the slave between commands, and its delay, as text."""
     if score.interpolation is None:
         return MISSING
     name = score.interpolation.replace("_", " ")
@@ -152,7 +155,7 @@ def _way(score: ReachScore) -> str:
 
 
 def _percent(share: float | None) -> str:
-    """Text in percent, rounded down, so that 100 means always."""
+    """Text in percent, rounded down, so that "100" means the whole time."""
     return MISSING if share is None else f"{math.floor(1000.0 * share + 1e-9) / 10.0:.1f}"
 
 

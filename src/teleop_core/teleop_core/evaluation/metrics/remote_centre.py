@@ -1,4 +1,4 @@
-"""Remote centre: how far the tool's shaft passes from the place that it must pass through."""
+"""Remote centre: distance between the tool's shaft and the point through which it must pass."""
 
 import numpy as np
 
@@ -10,12 +10,12 @@ from teleop_core.kernels.geometry import Array, rotations_from_quaternions
 
 
 def distances(poses: Array, centre: Array, shaft: Array) -> tuple[Array, Array]:
-    """Distances (N,) [m] from a place to the shafts of tools, and to their tips.
+    """Distances (N,) [m] from a point to the shafts of tools, and to their tips.
 
     Args:
-        poses: Of the tips, (N, 7).
-        centre: The place, (3,) or (N, 3) [m].
-        shaft: Along the shaft in the tip's frame, of length 1, (3,) or (N, 3).
+        poses: Poses of the tips, (N, 7).
+        centre: The point, (3,) or (N, 3) [m].
+        shaft: Unit vector along the shaft in the tip's frame, (3,) or (N, 3).
     """
     ways = poses[:, :3] - centre
     turned = rotations_from_quaternions(poses[:, 3:7]) * np.broadcast_to(shaft, ways.shape)[:, None]
@@ -24,7 +24,7 @@ def distances(poses: Array, centre: Array, shaft: Array) -> tuple[Array, Array]:
 
 
 class RemoteCentreMetric(Metric):
-    """How well a tool keeps to its remote centre after the approach; None without one."""
+    """How well a tool keeps its remote centre after the approach; None without a remote centre."""
 
     name, group = "remote_centre", "remote centre"
     topics = (REMOTE_CENTRE, SLAVE_MEASURED_CP)
@@ -42,11 +42,11 @@ class RemoteCentreMetric(Metric):
         self._last: Array | None = None
 
     def add(self, window: Window) -> None:
-        """Take one window."""
+        """Process one window."""
         places, poses = window.around(REMOTE_CENTRE), window.samples(SLAVE_MEASURED_CP)
         counts = poses.stamp_ns >= self._begin_ns
         if len(places):
-            self._last = places.values[-1]  # it stays as long as the session lasts
+            self._last = places.values[-1]  # it does not change during a session
         if self._last is None or not counts.any():
             return
         off, depth = distances(poses.values[counts, :7], self._last[:3], self._last[3:])

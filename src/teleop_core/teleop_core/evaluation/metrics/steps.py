@@ -19,7 +19,7 @@ class StepsMetric(Metric):
         self._times, self._last, self._tried = np.zeros(len(STEPS)), (0, 0), 0.0
 
     def add(self, window: Window) -> None:
-        """Take one window; a step lasts until the sample that tells another one."""
+        """Process one window; a step lasts until the first sample of another step."""
         told, (log_ns, step) = window.samples(TASK_STATE), self._last
         for ns, row in zip(told.log_ns.tolist(), told.values, strict=True):
             self._times[step] += 1e-9 * (ns - (log_ns or ns))
@@ -27,7 +27,7 @@ class StepsMetric(Metric):
         self._last = log_ns, step
 
     def values(self) -> dict[str, float | None]:
-        """What ``keys`` name; None without a step, or before the end of the first transfer."""
+        """Values named by ``keys``; None if there are no steps, or before the end of the first transfer."""
         count = self._tried if self._times[1:].any() else 0.0
         means = [float(time) / count if count else None for time in self._times[1:]]
         return dict(zip(STEPS[1:], means, strict=True))

@@ -1,11 +1,11 @@
-"""Task: how many attempts an operator made at a task's goals, how many failed, and how long they took."""
+"""Task: number of an operator's attempts at a task's goals, number of failures, and times of the attempts."""
 
 from teleop_core.evaluation.attempts import Attempts, AttemptsMetric
 from teleop_core.evaluation.metric import figure
 
 
 class TaskMetric(AttemptsMetric):
-    """Counts and times of the attempts that ``task/state`` tells."""
+    """Counts and times of the attempts in ``task/state``."""
 
     name = "task"
     attempts = figure("1", "attempts at a goal", "attempts")
@@ -18,7 +18,7 @@ class TaskMetric(AttemptsMetric):
     )
 
     def judge(self, tried: Attempts) -> None:
-        """Count, and take the mean time."""
+        """Set the counts and the mean time."""
         self.attempts, self.successes = tried.count, tried.successes
         if tried.count:
             self.error_share, self.time_s = 1.0 - self.successes / tried.count, float(tried.settled("time").mean())

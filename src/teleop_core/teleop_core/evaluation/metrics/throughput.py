@@ -1,4 +1,4 @@
-"""Throughput: bits a second of a pointing task, by the effective width of its targets."""
+"""Throughput: bits per second of a pointing task, from the effective width of its targets."""
 
 import numpy as np
 
@@ -23,7 +23,7 @@ class ThroughputMetric(AttemptsMetric):
     effective_width_mm = figure("mm", "4.133 standard deviations of the end points along their ways", "effective width")
 
     def judge(self, tried: Attempts) -> None:
-        """Take the width from where the attempts ended."""
+        """Compute the effective width from the end points of the attempts."""
         way, off, time = map(tried.settled, ("way", "off", "time"))
         if tried.count >= 4:
             width = EFFECTIVE * float(off.std(ddof=1))

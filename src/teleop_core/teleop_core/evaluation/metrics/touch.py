@@ -1,4 +1,4 @@
-"""Touch: what the slave's tip felt of the world."""
+"""Touch: contacts of the slave's tip with the world."""
 
 import numpy as np
 
@@ -11,14 +11,14 @@ from teleop_core.kernels.geometry import Array
 from teleop_core.slave.world.button import ButtonParameters, count_presses
 
 _NEXT_NS = 5_000_000
-"""Largest time between samples of which the later follows at once [ns]."""
+"""Largest time between two samples that count as consecutive [ns]."""
 
 
 class _Presses:
-    """Counts presses of a button by where the tip truly was.
+    """Counts presses of a button, from the true position of the tip.
 
     Attributes:
-        count: So far; None where nothing is known of a button.
+        count: Number of presses so far; None if no button is known.
     """
 
     def __init__(self, context: Context) -> None:
@@ -31,7 +31,7 @@ class _Presses:
             context.read((SLAVE_TRUE_CP,))
 
     def add(self, places: Array) -> None:
-        """Take places (N, 3) [m] of the tip; only where a button is known."""
+        """Add positions (N, 3) [m] of the tip; must be called only if a button is known."""
         assert self.count is not None
         depth = np.array([-self._world.distance(place[None], self._center) for place in places])
         new, self._is_pressed = count_presses(depth, self._button, is_pressed=self._is_pressed)
@@ -39,9 +39,9 @@ class _Presses:
 
 
 class TouchMetric(Metric):
-    """Touches of the tip with the world, and their forces; None where none were recorded.
+    """Touches of the tip with the world, and their forces; None if no forces were recorded.
 
-    Of the true force where it was recorded: noise and bias of a sensor are no touch.
+    The true force is used if it was recorded, so that noise and bias of a sensor do not count as touches.
     """
 
     name, group = "touch", "what the slave touched"
@@ -67,7 +67,7 @@ class TouchMetric(Metric):
         self._trace = Envelope(context.bag.start_ns, context.bag.end_ns, columns=4)
 
     def add(self, window: Window) -> None:
-        """Take one window; the topic is sent where it changes, and now and then."""
+        """Process one window. The topic is sent when it changes, and at long intervals."""
         if self._presses.count is not None:
             self._presses.add(window.samples(SLAVE_TRUE_CP).values[:, :3])
             self.presses = self._presses.count if self._seen else None
@@ -87,7 +87,7 @@ class TouchMetric(Metric):
         falls = -np.diff(forces)[times <= _NEXT_NS]
         self._drop = max(self._drop, float(falls.max(initial=0.0)))
         self._touches += int(np.sum(touches & ~before))
-        self._time_ns += int(times[before].sum())  # a value holds until the next one
+        self._time_ns += int(times[before].sum())  # a value is valid until the next value
         self._last = int(samples.log_ns[-1]), float(forces[-1])
         self._force.add(magnitude[touches])
         self._trace.add(samples.log_ns, np.column_stack((force, magnitude)))
@@ -97,7 +97,7 @@ class TouchMetric(Metric):
         self.drop_n = self._drop if self._touches else None
 
     def figures(self) -> list[Figure]:
-        """Force on the tip against time; none where nothing was touched."""
+        """Force on the tip against time; no plot if nothing was touched."""
         times, values = self._trace.line()
         if not self.count:
             return []

@@ -1,4 +1,4 @@
-"""Transfer: how many objects the jaw brought from peg to peg, how fast, and how pegs pulled."""
+"""Transfer: number of objects that the jaw moved from peg to peg, their times, and the forces on the pegs."""
 
 from teleop_core.evaluation import Context, Metric, Window
 from teleop_core.evaluation.changes import Changes
@@ -8,7 +8,7 @@ from teleop_core.graph.topics import SLAVE_JAW_BOARD, SLAVE_JAW_GRIP
 
 
 class TransferMetric(Metric):
-    """Counts, times and pulls of a simulated board, by what its simulator tells."""
+    """Counts, times and peg forces of a simulated board, as its simulator reports them."""
 
     name, group, topics = "transfer", "peg transfer", (SLAVE_JAW_BOARD, SLAVE_JAW_GRIP)
     transferred = figure("1", "objects that were let go onto another peg", "transferred")
@@ -21,7 +21,7 @@ class TransferMetric(Metric):
         self._board, self._grips = Changes(SLAVE_JAW_BOARD, "transferred"), Changes(SLAVE_JAW_GRIP, "grips")
 
     def add(self, window: Window) -> None:
-        """Take one window."""
+        """Process one window."""
         self._grips.add(window)
         if self._board.add(window):
             self.transferred, self.dropped = self._board.risen("transferred", "dropped")

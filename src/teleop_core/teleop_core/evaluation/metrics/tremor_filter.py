@@ -1,4 +1,4 @@
-"""Tremor filter: how much tremor it leaves, and how late and how large what is meant comes out."""
+"""Tremor filter: the remaining tremor, and delay and gain of the intended motion."""
 
 from dataclasses import dataclass
 
@@ -13,12 +13,15 @@ from teleop_core.kernels.geometry import Array
 
 GROUP = "tremor filter"
 MEANT = 2.0
-"""Motion below this frequency is meant [Hz]."""
+"""Motion below this frequency counts as intended motion [Hz]."""
 
 
 @dataclass(frozen=True)
 class TremorFilterScore:
-    """What a tremor filter did; None without one, or where the recording is too slow or short."""
+    """Score of a tremor filter.
+
+    Values are None without a filter, or if the recording's rate is too low or the recording is too short.
+    """
 
     before_um: float | None = figure("um", "RMS of the stylus's motion in 8 to 12 Hz over three axes; null below 60 Hz")
     after_um: float | None = figure("um", "the same of the filtered stylus")
@@ -47,11 +50,11 @@ def passage(before: Array, after: Array) -> tuple[float, float] | None:
     Σ|S| (2πf)²``. The gain is ``|Σ S exp(2πjf delay)|`` over the power of the first motion.
 
     Args:
-        before: Velocities (N, 3) at :data:`RATE`.
-        after: The same of the other.
+        before: Velocities of the first motion (N, 3) at :data:`RATE`.
+        after: Velocities of the second motion (N, 3).
 
     Returns:
-        None where there is no motion, or less than a second.
+        Delay and gain; None if there is no motion, or less than a second of it.
     """
     size = min(motion_measures.SPECTRUM_SAMPLES, len(before))
     if size < max(motion_measures.SHORTEST, motion_measures.RATE):
@@ -80,7 +83,7 @@ def passage(before: Array, after: Array) -> tuple[float, float] | None:
 
 
 class TremorFilterMetric(Metric):
-    """Tremor before and after a filter, and what became of the meant motion; after the approach."""
+    """Tremor before and after a filter, and delay and gain of the intended motion, after the approach."""
 
     name = "tremor_filter"
     keys = keys_of("tremor_filter", TremorFilterScore)
@@ -91,10 +94,11 @@ class TremorFilterMetric(Metric):
         self._start_ns = context.bag.start_ns
         self._begin_s = (begin_ns - self._start_ns) * 1e-9
         self._before, self._after = MotionSamples(), MotionSamples()
-        self._off, self._count = np.zeros(2), 0  # squares from what was meant, before and after
+        self._off, self._count = np.zeros(2), 0  # squared distances from the intended motion, before and after the
+        # filter
 
     def add(self, window: Window) -> None:
-        """Take one window: the readings that have an answer, by their stamps."""
+        """Process one window: device samples that have a filtered sample with the same stamp."""
         answers = window.samples(MASTER_FILTERED_CP)
         readings = window.around(MASTER_MEASURED_CP)
         if not (len(answers) and len(readings)):
@@ -106,7 +110,7 @@ class TremorFilterMetric(Metric):
         self._add_intention(stamps, readings.values[first, :3], answers.values[second, :3], window)
 
     def _add_intention(self, stamps: Integers, before: Array, after: Array, window: Window) -> None:
-        """Add how far both motions (N, 3) are from the one without tremor, after the approach."""
+        """Add the distances of both motions (N, 3) from the motion without tremor, after the approach."""
         tremors = window.around(HAND_TREMOR)
         common, own, other = np.intersect1d(stamps, tremors.stamp_ns, return_indices=True)
         counts = (common - self._start_ns) * 1e-9 >= self._begin_s
@@ -142,7 +146,7 @@ class TremorFilterMetric(Metric):
         return passage(*(motion_measures.velocities(motion[longest, :3]) for motion in (before, after)))
 
     def rows(self) -> list[TableRow]:
-        """Tremor before and after, delay and gain; nothing without a filter."""
+        """Tremor before and after, delay and gain; empty without a filter."""
         score = self.values()
         if score.after_um is None and score.delay_ms is None:
             return []

@@ -1,4 +1,4 @@
-"""Waits: how often, and how long, the hand rests, as of a person who waits for a late picture."""
+"""Waits: how often and how long the hand rests, for example because the operator waits for a late picture."""
 
 import numpy as np
 
@@ -8,7 +8,7 @@ from teleop_core.graph.topics import MASTER_MEASURED_CP
 
 
 class WaitsMetric(Metric):
-    """Rests of the hand: 0.3 s and longer, with less than 0.5 mm in each tenth of a second."""
+    """Rests of the hand: at least 0.3 s with less than 0.5 mm of motion in each tenth of a second."""
 
     name, topics = "waits", (MASTER_MEASURED_CP,)
     count = figure("1", "rests of the hand: 0.3 s or more, with < 0.5 mm in each 0.1 s")
@@ -16,7 +16,7 @@ class WaitsMetric(Metric):
     _place, _slot, _slots, _still, _rests = np.full(3, np.inf), -1, 0, 0, 0
 
     def add(self, window: Window) -> None:
-        """Take one window, of which one sample in each tenth of a second is looked at."""
+        """Process one window; one sample per 0.1 s is used."""
         at = window.samples(MASTER_MEASURED_CP)
         slots = at.stamp_ns // 100_000_000
         for i in np.flatnonzero(np.diff(slots, prepend=self._slot) > 0).tolist():
