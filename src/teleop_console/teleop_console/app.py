@@ -37,11 +37,11 @@ class Console:
         server: Where it is served.
         link: The session.
         renew: Begins a new session with other settings; returns the reason if it cannot, else an empty text. None if
-        the session is not ours.
+            the session is not ours.
         of_session: Parameters of the whole session, which belong to no node.
         can_end: Whether the page can end what it shows.
         if_stopped: Text of the pages during an emergency stop, for pages without a panel; empty for the usual text,
-        the operator's next step.
+            the operator's next step.
     """
 
     def __init__(

@@ -237,7 +237,7 @@ def options(field: Field, chosen: Chosen, until: float = math.inf) -> tuple[Opti
         field: The field.
         chosen: Words of all fields.
         until: Monotonic time [s] after which no further word is tested; the words not tested by then have an unknown
-        reason.
+            reason.
     """
     now = refusal(chosen)
     known = {"": field.unsaid, **field.options()}

@@ -72,7 +72,7 @@ class Past(ABC):
 
     Attributes:
         columns: Columns by name, such as ``left/slave/measured_cp x``; it grows while other threads read it, so they
-        must iterate over a copy.
+            must iterate over a copy.
         joints: Names of the joints of each arm, by namespace.
     """
 

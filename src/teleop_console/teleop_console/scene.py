@@ -105,7 +105,7 @@ class Scene:
 
         Args:
             parameters: As :meth:`~teleop_console.link.SessionLink.parameters` returns them; missing ones change
-            nothing.
+                nothing.
         """
         with self._server.atomic():
             for name, nodes in self.arms.items():

@@ -40,7 +40,7 @@ class CrtkTopic:
         group: What it is for.
         ros_type: Type of its messages.
         is_required: Whether every CRTK arm must have the topic. This is true for the operating state and for one of
-        ``measured_js`` and ``measured_cp``. CRTK allows an arm to leave out commands that it cannot do.
+            ``measured_js`` and ``measured_cp``. CRTK allows an arm to leave out commands that it cannot do.
     """
 
     name: str

@@ -29,7 +29,7 @@ def examine(arm: Arm, *, may_move: bool, report: Report = lambda _: None, robot:
     Args:
         arm: The arm.
         may_move: Whether the test commands states and small motions: a few millimetres and hundredths of a radian,
-        each back again.
+            each back again.
         report: Called with a text for each step.
         robot: Expected robot; its forward kinematics are compared with the measured tip.
     """

@@ -66,9 +66,9 @@ def drill(
         files: Parameter files over the scenario ``free_motion``.
         texts: Parameters ``key=value`` over all files.
         drives: Command line of drives that replace the simulated ones; exercises that break the simulator are left
-        out.
+            out.
         arm: Command line of the process that the drives command, such as the controller of a real arm. It is started
-        before them, and the drill does not break it.
+            before them, and the drill does not break it.
 
     Raises:
         TeleopError: A parameter is wrong, or a session cannot be started.

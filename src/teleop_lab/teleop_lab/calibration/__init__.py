@@ -58,7 +58,7 @@ class Calibration:
         tried: Accuracy at poses that were not used to find the errors; None if there are too few poses.
         truth: Errors of a simulated arm; None for a real one.
         equivalent: Values of the found entries that a perfect fit would give for ``truth``. If several entries have
-        the same effect, the found entry stands for their sum. Empty for a real arm.
+            the same effect, the found entry stands for their sum. Empty for a real arm.
     """
 
     robot: Robot
@@ -132,7 +132,7 @@ def simulate(
         robot: The arm as drawn; a chain of links.
         poses: Number of measured poses.
         noise: Standard deviation of a tracker on each axis [m], or "ruler" for a ruler with 0.5 mm divisions that
-        measures along one axis after the other.
+            measures along one axis after the other.
         errors: Tolerances and values as of :func:`~teleop_lab.calibration.simulate.true_errors`;
             None for "cnc", of the rcrt1 with the published offset of d3.
         fit: As in :func:`calibrate`; None for "all", or for "offsets" with a ruler.

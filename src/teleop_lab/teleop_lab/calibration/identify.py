@@ -124,14 +124,14 @@ def identify(
         fit: "all" link errors, joint "offsets", or names of entries, which must then all be distinguishable.
         finds_frame: Whether the base's pose in the frame of the measurement is estimated too.
         keeps_all: Whether entries are kept whose confidence interval contains zero. Otherwise they are fixed at zero,
-        the least certain first, unless ``fit`` names them. An entry that does not differ from zero fits noise, and
-        causes errors of the tip where nothing was measured.
+            the least certain first, unless ``fit`` names them. An entry that does not differ from zero fits noise, and
+            causes errors of the tip where nothing was measured.
         worst_condition: Ratio of singular values above which entries are left out, > 1.
 
     Raises:
         UnknownNameError: ``fit`` names what is no link error.
         CalibrationError: Too few readings, named entries that cannot be distinguished, or a search that does not end
-        near the nominal arm.
+            near the nominal arm.
     """
     is_named = fit not in ("all", "offsets")
     names = wanted_names(model, fit)

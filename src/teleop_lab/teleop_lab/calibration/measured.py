@@ -36,7 +36,7 @@ class Measured:
         distances: Distance (N,) [m] of the tip from its position at ``origins``; None for points.
         origins: Joint vectors (N, n) from which distances count; None for points.
         labels: A name for each distance, by which errors are grouped, such as the axis along which the tip moved;
-        empty for none.
+            empty for none.
 
     Raises:
         ShapeError: Arrays whose shapes do not match.
@@ -107,7 +107,7 @@ def read_measured(path: Path, robot: Robot) -> Measured:
     Raises:
         RecordingError: The file cannot be read, or is not a text table.
         CalibrationError: Columns are missing, cells are not numbers, or joints are far beyond their limits, usually
-        because they have another unit.
+            because they have another unit.
     """
     import pandas as pd
 

@@ -35,7 +35,7 @@ def true_errors(robot: Robot, texts: Sequence[str], rng: np.random.Generator) ->
     Args:
         robot: The arm.
         texts: Names of :data:`TOLERANCES`, from which every error is drawn uniformly, and texts such as ``d3=5.5e-3``
-        [m, rad], which replace the drawn value.
+            [m, rad], which replace the drawn value.
         rng: Source of the random errors.
 
     Raises:

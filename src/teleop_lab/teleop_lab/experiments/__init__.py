@@ -47,7 +47,7 @@ def run(name: str, *, seed: int = 1, bench: Bench | None = None) -> Outcome:
         name: One of :func:`list_experiments`.
         seed: First seed of everything random in it.
         bench: Bench on which its sessions run, in place of a new bench with that seed. Experiments that share a bench
-        run a common session only once.
+            run a common session only once.
 
     Returns:
         Rows of numbers, published and predicted, and plots.
@@ -71,7 +71,7 @@ def run_several(
         names: Names, each taken once; all experiments if there are none.
         bench: Where their sessions run.
         began: Called when an experiment begins, with its name, the number of finished experiments, and the number of
-        all.
+            all.
 
     Raises:
         UnknownNameError: There is no such experiment, found before any of them runs.

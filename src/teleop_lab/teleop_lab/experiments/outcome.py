@@ -20,7 +20,7 @@ class Tolerance:
 
     Attributes:
         kind: "exact" except for rounding errors, "share" of the published figure, "absolute" in the unit of the row,
-        or "factor", which bounds the ratio of both in both directions.
+            or "factor", which bounds the ratio of both in both directions.
         amount: Share (0.15), amount in the unit (0.5), or factor above 1 (1.6); of "exact" 0.
 
     Raises:

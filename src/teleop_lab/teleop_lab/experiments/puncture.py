@@ -52,7 +52,7 @@ class Puncture:
         hand_drop: Largest fall of the force at the hand within 0.2 s after the puncture can be felt [N].
         notice: Time from the puncture until the hand notices [s].
         overshoot: How far the tip moves beyond the puncture point if the hand stops a reaction time after it noticed
-        [m].
+            [m].
     """
 
     tip_drop: float

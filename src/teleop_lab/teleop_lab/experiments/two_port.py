@@ -60,7 +60,7 @@ class Ports:
         tip_speed: Of the slave's tip [m/s].
         tip_force: Of the tip on the world [N].
         stray: Share of a force, or of the tip's displacement if that is larger, outside of the lines up to the last
-        line; 0 for a linear system in steady state.
+            line; 0 for a linear system in steady state.
     """
 
     hand_speed: Complex

@@ -51,7 +51,7 @@ def fit_plant(
 
     Raises:
         TeleopError: The table does not match the robot, a name is wrong, the fit does not converge, or parameters
-        cannot be distinguished.
+            cannot be distinguished.
     """
     from teleop_core.robots import load_robot_set
     from teleop_core.session.configuration import configure

@@ -72,7 +72,7 @@ class FitResult:
         predicted_spread: The same, simulated.
         encoder_step: Smallest difference (n,) that is measured [rad or m].
         one_sided: Axes (n,) that all moves approach from one side. For these axes the distance to the target is
-        fitted, not its sign, because friction and bias cannot be distinguished there.
+            fitted, not its sign, because friction and bias cannot be distinguished there.
     """
 
     robot: str

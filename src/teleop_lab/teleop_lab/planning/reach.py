@@ -115,16 +115,15 @@ def reach(
 ) -> Reach:
     """How much of a hand's motion a slave can follow, and with which settings it follows most of it.
 
-
     Args:
         source: A recording, its path, or the name of a scenario, which is run first. Its own configuration is the
-        starting point; for a foreign recording, in any file that replay reads, it is the default configuration.
+            starting point; for a foreign recording, in any file that replay reads, it is the default configuration.
         robot: The slave, in place of the configuration's; its start then is the robot's own.
         geometry: Its lengths [m, rad] as ``symbol=value``.
         share: Share of the time that is to be followed, above 0 and at most 1.
         arm: Namespace of the arm; empty for the default one.
         keeps_axes: Whether the map of axes from hand to slave must not change, for example because a camera looks at
-        the slave from a fixed side.
+            the slave from a fixed side.
         progress: Called with the progress.
         files: ROS 2 parameter files over the configuration.
         settings: Parameters over the files.

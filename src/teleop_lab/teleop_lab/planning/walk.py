@@ -147,7 +147,7 @@ class Walker:
         Args:
             placement: Start, turn and gains.
             is_cut: Whether a limit cuts the hand's motion, as in a session. Otherwise every pose of the original path
-            is commanded.
+                is commanded.
             is_fast: Whether joints may be as fast as the path needs.
         """
         self._run(placement, is_cut=is_cut, is_fast=is_fast)
