@@ -192,7 +192,7 @@ class Stage:
             self.command("resume")
         elif state == State.FAULT:
             for button in self._buttons if told["is_pressed"] else ():  # a button without a message so far counts as
-            # pressed
+                # pressed
                 button.publish(Bool(data=False))
             self.command("reset")
         elif state == State.DISABLED:

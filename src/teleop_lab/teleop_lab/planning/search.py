@@ -105,8 +105,7 @@ class Search:
         return [replace(placement, axes=axes) for axes in self._turns]
 
     def _raised(self, found: Sequence[Found]) -> Found:
-        """The largest gain that reaches the goal, searched from a placement that reaches the goal with the least gain.
-        """
+        """The largest gain that reaches the goal, searched from a placement that reaches the goal with the least gain."""
         low, high, best = math.log(LEAST_GAIN), 0.0, found[0]
         pool = list(found)
         for i in range(_BISECTIONS + 1):

@@ -122,7 +122,7 @@ def on_dask(client: "Client", study: "Study", points: Sequence[Point]) -> Iterat
             if future.status == "finished":
                 yield from future.result()
             elif future.key not in repeated and all(codes := _codes(client, own)):  # a worker with other code joined
-            # later
+                # later
                 again = client.submit(do, batch, pure=False, retries=_TRIES, workers=codes[0])
                 futures[again] = batch
                 repeated.add(again.key)
