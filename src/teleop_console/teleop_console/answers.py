@@ -116,8 +116,7 @@ class Answers:
         return self.form.paths | self.strip.paths
 
     def to(self, request: Request) -> Response:
-        """Answer to a request for one of :attr:`paths`, from any thread; all requests except those for files need one
-        of our pages."""
+        """Answer to a request for one of :attr:`paths`, from any thread; all except files require one of our pages."""
         path = urlsplit(request.path).path
         if len(request.header(OWN_PAGE)) != 1 and path not in self._files:
             return answer_of(http.HTTPStatus.FORBIDDEN)

@@ -154,8 +154,7 @@ class Console:
 
 
 def give_way() -> None:
-    """Lower the priority of the page below that of the session: the page may be late, but arm and stop must not be
-    late."""
+    """Lower the priority of the page below that of the session: the page may be late, arm and stop must not."""
     stop = {thread.native_id for thread in threading.enumerate() if thread.name == STOPPER}
     with suppress(OSError):  # only on Linux does each thread have its own priority
         for thread in {int(name) for name in os.listdir("/proc/self/task")} - stop:

@@ -46,8 +46,7 @@ class Camera:
         return out
 
     def is_elsewhere(self, other: "Camera", part: float) -> bool:
-        """Whether its position or view point differs from another camera's by more than a part of the distance to the
-        view point."""
+        """Whether position or view point differ from another camera's by more than a part of its viewing distance."""
         far = part * float(np.linalg.norm(other.position - other.look_at))
         away = max(np.linalg.norm(self.position - other.position), np.linalg.norm(self.look_at - other.look_at))
         return bool(away > far)

@@ -188,7 +188,7 @@ def refusal(chosen: Chosen) -> str:
 
 
 def tips(chosen: Chosen) -> tuple[str, ...]:
-    """Links of a URDF without a child: one of them is the tip. Empty for another robot, or for a file that is no URDF."""
+    """Links of a URDF without a child: one of them is the tip. Empty for another robot, or another file."""
     file = Path(chosen.get("robot", ""))
     with suppress(TeleopError, OSError):
         if file.suffix == ".urdf":

@@ -120,7 +120,7 @@ def _columns(found: Rows, names: tuple[str, ...]) -> Mapping[str, Array]:
 
 
 def _runs(times: Array, values: Array, begin: float, end: float) -> list[tuple[float, float, float, int]]:
-    """Begin, end, value and first row of each stretch of constant value that overlaps the interval between two times."""
+    """Begin, end, value and first row of each stretch of constant value that overlaps an interval."""
     is_new = np.ones(len(values), bool)
     is_new[1:] = ~((values[1:] == values[:-1]) | (np.isnan(values[1:]) & np.isnan(values[:-1])))
     starts = np.flatnonzero(is_new)

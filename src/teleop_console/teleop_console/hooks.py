@@ -131,8 +131,7 @@ class Server(viser.ViserServer):
             self._websock_server.register_handler(message, lambda page, _, tell=tell: tell(page))  # type: ignore[misc]
 
     def show_on(self, page: int, name: str, *, is_shown: bool) -> None:
-        """Show a visible node of the scene on one page, or hide it there until its visibility is next sent to all
-        pages."""
+        """Show a visible node of the scene on one page, or hide it there until its visibility is sent to all."""
         client, node = self._connected_clients.get(page), self.scene.get_handle_by_name(name)
         if client is not None and node is not None:
             message = _messages.SetSceneNodeVisibilityMessage(name, node.visible and is_shown)

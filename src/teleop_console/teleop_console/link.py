@@ -151,7 +151,7 @@ class SessionLink(Protocol):
         return REFUSED
 
     def hold(self, arm: str, pose: Array) -> None:
-        """Command the stylus to a pose (7,) in the master's base; if no further pose follows, the stylus is released."""
+        """Command the stylus to a pose (7,) in the master's base; silence after it releases the stylus."""
         return
 
     def let_go(self, arm: str) -> None:

@@ -154,8 +154,7 @@ class Timeline:
         return self.state({})
 
     def lay(self, words: Mapping[str, str]) -> object:
-        """Draw the curves of recording ``name`` over these, or none for an empty name; ``align`` is the kind of
-        alignment."""
+        """Draw the curves of recording ``name`` over these, none for an empty name; ``align`` sets the alignment."""
         if (align := words.get("align", self._align)) not in _ALIGNMENTS:
             raise ParameterError("align", align, f"one of {', '.join(_ALIGNMENTS)}")
         name, folder = words.get("name", self._over_name), self._folder
@@ -177,8 +176,7 @@ class Timeline:
         return [entry.name for entry in Recordings(self._folder).entries() if entry.name != self._link.title]
 
     def _shift(self) -> float | None:
-        """Time of the overlaid recording at time 0 of this one [s]; None while the overlaid recording is still being
-        read."""
+        """Time of the overlaid recording at time 0 of this one [s]; None while the former is still being read."""
         if self._over is None or self._align == _ALIGNMENTS[0]:
             return 0.0
         found = [_following(past) for past in (self._past, self._over)]

@@ -232,8 +232,7 @@ class Visitors:
         return f"replay: {'you play it' if self._drivers.may_drive(number) else 'another page plays it'}"
 
     def _show_grips(self, number: int) -> None:
-        """Show the handles of the styli on a page if it may drive; for pages that watch, they are hidden again each
-        time.
+        """Show the handles of the styli on a page if it may drive; on other pages they are hidden each time.
 
         All pages are told when the handles are shown again, those that watch too.
         """

@@ -96,8 +96,7 @@ def adds_up(trail: Trail, least: float) -> str:
 
 
 def obeys(joints: Trail, tip: Trail, fk: Callable[[Vectors], Vectors], least: float) -> str:
-    """Difference between measured positions of the tip and forward kinematics of the joints, in words; empty if they
-    agree.
+    """Difference between measured tip positions and forward kinematics, in words; empty if they agree.
 
     Args:
         joints: Measured joints.

@@ -96,8 +96,7 @@ class Rig(Protocol):
         """Newest joint setpoint (n,) of the slave [rad or m]."""
 
     def way_to_limit(self) -> tuple[Array, float]:
-        """Displacement (n,) of one joint to its nearer limit [rad or m], and the resulting displacement of the tip
-        [m]."""
+        """Displacement (n,) of one joint to its nearer limit [rad or m], and the displacement of the tip [m]."""
 
     def drive(self, speeds: Array, seconds: float) -> None:
         """Drive the joints (n,) at speeds [rad/s or m/s] for a time [s], as a CRTK client does."""

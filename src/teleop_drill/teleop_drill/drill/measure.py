@@ -53,8 +53,7 @@ class Trace:
 
 
 def step_ratio(setpoints: Trace, speed_limit: Array, dt: float) -> float:
-    """Largest step of a setpoint divided by the step that its drive allows in that time; 0 with fewer than two
-    samples.
+    """Largest step of a setpoint divided by the step that its drive allows; 0 with fewer than two samples.
 
     A lost message counts as a tick in which the setpoint could move. If the sequence number starts again, there is
     another publisher, and that step is not counted.
@@ -244,8 +243,7 @@ def silence(places: Trace, setpoints: Trace) -> float:
 
 
 def way_ratio(places: Trace, speed_limit: float, dt: float) -> float:
-    """Largest step of the tip, values (N, 3) [m], divided by the step that a speed limit [m/s] allows; 0 with fewer
-    than two samples."""
+    """Largest step of the tip, values (N, 3) [m], divided by that at a speed limit [m/s]; 0 without two samples."""
     ticks = np.diff(places.number)
     steps = np.linalg.norm(np.diff(places.values, axis=0), axis=1)[ticks > 0]
     return float(np.max(steps / (speed_limit * dt * ticks[ticks > 0]), initial=0.0))

@@ -132,8 +132,7 @@ _STUCK = (Fault.TRACKING, Fault.TIP, Fault.EFFORT, Fault.OVERSPEED)
 
 
 def _stuck(fault: Fault, told: Time) -> Exercise:
-    """Exercise with joints that do not move, for one fault; other faults that would also detect this are only
-    reported.
+    """Exercise with joints that do not move, for one fault; other faults that detect this are only reported.
 
     The drives are off after the fault; the setpoint moves back to the arm, at worst across the whole circle.
     """

@@ -42,8 +42,7 @@ Heard = list[tuple[int, int, bytes]]
 
 
 class Tap:
-    """Receives the messages of the slave, and moves the hand if it is the master; works from its creation until
-    :meth:`close`.
+    """Receives the messages of the slave, and moves the hand if it is the master; runs until :meth:`close`.
 
     Args:
         owner: Node that owns its topics; no executor serves it.

@@ -289,8 +289,7 @@ class Laws:
     # -- at the end ------------------------------------------------------------------------------
 
     def judge_recording(self, path: Path, told: Mapping[str, str]) -> None:
-        """Sent messages are recorded or counted as lost; if the disk failed, this applies to the messages that were
-        saved.
+        """Sent messages are recorded or counted as lost; if the disk failed, this applies to saved messages.
 
         Args:
             path: A recording whose recorder was not killed, while no clock was stepped.

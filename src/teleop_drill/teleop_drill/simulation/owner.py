@@ -1,5 +1,4 @@
-"""Owner: which sender commands the arm, from the sent messages, those that the slave took, and the command that it
-reports to follow."""
+"""Owner: which sender commands the arm, judged by messages sent, messages taken, and the slave's own report."""
 
 import struct
 

@@ -91,8 +91,7 @@ class Model:
         return self._frames(q, vector)[0]
 
     def jacobian(self, q: Array, vector: Array) -> Array:
-        """Derivatives of :meth:`tips` with respect to the vector, (N, 3, 4n + 6); for the frame's rotation those at
-        zero."""
+        """Derivatives of :meth:`tips` by the vector, (N, 3, 4n + 6); those by the frame's rotation are at zero."""
         tip, along, about, alpha_place, theta_place = self._frames(q, vector)
         turns = np.concatenate(
             (np.cross(along, tip[:, None] - alpha_place), np.cross(about, tip[:, None] - theta_place)), axis=1

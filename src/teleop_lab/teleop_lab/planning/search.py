@@ -82,8 +82,7 @@ class Search:
         return [given, *(gain for gain in ROTATION_GAINS if gain < given)]
 
     def _at_rest(self, rotation_gain: float) -> list[Found]:
-        """The best placements with the least gain, the best first: with the given start and axes if these reach the
-        goal.
+        """The best placements with the least gain, best first: with the given start and axes if these are enough.
 
         Else other starts are tried, then other axes.
         """
@@ -105,7 +104,7 @@ class Search:
         return [replace(placement, axes=axes) for axes in self._turns]
 
     def _raised(self, found: Sequence[Found]) -> Found:
-        """The largest gain that reaches the goal, searched from a placement that reaches the goal with the least gain."""
+        """The largest gain that reaches the goal, searched from placements that reach it with the least gain."""
         low, high, best = math.log(LEAST_GAIN), 0.0, found[0]
         pool = list(found)
         for i in range(_BISECTIONS + 1):
@@ -182,8 +181,7 @@ class Search:
         return self._known[placement], placement
 
     def _share(self, placement: Placement) -> float:
-        """Share of the time in which a session would follow. Below the goal, it is only an upper bound, which is
-        faster to compute."""
+        """Share of the time in which a session would follow; below the goal only an upper bound, which is faster."""
         self._tell()
         share = self._walker.share(placement, is_cut=False) + CUT
         if share < self._goal:

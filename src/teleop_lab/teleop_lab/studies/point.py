@@ -105,8 +105,7 @@ def point_key(recipe: str, seed: int, metrics: Sequence[str], code: str) -> Key:
 
 @cache
 def code_digest() -> str:
-    """Digest of the code of ``teleop_core`` and of installed packages with parts, because other code may give other
-    numbers."""
+    """Digest of the code of ``teleop_core`` and installed parts, because other code may give other numbers."""
     groups = entry_points()
     names = {"teleop_core"}
     for group in groups.groups - _NO_PARTS:

@@ -138,8 +138,7 @@ def on_dask(client: "Client", study: "Study", points: Sequence[Point]) -> Iterat
 
 
 def _codes(client: "Client", own: str) -> tuple[list[str], dict[str, object]]:
-    """Addresses of workers with the same code, and the code of each other worker; workers may join after the study
-    began."""
+    """Addresses of workers with the same code, and the code of the other workers; workers may join later."""
     found = client.run(code_digest, on_error="return")
     return [worker for worker, code in found.items() if code == own], {w: c for w, c in found.items() if c != own}
 
