@@ -88,7 +88,7 @@ class Past(ABC):
         """All rows of a topic, empty for an unknown topic; None while the recording is still being read."""
 
     def marks(self) -> Sequence[tuple[float, str]]:
-        """Times [s] and texts of the marks that somebody set."""
+        """Times [s] and texts of the marks."""
         return ()
 
     def samples(self, name: str) -> Rows | None:
@@ -166,7 +166,7 @@ class Seen(Past):
                     self._ring(arm, topic, len(values))[row] = values
 
     def marks(self) -> Sequence[tuple[float, str]]:
-        """Times [s] and texts of the marks that somebody set."""
+        """Times [s] and texts of the marks."""
         return self._marks
 
     def _ring(self, arm: str, topic: str, width: int) -> Array:

@@ -14,7 +14,7 @@ from teleop_drill.drill.numbers import Numbers
 
 
 class Master(Enum):
-    """Who moves the hand."""
+    """What moves the hand."""
 
     DEVICE = "the simulated device of the session, a stage like all others"
     DRILL = "the drill itself, which publishes what a device would"
