@@ -1,9 +1,8 @@
-"""Answers: what the server says beside viser's page: signs of life, the stop, style and script.
+"""Answers: the server's responses that do not come from viser: signs of life, the stop, style and script.
 
-The emergency stop does not go through viser: its button is our own, in view from the page's first
-byte, and its press a request of its own, which is answered when the stop has been sent. So it works
-while the page's connection is lost, flooded or being opened again, and the page knows whether it
-was heard.
+The emergency stop does not go through viser. Its button is our own and visible as soon as the page begins to load. Its
+press is a separate request, which is answered when the stop has been sent. So the stop works while the page's
+connection is lost, flooded or being opened again, and the page knows whether the press was received.
 """
 
 import gzip
@@ -26,9 +25,9 @@ from teleop_console.start import Form, StartPage
 from teleop_console.timeline import StripPage
 
 OWN_PAGE = "Teleop-Page"
-"""Header of our page's requests; to a page of another origin browsers do not allow it."""
+"""Header of our page's requests; browsers do not allow a page of another origin to send it."""
 PRESS = "Teleop-Press"
-"""Header with the name of a press: one that is said again, unanswered, is the same."""
+"""Header with the name of a press: a press that the page repeats because no answer came keeps its name."""
 _SCRIPTS = tuple(Path(__file__).with_name(name) for name in ("page.js", "strip.js"))
 _FIELDS = 100  # of an address
 _FURNITURE = b'<head><link rel="stylesheet" href="teleop.css"><script src="teleop.js"></script>'
@@ -39,12 +38,12 @@ class Situation:
     """What every page shows beside viser's elements.
 
     Attributes:
-        can_stop: Whether a stop is of any use: not where a recording is shown.
+        can_stop: Whether a stop has any effect; false while a recording is shown.
         is_stopped: Whether an emergency stop is in force.
         text: What has happened, and what to do next; empty if nothing has.
-        doing: What is going on before there is a session to see; empty once there is.
+        doing: What is going on before a session can be shown; empty while a session is shown.
         chooses: Whether a session is being chosen: the form is shown.
-        can_end: Whether what is shown can be ended, which leads back to the form.
+        can_end: Whether the page can end the session or replay, which returns to the form.
         state: State of all arms in words, for screen readers.
         can_press: Whether a person at the page leads a hand that closes: at a task, or a jaw.
     """
@@ -60,16 +59,16 @@ class Situation:
 
 
 class Answers:
-    """Answers to requests that are ours, and what is added to viser's page.
+    """Answers to our own requests, and what is added to viser's page.
 
     Args:
-        drivers: Hears that a page is alive.
+        drivers: Receives the signs of life of pages.
         form: What is shown while nothing runs; None for the form on which sessions are chosen.
 
     Attributes:
-        situation: What pages show; whoever knows it writes it.
+        situation: What pages show; the session or replay that is shown writes it.
         stop: Presses the emergency stop; it must not block.
-        jaw: Closes the hand so far, 0 to 1; it must not block.
+        jaw: Closes the hand by a share, 0 to 1; it must not block.
         start: The form on which sessions are chosen.
         strip: The strip of time.
         form: What is shown while nothing runs.
@@ -108,7 +107,7 @@ class Answers:
 
     @property
     def paths(self) -> frozenset[str]:
-        """Paths of the requests that are ours to answer."""
+        """Paths of the requests that this object answers."""
         return frozenset({*self._paths, *self._files})
 
     @property
@@ -117,7 +116,7 @@ class Answers:
         return self.form.paths | self.strip.paths
 
     def to(self, request: Request) -> Response:
-        """Answer to a request for one of :attr:`paths`, from any thread; all but files ask for a page of ours."""
+        """Answer to a request for one of :attr:`paths`, from any thread; all except files require one of our pages."""
         path = urlsplit(request.path).path
         if len(request.header(OWN_PAGE)) != 1 and path not in self._files:
             return answer_of(http.HTTPStatus.FORBIDDEN)
@@ -135,7 +134,7 @@ class Answers:
         response.headers["Content-Length"] = str(len(response.body))
 
     def _page(self, request: Request) -> int:
-        """Page that asks; -1 for one that is not open."""
+        """Number of the page that sent the request; -1 if this page is not open."""
         return self._pages.get(request.header(OWN_PAGE)[0], -1)
 
     def _alive(self, request: Request) -> Response:

@@ -36,12 +36,12 @@ class Console:
     Args:
         server: Where it is served.
         link: The session.
-        renew: Begins a new session with other settings, and returns why it does not, empty if it
-            does; None where the session is not ours.
-        of_session: Parameters of the session as a whole, which no node has.
+        renew: Begins a new session with other settings; returns the reason if it cannot, else an empty text. None if
+            the session is not ours.
+        of_session: Parameters of the whole session, which belong to no node.
         can_end: Whether the page can end what it shows.
-        if_stopped: What pages say in an emergency stop, where their people see no panel; empty for what an
-            operator does next.
+        if_stopped: Text of the pages during an emergency stop, for pages without a panel; empty for the usual text,
+            the operator's next step.
     """
 
     def __init__(
@@ -66,7 +66,7 @@ class Console:
         self._failed = set[str]()
         self.panel = Panel(server.viser, link, drivers, renew, of_session)
         if if_stopped:
-            server.viser.gui.main_panel.float()  # hidden by the page's style: the scene has all of the window
+            server.viser.gui.main_panel.float()  # hidden by the page's style: the scene fills the whole window
         self.panel.settings.on_change(self.scene.retune)
         self.timeline = server.answers.strip.shown = Timeline(link)
         self._visitors = Visitors(server.viser, drivers, self.scene, is_live=link.is_live)
@@ -115,7 +115,7 @@ class Console:
             time.sleep(_ASK_AGAIN)
 
     def try_to_draw(self) -> None:
-        """Draw; what fails is said once, and costs this drawing and not the session."""
+        """Draw; an error is reported once and skips this drawing, but does not end the session."""
         try:
             self.draw()
         except Exception as error:
@@ -124,13 +124,13 @@ class Console:
                 logging.getLogger("teleop_console").exception("the page could not be drawn")
 
     def run(self, is_over: Callable[[], bool]) -> None:
-        """Draw until something is over; time that was lost is not made up for."""
+        """Draw until `is_over` returns true; missed drawings are not repeated."""
         if self._link.is_live:
             give_way()
         threading.Thread(target=self._ask, args=(is_over,), daemon=True).start()
         thresholds = gc.get_threshold()
-        # A stop waits while garbage is looked for: 0.2 s among all that the page is made of, so only among what
-        # came since, and so often that this is little.
+        # A stop waits during a garbage collection. A collection of all objects of the page takes 0.2 s, so only new
+        # objects are collected, and so often that each collection is short.
         gc.freeze()
         gc.set_threshold(*thresholds[:2], 1)
         try:
@@ -145,7 +145,7 @@ class Console:
         self.close()
 
     def close(self) -> None:
-        """Leave the page to what comes next."""
+        """Remove this session from the page, so that the page can show another one."""
         answers = self._server.answers
         answers.stop, answers.jaw, answers.situation = None, None, Situation(doing="closing …")
         answers.strip.shown = None
@@ -154,15 +154,15 @@ class Console:
 
 
 def give_way() -> None:
-    """Lower the page's priority below the session's: the page may be late, arm and stop may not."""
+    """Lower the priority of the page below that of the session: the page may be late, arm and stop must not."""
     stop = {thread.native_id for thread in threading.enumerate() if thread.name == STOPPER}
-    with suppress(OSError):  # elsewhere than on Linux threads have no priorities of their own
+    with suppress(OSError):  # only on Linux does each thread have its own priority
         for thread in {int(name) for name in os.listdir("/proc/self/task")} - stop:
             os.setpriority(os.PRIO_PROCESS, thread, _NICE)
 
 
 def choose(server: ConsoleServer) -> Wish:
-    """Show the form on which a session is chosen, until somebody wants one."""
+    """Show the form on which a session is chosen, until a person at the page chooses one."""
     answers = server.answers
     _empty(server)
     answers.situation = Situation(chooses=True)
@@ -173,7 +173,7 @@ def choose(server: ConsoleServer) -> Wish:
 
 
 def _empty(server: ConsoleServer) -> None:
-    """Take away what the page shows."""
+    """Remove everything that the page shows."""
     server.viser.gui.reset()
     server.viser.scene.reset()
 
@@ -202,7 +202,7 @@ def replay(server: ConsoleServer, path: Path) -> None:
     """Show a recording until the page ends it, or Ctrl-C.
 
     Raises:
-        RecordingError: It cannot be read, or is one of another system.
+        RecordingError: The recording cannot be read, or comes from another system.
     """
     link = RecordedLink(path)
     _empty(server)

@@ -47,7 +47,8 @@ _LEAST_GOAL = 1e-3  # width of a goal as it is drawn [m]
 _NEAR = 0.4  # part of the robot's length about the start of the tip in which an object is framed
 _TOUCH = 0.05  # force of a wall that somebody touches [N]
 SHOWN = ("axes", "ghost", "reach", "paths")
-"""What may be shown or hidden: axes of bodies, the commanded posture, where the tip can be, the last seconds' paths."""
+"""What may be shown or hidden: axes of bodies, the commanded posture, the positions that the tip can reach, the paths
+of the last seconds."""
 _REACHED, _POINT = 4000, 0.003  # points of the reach, and how wide each is, as a part of the robot's length
 
 
@@ -62,10 +63,10 @@ class ArmNodes:
         bodies: Bodies of its robot.
         world: What its tip touches.
         jaw: Its fingers, and what they grip.
-        low: Lowest corner (3,) [m] of what arm and master take, in slave_base.
+        low: Lowest corner (3,) [m] of the space that arm and master take, in slave_base.
         high: Highest corner (3,) [m].
-        fixture: What its fixture is.
-        recorded_path: Where paths come from when time jumps; None where nothing is recorded.
+        fixture: Kind and parameters of its fixture.
+        recorded_path: Returns the recorded path when time jumps; None without a recording.
     """
 
     def __init__(self, server: viser.ViserServer, arm: Arm) -> None:
@@ -103,7 +104,7 @@ class ArmNodes:
     # -- places ----------------------------------------------------------------------------------
 
     def place(self, side: float) -> None:
-        """Stand at a place along the page's y [m]."""
+        """Place arm and master at a position along the page's y [m]."""
         self._side = side
         self._root.position = (0.0, side, 0.0)
 
@@ -121,7 +122,7 @@ class ArmNodes:
     def work(self) -> Array:
         """Corners (16, 3) [m] of where stylus and tip work, in the axes of the page.
 
-        Those of the tip hold all that it met so far: where it was, fixture, object and goals.
+        The corners of the tip's space contain its positions so far, the fixture, the object and the goals.
         """
         hand = self._stand.axes @ REST[:3] + self._stand.origin
         tip, room = self._start(), max(_WORK, 0.08 * self.bodies.size)
@@ -144,7 +145,7 @@ class ArmNodes:
         self._works = np.array((np.minimum(before[0], met.min(axis=0)), np.maximum(before[1], met.max(axis=0))))
 
     def _start(self) -> Array:
-        """Place (3,) [m] of the tip where it was first measured, in the axes of its base."""
+        """First measured position (3,) [m] of the tip, in the axes of its base."""
         return self._poses[-1, :3].copy() if self._begin is None else self._begin
 
     def tip(self) -> Array:
@@ -154,11 +155,11 @@ class ArmNodes:
         return pose
 
     def begin(self) -> Array:
-        """Place (3,) [m] of the tip where it was first measured, in the axes of the page."""
+        """First measured position (3,) [m] of the tip, in the axes of the page."""
         return self._start() + np.array([0.0, self._side, 0.0])
 
     def turn_master(self, axes: Array) -> None:
-        """Let the master stand so that a motion of the stylus and the tip's have one direction.
+        """Rotate the master so that stylus and tip move in the same direction on the page.
 
         Args:
             axes: Rotation (3, 3) from the master's base to the slave's axes.
@@ -192,7 +193,7 @@ class ArmNodes:
             self._meet(view)
 
     def _draw_ghost(self, view: ArmView) -> None:
-        """Draw the reference posture, at a third of the rate, which is enough to see where the arm is sent."""
+        """Draw the commanded posture, at a third of the rate, which is enough to see the command."""
         reference = view.get(SLAVE_SETPOINT_JS)
         self._count = (self._count + 1) % 3
         if self._ghost is not None and reference is not None and self._is_ghost_shown and not self._count:
@@ -231,7 +232,7 @@ class ArmNodes:
             self._goal.scale = max(float(told[_GOAL + 3]), _LEAST_GOAL)
 
     def _draw_fixture(self, view: ArmView, *, is_touched: bool) -> None:
-        """Draw the fixture around the slave, which is told, and its image around the hand."""
+        """Draw the fixture around the slave, as the session reports it, and its image around the hand."""
         box = box_of(view.state)
         hand, command = view.get(MASTER_MEASURED_CP), view.get(SLAVE_SERVO_CP)
         gain = view.state.get("gain", 0.0)
@@ -240,7 +241,7 @@ class ArmNodes:
             self.master.outline.hide()
             return
         center, size = box
-        along = np.abs(self._axes.T) @ size  # the master's axes are the slave's, named otherwise
+        along = np.abs(self._axes.T) @ size  # the master's axes are the slave's axes in another order and sign
         look, unit = self.fixture, unit_outline(self.fixture)
         scale = scale_of(unit, along, gain)
         self.outline.draw(look, center, scale, is_touched=is_touched)
@@ -249,7 +250,7 @@ class ArmNodes:
             self.master.outline.draw(look, around, scale / gain, is_touched=is_touched)
 
     def _at_limit(self, joints: Array, state: dict[str, float]) -> frozenset[int]:
-        """Joints that are at the ends of their ranges, or that the session says are.
+        """Joints that are at the ends of their ranges, or that the session reports as limiting.
 
         A joint whose home is at its end counts only if the session reports it as the limit.
         """

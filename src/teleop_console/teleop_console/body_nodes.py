@@ -23,7 +23,7 @@ class BodyNodes:
         path: Path of the node that they are below.
         bodies: The robot's bodies.
         looks: Meshes in place of the solids of some bodies, by their index.
-        is_ghost: Whether they are drawn through and through in one colour, without axes.
+        is_ghost: Whether the bodies are drawn transparent in one colour, without axes.
     """
 
     def __init__(
@@ -50,9 +50,9 @@ class BodyNodes:
         self._marked: frozenset[int] = frozenset()
 
     def move(self, joints: Array) -> Array:
-        """Draw them where joints (n,) [rad, m] bring them; returns the poses (B, 7) drawn.
+        """Draw the bodies at joint positions (n,) [rad, m]; returns the drawn poses (B, 7).
 
-        Bodies whose place is not finite stay where they are.
+        Bodies whose position is not finite keep their drawn pose.
         """
         poses = self._bodies.poses(joints)
         for body in moved(poses, self._drawn):
@@ -122,7 +122,7 @@ def _add_mesh(
 
 
 def extent(bodies: Bodies, joints: Array) -> tuple[Array, Array]:
-    """Lowest and highest corner (3,) [m] of what the bodies take, in slave_base."""
+    """Lowest and highest corner (3,) [m] of the space that the bodies take, in slave_base."""
     points = [np.zeros((1, 3))]
     for body, pose in zip(bodies.bodies, bodies.poses(joints), strict=True):
         if np.isfinite(pose).all():

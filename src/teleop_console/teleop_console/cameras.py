@@ -11,12 +11,13 @@ from teleop_core.kernels.geometry import Array, quaternion_from_rotation, rotati
 FIELD = np.radians(45.0)
 """Vertical field of view of all cameras [rad]."""
 _FROM = np.array([-0.80, -0.42, 0.48])
-"""Direction from what is seen to the first camera: behind the arm, over its right shoulder."""
+"""Direction from the scene to the first camera: behind the arm, over its right shoulder."""
 _WIDE, _HIGH = 0.875, 0.8  # parts of a picture that may be filled across and upwards
 ASPECT = 1.2
 """Width over height of a wide window with the panel beside it."""
 _PHONE = 0.85  # width over height below which a panel may cover the lower part, as on phones
-_CLEAR = (0.4, 0.55)  # middle and half height of what is free then, of half the picture, upwards
+_CLEAR = (0.4, 0.55)  # middle and half height of the free part of the picture then, upwards, in units of half the
+# picture
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,7 +36,7 @@ class Camera:
 
     @property
     def quaternion(self) -> Array:
-        """Its turn (4,): x to the right, y downwards, z into the picture."""
+        """Its orientation (4,): x to the right, y downwards, z into the picture."""
         z = self.look_at - self.position
         z = z / np.linalg.norm(z)
         x = np.cross(z, self.up)
@@ -45,13 +46,13 @@ class Camera:
         return out
 
     def is_elsewhere(self, other: "Camera", part: float) -> bool:
-        """Whether it stands, or looks, away from another by more than a part of their distance from what they see."""
+        """Whether position or view point differ from another camera's by more than a part of its viewing distance."""
         far = part * float(np.linalg.norm(other.position - other.look_at))
         away = max(np.linalg.norm(self.position - other.position), np.linalg.norm(self.look_at - other.look_at))
         return bool(away > far)
 
     def give(self, client: viser.ClientHandle) -> None:
-        """Let the browser of one person see from here."""
+        """Set the camera of one person's browser to this one."""
         with client.atomic():
             client.camera.up_direction = self.up
             client.camera.position = self.position
@@ -67,7 +68,7 @@ def around(points: Array, aspect: float = ASPECT) -> Camera:
     """Camera that sees all of some points, beside the panel or, on a phone, above it.
 
     Args:
-        points: What it shall see (N, 3) [m], in the axes of the page.
+        points: Points (N, 3) [m] that the camera must see, in the axes of the page.
         aspect: Width over height of the picture.
     """
     up, direction = np.array([0.0, 0.0, 1.0]), _FROM / np.linalg.norm(_FROM)
@@ -96,6 +97,6 @@ def from_tool(pose: Array, size: float) -> Camera:
 
 
 def microscope(place: Array, size: float) -> Camera:
-    """Fixed camera above a place (3,) [m], steep from above, as a microscope over the task."""
+    """Fixed camera that looks steeply down on a position (3,) [m], as a microscope over the task."""
     position = place + size * np.array([0.06, 0.0, 0.35])
     return Camera(position, place.copy(), np.array([1.0, 0.0, 0.0]))

@@ -1,8 +1,7 @@
-"""Choices: what a session can be started with, what does not go together, and its command line.
+"""Choices: the options of a new session, which of them contradict each other, and the command line of a choice.
 
-A choice is a word for each of :data:`FIELDS`; an empty word is what the scenario says. Whether
-words go together is asked of the configuration itself, so a part of your own is offered, and
-refused, like any other.
+A choice is a word for each of :data:`FIELDS`; an empty word means the value of the scenario. The configuration itself
+decides whether words contradict each other, so a part of your own is offered, and refused, like any other.
 """
 
 import math
@@ -41,7 +40,7 @@ PERSON = "remote"
 _PERSON = f"operator={PERSON}"
 _FOR_EVER = f"{SESSION}.duration=86400.0"
 OWN = (_PERSON, _FOR_EVER)
-"""What a session behind a page is beside its scenario: a person is the hand, until it is ended."""
+"""Settings of a session of the page in addition to its scenario: a person is the hand, and the session has no end."""
 
 
 @dataclass(frozen=True)
@@ -50,10 +49,10 @@ class Field:
 
     Attributes:
         name: Its name.
-        label: What stands before it on the page.
-        unsaid: What an empty word stands for.
+        label: Its label on the page.
+        unsaid: Text for an empty word.
         key: Parameter that a word sets; empty for the scenario, which is a file.
-        options: Words that may be chosen, with what each is; any other text may be a file.
+        options: Words that may be chosen, each with its meaning; any other text may be a file.
         stage: Stage that a word needs; empty for none.
     """
 
@@ -102,19 +101,19 @@ FIELDS = (
     Field("controller", "Control law", _OF_SCENARIO, "controller.kind", _named(CONTROLLERS)),
     Field("plant", "Plant", _OF_SCENARIO, "plant.kind", _named(PLANTS)),
 )
-"""All that is chosen, in the order of the page."""
+"""All fields, in the order of the page."""
 FOLLOWED, TIP = "followed", "tip"
 """Further words: the file that an operator ``bag`` or ``file`` follows; the tip of a URDF."""
 _PATHS = {"bag": "operator.bag", "file": "operator.file.path"}  # by operator, where its file goes
 START: Chosen = {"operator": PERSON}
 """What is chosen at first."""
 _LONGEST = 500  # characters of a word
-_TASK_TIME = 60.0  # for which a simulated operator works at a task, at least [s]
+_TASK_TIME = 60.0  # shortest time for which a simulated operator works at a task [s]
 _NOTHING = "none"  # word of a field with a stage that does not need the stage
 
 
 def checked(words: Chosen) -> dict[str, str]:
-    """Words of known fields that say something.
+    """Words of known fields that are not empty.
 
     Raises:
         ParameterError: A field is unknown, or a word too long.
@@ -129,7 +128,7 @@ def checked(words: Chosen) -> dict[str, str]:
 
 
 def texts(chosen: Chosen) -> tuple[str, ...]:
-    """Settings ``key=value`` over the scenario and :data:`OWN` that make what is chosen.
+    """Settings ``key=value`` that express the choice, to be applied after the scenario and :data:`OWN`.
 
     Raises:
         TeleopError: The scenario is unknown.
@@ -149,7 +148,7 @@ def texts(chosen: Chosen) -> tuple[str, ...]:
 
 
 def _said(chosen: Chosen) -> tuple[str, ...]:
-    """Settings over the scenario alone."""
+    """Settings that are applied after the scenario, without :data:`OWN`."""
     said = [f"{f.key}={word}" for f in FIELDS if f.key and (word := chosen.get(f.name))]
     stages = before = _stages(chosen.get("scenario", ""))
     for field in FIELDS:
@@ -174,7 +173,7 @@ def command_line(chosen: Chosen) -> str:
 
 
 def refusal(chosen: Chosen) -> str:
-    """Why this cannot be started; empty if it can."""
+    """Reason why this choice cannot be started; empty if it can."""
     key = tuple(sorted((name, word) for name, word in chosen.items() if word))
     if key not in _REFUSALS:
         try:
@@ -189,7 +188,7 @@ def refusal(chosen: Chosen) -> str:
 
 
 def tips(chosen: Chosen) -> tuple[str, ...]:
-    """Links of a URDF that carry no other: one of them is the tip; none of another robot, or a file that is none."""
+    """Links of a URDF without a child: one of them is the tip. Empty for another robot, or another file."""
     file = Path(chosen.get("robot", ""))
     with suppress(TeleopError, OSError):
         if file.suffix == ".urdf":
@@ -201,7 +200,7 @@ def tips(chosen: Chosen) -> tuple[str, ...]:
 
 @lru_cache(64)
 def _no_robot(name: str, geometry: tuple[str, ...]) -> str:
-    """Why a robot cannot be loaded, which no configuration does; empty if it can."""
+    """Reason why a robot cannot be loaded; empty if it can. A configuration alone does not load the robot."""
     try:
         load_robot_set(name, geometry)
     except TeleopError as error:
@@ -210,7 +209,7 @@ def _no_robot(name: str, geometry: tuple[str, ...]) -> str:
 
 
 _REFUSALS: dict[tuple[tuple[str, str], ...], str] = {}
-_MOST = 4096  # choices whose refusals are remembered
+_MOST = 4096  # number of choices whose refusals are cached
 
 
 @dataclass(frozen=True)
@@ -219,8 +218,8 @@ class Option:
 
     Attributes:
         word: The word.
-        text: What it is; empty where the word says it.
-        reason: Why it may not be chosen now; empty if it may, None before that is known.
+        text: Its meaning; empty if the word alone is clear.
+        reason: Why the word may not be chosen now; empty if it may, None before this is known.
     """
 
     word: str
@@ -229,15 +228,15 @@ class Option:
 
 
 def options(field: Field, chosen: Chosen, until: float = math.inf) -> tuple[Option, ...]:
-    """All words of a field, with what speaks against each beside the other words.
+    """All words of a field, each with the reason why it contradicts the other chosen words.
 
     If the present choice is refused as a whole, no single word is refused for that.
 
     Args:
         field: The field.
         chosen: Words of all fields.
-        until: Monotonic time [s] after which nothing more is tried; what is not known then is
-            told as such.
+        until: Monotonic time [s] after which no further word is tested; the words not tested by then have an unknown
+            reason.
     """
     now = refusal(chosen)
     known = {"": field.unsaid, **field.options()}

@@ -91,7 +91,7 @@ def _show(arguments: argparse.Namespace, server: "ConsoleServer") -> int:
 
 
 def _is_told(arguments: argparse.Namespace) -> bool:
-    """Whether the command line says which session to start."""
+    """Whether the command line defines the session to start."""
     given = (arguments.scenario, arguments.settings, arguments.config, arguments.out)
     return any(given) or bool(arguments.without)
 
@@ -123,7 +123,7 @@ def _attach(arguments: argparse.Namespace, server: "ConsoleServer") -> None:
 
 
 def _drive(arguments: argparse.Namespace, server: "ConsoleServer", settings: Sequence[str]) -> bool:
-    """Start sessions one after the other, each with the page; whether the page ended the last."""
+    """Run sessions one after the other, each with the page; returns whether the page ended the last one."""
     from teleop_console.choices import OWN
 
     ros_module("guest")

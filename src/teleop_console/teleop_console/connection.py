@@ -1,4 +1,4 @@
-"""Connection: a browser's connection, with bounds on what it may send and what it may leave."""
+"""Connection: a browser's connection, with bounds on what the browser may send and on what it leaves unread."""
 
 from typing import Any, Protocol
 
@@ -8,33 +8,33 @@ from websockets.typing import Data, DataLike
 from teleop_console.filter import Budget
 
 STUCK = 10.0
-"""Time in which a page must have taken something of what waits for it [s]."""
+"""Time in which a page must read some of the data that waits for it [s]."""
 OPENING = 32
-"""Connections that may be opening or fetching files at once; the oldest gives way."""
+"""Connections that may be opening or fetching files at the same time; if there are more, the oldest is closed."""
 ALL = 3.0
-"""What all pages of a server may send together, in budgets of one."""
-_PART = 4096  # bytes that are looked at before the budget is asked again
+"""What all pages of a server may send together, as a multiple of the budget of one page."""
+_PART = 4096  # bytes that are read before the budget is checked again
 
 
 class Gate(Protocol):
     """Decides about the messages of connections."""
 
     def passed(self, connection: "Connection", data: Data) -> bytes:
-        """Part of a message that goes on to viser; empty if none does."""
+        """Part of a message that is passed on to viser; empty if nothing is passed on."""
 
     def cut(self, connection: "Connection") -> None:
-        """Take note of a connection that is cut for a flood."""
+        """Note that a connection was closed because of a flood."""
 
     def come(self, connection: "Connection") -> None:
-        """Take note of a connection that becomes a page."""
+        """Note that a connection has become a page."""
 
 
 class Crowd:
     """All connections of one server, and what all its pages may send together.
 
     Attributes:
-        opening: Connections that are no page yet, the oldest first.
-        pages: Those that are.
+        opening: Connections that are not pages yet, the oldest first.
+        pages: Connections that are pages.
     """
 
     def __init__(self) -> None:
@@ -43,21 +43,20 @@ class Crowd:
         self._budget = Budget(ALL)
 
     def spend(self, frames: int, size: int) -> None:
-        """Take some frames and bytes off; beyond that the page that sends most is cut."""
+        """Subtract frames and bytes from the common budget; if it is exceeded, the page that sends most is closed."""
         if not self._budget.spend(frames, size) and self.pages:
             self._budget = Budget(ALL)
             min(self.pages, key=lambda page: page.budget.left).cut()
 
 
 class Connection(ws.ServerConnection):
-    """A connection that is filtered, and that ends when it floods or stands still.
+    """A connection whose messages are filtered, and that ends when it floods or stops reading.
 
-    It ends when the other side takes nothing for :data:`STUCK` seconds, or sends more than its
-    :class:`~teleop_console.filter.Budget`. It also ends when the other side sends most of all
-    pages while these send more than the budget of the :class:`Crowd`, or has not become a page
-    while :data:`OPENING` newer ones have come. Of each of viser's two queues one message can wait
-    here, and the newest of each kind wait in the queues: so what a slow page costs is bounded, and
-    what a dead one costs ends.
+    The connection ends when the browser reads nothing for :data:`STUCK` seconds, or sends more than its
+    :class:`~teleop_console.filter.Budget`. It also ends if all pages together exceed the budget of the :class:`Crowd`
+    and this page sends most. It ends too if it has not become a page before :data:`OPENING` newer connections have
+    come. One message of each of viser's two queues can wait here, and the newest of each kind wait in the queues. So
+    the cost of a slow page is bounded, and the cost of a dead page ends.
 
     Args:
         gate: Decides about its messages.
@@ -66,8 +65,8 @@ class Connection(ws.ServerConnection):
         options: As the library gives them.
 
     Attributes:
-        budget: What it may still send.
-        silent_until: Time of the loop until which its page is told nothing more [s].
+        budget: Frames and bytes that the browser may still send.
+        silent_until: Loop time [s] until which nothing is sent to the page.
     """
 
     def __init__(self, *arguments: Any, gate: Gate, crowd: Crowd, **options: Any) -> None:
@@ -77,7 +76,7 @@ class Connection(ws.ServerConnection):
         self.silent_until = 0.0
 
     def connection_made(self, transport: Any) -> None:
-        """Begin; the oldest that is still opening gives way if there are too many."""
+        """Begin; if too many connections are opening, the oldest of them is closed."""
         super().connection_made(transport)
         opening = self._crowd.opening
         opening[self] = None
@@ -93,14 +92,14 @@ class Connection(ws.ServerConnection):
         super().connection_lost(exc)
 
     def start_keepalive(self) -> None:
-        """The handshake is done: it is a page now."""
+        """The handshake is done: the connection is a page now."""
         self._crowd.opening.pop(self, None)
         self._crowd.pages.add(self)
         self._gate.come(self)
         super().start_keepalive()
 
     def data_received(self, data: bytes) -> None:
-        """Take in what has come, a part at a time, as long as the budget lasts."""
+        """Process received data in parts, as long as the budget lasts."""
         for start in range(0, len(data), _PART):
             part = data[start : start + _PART]
             if self._is_cut or not self._spend(0, len(part)):
@@ -108,7 +107,7 @@ class Connection(ws.ServerConnection):
             super().data_received(part)
 
     def process_event(self, event: Any) -> None:
-        """Take in one frame of any kind; all of them cost time."""
+        """Process one frame of any kind; every frame counts, because each takes time."""
         if self._spend(1, 0):
             super().process_event(event)
 
@@ -143,7 +142,7 @@ class Connection(ws.ServerConnection):
 
 
 class _Watch:
-    """Looks whether what waits in a connection becomes less."""
+    """Checks whether the unread data of a connection decreases."""
 
     def __init__(self, connection: Connection) -> None:
         self._connection, self._waited = connection, float("inf")

@@ -1,8 +1,8 @@
-"""Console link: a live session as the page sees it, over its topics and services alone.
+"""Console link: a live session as the page sees it, only through topics and services.
 
-Of streams it reads the slow copies that the recorder gives (:mod:`teleop_core.nodes.display`);
-where nobody records, the streams themselves, best effort and one deep. In a session with a display
-the slave is shown as late as the display says, as it is to a simulated operator.
+It reads the slow copies of streams that the recorder publishes (:mod:`teleop_core.nodes.display`). Without a recorder
+it reads the streams themselves, best effort and with a queue of one. In a session with a display the slave is shown
+with the delay of that display, as a simulated operator sees it.
 """
 
 import math
@@ -34,7 +34,7 @@ from teleop_core.robots.robot import Robot
 from teleop_core.slave.operation import operation_text
 
 PATIENCE = 5.0
-"""Time in which an arm must be found, and answer [s]."""
+"""Time in which an arm must be found and must answer [s]."""
 _LIST, _SPLIT = "/list_parameters", "/split"
 _MARKS = 100  # marks that are kept
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}")
@@ -48,11 +48,11 @@ class LiveLink(Observer):
         domain: ROS domain of the session.
         title: What it is called.
         patience: Time in which an arm must be found [s].
-        button: Stop button that may have been pressed before the arm was found; None: a new one.
+        button: Stop button that may have been pressed before the arm was found; None for a new button.
         world: Where it is.
 
     Raises:
-        SessionError: There is no arm on this domain, or one does not say which robot it is.
+        SessionError: There is no arm on this domain, or an arm does not report its robot.
     """
 
     is_live = True
@@ -85,13 +85,13 @@ class LiveLink(Observer):
         self.title = title or str(self._value(self._recorder(), "scenario") or "session")
 
     def close(self) -> None:
-        """Leave the session as it is."""
-        self._is_closed = True  # first: an executor that is shut down while it spins breaks
+        """Disconnect; the session keeps running."""
+        self._is_closed = True  # first, because an executor that is shut down while it spins raises an error
         self._executor.wake()
         self._thread.join(PATIENCE)
         self._executor.shutdown()
         self.world.shutdown()
-        with suppress(Exception):  # the middleware may have let go already
+        with suppress(Exception):  # the middleware may be shut down already
             self.ros.destroy_node()
 
     def _spin(self) -> None:
@@ -125,7 +125,7 @@ class LiveLink(Observer):
     def _robot(self, arm: str) -> Robot:
         slave = "/".join(filter(None, (arm, "slave")))
         values = self._client.values(slave, ["robot", "geometry"])  # no answer is no RCRT-1
-        told = self._client.values(slave, [_HEARTBEAT])  # which a slave of others may lack
+        told = self._client.values(slave, [_HEARTBEAT])  # which a foreign slave may lack
         self.has_heartbeat = self.has_heartbeat or bool(told.get(_HEARTBEAT))
         geometry = values.get("geometry")
         texts = tuple(map(str, geometry)) if isinstance(geometry, tuple) else ()
@@ -202,7 +202,7 @@ class LiveLink(Observer):
     # -- commanding ------------------------------------------------------------------------------
 
     def command(self, word: str, arm: str = "") -> tuple[bool, str]:
-        """Send a state command; whether it was taken, and the arm's answer."""
+        """Send a state command; returns whether it was accepted, and the arm's answer."""
         return self._trigger("/" + "/".join(filter(None, (arm, "slave", word))))
 
     def _trigger(self, name: str) -> tuple[bool, str]:
@@ -218,7 +218,7 @@ class LiveLink(Observer):
     def press(self, *, is_pressed: bool = True) -> None:
         """Press or release the emergency stop of all arms.
 
-        A stop is said again at every :meth:`view` until all arms have said that it is in force.
+        The stop is repeated at every :meth:`view` until all arms have confirmed it.
         """
         with self._pressing:
             self._is_pressed = is_pressed
@@ -233,7 +233,7 @@ class LiveLink(Observer):
                 self._button.say(is_pressed=True)
 
     def parameters(self) -> Parameters:
-        """All parameters of all nodes, asked for anew."""
+        """All parameters of all nodes, read from the nodes again."""
         found: dict[tuple[str, str], ParameterInfo] = {}
         services = [name for name, _ in self.ros.get_service_names_and_types()]
         for node in sorted(name.removesuffix(_LIST).strip("/") for name in services if name.endswith(_LIST)):
@@ -243,38 +243,38 @@ class LiveLink(Observer):
         return MappingProxyType(found)
 
     def changes(self) -> dict[tuple[str, str], Setting]:
-        """Parameters that anybody has changed since the last call, by node and name."""
+        """Parameters that have changed since the last call, by node and name, whoever changed them."""
         return self._events.take()
 
     def change(self, node: str, name: str, value: Setting) -> str:
-        """Set a parameter; returns why it was refused, empty if it was taken."""
+        """Set a parameter; returns the reason if it was refused, else an empty text."""
         return self._client.change(node, name, value)
 
     def hold(self, arm: str, pose: Array) -> None:
-        """Want the stylus at a pose (7,) in the master's base."""
+        """Command the stylus to a pose (7,) in the master's base."""
         self._hands[arm].hold(pose)
 
     def let_go(self, arm: str) -> None:
-        """Let go of the stylus: what is not held is let go, so there is nothing to say."""
+        """Release the stylus. Nothing is sent, because silence releases it."""
 
     def press_button(self, arm: str, name: str) -> None:
         """Press and release the ``fixture`` or ``mode`` button of the stylus."""
         self._hands[arm].press(name)
 
     def close_jaw(self, share: float) -> None:
-        """Close the jaw of all hands so far: 0 open, 1 closed."""
+        """Close the jaw of all hands by a share: 0 open, 1 closed."""
         for hand in self._hands.values():
             hand.close_jaw(share)
 
     def mark(self) -> tuple[bool, str]:
-        """Mark that something happens now; whether it was noted in the recording, and as what."""
+        """Set a mark at the present time; returns whether the recorder wrote it, and its text."""
         return self._trigger(f"/{self._recorder()}/mark")
 
     def save(self, name: str) -> Path:
-        """Close the recording under a name and go on recording; returns where it is.
+        """Close the recording under a name and begin the next one; returns the path of the closed recording.
 
         Raises:
-            ParameterError: The name is no plain one, or is taken.
+            ParameterError: The name is not a plain file name, or exists already.
             SessionError: The recorder refuses, or does not answer.
         """
         recording = self._view.recording

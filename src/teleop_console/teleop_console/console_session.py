@@ -25,18 +25,18 @@ from teleop_core.nodes.live import live
 from teleop_core.nodes.operation import StopButton
 from teleop_core.session.configuration import Configuration
 
-_LOOK = 1.0  # for the arm, between looks whether the session has ended [s]
+_LOOK = 1.0  # wait for the arm between two checks whether the session has ended [s]
 _END_PATIENCE = 60.0
 
 
 class _Lines:
-    """Text file whose lines are handed on as they come."""
+    """Text file that passes each line on as soon as it is complete."""
 
     def __init__(self, say: Callable[[str], None]) -> None:
         self._say, self._rest = say, ""
 
     def write(self, text: str) -> int:
-        """Take text, hand on the lines that it ends."""
+        """Accept text, and pass on the lines that it completes."""
         *lines, self._rest = (self._rest + text).split("\n")
         for line in lines:
             if line:
@@ -44,21 +44,21 @@ class _Lines:
         return len(text)
 
     def flush(self) -> None:
-        """Nothing waits."""
+        """Do nothing, because no text is buffered."""
 
 
 class ConsoleSession:
-    """A session in a domain of its own, to be used with ``with``; composed if all nodes are ours.
+    """A session in its own domain, to be used with ``with``; composed if all nodes are ours.
 
-    Where ``ROS_DOMAIN_ID`` is set, its domain is that one, and the process can lead no second one.
+    If ``ROS_DOMAIN_ID`` is set, the session uses that domain, and the process cannot run a second session.
 
-    Its processes end with this one, however that comes about.
+    Its processes end when this process ends, even if this process is killed.
 
     Args:
-        configuration: What runs.
+        configuration: Configuration of the session.
         out: Directory of the recording.
-        say: Told what the session says, a line each, in a thread of its own.
-        without: Nodes that are not started, since others stand in their place.
+        say: Called with each line of the session's output, in a separate thread.
+        without: Nodes that are not started, because other programs replace them.
 
     Attributes:
         domain: Its ROS domain.
@@ -104,7 +104,7 @@ class ConsoleSession:
         return not self._thread.is_alive()
 
     def check(self) -> None:
-        """Check that the session runs, or has ended in order.
+        """Check that the session runs, or has ended without an error.
 
         Raises:
             SessionError: It ended with an error.
@@ -113,10 +113,10 @@ class ConsoleSession:
             raise SessionError(self._error)
 
     def link(self) -> LiveLink:
-        """Link to it, as soon as its arm is there.
+        """Link to the session, as soon as its arm has been found.
 
         Raises:
-            SessionError: It ended before.
+            SessionError: The session ended before its arm was found.
         """
         while True:
             try:
@@ -128,7 +128,7 @@ class ConsoleSession:
                     raise
 
     def end(self) -> None:
-        """End it in order; its recording is closed."""
+        """End the session, and close its recording."""
         self._interrupt.ask()
         self._thread.join(_END_PATIENCE)
         self._guest.close()
@@ -150,13 +150,14 @@ def show_session(
         server: The page.
         configuration: What runs.
         out: Directory of the recording.
-        is_over: Whether it shall end, asked at every drawing with what is known of the session.
-        renew: As of :class:`~teleop_console.app.Console`.
-        without: As of :class:`ConsoleSession`.
-        if_stopped: As of the page. With it pages say no more than that the session starts, and cannot end it.
+        is_over: Returns whether the session must end; called at every drawing with the present view.
+        renew: As in :class:`~teleop_console.app.Console`.
+        without: As in :class:`ConsoleSession`.
+        if_stopped: As in :class:`~teleop_console.app.Console`. With this text, pages report only that the session
+            starts, and cannot end it.
 
     Raises:
-        SessionError: It could not begin, or ended with an error.
+        SessionError: The session could not begin, or ended with an error.
     """
     with splash(server) as say:
         session = ConsoleSession(configuration, out, _both(say, is_on_page=not if_stopped), without)
@@ -174,7 +175,7 @@ def show_session(
 
 
 def _both(say: Callable[[str], None], *, is_on_page: bool) -> Callable[[str], None]:
-    """Say on the page what matters while a session starts, and in the terminal."""
+    """Print a line in the terminal and, while a session starts, also show it on the page if it matters."""
 
     def tell(line: str) -> None:
         if "s  " not in line:  # its line of every second is on the page

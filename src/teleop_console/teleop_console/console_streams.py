@@ -1,4 +1,4 @@
-"""Console streams: what a page reads of one stream of an arm, and what it says as a person's hand."""
+"""Console streams: the stream of an arm that a page reads, and the messages that it publishes as a person's hand."""
 
 import math
 from collections import deque
@@ -16,10 +16,10 @@ from teleop_core.nodes.display import displayed
 from teleop_core.nodes.streams import Subscription, message_type
 
 SILENCE = 1.0
-"""Time after which nothing is fresh, and another source of a stream is looked for [s]."""
+"""Time of silence after which a stream is no longer fresh, and another source of it is searched [s]."""
 _PRESS = 0.12  # of a button [s]
-_FRAMES = 512  # samples of a stream that may wait to be seen
-_SCREEN_NS = 33_000_000  # that the page itself takes, as a display does if it is told nothing else [ns]
+_FRAMES = 512  # samples of a stream that may wait to be shown
+_SCREEN_NS = 33_000_000  # delay of the page itself, the default latency of a display [ns]
 _RHYTHM_NS = 3_000_000_000  # over which the frames of a display are counted [ns]
 
 
@@ -39,10 +39,10 @@ class Seen:
         self._subscription = Subscription(owner, self._own, self._name, 1)
         self._is_of_slave = topic.name.startswith("slave/")
         self._waiting: deque[tuple[int, int, Array]] = deque(maxlen=_FRAMES)
-        self._frames: deque[tuple[int, int]] = deque(maxlen=_FRAMES)  # when new ones came, and their stamps
+        self._frames: deque[tuple[int, int]] = deque(maxlen=_FRAMES)  # arrival times of new samples, and their stamps
 
     def take(self) -> bool:
-        """Take the newest sample, for :meth:`show`; whether one came."""
+        """Take the newest sample, for :meth:`show`; returns whether a new sample came."""
         newest = None
         while (taken := self._subscription.take()) is not None:
             newest = taken.data
@@ -59,7 +59,7 @@ class Seen:
         return True
 
     def rhythm(self) -> tuple[float, float]:
-        """New samples in a second, and how late the newest one came [s]; NaN without any of late."""
+        """New samples in a second, and the delay of the newest one [s]; NaN without recent samples."""
         since_ns = self._owner.world.time_ns() - _RHYTHM_NS
         seen = [frame for frame in self._frames if frame[0] >= since_ns]
         if len(seen) < 2:
@@ -67,7 +67,7 @@ class Seen:
         return 1e9 * (len(seen) - 1) / (seen[-1][0] - seen[0][0]), 1e-9 * (seen[-1][0] - seen[-1][1])
 
     def show(self, view: ArmView) -> None:
-        """Write the newest sample into a view; of the slave only as late as the display shows it."""
+        """Write the newest sample into `view`; samples of the slave are delayed as on the display."""
         seen_ns = view.stamp_ns.get(DISPLAY_MEASURED_CP.name) if self._is_of_slave else None
         while self._waiting and (seen_ns is None or self._waiting[0][0] <= seen_ns + _SCREEN_NS):
             _, view.stamp_ns[self.topic.name], view.streams[self.topic.name] = self._waiting.popleft()
@@ -97,7 +97,7 @@ class Hand:
         self._closed = layout(OPERATOR_JAW, ())
 
     def hold(self, pose: Array) -> None:
-        """Want the stylus somewhere."""
+        """Command a pose of the stylus."""
         with self._lock:
             data = self._layout.encode_one(self._world.time_ns(), np.asarray(pose, np.float64))
             self._publishers[0].publish(data)
@@ -111,10 +111,10 @@ class Hand:
             self._say(np.array([0.0, name == "fixture", name == "mode"]))
             self._world.sleep(_PRESS)
             self._say(np.zeros(3))
-            self._world.sleep(_PRESS)  # released for as long, or two presses were one
+            self._world.sleep(_PRESS)  # released for the same time, because otherwise two presses would be one
 
     def close_jaw(self, share: float) -> None:
-        """Close the jaw so far."""
+        """Close the jaw by a share."""
         with self._lock:
             self._publishers[2].publish(self._closed.encode_one(self._world.time_ns(), np.array([share])))
 

@@ -1,6 +1,6 @@
-"""Controls: buttons of the page, by which the person who drives commands the session.
+"""Controls: buttons of the page with which the person who drives commands the session.
 
-One that is no command of the arm, such as a set of gentle limits, is one file like any other part.
+A control that is not a command of the arm, such as a set of gentle limits, is one file like any other part.
 """
 
 import time
@@ -15,9 +15,9 @@ from teleop_core.base.registry import Registry
 from teleop_core.slave.operation.states import AT_REST_ONLY, STILL_PRESSED
 
 Answers = Sequence[tuple[bool, str]]
-"""What became of each thing that was asked: whether it was done, and a line about it."""
-_PATIENCE = 3.0  # for an arm that must be at rest first [s]
-_PAUSE = 0.2  # until it is asked again [s]
+"""Result of each requested action: whether it was done, and a line about it."""
+_PATIENCE = 3.0  # longest wait for an arm that must come to rest first [s]
+_PAUSE = 0.2  # pause before the command is sent again [s]
 
 
 @dataclass(frozen=True)
@@ -25,15 +25,15 @@ class Control:
     """A button of the page.
 
     Attributes:
-        name: What stands on it.
-        hint: What it does, shown when one points at it.
-        act: ``act(link, arm)`` does it for the arm of a name, empty for the default one, and says
-            what became of it, as :data:`Answers`. It runs in a thread of its own. The link sends
-            commands (``link.command``), sets parameters (``link.change``), and more. If the last
-            answer is no, the person who pressed is told.
+        name: Label of the button.
+        hint: What the button does, shown when the pointer is over it.
+        act: ``act(link, arm)`` does the action for the arm with this name (empty for the default arm), and
+            returns the result as :data:`Answers`. It runs in a separate thread. The link sends commands
+            (``link.command``), sets parameters (``link.change``), and more. If the last answer is no, the page
+            shows it to the person who pressed.
         folder: ``stylus`` for buttons of the hand's device; empty for the others.
-        text: ``text(arm)`` is what is so now, behind the name; None where nothing is shown.
-        is_alive: ``is_alive(view)`` is whether it can do anything now; None: always.
+        text: ``text(arm)`` returns the present state, shown behind the name; None to show nothing.
+        is_alive: ``is_alive(view)`` returns whether the button has an effect now; None if it always has.
     """
 
     name: str
@@ -48,7 +48,7 @@ def commands(*words: str) -> Callable[[SessionLink, str], Answers]:
     """Action of a control that sends the arm commands, one after the other.
 
     Args:
-        words: Of :data:`~teleop_core.graph.topics.STATE_COMMANDS`; a reset lets the stop go first.
+        words: Commands from :data:`~teleop_core.graph.topics.STATE_COMMANDS`; before a reset the stop is released.
     """
 
     def act(link: SessionLink, arm: str) -> Answers:
@@ -60,7 +60,7 @@ def commands(*words: str) -> Callable[[SessionLink, str], Answers]:
 
 
 def _insist(link: SessionLink, word: str, arm: str) -> tuple[bool, str]:
-    """Send a command; an arm that is coming to rest is asked again for a while."""
+    """Send a command; while the arm is coming to rest, the command is repeated for a while."""
     until = time.monotonic() + _PATIENCE
     while True:
         is_taken, text = link.command(word, arm)

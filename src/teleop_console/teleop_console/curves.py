@@ -1,4 +1,4 @@
-"""Curves: columns thinned to the pixels that show them, and bands and ticks of what a session did."""
+"""Curves: columns thinned to the pixels that show them, and the bands and ticks of a session's states and events."""
 
 import math
 from collections.abc import Mapping
@@ -12,10 +12,10 @@ from teleop_core.kernels.geometry import Array
 from teleop_core.slave.operation import State
 
 STRETCHES = 400
-"""Stretches of a band that are told, the worst and the longest of them."""
+"""Largest number of stretches of a band; the worst and the longest ones are kept."""
 TICKS = 200
-"""Ticks that are told, faults first."""
-_GAP, _GAPS = 0.5, 10.0  # a pause is this long [s], and so many usual steps
+"""Largest number of ticks; faults are kept first."""
+_GAP, _GAPS = 0.5, 10.0  # a pause is at least this long [s], and at least this many usual steps
 _FAULTS = 100.0  # more than there are kinds of faults
 _STATES = {
     float(state): (state.name, meaning) for state, meaning in zip(State, ("idle", "good", "held", "wrong"), strict=True)
@@ -27,8 +27,8 @@ def thinned(samples: Rows, begin: float, end: float, pixels: int, *, is_held: bo
     """Smallest and largest value of each pixel, with a sample on each side; no peak is left out.
 
     Args:
-        samples: Times (N,) [s], ascending, and values (N,); what is not finite is unknown.
-        begin: Left end of what is shown [s].
+        samples: Times (N,) [s], ascending, and values (N,); values that are not finite are unknown.
+        begin: Left end of the strip [s].
         end: Right end [s], later.
         pixels: Number of pixels, at least one.
         is_held: Whether a value holds until the next one, so that a pause is none.
@@ -62,7 +62,7 @@ def _plain(values: Array) -> list[object]:
 
 
 def bands(past: Past, begin: float, end: float) -> tuple[list[Told], list[Told]]:
-    """Bands and ticks of all arms between two times [s]; what is being read comes later.
+    """Bands and ticks of all arms between two times [s], without topics that are still being read.
 
     Returns:
         Rows with their ``row`` and ``stretches`` of begin, end, text and meaning of a colour, and
@@ -89,7 +89,7 @@ def bands(past: Past, begin: float, end: float) -> tuple[list[Told], list[Told]]
 
 
 def _hand_rows(found: Rows, label: str, joints: tuple[str, ...], begin: float, end: float) -> list[Told]:
-    """Bands of hand, mode and what limits the slave."""
+    """Bands of the hand, the mode and the limits of the slave."""
     column = _columns(found, TELEOP_STATE.columns)
     rows: list[Told] = []
     hand = np.where(column["is_clutched"] > 0.0, 1.0, np.where(column["is_following"] > 0.0, 2.0, 0.0))
@@ -120,7 +120,7 @@ def _columns(found: Rows, names: tuple[str, ...]) -> Mapping[str, Array]:
 
 
 def _runs(times: Array, values: Array, begin: float, end: float) -> list[tuple[float, float, float, int]]:
-    """Begin, end, value and first row of each stretch of one value that is seen between two times."""
+    """Begin, end, value and first row of each stretch of constant value that overlaps an interval."""
     is_new = np.ones(len(values), bool)
     is_new[1:] = ~((values[1:] == values[:-1]) | (np.isnan(values[1:]) & np.isnan(values[:-1])))
     starts = np.flatnonzero(is_new)
@@ -133,6 +133,6 @@ def _runs(times: Array, values: Array, begin: float, end: float) -> list[tuple[f
 
 
 def _most(runs: list[tuple[float, float, str, str]]) -> list[tuple[float, float, str, str]]:
-    """Those that are told, in their order."""
+    """The stretches that are kept, in their order."""
     kept = sorted(runs, key=lambda run: (run[3] != "wrong", run[0] - run[1]))[:STRETCHES]
     return [(round(a, 4), round(b, 4), text, meaning) for a, b, text, meaning in sorted(kept)]

@@ -5,25 +5,25 @@ import time
 from collections.abc import Callable
 
 PATIENCE = 5.0
-"""Time [s] after which a page that holds the stylus and gives no sign of life loses control."""
+"""A page that holds the stylus and gives no sign of life for this time [s] loses control."""
 
 
 class Drivers:
-    """Who of the open pages may command the session.
+    """Which of the open pages may command the session.
 
-    The first page drives. Others watch until they take control, which always succeeds: two people
-    at one arm talk to each other. A page that comes while nobody drives gets control, so that one
-    which is loaded again goes on; a page that is already open never gets it without asking. Control
-    is lost by leaving, and by silence while the stylus is held: a page that stands still then would
-    always hold it. Silence with an idle stylus harms nobody, and browsers slow hidden pages down.
+    The first page drives. Other pages watch until they take control, which always succeeds, because two people at one
+    arm talk to each other. A page that opens while no page drives gets control, so that a reloaded page continues to
+    drive. A page that is already open gets control only on request. A page loses control when it closes, and when it
+    is silent while it holds the stylus; otherwise a page that hangs would hold the stylus without end. Silence with a
+    free stylus is harmless, and browsers slow hidden pages down.
 
     Methods may be called from any thread.
 
     Attributes:
-        is_for_all: Whether every page drives, as where nothing can be harmed: in a replay.
+        is_for_all: Whether every page drives, as in a replay, which commands no arm.
 
     Args:
-        patience: Time without a sign of life after which a held stylus is lost [s].
+        patience: Time without a sign of life after which a page loses a held stylus [s].
         clock: Monotonic time [s].
     """
 
@@ -50,13 +50,13 @@ class Drivers:
         return self.is_for_all or page == self._driver
 
     def role(self, page: int) -> str:
-        """What to tell the people at a page about it."""
+        """Text that tells the people at a page whether the page drives."""
         if self.may_drive(page):
             return "you have control"
         return "you watch" if self._driver is not None else "you watch, nobody has control"
 
     def join(self, page: int) -> None:
-        """A page has opened; it drives if nobody does."""
+        """A page has opened; it drives if no other page does."""
         with self._lock:
             self._heard[page] = self._clock()
             self._give(page if self._driver is None else self._driver)
@@ -81,7 +81,7 @@ class Drivers:
                 self._heard[page] = self._clock()
 
     def hold(self, page: int) -> bool:
-        """A page takes the stylus or moves it; false if it may not."""
+        """A page takes the stylus or moves it; returns false if the page may not do this."""
         with self._lock:
             self._holds = self._holds or self.may_drive(page)
             return self.may_drive(page)
@@ -100,6 +100,6 @@ class Drivers:
                 self._give(None)
 
     def _give(self, page: int | None) -> None:
-        """Change the driver; whoever drove before holds nothing any more."""
+        """Change the driver; the former driver no longer holds the stylus."""
         if page != self._driver:
             self._driver, self._holds = page, False

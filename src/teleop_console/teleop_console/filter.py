@@ -1,8 +1,8 @@
 """Filter: which messages of a page the console accepts; all others are dropped at the socket.
 
-viser sets any attribute of any element that a page names, takes positions of any shape, and keeps
-uploads. So nothing reaches viser but the messages that are declared here, with the bounds that are
-declared here, from a page that may send them. What passes is encoded anew from what was checked.
+viser sets any attribute of any element that a page names, accepts positions of any shape, and keeps uploads. So only
+the messages declared here, within the bounds declared here, reach viser, and only from a page that may send them. An
+accepted message is encoded anew from its checked values.
 """
 
 import struct
@@ -18,9 +18,9 @@ from msgspec import Meta, Struct
 LARGEST = 256 * 1024
 """Largest message of a page [bytes]: a picture of an inset, drawn by a browser."""
 RATE, BURST = 200.0, 400.0
-"""Frames that a page may send in a second, and at once; a busy page sends 90."""
+"""Frames that a page may send in a second, and in one burst; a busy page sends 90 a second."""
 BYTES_RATE, BYTES_BURST = 1e6, 2e6
-"""Bytes that a page may send in a second, and at once; insets that are shown need 520,000."""
+"""Bytes that a page may send in a second, and in one burst; visible insets need 520,000 a second."""
 PICTURE = (180, 240)
 """Height and width of a picture that a browser may be asked for [px]."""
 
@@ -45,11 +45,11 @@ _OFF_UNIT = 1e-2  # of the square of a quaternion's length
 
 
 class _Message(Struct, tag_field="type", forbid_unknown_fields=True):
-    """What a page says; a float is finite because it has bounds."""
+    """A message of a page; a float is finite because it has bounds."""
 
 
 class Looks(_Message, tag="ViewerCameraMessage"):
-    """Where the camera of the page is."""
+    """The page reports its camera."""
 
     wxyz: _Quaternion
     position: tuple[_Far, _Far, _Far]
@@ -70,7 +70,7 @@ class Takes(_Message, tag="TransformControlsDragStartMessage"):
 
 
 class Drags(_Message, tag="TransformControlsUpdateMessage"):
-    """The page wants a gizmo at a pose in the frame of its parent."""
+    """The page drags a gizmo to a pose in the frame of its parent."""
 
     name: _Name
     wxyz: _Quaternion
@@ -79,7 +79,7 @@ class Drags(_Message, tag="TransformControlsUpdateMessage"):
 
 
 class LetsGo(_Message, tag="TransformControlsDragEndMessage"):
-    """The page lets a gizmo go."""
+    """The page releases a gizmo."""
 
     name: _Name
     owner: _Name = ""
@@ -116,7 +116,7 @@ _ENCODER = msgspec.msgpack.Encoder()
 
 
 def decode(data: bytes | str) -> _Message | None:
-    """Message of a page, with sound bounds; None if it is none."""
+    """Decoded message of a page, within its bounds; None if the data is not such a message."""
     try:
         return _DECODER.decode(data)  # type: ignore[arg-type]
     except (TypeError, ValueError):  # a text; msgspec's errors are ValueErrors
@@ -127,7 +127,7 @@ class Elements(Protocol):
     """What is on the page now."""
 
     def control(self, page: int, uuid: str) -> Any | None:
-        """Handle of an input that a page has before it; None if there is none."""
+        """Handle of an input that the page shows; None if there is none."""
 
     def has_command(self, uuid: str) -> bool:
         """Whether there is such a command."""
@@ -148,7 +148,7 @@ class Filter:
     Args:
         elements: What is on the page.
         may_drive: Whether a page may command the session.
-        say: Told of the first refusal of each kind, a line each.
+        say: Called with a line at the first refusal of each kind.
 
     Attributes:
         refused: How often a message was refused, by the reason.
@@ -160,7 +160,7 @@ class Filter:
         self.refused: Counter[str] = Counter()
 
     def judge(self, page: int, data: bytes | str) -> tuple[bytes, str]:
-        """Encoded message that may go on to viser, and no reason; or nothing, and the reason."""
+        """Encoded message for viser and an empty reason, or no message and the reason of the refusal."""
         message = decode(data)
         reason = UNKNOWN if message is None else self._reason(page, message)
         if reason:
@@ -169,7 +169,7 @@ class Filter:
         return _ENCODER.encode(message), ""
 
     def refuse(self, page: int, reason: str) -> None:
-        """Count a refusal; the first of its kind is said."""
+        """Count a refusal, and report the first of its kind."""
         with self._lock:
             self.refused[reason] += 1
             is_first = self.refused[reason] == 1
@@ -177,7 +177,7 @@ class Filter:
             self._say(f"page {page + 1} was refused: {reason}")
 
     def _reason(self, page: int, message: _Message) -> str:
-        """Why a message with sound bounds is refused; empty if it is not."""
+        """Reason why a message within its bounds is refused; empty if it is accepted."""
         elements = self._elements
         if isinstance(message, Looks | Drags) and not _is_unit(message.wxyz):
             return NO_TURN
@@ -234,7 +234,7 @@ class Budget:
     """Frames and bytes that one page, or all of them, may still send.
 
     Args:
-        share: In shares of what one page may send.
+        share: Budget as a multiple of what one page may send.
         clock: Monotonic time [s].
     """
 
@@ -243,7 +243,7 @@ class Budget:
         self._frames, self._bytes = share * BURST, share * BYTES_BURST
 
     def spend(self, frames: int, size: int) -> bool:
-        """Take some frames and bytes off; whether there were as many."""
+        """Subtract frames and bytes; returns whether the budget was large enough."""
         now = self._clock()
         passed, self._since = now - self._since, now
         most, more = self._share, self._share * passed
@@ -253,5 +253,5 @@ class Budget:
 
     @property
     def left(self) -> float:
-        """What is left, the lesser share of frames and bytes: 1 for all, negative for none."""
+        """Remaining budget, the smaller share of frames and bytes: 1 if nothing is used, negative if it is exceeded."""
         return min(self._frames / BURST, self._bytes / BYTES_BURST) / self._share

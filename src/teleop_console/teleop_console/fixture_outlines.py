@@ -23,7 +23,7 @@ _FLAT = 1e-9  # [m]
 
 @dataclass(frozen=True)
 class Look:
-    """What a fixture is, wherever it stands.
+    """Kind and parameters of a fixture, without its position.
 
     Attributes:
         kind: Name of its kind.
@@ -37,13 +37,13 @@ class Look:
 
 @lru_cache(maxsize=64)
 def unit_outline(look: Look) -> Array:
-    """Segments (N, 2, 3) of a fixture along the master's axes, one long along each.
+    """Segments (N, 2, 3) of a fixture along the master's axes, scaled to length 1 along each axis.
 
-    Along an axis on which it has no length they are in metres. A fixture that is not known here is
-    drawn as the box around it.
+    Along an axis on which the fixture has no extent, they are in metres. A fixture of an unknown kind is drawn as its
+    bounding box.
     """
     fixture = Fixture(BOX, BOX.parameters())
-    with suppress(Exception):  # of another's kind anything may fail, and the page goes on
+    with suppress(Exception):  # a foreign kind may raise any error, which must not stop the page
         values: dict[str, Any] = dict(look.values)
         place, shape = values.pop("place", fixture.place), SHAPES.find(look.kind)
         found = Fixture(shape, build(shape.parameters, values), tuple(place))
@@ -54,7 +54,7 @@ def unit_outline(look: Look) -> Array:
 
 
 def scale_of(outline: Array, size: Array, gain: float) -> Array:
-    """Scale (3,) that gives a unit outline its size (3,) [m], and its metres where it is flat."""
+    """Scale (3,) that gives a unit outline its size (3,) [m]; along flat axes the scale keeps metres."""
     is_flat = np.ptp(outline.reshape(-1, 3), axis=0) < 0.5
     scale: Array = np.where(is_flat, gain, size)
     return scale
@@ -76,7 +76,7 @@ class OutlineNode:
         self.line: viser.LineSegmentsHandle | None = None
 
     def turn(self, turn: Array) -> None:
-        """Take another turn (4,) from the master's axes to those of the node above."""
+        """Set another rotation (4,) from the master's axes to those of the node above."""
         self._turn = turn
         if self.line is not None:
             self.line.wxyz = turn
@@ -93,7 +93,7 @@ class OutlineNode:
             look: What it is.
             center: Its middle (3,) [m] in the axes of the node above.
             scale: Of its unit outline (3,), along the master's axes.
-            is_touched: Whether somebody stands at its wall.
+            is_touched: Whether the hand or the slave touches its wall.
         """
         color = WRONG if is_touched else GOOD
         if self.line is None or look != self._look:

@@ -1,9 +1,8 @@
 """Front: accepts the connections of the page's server, and answers the emergency stop by itself.
 
-Messages of pages are worked off by one event loop, in which a stop would wait behind all of them.
-So a thread of its own accepts the connections. Requests for the stop and signs of life it answers
-at once. What may take a while another thread answers, one after the other. Every other connection
-goes on to the event loop as it came.
+One event loop processes the messages of all pages, and a stop would wait behind all of them. So a separate thread
+accepts the connections. It answers requests for the stop and signs of life at once. Another thread answers slow
+requests, one after the other. Every other connection is passed on to the event loop unread.
 """
 
 import logging
@@ -26,32 +25,32 @@ from websockets.http11 import Response
 from websockets.streams import StreamReader
 
 WAITING = 64
-"""Connections that may be open without having said what they want; the oldest gives way."""
+"""Connections that may be open without a complete request; if there are more, the oldest is closed."""
 PATIENCE = 10.0
-"""Time in which a connection must have said what it wants [s]."""
+"""Time in which a connection must send its request [s]."""
 STOPPER = "console front"
 """Name of the thread that answers the stop."""
 _LARGEST = 16 * 1024  # bytes of a request's head
-_LOOK = 0.5  # s, between looks at those that say nothing
-_SOON = 0.02  # s, between looks at a request that has begun
+_LOOK = 0.5  # s, between two checks of connections that have sent nothing
+_SOON = 0.02  # s, between two checks of a request that has begun
 _BACKLOG = 64
-_LINE = 32  # requests that wait for an answer that may take a while; one more is not answered
+_LINE = 32  # slow requests that may wait for an answer; one more is not answered
 _LENGTH = re.compile(rb"\r\nContent-Length: *([0-9]{1,9})(?=\r\n|$)", re.IGNORECASE)
 _MALFORMED = (EOFError, SecurityError, ValueError, NotImplementedError)
 
 Body = Callable[[int], bytes]
-"""Body of a request, taken when it is asked for; of at most so many bytes, else a ValueError."""
+"""Reads the body of a request when it is called; raises ValueError if the body has more bytes than the argument."""
 Answer = Callable[[Head, Body], Response]
 
 
 class Front:
-    """Listening socket whose connections a thread looks at first.
+    """Listening socket whose connections are first examined by a thread.
 
     Args:
         opened: Socket that listens; it is closed at the end.
         paths: Paths of requests that are answered here.
         answer: Answers one of these requests; called in a thread of this object.
-        slow: Those of the paths whose answers may take a while: they keep no other waiting.
+        slow: Paths whose answers may take a while; they do not delay other answers.
 
     Attributes:
         passed_on: Socket for an event loop: it accepts the connections that are passed on.
@@ -78,7 +77,7 @@ class Front:
         """Accept nobody any more."""
         self._is_closed = True
         self._thread.join()
-        with suppress(queue.Full):  # its thread is no worse where nobody tells it to end
+        with suppress(queue.Full):  # no harm if the thread is not woken to end
             self._line.put_nowait(None)
         for one in (self._opened, self._told, *self._waiting):
             one.close()
@@ -112,7 +111,7 @@ class Front:
         self._selector.register(one, selectors.EVENT_READ)
 
     def _look(self, one: Any) -> None:
-        """Look at what has come of a request, without taking it."""
+        """Examine the received part of a request, without consuming it."""
         try:
             data = one.recv(_LARGEST, socket.MSG_PEEK)
         except OSError:
@@ -144,7 +143,7 @@ class Front:
             try:
                 waiting[0].settimeout(PATIENCE)
                 self._reply(*waiting)
-            except Exception:  # of whatever answers: the next one is answered
+            except Exception:  # whatever error an answer raises, the next request is answered
                 logging.getLogger("teleop_console").exception("a request was not answered")
 
     def _reply(self, one: socket.socket, data: bytes) -> None:
@@ -161,7 +160,7 @@ class Front:
 
     def _pass_on(self, one: socket.socket) -> None:
         self.passed_on.waiting.append(one)
-        with suppress(OSError):  # it has many to take already
+        with suppress(OSError):  # the event loop already has many connections to accept
             self._told.send(b"\0")
 
     def _forget(self, one: socket.socket) -> None:
@@ -177,7 +176,7 @@ class Front:
 
 
 class PassedOn(socket.socket):
-    """Socket that an event loop takes for one that listens; it accepts what a front passes on.
+    """Socket that an event loop uses like a listening socket; it accepts the connections that a front passes on.
 
     Args:
         inner: Becomes readable with every connection that is passed on; taken over.
@@ -194,7 +193,7 @@ class PassedOn(socket.socket):
         self._address = address
 
     def listen(self, backlog: int = _BACKLOG, /) -> None:
-        """Nothing is to be done: another socket listens."""
+        """Do nothing, because another socket listens."""
 
     def getsockname(self) -> Any:
         """Address of that other socket."""
@@ -211,11 +210,11 @@ class PassedOn(socket.socket):
                 self.recv(1)
             one = self.waiting.popleft()
             return one, self._address
-        self.recv(_LARGEST)  # told, but taken already; raises where nothing is told
+        self.recv(_LARGEST)  # a byte for a connection that is taken already; raises if there is no byte
         raise BlockingIOError
 
     def close(self) -> None:
-        """Close it, and what nobody has taken."""
+        """Close the socket, and the connections that were not accepted."""
         while self.waiting:
             self.waiting.popleft().close()
         super().close()
@@ -227,7 +226,7 @@ def _none(most: int) -> bytes:
 
 
 def _without_body(head: bytes) -> tuple[bytes, int]:
-    """Head of a request as of one without a body, and the length of its body [bytes]."""
+    """Head of a request, changed to that of a request without a body, and the length of the body [bytes]."""
     if not head.startswith(b"POST "):
         return head, 0
     found = _LENGTH.findall(head)

@@ -1,4 +1,4 @@
-"""Guard: which requests the page's server answers; no page from elsewhere may drive an arm.
+"""Guard: which requests the page's server answers; a page of another origin must not drive an arm.
 
 Three things protect it. *Host*: a name that resolves to this machine but is not ours is an attack (DNS rebinding).
 *Origin*: browsers tell which page opens a WebSocket, or fetches anything; only our own may. *Token*: where others can
@@ -24,7 +24,7 @@ HEADERS = {
     "X-Content-Type-Options": "nosniff",
     "Cache-Control": "no-store",
 }
-"""Sent with every page: it can ask no other host for anything, and no other page can frame it."""
+"""Headers of every page: the page cannot send requests to another host, and no other page can frame it."""
 
 
 def is_loopback(host: str) -> bool:
@@ -51,7 +51,7 @@ class Request:
         path: Path with its query.
         is_socket: Whether it asks for a WebSocket.
         header: All values of a header by its name.
-        body: Its body, of at most so many bytes; read when it is asked for.
+        body: Function that reads its body, of at most the given number of bytes.
     """
 
     path: str
@@ -89,7 +89,7 @@ class Guard:
         return ""
 
     def cookie(self) -> str:
-        """Value of Set-Cookie that lets the page go on without the token in its address."""
+        """Value of Set-Cookie with which the page no longer needs the token in its address."""
         if not self._token:
             return ""
         return f"{self._cookie}={self._token}; Path=/; HttpOnly; SameSite=Strict"
@@ -121,13 +121,13 @@ def _is_same(origins: Sequence[str], host: str) -> bool:
 
 
 def _is_visit(request: Request) -> bool:
-    """Whether a request comes from our own page or from none, or opens ours where one was."""
+    """Whether a request comes from our own page or from no page, or opens our page in place of another one."""
     sites, modes = request.header("Sec-Fetch-Site"), request.header("Sec-Fetch-Mode")
     return set(sites) <= {"same-origin", "none"} or list(modes) == ["navigate"]
 
 
 def _is_address(name: str) -> bool:
-    """Whether a name is a number, which nobody can make lead elsewhere."""
+    """Whether a name is a numeric address, which DNS cannot redirect."""
     try:
         ipaddress.ip_address(name)
     except ValueError:

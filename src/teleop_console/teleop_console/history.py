@@ -1,4 +1,4 @@
-"""History: figures that the page sums up of what it has seen."""
+"""History: figures that the page computes from the samples that it received."""
 
 from dataclasses import dataclass
 
@@ -13,10 +13,10 @@ from teleop_core.kernels.geometry import Array
 class LiveScores:
     """Figures of one arm since they were last begun, from the samples that the page has seen.
 
-    The scores of a recording come from every sample; these are a look at them on the way.
+    The scores of a recording use every sample; these figures are a preview.
 
     Attributes:
-        time: How long it has followed the hand [s]; what the clutch holds does not count.
+        time: How long the arm has followed the hand [s], without clutched time.
         way: Length of the tip's path [m].
         rms: Root mean square of the distance between wanted and measured place [m].
         largest: Largest such distance [m].

@@ -1,11 +1,10 @@
 """Hooks: everything that is changed in viser, and the only place that knows its inner names.
 
-viser 1.1 opens its port itself, answers every request, counts ports up where one is taken, prints a
-banner and offers to lead the page out through a tunnel. It has no settings for these. What it is
-given here instead is the function with which it opens its server: ours hands a socket that listens
-already to the same library, asks the guard before viser sees a request, and the filter before it
-sees a message. Its buffers of messages wake their readers from the right thread. The version bound
-in ``setup.py`` belongs to this module.
+viser 1.1 opens its port itself, answers every request, tries the next port if one is taken, prints a banner and offers
+a public tunnel to the page. It has no settings for these. So this module replaces the function with which viser opens
+its server. Our function passes an already listening socket to the same library, asks the guard before viser sees a
+request, and asks the filter before viser sees a message. The message buffers here wake their readers from the right
+thread. The bound on viser's version in ``setup.py`` is needed by this module.
 """
 
 import asyncio
@@ -39,19 +38,19 @@ from teleop_console.guard import Request as Asked
 from teleop_core.base.errors import SessionError
 
 PAGES = 16
-"""Pages that may be open at once; the youngest that does not drive gives way."""
-_NOTICE = 5.0  # for which a page is told something, and nothing else [s]
+"""Pages that may be open at the same time; if there are more, the newest page that does not drive is closed."""
+_NOTICE = 5.0  # time for which a page receives only its last message [s]
 _STARTING = threading.Lock()
 
 Answer = Callable[[ws.ServerConnection, Request], Response | None]
 
 
 class Wake(asyncio.Event):
-    """Event that is set on an event loop alone.
+    """Event that is set only on the thread of its event loop.
 
-    viser sets its event from the drawing thread, and then asks the loop to set it too. A reader
-    that has looked at the event but does not wait yet misses the first. The second does nothing,
-    since the event is set already, nor does any later one: its page shows what is old without end.
+    viser sets its event from the drawing thread, and then asks the loop to set it too. A reader that has checked the
+    event but does not wait yet misses the first call. The second call, and every later one, has no effect, because the
+    event is set already: the page then never shows anything new.
     """
 
     def set(self) -> None:
@@ -78,8 +77,8 @@ class Server(viser.ViserServer):
     Args:
         opened: Listening socket; it is closed with the server.
         guard: Decides about requests.
-        drivers: Hears which pages are open and alive, and which hold a gizmo.
-        answers: What is answered beside viser's page.
+        drivers: Is told which pages are open and alive, and which hold a gizmo.
+        answers: Answers to requests that are not for viser's page.
         label: Heading of the panel.
 
     Attributes:
@@ -92,7 +91,7 @@ class Server(viser.ViserServer):
         self._front = Front(opened, answers.paths, answer, answers.slow_paths)
         self._drivers, self._public = drivers, set[str]()
         self.filter = Filter(self, drivers.may_drive, _logger().warning)
-        rich.get_console().quiet = True  # which viser alone writes to here
+        rich.get_console().quiet = True  # which only viser writes to
         with _STARTING, _opening(_server_at(self._front.passed_on, guard, answers, self)):
             super().__init__(host=host, port=port, label=label, verbose=False)
         for message in (_messages.ShareUrlRequest, _messages.ShareUrlDisconnect):
@@ -110,7 +109,7 @@ class Server(viser.ViserServer):
         raise SessionError("the console takes no public address; `ssh -L` reaches it from another machine")
 
     def _tell(self, answers: Answers) -> None:
-        """Let the drivers hear of pages: in the order of events, hence on the server's loop."""
+        """Report pages to the drivers, in the order of events, and therefore on the server's loop."""
         drivers = self._drivers
 
         async def come(client: viser.ClientHandle) -> None:
@@ -132,7 +131,7 @@ class Server(viser.ViserServer):
             self._websock_server.register_handler(message, lambda page, _, tell=tell: tell(page))  # type: ignore[misc]
 
     def show_on(self, page: int, name: str, *, is_shown: bool) -> None:
-        """Show a node of the scene on one page, if it is shown at all; or hide it there until all are told anew."""
+        """Show a visible node of the scene on one page, or hide it there until its visibility is sent to all."""
         client, node = self._connected_clients.get(page), self.scene.get_handle_by_name(name)
         if client is not None and node is not None:
             message = _messages.SetSceneNodeVisibilityMessage(name, node.visible and is_shown)
@@ -169,7 +168,7 @@ class Server(viser.ViserServer):
     # -- what connections ask ----------------------------------------------------------------------
 
     def passed(self, connection: Connection, data: Data) -> bytes:
-        """Part of a message that goes on to viser. A page whose change is refused is shown the old value."""
+        """Part of a message that is passed on to viser. If a change is refused, the page shows the old value again."""
         page = self._page(connection)
         passed, reason = self.filter.judge(page, data)
         if reason in {WATCHES, NO_VALUE}:
@@ -184,7 +183,7 @@ class Server(viser.ViserServer):
         self.filter.refuse(self._page(connection), FLOOD)
 
     def come(self, connection: Connection) -> None:
-        """Let the youngest page that does not drive give way to a new one if there are too many."""
+        """If there are too many pages, close the newest one that does not drive."""
         live = self._websock_server._live_connections
         watchers = [page for page in live if not self._drivers.may_drive(page)]
         if len(live) >= PAGES and watchers:
@@ -199,7 +198,7 @@ class Server(viser.ViserServer):
             client.add_notification("Not done", text, auto_close_seconds=_NOTICE, color="yellow")
 
     def _put_back(self, page: int, data: Data) -> None:
-        """Show the value of an element again that a page could not change."""
+        """Show the old value of an element again after a refused change."""
         client, sets = self._connected_clients.get(page), decode(data)
         if client is None or not isinstance(sets, Sets):
             return
@@ -209,12 +208,12 @@ class Server(viser.ViserServer):
             client._websock_connection.queue_message(message)
 
     def forget(self) -> None:
-        """Drop what is kept of removed elements; viser does so only when a page comes."""
+        """Delete the messages of removed elements; viser does so only when a page opens."""
         self._run_garbage_collector()
 
 
 def _server_at(opened: socket, guard: Guard, answers: Answers, gate: Gate) -> Callable[..., ws.serve]:
-    """A function that opens a server at the socket, whatever address it is told."""
+    """A function that opens a server at the given socket, and ignores the address argument."""
 
     def serve(handler: Any, host: str, port: int, *, process_request: Answer, **options: Any) -> ws.serve:
         return _Serving(
@@ -230,7 +229,7 @@ def _server_at(opened: socket, guard: Guard, answers: Answers, gate: Gate) -> Ca
 
 
 class _Serving(ws.serve):
-    """A server that accepts nobody any more a turn of the loop before it ends.
+    """A server that stops accepting connections one turn of the loop before it ends.
 
     asyncio takes two turns to accept a connection, and the library waits for one of them. A
     connection that began in the last turn would belong to nobody and stay open.

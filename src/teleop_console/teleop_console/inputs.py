@@ -18,8 +18,8 @@ FIELDS = 7
 """Numbers of a vector that have a field each; a longer one is a text."""
 LATER = "↻"
 """Mark of a parameter that only a new session takes."""
-_WIDE = 200.0  # width of a slider, in times of what it shows: a wider one cannot be set by hand
-_DIGITS = 6  # after the point of a slider's numbers
+_WIDE = 200.0  # largest range of a slider, as a multiple of its value: a larger range cannot be set by hand
+_DIGITS = 6  # digits after the decimal point of a slider's numbers
 
 
 def kind_of(info: ParameterInfo) -> str:
@@ -52,9 +52,9 @@ class Input:
 
     Args:
         gui: The page.
-        label: What stands before it; the unit and the mark of what is fixed come behind.
+        label: Text before the input; the unit and the mark of a fixed parameter follow it.
         info: The parameter.
-        names: Names of a vector's numbers; x, y, z or 1, 2, ... where there are not as many.
+        names: Names of a vector's numbers; if their count does not match, x, y, z or 1, 2, ... are used.
 
     Attributes:
         kind: Which of :data:`KINDS` it is.
@@ -78,7 +78,7 @@ class Input:
 
     @property
     def value(self) -> Setting | None:
-        """What it shows now, of the parameter's type; None if that is none."""
+        """Present value, with the parameter's type; None if the input has no valid value."""
         if self.kind != "vector":
             return parsed(self._own.value, self._info)
         assert isinstance(self._info.value, tuple)
@@ -91,7 +91,7 @@ class Input:
         return self._own.value if self.kind != "vector" else shown(self.value or ())
 
     def show(self, value: Setting) -> bool:
-        """Show a value; whether it can, for one of another kind needs another input."""
+        """Show a value; returns false if a value of this kind needs another input."""
         values = value if self.kind == "vector" and isinstance(value, tuple) else (shown(value),)
         if len(values) != len(self.parts) or any(not _takes(p, v) for p, v in zip(self.parts, values, strict=True)):
             return False
@@ -101,7 +101,7 @@ class Input:
         return True
 
     def on_change(self, act: Callable[[int | None], None]) -> None:
-        """Call a function with the number of the browser whenever somebody changes it there."""
+        """Call a function with the number of the browser whenever a person changes the input there."""
         for part in self.parts:
             part.on_update(lambda event: act(event.client_id))
 
@@ -195,7 +195,7 @@ def form(info: ParameterInfo) -> str:
 
 
 def parsed(said: object, info: ParameterInfo) -> Setting | None:
-    """Value that an element shows, of the parameter's type; None if it is none."""
+    """Value of an element, converted to the parameter's type; None if it is not valid."""
     if isinstance(info.value, bool):
         return bool(said)
     if isinstance(info.value, tuple):
@@ -207,7 +207,7 @@ def parsed(said: object, info: ParameterInfo) -> Setting | None:
 
 
 def _list(said: str, like: tuple[object, ...]) -> Setting | None:
-    """Tuple of a text ``[1, 2]`` or ``[a, b]``; of numbers where the present one has numbers."""
+    """Tuple from a text ``[1, 2]`` or ``[a, b]``; its items are numbers if the present value has numbers."""
     try:
         found = ast.literal_eval(said)
     except (ValueError, SyntaxError):

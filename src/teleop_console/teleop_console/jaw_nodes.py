@@ -56,7 +56,7 @@ class JawNodes:
         self.pegs: list[viser.BoxHandle] = []
 
     def retune(self, values: Mapping[str, Setting]) -> None:
-        """Take the sizes that these parameters of the jaw say.
+        """Set the sizes from parameters of the jaw.
 
         Args:
             values: By their names in the group ``jaw_sim``; none of a session without.
@@ -79,7 +79,7 @@ class JawNodes:
             self.pegs[-1].position = middle
 
     def draw(self, tip: Array, view: ArmView) -> None:
-        """Draw the fingers at a tip (7,), and the objects where they are told to be."""
+        """Draw the fingers at a tip (7,), and the objects at their reported poses."""
         state, place = view.get(SLAVE_JAW_MEASURED_JS), view.get(SLAVE_JAW_OBJECT_CP)
         if state is not None and self._length > 0.0:
             thick = _THICK * self._length

@@ -1,4 +1,4 @@
-"""SessionLink: what the page sees of a session, and what it asks of it; live or recorded alike."""
+"""SessionLink: the interface between the page and a session, live or recorded."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -17,7 +17,7 @@ Setting = bool | int | float | str | tuple[bool, ...] | tuple[int, ...] | tuple[
 
 
 REFUSED = "a recording cannot be commanded"
-"""What a link says to commands that it does not know."""
+"""Answer of a link to commands that it does not support."""
 
 
 @dataclass(frozen=True)
@@ -34,8 +34,8 @@ class ArmView:
 
     Attributes:
         streams: Newest values of each stream by its name without the arm, such as
-            ``slave/measured_cp``; columns as of :class:`~teleop_core.graph.topics.Kind`. Topics
-            that have not spoken are missing.
+            ``slave/measured_cp``; columns as of :class:`~teleop_core.graph.topics.Kind`. Topics without a message so
+            far are missing.
         stamp_ns: Their stamps [ns].
         state: Numbers of ``teleop/state`` by name; empty before the first.
         operation: Numbers of ``slave/operation`` by name; empty before the first.
@@ -60,14 +60,14 @@ class View:
     Attributes:
         time: Time since the beginning of the session [s].
         arms: By namespace.
-        is_fresh: Whether streams come; false when the session is silent or gone.
+        is_fresh: Whether streams arrive; false if the session is silent or has ended.
         news: Warnings of the nodes, a line each.
         delay: Median and 99th percentile from master sample to slave command [s]; NaN if unknown.
         rate: Ticks of the slave in a second; NaN if unknown.
         age: Time since the newest sample that is shown came [s]; NaN if unknown.
-        marks: Times [s] and texts of the marks that somebody set while this page looked.
+        marks: Times [s] and texts of the marks that were set since the page opened.
         display: Frames a second of the operator's display, and how late they are [s]; NaN without one.
-        recording: Where it is being recorded; None if it is not.
+        recording: Path of the present recording; None if nothing is recorded.
         run: Number of recordings that were saved in this session.
     """
 
@@ -116,7 +116,7 @@ Parameters = Mapping[tuple[str, str], ParameterInfo]
 class SessionLink(Protocol):
     """A session as the page sees it. All methods may be called from any thread.
 
-    A class below it that has only ``view`` and ``parameters`` of its own refuses all commands.
+    A subclass that defines only ``view`` and ``parameters`` refuses all commands.
 
     Attributes:
         arms: The arms, the default one first.
@@ -132,7 +132,7 @@ class SessionLink(Protocol):
         """What is known now; cheap, called at the rate of the page."""
 
     def command(self, word: str, arm: str = "") -> tuple[bool, str]:
-        """Send one of ``topics.STATE_COMMANDS``; whether it was taken, and why."""
+        """Send one of ``topics.STATE_COMMANDS``; returns whether it was accepted, and the reason."""
         return False, REFUSED
 
     def press(self, *, is_pressed: bool) -> None:
@@ -140,22 +140,22 @@ class SessionLink(Protocol):
         return
 
     def parameters(self) -> Parameters:
-        """All parameters of all nodes by node and name, as they were when last asked for."""
+        """All parameters of all nodes by node and name, as of the last read."""
 
     def changes(self) -> Mapping[tuple[str, str], Setting]:
-        """Parameters that anybody has changed since the last call, by node and name."""
+        """Parameters that have changed since the last call, by node and name, whoever changed them."""
         return {}
 
     def change(self, node: str, name: str, value: Setting) -> str:
-        """Set a parameter; returns why it was refused, empty if it was taken."""
+        """Set a parameter; returns the reason if it was refused, else an empty text."""
         return REFUSED
 
     def hold(self, arm: str, pose: Array) -> None:
-        """Want the stylus at a pose (7,) in the master's base; silence after it lets go."""
+        """Command the stylus to a pose (7,) in the master's base; silence after it releases the stylus."""
         return
 
     def let_go(self, arm: str) -> None:
-        """Let go of the stylus: the slave holds until it is taken again."""
+        """Release the stylus: the slave holds its position until the stylus is held again."""
         return
 
     def press_button(self, arm: str, name: str) -> None:
@@ -163,15 +163,15 @@ class SessionLink(Protocol):
         return
 
     def close_jaw(self, share: float) -> None:
-        """Close the jaw of all hands so far: 0 open, 1 closed; to close it presses at a task's goal."""
+        """Close the jaw of all hands by a share: 0 open, 1 closed; closing it also presses at a task's goal."""
         return
 
     def mark(self) -> tuple[bool, str]:
-        """Mark that something happens now; whether it was noted in the recording, and as what."""
+        """Set a mark at the present time; returns whether the recorder wrote it, and its text."""
         return False, REFUSED
 
     def save(self, name: str) -> Path:
-        """Close the recording under a name and go on recording; returns where it is.
+        """Close the recording under a name and begin the next one; returns the path of the closed recording.
 
         Raises:
             TeleopError: The name cannot be used, or the recorder refuses.

@@ -1,9 +1,8 @@
 """Look: the colours and the type of the page, each colour named once by the one thing it means.
 
-Colour is for meaning, grey for what is there. Red is what is wrong and the stop, and nothing else;
-what is measured is orange, what is wanted or to be pressed next blue, what the person does violet,
-forces are magenta: everywhere, in the scene and in texts. Curves of a plot are told apart by
-colours that mean nothing but their number.
+Colours have a meaning; everything without a meaning is grey. Red is only for errors and the stop. Measured values are
+orange, wanted values and the next button blue, actions of the person violet, and forces magenta, both in the scene and
+in texts. The colours of curves in a plot have no meaning; they only distinguish the curves.
 """
 
 from collections.abc import Mapping
@@ -31,7 +30,7 @@ MEANINGS: Mapping[str, Meaning] = MappingProxyType(
         "wrong": Meaning((200, 0, 26), "#a80016", "#ff6060"),  # stopped, touches; the stop
         "idle": Meaning((92, 102, 112), "#5c6670", "#9aa5b1"),  # there, and no more
         "measured": Meaning((217, 95, 2), "#b34d00", "#ff9f4d"),  # paths that were measured
-        "wanted": Meaning((28, 109, 208), "#1c6dd0", "#74a9f2"),  # what shall be; what to press next
+        "wanted": Meaning((28, 109, 208), "#1c6dd0", "#74a9f2"),  # wanted values; what to press next
         "hand": Meaning((112, 72, 190), "#7048be", "#b197fc"),  # path of the stylus
         "force": Meaning((190, 24, 132), "#a61e74", "#f06ec0"),  # on stylus and tip
         "target": Meaning((12, 133, 153), "#0b7285", "#3bc9db"),  # points and objects of a task
@@ -60,8 +59,8 @@ GRID: Color = (196, 202, 208)
 GRID_DARK: Color = (52, 58, 64)
 """Lines of the floor."""
 CURVES = ("#0072b2", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#8c6d46")
-"""Of curves, in their order; told apart without seeing red or green (Okabe and Ito
-2008)."""
+"""Colours of curves, in their order; people with red-green colour blindness can distinguish them (Okabe and Ito 2008).
+"""
 
 _LIGHT = {
     "scene": "#ffffff",

@@ -14,8 +14,8 @@ from teleop_core.kernels.geometry import Array
 METRES_PER_NEWTON = 0.05
 """Scale of forces."""
 _LEAST = 0.03
-"""Force that is not drawn [N]; forces of the device are read in steps of some mN."""
-_STEP = 0.02  # change that is not drawn [N]
+"""Force below which no arrow is drawn [N]; forces of the device have steps of some mN."""
+_STEP = 0.02  # change below which the arrow is not redrawn [N]
 
 
 class ForceArrow:

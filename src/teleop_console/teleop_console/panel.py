@@ -1,4 +1,4 @@
-"""Panel: what an operator's console has: state, commands, save, settings, scores."""
+"""Panel: the operator's controls: state, commands, save, settings, scores."""
 
 import html
 import subprocess
@@ -50,7 +50,7 @@ class Panel:
         self._take, self._drawn = drivers.take, 0.0
         self.scores = {arm.name: LiveScores() for arm in link.arms}
         self._gui.main_panel.dock_right()  # beside the scene, not over it
-        self._gui.main_panel.set_width(WIDTH)  # without it, what a phone had room for is kept on a desk
+        self._gui.main_panel.set_width(WIDTH)  # without it, a wide screen keeps the layout of a phone
         self._buttons: dict[str, viser.GuiButtonHandle] = {}
         self._controls: list[Control] = []
         self._status = self._gui.add_html("")
@@ -95,8 +95,8 @@ class Panel:
         def _(event: viser.GuiEvent[viser.GuiButtonHandle]) -> None:
             client = -1 if event.client_id is None else event.client_id
             if action != self._take and not self._may_drive(client):
-                return  # the filter has refused and told others; control has changed since
-            if acts.acquire(blocking=False):  # what is pressed while it works is not done again
+                return  # pages without control were refused by the filter already; control may have changed since
+            if acts.acquire(blocking=False):  # presses during the action are ignored
                 try:
                     action(client)
                 finally:
@@ -124,12 +124,12 @@ class Panel:
         return client is not None and self._may_drive(client)
 
     def _act(self, control: Control, client: int) -> None:
-        """Do it for every arm; what is refused, or goes wrong, is told."""
+        """Do the action for every arm; refusals and errors are shown to the person."""
         told: list[str] = []
         for arm in self._link.arms:
             try:
                 answers = control.act(self._link, arm.name)
-            except Exception as error:  # of anybody's control: the page goes on
+            except Exception as error:  # a foreign control may raise any error, which must not stop the page
                 reason = " ".join(str(error).split())
                 answers = [(False, f"{control.name}: {type(error).__name__}: {reason}")]
             told += [f"- {'✓' if is_taken else '⚠'} {text}" for is_taken, text in answers]
@@ -155,7 +155,7 @@ class Panel:
             self.scores[name] = LiveScores()
 
     def _evaluate(self, client: int) -> None:
-        """Score in a process of its own, with what the session leaves of the processors."""
+        """Score in a separate process at low priority, so that the session keeps its processor time."""
         self._scored.content = "scoring …"
         command = ["nice", "-n", "15", sys.executable, "-m", "teleop_core.commands.cli", "evaluate"]
         done = subprocess.run([*command, str(self._last)], capture_output=True, text=True, check=False)
@@ -199,7 +199,7 @@ class Panel:
         self.stylus_folder.visible = now["steps"]
 
     def _doing(self, view: View) -> str:
-        """Run, recording, and who leads where nobody at a page does."""
+        """Run, recording, and what moves the hand if no person at a page does."""
         where = view.recording.name if view.recording else "not recording"
         return " · ".join(filter(None, (f"run {view.run + 1}", where, leader(self._kind))))
 
@@ -212,7 +212,7 @@ class Panel:
 
     @property
     def is_led_here(self) -> bool:
-        """Whether a person at the page moves the hand, as long as nothing else is known."""
+        """Whether a person at the page moves the hand; true while the operator is unknown."""
         return not leader(self._kind)
 
     @staticmethod

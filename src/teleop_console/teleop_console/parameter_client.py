@@ -1,4 +1,4 @@
-"""Parameter client: what the parameters of other nodes are, what they may be, and setting them."""
+"""Parameter client: reads the parameters of other nodes with their bounds, and sets them."""
 
 from collections.abc import Callable
 from typing import Any
@@ -19,7 +19,7 @@ _HIDDEN = ("use_sim_time", "qos_overrides", "start_type_description_service", "c
 
 
 class ParameterEvents:
-    """Changes of parameters that nodes tell; an executor of the caller's must be spinning.
+    """Changes of parameters that nodes publish; the caller must spin an executor.
 
     Args:
         owner: Node that hears them.
@@ -45,7 +45,7 @@ class ParameterEvents:
 
 
 class ParameterClient:
-    """Asks nodes for their parameters; an executor of the caller's must be spinning.
+    """Asks nodes for their parameters; the caller must spin an executor.
 
     Args:
         owner: Whose clients they are.
@@ -81,7 +81,7 @@ class ParameterClient:
         }
 
     def change(self, name: str, parameter: str, value: Setting) -> str:
-        """Set a parameter of a node; returns why it was refused, empty if it was taken."""
+        """Set a parameter of a node; returns the reason if it was refused, else an empty text."""
         request = SetParameters.Request(parameters=[to_message(parameter, value)])
         try:
             (result,) = self._ask(SetParameters, name, "set_parameters", request).results

@@ -71,8 +71,8 @@ class Past(ABC):
     """Columns of a session; methods may be called from any thread.
 
     Attributes:
-        columns: By their names, such as ``left/slave/measured_cp x``; it grows while others look, who go
-            through a copy.
+        columns: Columns by name, such as ``left/slave/measured_cp x``; it grows while other threads read it, so they
+            must iterate over a copy.
         joints: Names of the joints of each arm, by namespace.
     """
 
@@ -81,18 +81,18 @@ class Past(ABC):
 
     def __init__(self) -> None:
         self.columns = {}
-        self._errors: dict[str, tuple[Rows, Rows, Rows]] = {}  # by arms, with what they are made of
+        self._errors: dict[str, tuple[Rows, Rows, Rows]] = {}  # by arm, with the rows from which they were computed
 
     @abstractmethod
     def rows(self, topic: str) -> Rows | None:
-        """All rows of a topic, none of an unknown one; None while they are being read."""
+        """All rows of a topic, empty for an unknown topic; None while the recording is still being read."""
 
     def marks(self) -> Sequence[tuple[float, str]]:
-        """Times [s] and texts of the marks that somebody set."""
+        """Times [s] and texts of the marks."""
         return ()
 
     def samples(self, name: str) -> Rows | None:
-        """Times (N,) [s] and values (N,) of a column; None while they are being read."""
+        """Times (N,) [s] and values (N,) of a column; None while the recording is still being read."""
         column = self.columns[name]
         if not name.endswith(ERROR):
             found = self.rows(column.topic)
@@ -132,7 +132,7 @@ class Past(ABC):
 
 
 class Seen(Past):
-    """What the page has seen of a live session in the last minutes: a row for each look.
+    """Views of a live session in the last minutes, as the page received them: a row for each view.
 
     Args:
         arms: The arms.
@@ -148,7 +148,7 @@ class Seen(Past):
         self.columns = {below(arm.name, ERROR): Column("", 0, "m") for arm in arms} | {DELAY: Column(DELAY, 0, "s")}
 
     def add(self, view: View) -> None:
-        """Note what is known; an earlier time begins anew, the same one and silence add nothing."""
+        """Add a view. A time before the last one clears the rows; the same time, or a silent session, adds nothing."""
         with self._lock:
             last = self._times[(self._count - 1) % ROWS]
             if self._count and view.time < last:
@@ -166,7 +166,7 @@ class Seen(Past):
                     self._ring(arm, topic, len(values))[row] = values
 
     def marks(self) -> Sequence[tuple[float, str]]:
-        """Times [s] and texts of the marks that somebody set."""
+        """Times [s] and texts of the marks."""
         return self._marks
 
     def _ring(self, arm: str, topic: str, width: int) -> Array:
@@ -196,7 +196,7 @@ class Seen(Past):
             return (self._times[order], found[0][order]) if found else NOTHING
 
     def view(self, time: float) -> View:
-        """What was known at a time [s]; at the first one that is kept, if that is later."""
+        """View at a time [s], but not before the first kept time."""
         with self._lock:
             order = self._order()
             at = max(0, int(np.searchsorted(self._times[order], time, side="right")) - 1)

@@ -1,8 +1,8 @@
 """Poses: moving nodes of the page, thirty times a second and many at once.
 
-viser compares every pose that it is given with the last one by ``np.allclose``, and then sends
-position and turn. The comparison takes more time than all the rest, and we compare before, for all
-bodies of an arm together. What is sent, and what the nodes say of themselves, is the same.
+viser compares every new pose with the last one by ``np.allclose``, and then sends position and rotation. This
+comparison takes more time than everything else. Here all bodies of an arm are compared together beforehand, so viser's
+comparison is skipped. The messages and the attributes of the nodes are the same.
 """
 
 from typing import Any

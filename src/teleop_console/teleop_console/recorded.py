@@ -19,10 +19,10 @@ _PATH = 200  # points of a path
 
 
 class RecordedLink(SessionLink):
-    """A link to a recording, which refuses what a session takes.
+    """A link to a recording, which refuses the commands of a session.
 
-    A view is what was known at the present time of the replay: of each stream the last sample that
-    was recorded by then. Time goes on by :meth:`advance`, whose caller has the clock.
+    A view has, for each stream, the last sample that was recorded up to the present time of the replay.
+    :meth:`advance` moves the time on; its caller has the clock.
 
     Args:
         recording: Its path, or the recording itself.
@@ -30,7 +30,7 @@ class RecordedLink(SessionLink):
     Attributes:
         duration: Time from the first to the last message [s].
         loop: Whether it begins again at its end.
-        thinning: Of how many samples one is kept; 1 for all.
+        thinning: Every ``thinning``-th sample is kept; 1 for all.
         past: Its columns, of all samples.
         recording: Its path.
 
@@ -79,7 +79,7 @@ class RecordedLink(SessionLink):
         return (f"a long recording: one of {self.thinning} samples is shown",)
 
     def path(self, topic: Topic, arm: str, length: float) -> tuple[Array, Array]:
-        """Way of a stream up to the present time.
+        """Samples of a stream up to the present time.
 
         Args:
             topic: A stream; nothing is found of one that was not recorded.
@@ -101,7 +101,7 @@ class RecordedLink(SessionLink):
         return times, track.values[chosen]
 
     def parameters(self) -> Parameters:
-        """Parameters that it was made with; none of recordings that do not tell."""
+        """Parameters of the recorded session; empty if the recording does not contain them."""
         return MappingProxyType(self._parameters)
 
     # -- time ------------------------------------------------------------------------------------
@@ -118,7 +118,7 @@ class RecordedLink(SessionLink):
 
     @property
     def speed(self) -> float:
-        """Time of the replay per time that passes; a new one from 0.01 to 100.
+        """Speed of the replay relative to real time; a new speed must be from 0.01 to 100.
 
         Raises:
             ParameterError: Another one.
@@ -132,7 +132,7 @@ class RecordedLink(SessionLink):
         self._speed = float(speed)
 
     def seek(self, time: float) -> None:
-        """Go to a time [s]; before the begin and after the end that is the begin and the end.
+        """Go to a time [s], limited to the begin and the end of the recording.
 
         Raises:
             ParameterError: NaN.

@@ -1,4 +1,4 @@
-"""Recorded arms: what a recording holds of each arm, as samples that are found by their time."""
+"""Recorded arms: the samples of each arm in a recording, found by their time."""
 
 from collections.abc import Mapping
 from contextlib import suppress
@@ -22,7 +22,7 @@ from teleop_core.session.runner import recorded_configuration
 from teleop_core.slave.operation.report import operation_text
 
 MOST = 200 << 20
-"""Bytes of samples that are kept; of longer recordings every second, third ... sample is."""
+"""Bytes of samples that are kept; of a longer recording only every second, third ... sample is kept."""
 _STAMP_BYTES = 16
 _KEPT = (
     *topics.STREAMS,
@@ -38,7 +38,7 @@ _KEPT = (
 
 @dataclass(frozen=True, eq=False)
 class RecordedArm:
-    """What is kept of one arm.
+    """Samples of one arm that are kept.
 
     Attributes:
         arm: The arm.
@@ -49,7 +49,7 @@ class RecordedArm:
     tracks: Mapping[str, Series]
 
     def show(self, time_ns: int, view: ArmView) -> None:
-        """Write what was known at a time [ns] into an empty view."""
+        """Write the values at a time [ns] into an empty view."""
         for name, track in self.tracks.items():
             if (i := track.at(time_ns)) < 0:
                 continue
@@ -66,7 +66,7 @@ class RecordedArm:
 def recorded_arms(
     bag: Bag, configuration: Configuration | None, most: int = MOST
 ) -> tuple[tuple[RecordedArm, ...], int]:
-    """All arms of a recording, the default one first, and of how many samples one is kept.
+    """All arms of a recording, the default one first, and the thinning n: every n-th sample is kept.
 
     Args:
         bag: The recording.
@@ -89,7 +89,7 @@ def namespaces(bag: Bag) -> dict[str, str]:
 
 
 def configuration_of(bag: Bag) -> Configuration | None:
-    """What it was made with; None where that is not told, or cannot be built any more."""
+    """Configuration of the recorded session; None if the recording has none, or if it can no longer be built."""
     with suppress(TeleopError):
         layer, scenario = recorded_configuration(bag)
         return Configuration.from_layers([layer], scenario) if layer else None
@@ -154,7 +154,7 @@ def _tracks(bag: Bag, arm: Arm, thinning: int) -> dict[str, Series]:
 
 
 def _order(bag: Bag, names: tuple[str, ...], width: int, robot: Robot) -> list[int] | slice:
-    """Columns of joints in the robot's order; all columns of what is none of joints.
+    """Columns of joints in the robot's order; all columns of a topic without joints.
 
     Raises:
         RecordingError: Joints of the robot were not recorded.
@@ -169,7 +169,7 @@ def _order(bag: Bag, names: tuple[str, ...], width: int, robot: Robot) -> list[i
 
 
 def reports_of(bag: Bag, topic: topics.Topic) -> Series | None:
-    """Numbers of a report, whose own are those of its columns that it has; None without any."""
+    """Numbers of a report, with those columns that the recording has; None without any."""
     info = bag.topics.get(topic.name)
     if info is None or not info.count or info.type != topic.kind.ros_type:
         return None
@@ -186,7 +186,7 @@ def reports_of(bag: Bag, topic: topics.Topic) -> Series | None:
 
 
 def in_words(operation: Mapping[str, float], joints: tuple[str, ...]) -> str:
-    """State of the arm in words; empty for numbers that are none of this version's."""
+    """State of the arm in words; empty for numbers of another version."""
     with suppress(ValueError, KeyError):
         return operation_text(operation, joints)
     return ""

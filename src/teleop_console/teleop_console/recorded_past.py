@@ -19,15 +19,15 @@ from teleop_core.evaluation.traces import Envelope
 from teleop_core.graph.topics import BY_NAME, REPORTS, Kind
 from teleop_core.robots.robot import Robot
 
-_KEPT = 8  # topics that are read at once; twice as many are kept
-_GATHER = 0.02  # time in which one request asks for all that it needs [s]
+_KEPT = 8  # topics that are read at the same time; twice as many are kept
+_GATHER = 0.02  # time in which one request asks for all its topics [s]
 
 
 class Recorded(Past):
     """What was recorded: every column of every topic that has numbers.
 
     A topic is read when it is first asked for, in a thread: reading ten minutes takes five seconds.
-    Of recordings beyond eleven minutes the smallest and largest value of short stretches are kept.
+    For recordings longer than eleven minutes, only the smallest and largest value of short intervals are kept.
 
     Args:
         bag: The recording.

@@ -29,7 +29,7 @@ class Entry:
         made: When it was closed [s since 1970].
         about: Scenario, robot and length, a line; empty before they are known.
         verdict: Line that names the worst first; empty before it is known.
-        is_good: Whether nothing is beyond what is fine; None before that is known.
+        is_good: Whether all figures are within their bounds; None before this is known.
     """
 
     name: str
@@ -93,7 +93,7 @@ class Recordings:
         return done.stdout or done.stderr
 
     def judge(self) -> None:
-        """Go on with the verdict on the newest recording that has none; never waits."""
+        """Continue to compute the verdict of the newest recording without one; never waits."""
         if self._judging is not None:
             self._take()
             return
@@ -106,7 +106,7 @@ class Recordings:
         self._judging = waiting, subprocess.Popen(words, stdout=nothing, stderr=nothing), out
 
     def rest(self) -> None:
-        """Give up the verdict that is being worked at: a session has the processors now."""
+        """Cancel the verdict that is being computed, because a session needs the processors now."""
         if self._judging is not None:
             _, process, out = self._judging
             self._judging = None

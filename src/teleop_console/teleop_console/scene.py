@@ -40,7 +40,7 @@ def targets_of(parameters: Parameters, arm: str) -> Array:
 def floor_lines(radius: float, cell: float) -> tuple[Array, Array]:
     """Lines of a floor that fade towards its rim, every fifth of them strong.
 
-    A grid that a shader draws takes a quarter of the time of a picture that software draws.
+    With software rendering, a grid drawn by a shader takes a quarter of the time of a picture.
 
     Args:
         radius: Where they end [m].
@@ -101,11 +101,11 @@ class Scene:
                     nodes.draw(view.time, seen)
 
     def retune(self, parameters: Parameters) -> None:
-        """Take what parameters of the session say of the picture: axes, fixture, targets, object.
+        """Apply those parameters of the session that change the picture: axes, fixture, targets, object.
 
         Args:
-            parameters: As :meth:`~teleop_console.link.SessionLink.parameters` gives them; what they
-                lack stays as it is.
+            parameters: As :meth:`~teleop_console.link.SessionLink.parameters` returns them; missing ones change
+                nothing.
         """
         with self._server.atomic():
             for name, nodes in self.arms.items():
@@ -128,7 +128,7 @@ class Scene:
             )
 
     def remember(self, path: Path) -> None:
-        """Take paths from a recording wherever time jumps; without that they begin anew there."""
+        """When time jumps, take paths from a recording; without this, paths begin again there."""
         for nodes in self.arms.values():
             nodes.recorded_path = path
 
@@ -151,7 +151,7 @@ class Scene:
     # -- cameras ---------------------------------------------------------------------------------
 
     def work(self, aspect: float = ASPECT) -> Camera:
-        """Camera that sees the work: all tips and styli with the room that they need."""
+        """Camera that sees the work: all tips and styli with the space around them."""
         return around(np.concatenate([nodes.work() for nodes in self.arms.values()]), aspect)
 
     def whole(self, aspect: float = ASPECT) -> Camera:
@@ -216,7 +216,7 @@ def _values_below(parameters: Parameters, node: str, start: str) -> dict[str, Se
 
 
 def _map(axes: object) -> Array:
-    """Rotation (3, 3) of axes as a parameter gives them; the published one of what is none."""
+    """Rotation (3, 3) for the value of an axes parameter; the published one if the value is not valid."""
     try:
         return axis_map("axes", tuple(axes))  # type: ignore[arg-type]
     except (TeleopError, TypeError, ValueError):

@@ -1,6 +1,6 @@
 """ConsoleServer: serves the page to browsers of this machine, and knows which page drives.
 
-A taken port is told with who has it, never changed silently.
+If the port is taken, an error names the process that uses it; the port is never changed silently.
 """
 
 import secrets
@@ -107,8 +107,8 @@ _FORGET = 20  # looks between clearing up
 class ConsoleServer:
     """Server of the page, running from its making to :meth:`close`.
 
-    Without a token it serves this machine alone; other addresses always have one. Pages of other
-    origins, names that were made to lead here, and requests without the token get 403. Messages of
+    Without a token it serves this machine alone; other addresses always have one. Pages of other origins, foreign host
+    names that resolve to this machine, and requests without the token get 403. Messages of
     pages go through a :class:`~teleop_console.filter.Filter`.
 
     Attributes:

@@ -18,13 +18,13 @@ QUICK = (
     ("slave_sim", "world.material"), ("network", "preset"), ("slave", "reference_filter.is_on"),
     ("slave_sim", "controller.kind"), ("slave_sim", "plant.kind"), ("teleop", "delays"),
 )  # fmt: skip
-"""What people change most, by stage and name."""
+"""Parameters that people change most, by stage and name."""
 _USED = "most used"
 _MOST = 40  # parameters that are shown at once
 Renew = Callable[[tuple[str, ...]], str]
-"""Begins a new session with other settings; why it does not, empty if it does."""
+"""Begins a new session with other settings; returns the reason if it cannot, else an empty text."""
 Guard = Callable[[int | None], bool]
-"""Whether a browser may change something; tells it why not."""
+"""Returns whether a browser may change something; if not, it shows the reason there."""
 
 
 class SettingsPanel:
@@ -75,14 +75,14 @@ class SettingsPanel:
         begin.on_click(lambda event: self._begin(event.client_id))
 
     def on_change(self, listener: Callable[[Parameters], None]) -> None:
-        """Call a function with all parameters whenever some of them are other ones."""
+        """Call a function with all parameters whenever some of them have changed."""
         self._listeners.append(listener)
 
     def refresh(self) -> bool:
-        """Ask the nodes anew, and show what they say; takes a moment.
+        """Read the parameters of all nodes again, and show them; takes a moment.
 
         Returns:
-            Whether they say as much as when they were asked before: all of them have come up.
+            Whether they returned as many parameters as before, which means that all nodes have started.
         """
         before = self.known.keys()
         try:
@@ -100,7 +100,7 @@ class SettingsPanel:
         return False
 
     def follow(self, changes: Mapping[tuple[str, str], Setting]) -> None:
-        """Show values that anybody has changed: a button of the stylus, a program, another page."""
+        """Show values that were changed elsewhere: by a button of the stylus, a program, another page."""
         known = {key: value for key, value in changes.items() if key in self.known}
         if not known:
             return
@@ -168,7 +168,7 @@ class SettingsPanel:
         control.on_change(lambda client: self._changed(client, control, why, info))
 
     def _changed(self, client: int | None, control: Input, why: viser.GuiMarkdownHandle, info: ParameterInfo) -> None:
-        """Set what an input shows now: of a slider that is pulled, the last value is set last."""
+        """Set the parameter to the present value of an input; while a slider is dragged, its last value is set last."""
         key = info.node, info.name
         with self._changing:
             before, value = self._wanted.get(key, self.known[key].value), control.value

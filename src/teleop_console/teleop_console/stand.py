@@ -58,7 +58,7 @@ class Stand:
 
 
 def stand_beside(low: Array, high: Array, axes: Array) -> Stand:
-    """Stand to the right of a robot, as seen from where its x points away; on the same ground.
+    """Stand to the right of a robot, on the same ground; the view is along the robot's x.
 
     Args:
         low: Lowest corner (3,) [m] of what the robot takes, in slave_base.

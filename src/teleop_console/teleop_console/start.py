@@ -1,7 +1,7 @@
 """Start page: a form to choose, begin and end a session, and to replay and score recordings.
 
-It is a form of our own, and all that it can say is one request of these few, with words that are
-checked here. The requests are answered by a thread of their own, beside the one of the stop.
+The form is our own. It can send only the few requests below, whose words are checked here. A separate thread answers
+them, beside the thread of the stop.
 """
 
 import http
@@ -47,7 +47,7 @@ class Wish:
 
 
 class Form(Protocol):
-    """What lies over the page while nothing runs, and what it may ask."""
+    """The form that covers the page while no session runs, and its requests."""
 
     @property
     def script(self) -> Path:
@@ -78,7 +78,7 @@ class StartPage:
 
     Attributes:
         is_open: Whether the form is shown: nothing runs.
-        told: What a person is told: why the last session ended, what a command said.
+        told: Text for the person at the page: why the last session ended, or the output of a command.
     """
 
     script, style = Path(__file__).with_name("start.js"), None
@@ -105,7 +105,7 @@ class StartPage:
         return frozenset({"/start", "/take", "/robot", *self._acts})
 
     def wait(self) -> Wish:
-        """Show the form until somebody wants something."""
+        """Show the form until a person at the page makes a request."""
         self._ends.clear()
         self.is_open = True
         try:
@@ -121,7 +121,7 @@ class StartPage:
 
     @property
     def is_ended(self) -> bool:
-        """Whether what runs shall end, and the form come back."""
+        """Whether the session or replay must end and the form return."""
         return self._ends.is_set()
 
     def answer(self, path: str, query: Query, page: int, body: Body = bytes) -> Told:
@@ -212,7 +212,7 @@ class StartPage:
             self._runs.release()
 
     def _keep(self, name: str, body: Body) -> str:
-        """Keep the file of a robot under its name; one that is there is not replaced."""
+        """Save the file of a robot under its name; an existing file is not replaced."""
         self._insist_open()
         if not _NAME.fullmatch(name):
             raise ParameterError("name", name, "letters, digits, '.', '_' and '-', then .urdf")

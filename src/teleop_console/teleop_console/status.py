@@ -1,4 +1,4 @@
-"""Status: what the page says of a session, which buttons are alive then, and which comes next."""
+"""Status: the text of the page about a session, which buttons have an effect, and which one comes next."""
 
 import html
 import math
@@ -82,7 +82,7 @@ _LEADERS = {
 
 
 def leader(kind: str) -> str:
-    """Who moves the hand, by the kind of its operator; empty if it is the person at the page."""
+    """What moves the hand, by the kind of the operator; empty if it is the person at the page."""
     return "" if kind in {"", "remote"} else _LEADERS.get(kind, f"operator {kind} leads, simulated")
 
 
@@ -118,7 +118,7 @@ def display_text(view: View) -> str:
 
 
 def mode_text(arm: ArmView) -> str:
-    """Mode and gain of an arm in words; empty before it has said them."""
+    """Mode and gain of an arm in words; empty before the arm has reported them."""
     if not arm.state:
         return ""
     return f"{'fine' if arm.state['is_fine'] else 'coarse'} × {arm.state['gain']:g}"
@@ -145,7 +145,7 @@ def task_text(arm: ArmView) -> str:
 
 
 def closes(arm: ArmView) -> bool:
-    """Whether it matters how far the hand closes: at a task, or with a jaw, while the arm follows."""
+    """Whether closing the hand has an effect: at a task, or with a jaw, while the arm follows."""
     told = arm.operation
     follows = bool(told) and State(int(told["state"])) is State.ENABLED and bool(told["is_homed"])
     return follows and (arm.get(TASK_STATE) is not None or arm.get(SLAVE_JAW_MEASURED_JS) is not None)

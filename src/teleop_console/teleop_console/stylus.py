@@ -21,7 +21,7 @@ AXES = ("x", "y", "z", "rx", "ry", "rz")
 STEP_LENGTH, STEP_TURN = 1e-3, np.radians(1.0)
 """A small step [m, rad]."""
 LINGER = 1.0
-"""Time for which the stylus is held after a small step, in which the next may come [s]."""
+"""Time for which the stylus is held after a small step, so that the next step can follow [s]."""
 GRIP = "grip"
 """Name of a gizmo's node below that of its master."""
 _SIZE = 0.08  # of a gizmo [m]
@@ -50,8 +50,8 @@ class _Hand:
 class Stylus:
     """Gizmos of all arms.
 
-    While nobody holds it, a gizmo follows its stylus. While somebody does, the pose that is wanted
-    is told again at every :meth:`tick`, since silence lets go.
+    While no browser holds it, a gizmo follows its stylus. While a browser holds it, the wanted pose is sent again at
+    every :meth:`tick`, because silence releases the stylus.
 
     Args:
         server: The page.
@@ -141,7 +141,7 @@ class Stylus:
                 move(hand.gizmo, pose)
 
     def tick(self, dt: float) -> None:
-        """Tell all poses that are held again; to be called at least every 50 ms.
+        """Send all held poses again; to be called at least every 50 ms.
 
         Args:
             dt: Time since the last call [s].
@@ -161,10 +161,10 @@ class Stylus:
                     self._on_hold(arm, hand.wanted.copy())
 
     def nudge(self, arm: str, axis: str, sign: int) -> None:
-        """Want the stylus a small step farther: 1 mm along an axis, or 1° about it.
+        """Command the stylus one small step: 1 mm along an axis, or 1° about it.
 
         It is held for :data:`LINGER` after the last step, then let go. Before its first sample, and
-        while it is dragged, nothing happens. Who may take steps is the caller's to ask.
+        while it is dragged, nothing happens. The caller must check who may take steps.
 
         Args:
             arm: Namespace of the arm.
@@ -190,7 +190,7 @@ class Stylus:
         with self._lock:
             hand = self._hands[arm]
             if hand.client is not None:
-                hand.refused.add(hand.client)  # the rest of the gesture is not heard
+                hand.refused.add(hand.client)  # the rest of the gesture is ignored
             if hand.wanted is not None:
                 self._let_go(arm, hand)
 

@@ -11,7 +11,7 @@ LENGTH = 10.0
 PERIOD = 0.25
 """Time between two drawings of a tail [s]."""
 _POINTS = 160
-_GAP = 1.0  # between two drawings, from which on something else is seen [s]
+_GAP = 1.0  # gap between two drawings that counts as a jump of time [s]
 _SHORTEST = 1e-4  # between two points of it [m]
 
 

@@ -1,8 +1,8 @@
 """Timeline: one strip of time under the page: what happened when, and which time the scene shows.
 
-Its requests are small: each tells no more than pixels can show. Every page may look; time is moved
-by a page that drives. A live session goes on whatever is looked at, so the scene shows the past
-only while a page says again and again that it wants to see it.
+Its answers are small: each contains no more than the pixels can show. Every page may look; only a page that drives
+moves time. A live session continues whatever is shown, so the scene shows the past only while a page repeats that it
+wants to see it.
 """
 
 import http
@@ -30,7 +30,7 @@ PIXELS = 4000
 FOUND = 40
 """Columns that a search tells."""
 HELD = 2.5
-"""Time after which a live scene goes back to now, unless a page asks again for the past [s]."""
+"""Time after which a live scene returns to the present, unless a page asks for the past again [s]."""
 _LONGEST = 200  # text of a word
 _ALIGNMENTS = ("start", "following")
 
@@ -58,11 +58,11 @@ class Timeline:
     # -- for the page's own drawing ----------------------------------------------------------------
 
     def shown(self, view: View, *, is_stopped: bool = False) -> View:
-        """Take note of what is known now; what the scene shall show: that, or what was then."""
+        """Add the present view; returns the view that the scene must show, the present or a past one."""
         if self._seen is None:
             return view
         self._seen.add(view)
-        if is_stopped:  # whoever stops an arm has to see it
+        if is_stopped:  # a person who stops an arm must see the present
             self._wanted = (0.0, -math.inf)
         time, until = self._wanted
         return self._seen.view(time) if self._clock() < until else view
@@ -154,7 +154,7 @@ class Timeline:
         return self.state({})
 
     def lay(self, words: Mapping[str, str]) -> object:
-        """Lay the curves of recording ``name`` over these, none for an empty one; ``align`` says how."""
+        """Draw the curves of recording ``name`` over these, none for an empty name; ``align`` sets the alignment."""
         if (align := words.get("align", self._align)) not in _ALIGNMENTS:
             raise ParameterError("align", align, f"one of {', '.join(_ALIGNMENTS)}")
         name, folder = words.get("name", self._over_name), self._folder
@@ -176,7 +176,7 @@ class Timeline:
         return [entry.name for entry in Recordings(self._folder).entries() if entry.name != self._link.title]
 
     def _shift(self) -> float | None:
-        """Time of the recording laid over at time 0 of this one [s]; None while it is being read."""
+        """Time of the overlaid recording at time 0 of this one [s]; None while the former is still being read."""
         if self._over is None or self._align == _ALIGNMENTS[0]:
             return 0.0
         found = [_following(past) for past in (self._past, self._over)]
@@ -194,7 +194,7 @@ class Timeline:
 
 
 def _following(past: Past) -> float | None:
-    """When an arm first followed the hand [s], 0 if none did; None while it is being read."""
+    """When an arm first followed the hand [s], 0 if none did; None while the recording is still being read."""
     first = math.inf
     for name in tuple(past.columns):
         if not name.endswith(f"{TELEOP_STATE.name} is_following"):

@@ -1,8 +1,8 @@
-"""View tab: what the page shows, and from where; for each browser its own camera, and its role.
+"""View tab: the visible parts of the scene, and for each browser its camera and its role.
 
 Insets are small pictures beside the scene. A browser that shows the page renders them and sends
-them here, and all pages show them; without a browser there are none. They cost that browser a
-further picture each, so they are off at first and rare.
+them here, and all pages show them; without a browser there are none. Each inset costs that browser one more picture,
+so insets are off by default and updated rarely.
 """
 
 import threading
@@ -70,7 +70,7 @@ class ViewTab:
 
 
 def theme(server: viser.ViserServer, *, is_dark: bool) -> None:
-    """Take colours and layout of the page; what would reach other hosts is left out."""
+    """Set colours and layout of the page; elements that would load from other hosts are left out."""
     server.gui.configure_theme(
         control_layout="floating", control_width="medium", dark_mode=is_dark, show_logo=False, show_share_button=False
     )
@@ -105,7 +105,7 @@ class Insets:
         self._told = ""
 
     def say(self, display: str) -> None:
-        """Say with the pictures how often and how late the operator's display shows the slave; empty without one."""
+        """Show rate and delay of the operator's display beside the pictures; an empty text without a display."""
         if display != self._told:
             self._told = display
             for name, image in self._images.items():
@@ -146,8 +146,9 @@ class Insets:
 
 
 _SETTLING = 4.0  # until a window has its panel beside it [s]
-_LOOK = 1.0  # between looks whether the work has grown out of the picture [s]
-_GROWN, _STILL = 0.08, 1e-4  # parts of its distance by which a camera is elsewhere: for a new view, for a ride
+_LOOK = 1.0  # between two checks whether the work has left the picture [s]
+_GROWN, _STILL = 0.08, 1e-4  # shares of its distance by which a camera has moved: for a new view, for a view that
+# follows
 
 
 @dataclass(frozen=True)
@@ -159,7 +160,7 @@ class _Fit:
         aspect: Width over height of its picture.
         looked: When its picture was last compared with the work [s].
         camera: What it was given.
-        is_own: Whether its person has chosen another view than the work.
+        is_own: Whether the person at the browser has chosen another view.
     """
 
     since: float
@@ -209,12 +210,12 @@ class Visitors:
             self._riding.pop(number, None)
 
     def give(self, client: viser.ClientHandle, find: Callable[[], Camera] | None, *, is_riding: bool = False) -> None:
-        """Let a browser see from somewhere.
+        """Set the camera of a browser.
 
         Args:
             client: The browser.
             find: The camera; None for one that sees the work.
-            is_riding: Whether it goes on with what it is on.
+            is_riding: Whether the camera follows the body that it is attached to.
         """
         number, now = client.client_id, time.monotonic()
         camera = None if find is None else find()
@@ -231,7 +232,7 @@ class Visitors:
         return f"replay: {'you play it' if self._drivers.may_drive(number) else 'another page plays it'}"
 
     def _show_grips(self, number: int) -> None:
-        """Show a page the handles of the styli if it may drive; those that watch are told again and again.
+        """Show the handles of the styli on a page if it may drive; on other pages they are hidden each time.
 
         All pages are told when the handles are shown again, those that watch too.
         """
@@ -264,7 +265,7 @@ class Visitors:
         self._fitted[number] = replace(fit, aspect=aspect, looked=now, camera=given)
 
     def close(self) -> None:
-        """Take the lines back."""
+        """Remove the lines."""
         for line in self._lines.values():
             line.remove()
         self._lines.clear()

@@ -29,7 +29,7 @@ def object_outline(values: Mapping[str, Setting], robot: Robot) -> Array:
     own = {
         name: value for name, value in values.items() if name in {"kind", "place", "gap"} or name.startswith(of_object)
     }
-    with suppress(Exception):  # of another's kind anything may fail, and the page goes on
+    with suppress(Exception):  # a foreign kind may raise any error, which must not stop the page
         world = build(WorldParameters, own)
         if world.kind.kind == "empty":
             return nothing
@@ -56,7 +56,7 @@ class WorldNodes:
         self.push = ForceArrow(server, f"{path}/push")
 
     def retune(self, values: Mapping[str, Setting]) -> None:
-        """Draw the object that these parameters of the world say, in place of the one before."""
+        """Draw the object that these parameters define, in place of the last one."""
         if values == self._values:
             return
         self._values = dict(values)

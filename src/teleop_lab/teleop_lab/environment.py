@@ -32,7 +32,7 @@ _BLOCKS = 3
 
 
 class _TaskEnv(gymnasium.Env[Observed, Observed]):
-    """A task with a hand that actions lead, and a jaw if there is one."""
+    """A task whose hand is moved by actions, with a jaw if the task needs one."""
 
     metadata = {"render_modes": []}  # noqa: RUF012 - gymnasium's own declaration
 
@@ -78,7 +78,7 @@ class _TaskEnv(gymnasium.Env[Observed, Observed]):
     def _judged(
         self, observed: Observed, before: NDArray[np.float64], now: NDArray[np.float64]
     ) -> tuple[float, bool, bool]:
-        """Reward, whether the episode is over, and whether all is done that was asked for."""
+        """Reward, whether the episode is over, and whether the task is completed."""
         raise NotImplementedError
 
     def _observed(self, found: tc.Observation, task: NDArray[np.float64]) -> Observed:
@@ -97,9 +97,10 @@ class ReachEnv(_TaskEnv):
     """Lead the slave's tip to a goal.
 
     An action (3,) in -1 to 1 moves the hand by up to ``reach`` along the axes of the slave, over a step of 20 ms; as in
-    :mod:`teleop_core`, the hand holds a device and the arm follows. The observation (9,) has the way to the goal, the
-    velocity of the tip and the way from the hand's command to the tip, in 20 mm and 20 mm/s. The reward is minus the
-    distance in 20 mm, and 10 at the goal, where the episode ends. It is truncated after 10 s.
+    :mod:`teleop_core`, the hand holds a device and the arm follows. The observation (9,) has the vector to the goal,
+    the velocity of the tip, and the vector from the hand's command to the tip, in units of 20 mm and 20 mm/s. The
+    reward is minus the distance in units of 20 mm, and 10 at the goal, where the episode ends. It is truncated after
+    10 s.
 
     Args:
         settings: Parameters of the session, such as ``{"display.latency": 0.2}`` or those of a
@@ -124,8 +125,9 @@ class ReachEnv(_TaskEnv):
 class PegTransferEnv(_TaskEnv):
     """Bring three blocks with the slave's jaw from their pegs to those of their colours.
 
-    An action (4,) moves the hand as in :class:`ReachEnv`; a fourth number above 0 closes the jaw. The observation (12,)
-    has those of ``ReachEnv``, the jaw's angle [rad], whether it grips a block, and whether the task asks for a closed
+    An action (4,) moves the hand as in :class:`ReachEnv`; a fourth number above 0 closes the jaw. The observation
+    (12,) has the values of ``ReachEnv``, the jaw's angle [rad], whether it grips a block, and whether the task asks
+    for a closed
     jaw. The goal is that of the present step of the task: reach, grasp, lift, carry, place. The reward is minus the
     distance in 20 mm, 5 for each step that is done, 20 for each block on its peg and -20 for one that is elsewhere. The
     episode ends with the third block, and is truncated after 90 s.

@@ -1,6 +1,6 @@
-"""Grading: every episode of a data set gets its figures of motion, the oddest first.
+"""Grading: figures of motion of every episode of a data set, the most unusual episode first.
 
-No ROS, no arm: an episode is a hand's motion. What a data set does not say has no figure.
+It needs no ROS and no arm: an episode is the motion of a hand. A figure is missing if the data set lacks its data.
 """
 
 from collections.abc import Callable, Sequence
@@ -37,19 +37,20 @@ def grade(
 ) -> "pandas.DataFrame":
     """Figures of every episode, the oddest first.
 
-    An episode is as odd as its oddest figure: by how many robust standard deviations (1.4826 times the median absolute
-    deviation) it is off the median of all episodes. That says which to look at, not which are wrong.
+    The oddness of a figure is its deviation from the median of all episodes, in robust standard deviations (1.4826
+    times the median absolute deviation). The oddness of an episode is that of its oddest figure. It shows which
+    episodes to look at, not which are wrong.
 
     Args:
         data: Folder of a LeRobot data set, or a table with a column of episodes.
         figures: Keys below ``motion.hand`` of a score.
         options: As of :func:`teleop_exchange.import_recording`: columns, units, frames.
-        recordings: Folder for a recording of each episode, kept; None: none are kept.
-        say: Told a line after each episode.
+        recordings: Folder in which a recording of each episode is kept; None to keep none.
+        say: Called with a line after each episode.
 
     Returns:
-        A row for each episode by its number: its figures, ``odd``, ``most_odd``, the figure that
-        is so, and ``reason``, why there are none; NaN where the data set does not say.
+        A row for each episode by its number: its figures, the oddness ``odd``, the oddest figure ``most_odd``, and the
+        ``reason`` if it has no figures. NaN if the data set lacks the data.
 
     Raises:
         RecordingError: The data cannot be read, or no episode can.
@@ -79,7 +80,7 @@ def grade(
     table[list(figures)] = values
     off = (values - values.median()).abs()
     spread = _NORMAL * off.median()
-    # Where all are alike nothing is odd.
+    # If all values are equal, none is odd.
     shares = (off / spread.where(spread > 0.0, np.inf)).fillna(0.0)
     table.insert(0, ODD, shares.max(axis=1).where(table[REASON] == "", np.inf))
     table.insert(1, WORST, shares.idxmax(axis=1).where(shares.max(axis=1) > 0.0, ""))
@@ -87,5 +88,5 @@ def grade(
 
 
 def usual(table: "pandas.DataFrame", most: float = 3.5) -> list[int]:
-    """Numbers of the episodes that are no odder than this, in their order: a list for training."""
+    """Numbers of the episodes whose oddness is at most `most`, in their order: a list for training."""
     return sorted(int(number) for number in table.index[table[ODD] <= most])

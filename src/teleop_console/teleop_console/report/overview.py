@@ -49,7 +49,7 @@ def _figures(score: Score) -> str:
 
 
 def _known(score: Score) -> Iterator[tuple[str, str, str]]:
-    """Value, unit and meaning of figures that the score has, and that say something."""
+    """Value, unit and meaning of the figures that the score has and that are not trivial."""
     values = score.to_dict()
     for key, unit, text in _FIGURES:
         value = values.get(key)

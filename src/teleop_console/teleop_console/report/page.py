@@ -26,7 +26,7 @@ _HEADER = "<h1>Teleoperation report</h1>"
 def report_page(studies: Sequence[Study]) -> str:
     """HTML page with the summary of all recordings and the plots of each.
 
-    It works offline and asks for nothing: plotly.js is inside, once. All plots against time of a
+    It works offline and loads nothing: plotly.js is embedded once. All plots against time of a
     recording show the same time, down to single samples. Texts from recordings are escaped.
     """
     sections, drawn, arrays = [], [], Arrays()

@@ -88,7 +88,7 @@ def _run(arguments: argparse.Namespace) -> int:
 
 
 def _agreed(namespace: str) -> bool:
-    """Whether the user lets it move; without a terminal nobody can."""
+    """Whether the user agrees that the arm moves; false without a terminal."""
     if not sys.stdin.isatty():
         raise SessionError("needs an answer: --yes to move the arm, or --read-only")
     return input(_QUESTION.format(namespace)).strip().lower() in {"y", "yes"}

@@ -10,7 +10,7 @@ from teleop_core.nodes.crews import Processes
 
 
 def run_schedules(arguments: argparse.Namespace) -> int:
-    """Run them; 1 if a law was broken.
+    """Run the schedules; returns 1 if a law was broken.
 
     Raises:
         ParameterError: Arguments do not go together.
@@ -66,7 +66,7 @@ def _run_many(first: int, count: int, json_file: Path | None, processes: Process
     runs = run_seeds(first, count, None, processes, breaks)
     for found in track(runs, "schedules", count, console=console):
         coverage.add(found)
-        if json_file is not None:  # after each: an hour of them may be ended
+        if json_file is not None:  # written after each schedule, because a run of an hour may be interrupted
             json_file.write_text(json.dumps(coverage.plain(), indent=2) + "\n", encoding="utf-8")
         for one in found.broken:
             for line in told(found, shrink(found, one.law), one.law):

@@ -1,7 +1,7 @@
-"""Agreement: whether an arm measures what it was told to do, in time and in place.
+"""Agreement: whether the measurement of an arm agrees with its command, in time and in position.
 
-Trails of the same motion are compared by what changes: a constant difference, such as that of an uncompensated load,
-is ignored.
+Two trails of the same motion are compared by their changes: a constant difference, such as that of an uncompensated
+load, is ignored.
 """
 
 from collections.abc import Callable
@@ -13,16 +13,17 @@ from numpy.typing import NDArray
 Vectors = NDArray[np.float64]
 
 LATEST = 0.25
-"""A measurement may be so much later than its setpoint [s]: five times what our own arms are, which
-leaves a tenth for networks and slow laws; assumed."""
+"""Largest delay of a measurement behind its setpoint [s]: five times the delay of our own arms, so that a tenth of a
+second remains for networks and slow laws; assumed."""
 SHARE = 0.15
-"""Share of the way by which two trails may differ; assumed: between friction and a wrong scale."""
+"""Share of the displacement by which two trails may differ; assumed: larger than the effect of friction, smaller than
+that of a wrong scale."""
 _GRID = 0.01  # time from one place of a comparison to the next [s]
-_FARTHEST = 1.0  # lag that is looked for [s]
-_GAP = 0.05  # messages farther apart were lost on the way, or nobody was there to take them [s]
-_SPAN = 0.25  # over which places are averaged: longer than a loop settles [s]
-_SAMPLES = 20  # with which a motion must be told, so that its speeds can be added up
-_FEW = 10  # messages with which nothing can be compared
+_FARTHEST = 1.0  # largest lag that is searched [s]
+_GAP = 0.05  # if messages are farther apart, some were lost in transport, or no reader existed [s]
+_SPAN = 0.25  # time over which positions are averaged: longer than the settling time of a loop [s]
+_SAMPLES = 20  # least number of messages of a motion for which its speeds can be integrated
+_FEW = 10  # with no more messages than this nothing can be compared
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,8 +33,8 @@ class Trail:
     Attributes:
         sent: When each was sent, shape (N,) [s].
         stamp: Time of its sample, shape (N,) [s].
-        place: Joints or place, shape (N, k).
-        rate: Its speeds, shape (N, k); empty if it tells none.
+        place: Joint positions or position of the tip, shape (N, k).
+        rate: Velocities, shape (N, k); empty if the topic has none.
     """
 
     sent: Vectors
@@ -51,13 +52,13 @@ class Trail:
 
 
 def follows(name: str, measured: Trail, wanted: Trail, least: float) -> str:
-    """What is wrong with a measurement beside its setpoint, in words; empty if it agrees.
+    """Difference between a measurement and its setpoint, in words; empty if they agree.
 
     Args:
         name: Name of the measurement.
-        measured: What the arm measures.
-        wanted: What it is told.
-        least: A way below which nothing is compared.
+        measured: Trail that the arm measures.
+        wanted: Trail of the setpoint.
+        least: Smallest displacement that is compared.
     """
     if len(measured) < _FEW or len(wanted) < _FEW or wanted.way < least:
         return ""
@@ -78,7 +79,7 @@ def follows(name: str, measured: Trail, wanted: Trail, least: float) -> str:
 
 
 def adds_up(trail: Trail, least: float) -> str:
-    """What is wrong with speeds beside the differences of places, in words; empty if they agree."""
+    """Difference between the velocities and the change of the positions, in words; empty if they agree."""
     if len(trail) < _FEW or not trail.rate.size or trail.way < least:
         return ""
     steps = np.diff(trail.stamp)[:, None]
@@ -87,7 +88,7 @@ def adds_up(trail: Trail, least: float) -> str:
     moved = np.cumsum(is_whole * np.diff(trail.place, axis=0), axis=0)
     longest = max(_SAMPLES * float(np.median(steps)), 0.5 * _SPAN)
     if np.max(np.abs(trail.rate)) * longest > trail.way:
-        return ""  # over before filtered speeds could be told
+        return ""  # the motion ended before filtered velocities were available
     share = float(np.max(np.abs(_differences(went, moved)))) / trail.way
     if share > SHARE:
         return f"its speeds add up to another way than its places: {share:.0%} off"
@@ -95,13 +96,13 @@ def adds_up(trail: Trail, least: float) -> str:
 
 
 def obeys(joints: Trail, tip: Trail, fk: Callable[[Vectors], Vectors], least: float) -> str:
-    """What is wrong with places of the tip beside forward kinematics of the joints, in words.
+    """Difference between measured tip positions and forward kinematics, in words; empty if they agree.
 
     Args:
         joints: Measured joints.
         tip: Measured places of the tip, (N, 3) [m].
         fk: Joints (n,) to the tip's pose (4, 4).
-        least: Way of the tip below which nothing is compared [m].
+        least: Smallest displacement of the tip that is compared [m].
     """
     if len(joints) < _FEW or len(tip) < _FEW:
         return ""
@@ -118,14 +119,14 @@ def obeys(joints: Trail, tip: Trail, fk: Callable[[Vectors], Vectors], least: fl
 
 
 def _differences(first: Vectors, second: Vectors) -> Vectors:
-    """Differences (M, k) where both are known, less their median."""
+    """Differences (M, k) of the rows in which both are known, minus their median."""
     found = first - second
     found = found[np.isfinite(found).all(axis=1)]
     return found - np.median(found, axis=0) if len(found) else found
 
 
 def _smooth(times: Vectors, trail: Trail) -> Vectors:
-    """Change (M, k) since the first message, mean of a time around each of some times (M,).
+    """Change (M, k) since the first message, averaged over a window around each of the given times (M,).
 
     The mean hides an overshoot of a few hundredths of a second. NaN where messages are missing; zero before the first
     one.

@@ -18,12 +18,12 @@ class Group(Enum):
 
 
 class Verdict(Enum):
-    """What was found."""
+    """Result of a row."""
 
     OK = "ok"
     ABSENT = "absent"  # and not required
     SKIPPED = "not tried"
-    NOTED = "noted"  # works, but not as one would wish
+    NOTED = "noted"  # works, but with a weakness
     FAILED = "FAILED"
 
 
@@ -39,9 +39,8 @@ class CrtkTopic:
         name: Name below the arm's namespace.
         group: What it is for.
         ros_type: Type of its messages.
-        is_required: Whether an arm without it is none of CRTK. That is so for the operating state
-            and for one of ``measured_js`` and ``measured_cp``; commands that an arm cannot do are
-            left out, as CRTK says.
+        is_required: Whether every CRTK arm must have the topic. This is true for the operating state and for one of
+            ``measured_js`` and ``measured_cp``. CRTK allows an arm to leave out commands that it cannot do.
     """
 
     name: str
@@ -82,10 +81,10 @@ class Finding:
     """What was found in one row.
 
     Attributes:
-        row: The row, or what was tried with several of them.
-        verdict: How it is.
-        found: What there is, in a few words.
-        note: What is wrong with it, or why it was not tried.
+        row: The row, or the trial that concerns several rows.
+        verdict: Result of the row.
+        found: What the arm has, in a few words.
+        note: Error, or the reason why the row was not tested.
     """
 
     row: CrtkTopic

@@ -14,9 +14,9 @@ __all__ = [
 ]  # fmt: skip
 
 EXERCISES = (*STOPS, *PROCESSES, *SAMPLES)
-"""Built-in ones; some once for each way of running."""
+"""Built-in exercises; some of them once for each way of running."""
 SHORT = ("stop_topic", "kill_motion_scaling", "teleport", "second_commander", "kill_bystander")
-"""What is enough to see that nothing is badly wrong."""
+"""A short selection that finds gross errors."""
 
 
 def _checked(name: str, part: object) -> Exercise:
@@ -28,7 +28,7 @@ def _checked(name: str, part: object) -> Exercise:
 
 
 FURTHER: Registry[Exercise] = Registry("exercise", "exercises", {}, _checked, package="teleop_drill")
-"""Those of installed packages and of the program."""
+"""Exercises of installed packages and of the program."""
 
 
 def register_exercise(exercise: Exercise, *, replace: bool = False) -> Exercise:
@@ -40,11 +40,11 @@ def chosen(names: tuple[str, ...], *, is_composed: bool) -> tuple[Exercise, ...]
     """Exercises of a way of running, in the order of the table, further ones last.
 
     Args:
-        names: Which; none for all.
+        names: Names of the exercises; empty for all.
         is_composed: Whether all nodes share one process.
 
     Raises:
-        UnknownNameError: One is not there in this way of running.
+        UnknownNameError: An exercise does not exist in this way of running.
     """
     further = map(FURTHER.find, FURTHER)
     fitting = [one for one in (*EXERCISES, *further) if is_composed in one.ways]

@@ -44,7 +44,7 @@ def markdown(outcomes: Sequence[Outcome]) -> str:
 
 
 def summary(outcomes: Sequence[Outcome]) -> list[str]:
-    """What the table does not say: times of stops, the load, and what is not as expected."""
+    """Lines below the table: times of stops, the load, and the results that are not as expected."""
     lines = []
     for outcome in outcomes:
         name, extra = outcome.exercise.name, outcome.extra

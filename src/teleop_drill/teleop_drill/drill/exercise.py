@@ -1,4 +1,4 @@
-"""Exercise: one fault of a drill, what is expected of the arm, and how it recovers."""
+"""Exercise: one fault of a drill, the expected reaction of the arm, and how the arm recovers."""
 
 import math
 from collections.abc import Callable
@@ -14,7 +14,7 @@ from teleop_drill.drill.numbers import Numbers
 
 
 class Master(Enum):
-    """Who moves the hand."""
+    """What moves the hand."""
 
     DEVICE = "the simulated device of the session, a stage like all others"
     DRILL = "the drill itself, which publishes what a device would"
@@ -30,7 +30,7 @@ class Motion(Enum):
 
 
 class Cure(Enum):
-    """What it takes to move again."""
+    """What the arm needs to move again."""
 
     NOTHING = "by itself"
     RESUME = "resume"
@@ -39,7 +39,7 @@ class Cure(Enum):
 
 
 class Rig(Protocol):
-    """The session under drill, and what can be done to it."""
+    """The session under drill, and the actions that break it."""
 
     @property
     def is_composed(self) -> bool:
@@ -47,7 +47,7 @@ class Rig(Protocol):
         ...
 
     def mark(self) -> None:
-        """The fault begins now; without a word it is when :attr:`Exercise.inject` is called."""
+        """Declare that the fault begins now; without this call it begins when :attr:`Exercise.inject` is called."""
 
     def note(self, text: str) -> None:
         """Add a note, which the table shows beside the state."""
@@ -63,22 +63,22 @@ class Rig(Protocol):
         ...
 
     def freeze(self, node: str, seconds: float, meanwhile: Callable[[], None] = lambda: None) -> None:
-        """Stop a node's process for a time [s], do something, then let it go on."""
+        """Stop a node's process for a time [s], call `meanwhile` during the stop, then let the process continue."""
 
     def limit_files(self, node: str, room: int | None) -> None:
-        """Let files of a node's process grow by so many bytes only; None: as they like."""
+        """Let files of a node's process grow by at most `room` bytes; None for no limit."""
 
     def hog(self, seconds: float) -> None:
         """Keep all cores busy for a time [s]."""
 
     def start_bystander(self) -> None:
-        """Start a ROS process of others that listens to all streams; it listens on return."""
+        """Start a foreign ROS process that subscribes to all streams; it is subscribed on return."""
 
     def kill_bystander(self) -> None:
         """Kill it."""
 
     def distort(self, distortion: Distortion) -> None:
-        """Let something become of the hand's samples on the way."""
+        """Apply a distortion to the hand's samples before they are sent."""
 
     def mute_buttons(self, *, is_mute: bool) -> None:
         """Send no buttons, or send them again."""
@@ -87,7 +87,7 @@ class Rig(Protocol):
         """Send one message as another publisher of the topic would."""
 
     def publish_bytes(self, topic: Topic, data: bytes) -> None:
-        """Send bytes that are no message as another publisher of the topic would."""
+        """Send bytes that are not a valid message, as another publisher of the topic would."""
 
     def leave(self, topic: Topic) -> None:
         """Close that other publisher."""
@@ -96,7 +96,7 @@ class Rig(Protocol):
         """Newest joint setpoint (n,) of the slave [rad or m]."""
 
     def way_to_limit(self) -> tuple[Array, float]:
-        """Way (n,) of one joint to its nearer limit [rad or m], and that of the tip [m]."""
+        """Displacement (n,) of one joint to its nearer limit [rad or m], and the displacement of the tip [m]."""
 
     def drive(self, speeds: Array, seconds: float) -> None:
         """Drive the joints (n,) at speeds [rad/s or m/s] for a time [s], as a CRTK client does."""
@@ -108,16 +108,16 @@ class Rig(Protocol):
         """Send a message of a stop button: the first one, or another."""
 
     def command(self, name: str) -> bool:
-        """Ask the slave for something by service; whether it was done."""
+        """Call a service of the slave; returns whether the command was done."""
 
     def commands(self, *names: str) -> list[bool]:
-        """As :meth:`command`, some at once, without waiting for the answers in between."""
+        """As :meth:`command`, but several commands at once, without waiting for the answers in between."""
 
     def set(self, node: str, name: str, value: object) -> bool:
-        """Set a parameter of a running node; whether it was taken."""
+        """Set a parameter of a running node; returns whether it was accepted."""
 
     def control(self, word: int, offset_ns: int = 0) -> None:
-        """Say what the drill's own stage does, and by how much all clocks are off [ns]."""
+        """Set what the drill's own stage does, and the error of all clocks [ns]."""
 
 
 Time = Callable[[Numbers], float]
@@ -125,12 +125,12 @@ Time = Callable[[Numbers], float]
 
 
 def command_timeout(numbers: Numbers) -> float:
-    """Bound for commands that stop coming: the last one stays in force for the command timeout."""
+    """Bound for commands that cease: the arm follows the last command for the command timeout."""
     return numbers.command_timeout
 
 
 def at_once(numbers: Numbers) -> float:
-    """Bound for what the slave is told directly: it looks in every tick."""
+    """Bound for commands sent directly to the slave: it reads them in every tick."""
     return numbers.tick
 
 
@@ -169,17 +169,17 @@ class Exercise:
     """One fault.
 
     Attributes:
-        name: By which it is asked for.
-        text: What is done.
-        inject: Does it; returns when it is done, or is over.
-        undo: Takes back what lasts.
-        motion: What the arm does meanwhile.
+        name: Name that selects the exercise.
+        text: Description of the fault.
+        inject: Causes the fault; returns when the fault has begun, or is over.
+        undo: Removes a fault that lasts.
+        motion: What the arm does during the fault.
         states: Operating states that may follow; None among them: the slave is gone.
-        faults: Faults that may be told; empty: any or none.
-        cures: What it may take to move again.
-        master: Who moves the hand.
-        allowed: Time for which it may go on as it moves [s], before it has to brake.
-        stands: Time for which an arm that goes on may stand still all the same [s].
+        faults: Faults that may be reported; empty for any or none.
+        cures: What the arm may need to move again.
+        master: What moves the hand.
+        allowed: Time for which the arm may continue its motion [s] before it must brake.
+        stands: Time for which an arm that is expected to keep moving may stand still [s].
         gap: Time for which commands may be missing that the arm makes up for [s].
         by_drives: Whether it is the drives that were missing, and make up for what came meanwhile.
         said: What the arm must have answered, as :meth:`Rig.note` took it; empty: anything.

@@ -1,7 +1,7 @@
 """Parts of a drill inside the processes under test: a stage that breaks, a clock that is stepped.
 
-The file is given to the processes as one with own parts, so that nothing of it is in nodes that no
-drill has started. What it does is said by the numbers of a file that both sides see.
+The processes load this file as a file with own parts, so nodes that no drill has started contain nothing of it. The
+numbers in a file that both sides read control what it does.
 """
 
 import mmap
@@ -22,18 +22,18 @@ from teleop_core.kernels.geometry import Array
 from teleop_core.slave.slave_sim import SlaveSim
 
 VARIABLE = "TELEOP_DRILL"
-"""Environment variable with the name of the file that says what is to break."""
+"""Environment variable with the name of the file that controls what breaks."""
 STAGE_NAME = "drill_stage"
 _FORM = struct.Struct("<qq")
 WORKS, HANGS, RAISES, STICKS, RACES = 0, 1, 2, 3, 4
 """What the stage does; or what the joints do, which no parameter of a session makes stick or race.
 """
 _BRAKED = OPERATION.index("is_braked")
-TURN = 5e-3  # from one look at what joints are to do to the next [s]
+TURN = 5e-3  # time between two readings of what the joints must do [s]
 
 
 class Control:
-    """What is to break, as both sides see it.
+    """Controls what breaks; both sides read it.
 
     Args:
         file: File of 16 bytes: what the stage does, and by how much the clock is off [ns].
@@ -45,7 +45,7 @@ class Control:
 
     @staticmethod
     def make(file: Path) -> "Control":
-        """A new file, under which all works."""
+        """Create the file, with a content that breaks nothing."""
         file.write_bytes(bytes(_FORM.size))
         return Control(file)
 
@@ -60,7 +60,7 @@ class Control:
         return int(_FORM.unpack(self._map)[1])
 
     def write(self, word: int = WORKS, offset_ns: int = 0) -> None:
-        """Say what the stage does and by how much the clock is off [ns]."""
+        """Set what the stage does and the error of the clock [ns]."""
         self._map[:] = _FORM.pack(word, offset_ns)
 
 
@@ -68,7 +68,7 @@ DRILLED_CP = Topic("slave/drilled_cp", Kind.POSE, passed_on(SLAVE_SERVO_CP.name)
 
 
 class Steered(Protocol):
-    """Who says what the stage does."""
+    """Source that decides what the stage does."""
 
     @property
     def word(self) -> int:
@@ -76,10 +76,10 @@ class Steered(Protocol):
 
 
 class Passing(RunningStage):
-    """Passes every command on, as long as it works.
+    """Stage that passes every command on, until it is told to hang or to raise.
 
     Attributes:
-        control: Who says what it does.
+        control: Source that decides what it does.
         sleep: How it waits while it hangs [s].
     """
 
@@ -104,16 +104,16 @@ def _make(_: Any, dt: float) -> Passing:
 
 
 def _step_clock(control: Control) -> None:
-    """Let the process read a clock that may be off; what measures durations stays as it is."""
+    """Let the process read a clock that may be wrong; clocks that measure durations do not change."""
     right = time.time_ns
     time.time_ns = lambda: right() + control.offset_ns
 
 
 class Joints:
-    """Joints of simulated slaves: they stick as long as they are told to.
+    """Joints of simulated slaves, which stick or race on command.
 
-    Their dry friction is then twice what the drives can give, as under a load far too heavy. Or the
-    first one races: it is pushed to twice its speed until the brakes hold it.
+    A joint that sticks has dry friction of twice the effort limit of its drive, as with a load far too heavy. If
+    joints race, the first joint is pushed to twice its rated speed until the brakes hold it.
     """
 
     def __init__(self) -> None:
@@ -133,7 +133,7 @@ class Joints:
 
 
 class _Watched:
-    """All simulated slaves of the process, each of which obeys from its making on."""
+    """All simulated slaves of the process; each obeys as soon as it has been created."""
 
     def __init__(self, control: Control) -> None:
         self._control, self._joints = control, Joints()
@@ -141,7 +141,7 @@ class _Watched:
         self._make, self._owner = SlaveSim.__init__, 0
 
     def follow(self) -> None:
-        """Know every slave that is made from now on."""
+        """Register every slave that is created from now on."""
         watched = self
 
         def make(slave: SlaveSim, *arguments: Any, **options: Any) -> None:
@@ -181,7 +181,7 @@ def register() -> None:
 
 
 def install() -> None:
-    """Register the stage in a process that a drill has started, and do there what it says."""
+    """Register the stage in a process that a drill has started, and start what the control file asks for."""
     register()
     file = os.environ.get(VARIABLE)
     if file is None:
@@ -194,7 +194,7 @@ def install() -> None:
 
 
 if __name__.startswith("teleop_own_parts"):
-    # This file is read as parts of one's own: the stage is that of the package, which the drill steers.
+    # This file is loaded as own parts: the stage that is registered is that of the package, which the drill controls.
     from teleop_drill.drill import inside  # noqa: PLW0406  # no, it is read under another name
 
     inside.install()

@@ -1,4 +1,4 @@
-"""Judging: measurements of a fault, and bounds that follow from the session's own numbers."""
+"""Judging: measurements of a fault, and bounds that follow from the parameters of the session."""
 
 import math
 from collections.abc import Iterator
@@ -19,14 +19,14 @@ _HOPS = 4
 _FULL = 0.9
 """Share of the possible deceleration with which a setpoint must brake."""
 _LEAST = 0.8
-"""Share of the hand's way that an arm that goes on must go."""
+"""Share of the hand's path that an arm must travel if it is expected to keep moving."""
 _SLOW = 0.05
 """Share of the hand's speed below which the tip is at rest."""
-_NOW_NS = 15_000_000  # over which the speed of the moment is taken
+_NOW_NS = 15_000_000  # time over which the present speed is measured
 _CALM = 10.0
 """Times :attr:`Numbers.coast` after which the loop has settled to that share: its answer to a
 setpoint that stops, of speed :math:`(1 + x - x^2) e^{-x}`, is below it from x = 6.6 on."""
-_SETTLED = 5.0  # time constants after which a filter has done what it does
+_SETTLED = 5.0  # time constants after which a filter has settled
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ class Measured:
 
     Attributes:
         name: Name in files, with its unit at the end: ``"travel_m"``.
-        text: What is wrong if it is outside: ``"the tip moved {0:.1f} mm, at most {1:.1f}"``.
+        text: Error text if the value is outside of its bounds: ``"the tip moved {0:.1f} mm, at most {1:.1f}"``.
         value: The number in SI units; NaN if it could not be measured, which is no fault.
         most: Largest that is allowed.
         least: Smallest that is allowed.
@@ -51,31 +51,31 @@ class Measured:
 
     @property
     def failure(self) -> str:
-        """What is wrong, in words; empty if it is within its bounds."""
+        """Error in words; empty if the value is within its bounds."""
         if not (self.value > self.most or self.value < self.least):
             return ""
         bound = self.most if self.value > self.most else self.least
         return self.text.format(self.scale * self.value, self.scale * bound)
 
     def to_json(self) -> dict[str, float | None]:
-        """Value and bounds, in SI units; None for what there is not."""
+        """Value and bounds, in SI units; None for a missing value or bound."""
         numbers = {"value": self.value, "most": self.most, "least": self.least}
         return {k: round(v, 9) if math.isfinite(v) else None for k, v in numbers.items()}
 
 
 @dataclass(frozen=True, eq=False)
 class Seen:
-    """What an independent tap has heard of one fault.
+    """Messages of one fault that an independent tap received.
 
     Attributes:
         begin_ns: When the fault began [ns].
-        end_ns: When it was taken back [ns].
+        end_ns: When the fault was removed [ns].
         setpoint_js: Joint setpoints.
         measured_js: Joints that the slave measures: position, speed, effort.
-        true_cp: Where the tip is, which the plant knows.
-        told_ns: When ``slave/operation`` first told a state or a fault [ns]; None if it did not.
+        true_cp: True pose of the tip, from the plant.
+        told_ns: When ``slave/operation`` first reported a state or a fault [ns]; None if it did not.
         warned_ns: When a node first warned of something new [ns]; None if none did.
-        scheduling: How late this machine woke the drill meanwhile.
+        scheduling: How late this machine woke the drill during the fault.
         deaf: For how long the slave's process stood still [s].
     """
 
@@ -95,7 +95,7 @@ class Seen:
 
 
 def judge(exercise: Exercise, seen: Seen, numbers: Numbers) -> Iterator[Measured]:
-    """All that was measured of one fault, each with its bounds."""
+    """All measurements of one fault, each with its bounds."""
     yield from _always(exercise, seen, numbers)
     yield from _told(exercise, seen, numbers)
     if exercise.motion in {Motion.RESTS, Motion.HOLDS}:
@@ -107,10 +107,10 @@ def judge(exercise: Exercise, seen: Seen, numbers: Numbers) -> Iterator[Measured
 
 
 def late(seen: Seen, numbers: Numbers) -> float:
-    """What transport and machine may add to any time [s].
+    """Delay that transport and machine may add to any time [s].
 
-    A tick for each topic on the way, and twice what the drill's own thread was woken too late: once
-    where a message is sent, once where it is taken.
+    A tick for each topic from hand to setpoint, plus twice the wake-up delay of the drill's own thread: once for
+    sending a message, once for receiving it.
     """
     return _HOPS * numbers.tick + 2.0 * seen.scheduling.worst
 
@@ -130,14 +130,14 @@ def _always(exercise: Exercise, seen: Seen, numbers: Numbers) -> Iterator[Measur
     way = measure.travel(seen.true_cp, seen.begin_ns, seen.end_ns)
     most = measure.RESOLUTION + 0.1 * (0.0 if math.isnan(way) else way)
     yield Measured("apart_m", text, measure.apart(measured, seen.true_cp), most)
-    # Who falls silent hides what the arm does; the slave holds an arm that is silent for longer.
+    # While the arm is silent, its motion is unknown; the slave stops an arm that is silent for longer.
     text = "the tip or the joints fell silent {0:.0f} ms before the setpoints, at most {1:.0f}"
     silence = max(measure.silence(one, setpoints) for one in (seen.true_cp, seen.measured_js))
     yield Measured("silent_s", text, silence, numbers.command_timeout + late(seen, numbers))
 
 
 def _tool(exercise: Exercise, seen: Seen, numbers: Numbers) -> Measured:
-    """Steps of the tip's setpoint against the speed of the tool.
+    """Compare steps of the tip's setpoint with the speed limit of the tool.
 
     Joints are slowed down in proportion, which is exact for the tip up to their step [rad].
     """
@@ -152,7 +152,7 @@ def _tool(exercise: Exercise, seen: Seen, numbers: Numbers) -> Measured:
 
 
 def _told(exercise: Exercise, seen: Seen, numbers: Numbers) -> Iterator[Measured]:
-    """When the slave's report told the fault, and when ``diagnostics`` warned of it."""
+    """When the slave reported the fault, and when ``diagnostics`` warned of it."""
     if exercise.told is not None:
         most = seen.deaf + exercise.told(numbers) + late(seen, numbers)
         text = "slave/operation told after {0:.0f} ms, at most {1:.0f}"
@@ -164,14 +164,14 @@ def _told(exercise: Exercise, seen: Seen, numbers: Numbers) -> Iterator[Measured
 
 
 def _stops(exercise: Exercise, seen: Seen, numbers: Numbers) -> Iterator[Measured]:
-    """The way to rest, its speed, and what follows: rest, or a tip that is held."""
+    """The distance to rest, the speed on it, and what follows: rest, or a tip that is held."""
     going = exercise.allowed(numbers) + late(seen, numbers)
     yield _travel_to_rest(exercise, seen, numbers, going)
     yield _speed(exercise, seen, numbers)
     if exercise.motion is Motion.HOLDS:
         yield _held(exercise, seen, numbers)
         return
-    if None not in exercise.states:  # of an arm that is gone there is nothing to hear
+    if None not in exercise.states:  # an arm that has ended sends nothing
         yield from _rests(exercise, seen, numbers, going)
     text = "a joint braked with {0:.2f} of what its drive can do, at least {1:.2f}"
     stopping = seen.setpoint_js.within(0, seen.end_ns)
@@ -180,7 +180,7 @@ def _stops(exercise: Exercise, seen: Seen, numbers: Numbers) -> Iterator[Measure
 
 
 def _travel_to_rest(exercise: Exercise, seen: Seen, numbers: Numbers, going: float) -> Measured:
-    """Way to rest: it may go on for a time [s], brake, and come up to its setpoint."""
+    """Distance to rest: the tip may continue for a time [s], brake, and catch up with its setpoint."""
     begin_ns, setpoints, robot = seen.begin_ns, seen.setpoint_js, numbers.robot
     speed = min(measure.speed_before(seen.true_cp, begin_ns), OVERSHOOT * numbers.tip_speed)
     wanted = measure.tips(robot.fk, setpoints, robot.n)
@@ -197,7 +197,7 @@ def _travel_to_rest(exercise: Exercise, seen: Seen, numbers: Numbers, going: flo
 def _rests(exercise: Exercise, seen: Seen, numbers: Numbers, going: float) -> Iterator[Measured]:
     """When setpoints stand still, and when the tip itself is at rest.
 
-    Setpoints do not brake where an arm is in FAULT, but its drives must.
+    Setpoints do not brake if an arm is in FAULT, but its drives must.
     """
     begin_ns, setpoints = seen.begin_ns, seen.setpoint_js
     until = seen.deaf + going
@@ -215,7 +215,7 @@ def _rests(exercise: Exercise, seen: Seen, numbers: Numbers, going: float) -> It
 
 
 def _or_never(time: float) -> float:
-    """A time [s]; infinite where it is none."""
+    """The given time [s], or infinity if it is NaN."""
     return math.inf if math.isnan(time) else time
 
 
@@ -231,7 +231,7 @@ def _held(exercise: Exercise, seen: Seen, numbers: Numbers) -> Measured:
 
 
 def _speed(exercise: Exercise, seen: Seen, numbers: Numbers) -> Measured:
-    """Speed of the tip: never above what the hand asks for."""
+    """Speed of the tip, which must never exceed the speed that the hand asks for."""
     moving = seen.true_cp.within(seen.begin_ns, seen.end_ns)
     gap = exercise.gap(numbers) + late(seen, numbers)
     times = numbers.catching_up(gap, by_drives=exercise.by_drives)
@@ -242,15 +242,15 @@ def _speed(exercise: Exercise, seen: Seen, numbers: Numbers) -> Measured:
 
 
 def _goes_on(exercise: Exercise, seen: Seen, numbers: Numbers) -> Iterator[Measured]:
-    """It goes where the hand goes: no farther, no faster, and not much less."""
+    """An arm that keeps moving must follow the hand: no farther, no faster, and not much less."""
     begin_ns, end_ns = seen.begin_ns, seen.end_ns
     yield _speed(exercise, seen, numbers)
     elapsed, stands = 1e-9 * (end_ns - begin_ns), exercise.stands(numbers)
     speed = numbers.tip_speed
     lag = measure.lag(measure.tips(numbers.robot.fk, seen.setpoint_js, numbers.robot.n), seen.true_cp, begin_ns)
-    # On its circle the hand gets no farther than the diameter; what it goes while the arm stands,
-    # the circle of the arm is shifted by. Behind a filter of first order the setpoint trails the
-    # command by its speed times the time constant: while it comes up from rest, by so much less.
+    # On its circle the hand moves no farther than the diameter. The circle of the arm is shifted by the hand's motion
+    # while the arm stands. Behind a first-order filter the setpoint lags behind the command by its speed times the
+    # time constant, and by less while it starts from rest.
     now = measure.tip_speed(seen.true_cp.within(begin_ns - _NOW_NS, begin_ns))
     coming = max(0.0, speed - now)
     far = 2.0 * RADIUS * numbers.gain + speed * min(stands, elapsed) + coming * numbers.filter_time

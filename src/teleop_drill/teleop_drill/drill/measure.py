@@ -1,4 +1,4 @@
-"""Measures of a drill: what a trace of setpoints and of the tip tells of a fault."""
+"""Measures of a drill, computed from traces of setpoints and of the tip."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -10,17 +10,17 @@ from teleop_core.kernels.geometry import Array
 
 Stamps = NDArray[np.int64]
 RESOLUTION = 2e-4
-"""What the tip may move in any case [m]: steps of encoders, gravity that sets in, play."""
+"""Motion of the tip that is always allowed [m]: encoder steps, the onset of gravity, play."""
 _BEFORE_NS = 300_000_000
-"""How long before a fault the motion is looked at."""
+"""Time before a fault in which the motion is measured."""
 JUST_BEFORE_NS = 11_000_000
-"""Before a moment, time in which the present speed is measured [ns]."""
-_SILENT_NS = 100_000_000  # longer than any teller of the tip waits
+"""Time before a given moment in which the present speed is measured [ns]."""
+_SILENT_NS = 100_000_000  # longer than the period of any publisher of the tip
 _SHORT = 10  # samples of which the present speed is taken
 _ROUNDING = 1e-12  # of a step [rad or m]
-_ENOUGH = 41  # samples from which it is told whether an arm follows
-_MOVING = 0.3  # share of all ticks in which a setpoint moves that goes round
-_FOLLOWED = 0.1  # share of the setpoint's way; noise of encoders is far less, a lag is none
+_ENOUGH = 41  # samples that decide whether an arm follows
+_MOVING = 0.3  # least share of ticks in which a circling setpoint moves
+_FOLLOWED = 0.1  # least share of the setpoint's path; encoder noise is far less, and a lag does not shorten the path
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +40,7 @@ class Trace:
     stamp_ns: Stamps
 
     def within(self, begin_ns: int, end_ns: int) -> "Trace":
-        """Those sent in a time [ns], its end left out."""
+        """Messages sent in an interval [ns], without its end."""
         chosen = (self.sent_ns >= begin_ns) & (self.sent_ns < end_ns)
         return self.only(chosen)
 
@@ -53,10 +53,10 @@ class Trace:
 
 
 def step_ratio(setpoints: Trace, speed_limit: Array, dt: float) -> float:
-    """Largest step of a setpoint over what its drive allows in the time; 0 without two samples.
+    """Largest step of a setpoint divided by the step that its drive allows; 0 with fewer than two samples.
 
-    Messages that were lost on the way are ticks in which it could move as well. Where the number
-    starts anew, there is another publisher, and no step.
+    A lost message counts as a tick in which the setpoint could move. If the sequence number starts again, there is
+    another publisher, and that step is not counted.
 
     Args:
         setpoints: Joint setpoints, values (N, n) [rad or m].
@@ -72,7 +72,7 @@ def step_ratio(setpoints: Trace, speed_limit: Array, dt: float) -> float:
 
 
 def stop_delay(setpoints: Trace, since_ns: int) -> float:
-    """Time from a moment to the first of all setpoints that stand still [s]; NaN if they never do.
+    """Time from a moment until the setpoint stands still for good [s]; NaN if it never does.
 
     Args:
         setpoints: Joint setpoints, values (N, n).
@@ -88,7 +88,7 @@ def stop_delay(setpoints: Trace, since_ns: int) -> float:
 
 
 def travel(places: Trace, since_ns: int, until_ns: int) -> float:
-    """Farthest that the tip got from where it was at a moment, until another [m]; NaN if unknown.
+    """Largest distance of the tip from its position at one moment, up to another moment [m]; NaN if unknown.
 
     Args:
         places: Of the tip, values (N, 3 or more) [m].
@@ -103,13 +103,13 @@ def travel(places: Trace, since_ns: int, until_ns: int) -> float:
 
 
 def follows(setpoints: Array, measured: Array, speed_limit: Array) -> bool:
-    """Whether an arm goes where its setpoints go, by both traces of a recent time.
+    """Whether an arm follows its setpoints, decided from recent traces of both.
 
-    Setpoints alone prove nothing: drives that do not listen leave the arm where it is.
+    Moving setpoints alone prove nothing: if the drives do not react, the arm stands still.
 
     Args:
         setpoints: Newest setpoints, shape (m, n) [rad or m].
-        measured: Newest measured joints of as long a time or longer, shape (k, n) [rad or m].
+        measured: Newest measured joints over the same time or longer, shape (k, n) [rad or m].
         speed_limit: Rated speeds, by which joints are compared, shape (n,) [rad/s or m/s].
     """
     if len(setpoints) < _ENOUGH or len(measured) < _ENOUGH:
@@ -121,7 +121,7 @@ def follows(setpoints: Array, measured: Array, speed_limit: Array) -> bool:
 
 
 def tip_speed(places: Trace) -> float:
-    """Largest speed of the tip over ten samples, by their stamps [m/s]; 0 of fewer.
+    """Largest speed of the tip over ten samples, by their stamps [m/s]; 0 with fewer samples.
 
     Args:
         places: Of the tip, values (N, 3 or more) [m].
@@ -142,13 +142,13 @@ def _speeds(places: Trace) -> tuple[Array, Stamps]:
 def rest_delay(places: Trace, since_ns: int, slow: float, until_ns: int) -> float:
     """Time from a moment until the tip is slower than a speed [m/s] for good [s]; NaN if never.
 
-    Of a tip that nobody tells any more, it is the time of its last sample.
+    If the pose of the tip is no longer published, it is the time of the last sample.
 
     Args:
         places: Of the tip.
         since_ns: The moment [ns].
         slow: The speed [m/s].
-        until_ns: Until when it was looked at [ns].
+        until_ns: End of the observation [ns].
     """
     speeds, sent_ns = _speeds(places)
     after = sent_ns >= since_ns
@@ -168,16 +168,16 @@ def speed_before(places: Trace, moment_ns: int) -> float:
 
 
 def path(places: Trace, since_ns: int, until_ns: int) -> float:
-    """Length of the way of the tip between two moments, in steps of ten samples [m]."""
+    """Length of the path of the tip between two moments, in steps of ten samples [m]."""
     taken = places.within(since_ns, until_ns).values[::_SHORT, :3]
     return float(np.sum(np.linalg.norm(np.diff(taken, axis=0), axis=1)))
 
 
 def ramp(setpoints: Trace, braking: Array, dt: float) -> float:
-    """Least deceleration with which any joint came to rest, over what its drive can do; NaN: none.
+    """Smallest deceleration with which a joint came to rest, divided by that of its drive; NaN if no joint braked.
 
-    A joint that brakes evenly loses the same step every tick, and in its last tick no more than
-    that is left. A joint that has crept after its reference stops from steps that hardly change.
+    If a joint brakes at a constant rate, its step shrinks by the same amount in every tick, and its last step is no
+    larger than that amount. A joint that crept behind its reference stops from steps that hardly change.
 
     Args:
         setpoints: Joint setpoints up to rest, values (N, n) [rad or m].
@@ -200,12 +200,12 @@ def ramp(setpoints: Trace, braking: Array, dt: float) -> float:
 
 
 def beyond(places: Array, lower: Array, upper: Array) -> float:
-    """Farthest that joints (N, n) are outside their limits (n,) [rad or m]; 0 inside."""
+    """Largest distance of joints (N, n) beyond their limits (n,) [rad or m]; 0 inside."""
     return float(np.max(np.maximum(places - upper, lower - places), initial=0.0))
 
 
 def tips(fk: Callable[[Array], Array], joints: Trace, n: int) -> Trace:
-    """Places (N, 3) of the tip [m] for joints, by forward kinematics that are not the slave's.
+    """Positions (N, 3) of the tip [m] for joints, by forward kinematics independent of the slave.
 
     Args:
         fk: Forward kinematics: joints (n,) to the tip's pose (4, 4).
@@ -218,10 +218,10 @@ def tips(fk: Callable[[Array], Array], joints: Trace, n: int) -> Trace:
 
 
 def apart(first: Trace, second: Trace) -> float:
-    """Largest difference of the ways (N, 3) that two traces tell of the same ticks [m].
+    """Largest difference between the displacements (N, 3) of two traces in the same ticks [m].
 
-    Each begins where it begins: a place that is off all the time, as a tool that was measured
-    badly, is no difference of motion.
+    Each trace is relative to its own first position, so a constant offset, such as that of a badly measured tool, does
+    not count.
     """
     _, at, other = np.intersect1d(first.stamp_ns, second.stamp_ns, return_indices=True)
     if not len(at):
@@ -233,7 +233,7 @@ def apart(first: Trace, second: Trace) -> float:
 def silence(places: Trace, setpoints: Trace) -> float:
     """For how long setpoints were still sent after the last of another trace [s].
 
-    0 where there are no setpoints; infinite where they alone were heard.
+    0 without setpoints; infinite if only setpoints were received.
     """
     if not len(setpoints):
         return 0.0
@@ -243,14 +243,14 @@ def silence(places: Trace, setpoints: Trace) -> float:
 
 
 def way_ratio(places: Trace, speed_limit: float, dt: float) -> float:
-    """Largest step of the tip, values (N, 3) [m], over what a speed [m/s] allows; 0 without two."""
+    """Largest step of the tip, values (N, 3) [m], divided by that at a speed limit [m/s]; 0 without two samples."""
     ticks = np.diff(places.number)
     steps = np.linalg.norm(np.diff(places.values, axis=0), axis=1)[ticks > 0]
     return float(np.max(steps / (speed_limit * dt * ticks[ticks > 0]), initial=0.0))
 
 
 def joint_speeds(setpoints: Trace, since_ns: int, until_ns: int) -> Array:
-    """Largest speed of each joint's setpoint in a time, shape (n,) [rad/s or m/s]."""
+    """Largest speed of each joint's setpoint in an interval, shape (n,) [rad/s or m/s]."""
     found = setpoints.within(since_ns, until_ns)
     if len(found) < 2:
         return np.zeros(setpoints.values.shape[1])
@@ -260,23 +260,23 @@ def joint_speeds(setpoints: Trace, since_ns: int, until_ns: int) -> Array:
 
 
 def braking_way(setpoints: Trace, moment_ns: int, jacobian: Array, braking: Array) -> float:
-    r"""Farthest that the tip gets when all drives brake from their speeds at a moment [m].
+    r"""Largest distance that the tip moves if all drives brake from their speeds at a moment [m].
 
     Joint i, which turns at :math:`\dot q_i` and brakes at :math:`a_i`, needs
-    :math:`\dot q_i^2 / (2 a_i)`; the tip gets no farther than the sum of what each moves it.
+    :math:`\dot q_i^2 / (2 a_i)`; the tip moves no farther than the sum of the motions that the joints cause.
 
     Args:
         setpoints: Joint setpoints, values (N, n) [rad or m].
         moment_ns: The moment [ns].
         jacobian: Of the tip, shape (6, n).
-        braking: What the drives brake, shape (n,) [rad/s² or m/s²].
+        braking: Deceleration of the drives, shape (n,) [rad/s² or m/s²].
     """
     speeds = joint_speeds(setpoints, moment_ns - JUST_BEFORE_NS, moment_ns)
     return float(np.linalg.norm(jacobian[:3], axis=0) @ (speeds**2 / (2.0 * braking)))
 
 
 def lag(setpoints: Trace, places: Trace, moment_ns: int) -> float:
-    """How far the tip is behind its setpoint at a moment [m]; it may come up to it."""
+    """How far the tip lags behind its setpoint at a moment [m]; it may still catch up by this distance."""
     wanted = setpoints.within(moment_ns - _BEFORE_NS, moment_ns)
     found = places.within(moment_ns - _BEFORE_NS, moment_ns)
     if not len(wanted) or not len(found):

@@ -13,22 +13,23 @@ from teleop_core.slave.slave import Slave
 from teleop_drill.drill import hand
 
 OVERSHOOT = 1.5
-"""Speed of the tip over that of its setpoint, at most: three equal poles with a zero at a third of
-them answer a step by a quarter too much
-(:func:`~teleop_core.slave.controllers.pid.critically_damped_gains`). A setpoint that turns
-round at full speed makes a step of twice its speed."""
+"""Largest speed of the tip divided by that of its setpoint: three equal poles with a zero at a third of them overshoot
+a step by a quarter
+(:func:`~teleop_core.slave.controllers.pid.critically_damped_gains`). A setpoint that reverses at full speed makes a
+step of twice its speed."""
 _STEP = 0.8
 """Largest of (3 x - x²) exp(-x), at x = 0.70: speed of a step's answer, over bandwidth and step."""
 _COAST = 0.84
-"""Way of such a loop beyond a setpoint that stops at once, in speeds over its pole: the maximum of
+"""Distance that such a loop moves beyond a setpoint that stops at once, in units of speed divided by pole: the maximum
+of
 :math:`(x + x^2) e^{-x}`, the answer to a ramp that ends."""
 WARNED = 2.0
-"""Two reports in ``diagnostics`` [s]: the first may still tell of what was before."""
+"""Time of two reports in ``diagnostics`` [s]: the first may still describe the time before the fault."""
 
 
 @dataclass(frozen=True)
 class Scheduling:
-    """How late this machine wakes a thread that is due, measured on the drill's own.
+    """How late this machine wakes a thread, measured on a thread of the drill.
 
     Attributes:
         usual: Median [s].
@@ -39,19 +40,19 @@ class Scheduling:
     worst: float = 0.0
 
     def beside(self, other: "Scheduling") -> "Scheduling":
-        """The worse of two."""
+        """The larger values of two measurements."""
         return Scheduling(max(self.usual, other.usual), max(self.worst, other.worst))
 
 
 @dataclass(frozen=True, eq=False)
 class Numbers:
-    """What a session's parameters and drives say.
+    """Numbers from a session's parameters and drives.
 
     Attributes:
         robot: The slave.
         gain: Motion of the tip per motion of the hand.
         speed_limit: Of each joint's drive, shape (n,) [rad/s or m/s].
-        braking: What each drive brakes, shape (n,) [rad/s² or m/s²].
+        braking: Deceleration of each drive, shape (n,) [rad/s² or m/s²].
         tool_speed: Largest speed of the tip's setpoint [m/s].
         command_timeout: Silence of commands after which the setpoint brakes [s].
         longest_outage: Silence after which the arm is PAUSED [s].
@@ -60,9 +61,9 @@ class Numbers:
         hand_timeout: Silence of the hand that lets go of the stylus [s].
         button_silence: Silence of the buttons that counts as a pressed clutch [s].
         effort_time: Time at the effort limit that is a fault [s].
-        pressing_time: Time beyond a joint's limit that is told [s].
+        pressing_time: Time beyond a joint's limit after which it is reported [s].
         filter_time: Time constant of the reference filter [s]; 0 without.
-        coast: Time for which the arm goes on, at its speed, after a setpoint that stops [s].
+        coast: Time for which the arm continues at its speed after its setpoint has stopped [s].
         bandwidth: Of the fastest drive [rad/s].
     """
 
@@ -90,12 +91,12 @@ class Numbers:
         return hand.SPEED * self.gain
 
     def catching_up(self, gap: float, *, by_drives: bool = False) -> float:
-        """Times the hand's speed at which the arm makes up for a gap [s].
+        """Speed at which the arm catches up after a gap [s], as a multiple of the hand's speed.
 
-        What the hand went meanwhile comes at once, and the filter makes it up, at first at the
-        whole of it in its time constant; after a longer pause hand and slave are aligned anew.
-        Of drives that stood still themselves the setpoint went on, and they make it up as a step:
-        with a triple pole w, and no derivative of the setpoint, by 0.8 w of it a second.
+        The hand's motion during the gap arrives at once as a step. The filter follows it at an initial speed of step
+        over time constant; after a longer pause hand and slave are aligned anew. If the drives themselves stood still,
+        the setpoint moved on without them, and they follow the difference as a step. With a triple pole w and no
+        derivative of the setpoint, their speed is at most 0.8 w times the step.
         """
         rate = 1.0 / max(self.filter_time, self.tick)
         if by_drives:

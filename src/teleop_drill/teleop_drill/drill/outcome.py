@@ -1,4 +1,4 @@
-"""Outcome: what was measured of one fault, and whether it is what was expected."""
+"""Outcome: the measurements of one fault, and whether they are as expected."""
 
 import math
 from dataclasses import dataclass, field
@@ -15,18 +15,18 @@ class Outcome:
     """One fault and what followed.
 
     Attributes:
-        exercise: What was done.
-        detected: Time until somebody said so [s]; NaN if nobody did.
-        told_by: Who said so first, and what.
-        told: Time until ``slave/operation`` told what was expected [s]; None if it did not.
+        exercise: The exercise that was run.
+        detected: Time until a node reported the fault [s]; NaN if none did.
+        told_by: First node that reported the fault, and its text.
+        told: Time until ``slave/operation`` reported the expected state [s]; None if it did not.
         state: Operating state that followed; None if the slave was gone.
-        fault: What it told.
+        fault: Fault that it reported.
         measures: All numbers that were measured, by name, each with its bounds.
-        recording: What became of the recording; empty until it has been looked at.
-        is_recorded: Whether that is as it should be.
+        recording: State of the recording in words; empty before it has been checked.
+        is_recorded: Whether the recording is as expected.
         recovered: Time from the end of the fault until the arm followed again [s]; NaN if never.
-        cure: What that took.
-        note: What else is to be said.
+        cure: What the arm needed to follow again.
+        note: Further remarks.
         load: Load of the machine over its cores, as the fault began.
     """
 
@@ -50,13 +50,13 @@ class Outcome:
         return self.measures.get(name, Measured(name, "", math.nan))
 
     def note_loss(self, seconds: float) -> None:
-        """Take note of how much of what the drill's own tap heard is not in the recording [s]."""
+        """Note the time of messages that the drill's own tap received and that are missing in the recording [s]."""
         text = "{0:.2f} s of a topic that the drill heard are not recorded, at most {1:.2f} s"
         most = self.exercise.lost
         self.measures["lost_s"] = Measured("lost_s", text, seconds, most, scale=1.0)
 
     def failures(self) -> list[str]:
-        """What is not as expected, in words."""
+        """Results that are not as expected, in words."""
         asked, found = self.exercise, []
         if self.state not in asked.states:
             wanted = " or ".join(_state(state) for state in asked.states)

@@ -13,9 +13,9 @@ FREEZE = 3.0
 """For how long a process is stopped [s]."""
 _STAGES = ("haptic_master", "motion_scaling", "inverse_kinematics")
 _LOOK = 0.01
-"""Time from one look of the slave at its clocks, or of the drill at a file, to the next [s]."""
+"""Time between two checks: of its clocks by the slave, or of a file by the drill [s]."""
 _PATIENCE_NS = 2_000_000_000
-"""Time in which a recorder shows for how long it keeps what came [ns]."""
+"""Time in which a recorder shows how long it buffers messages [ns]."""
 _HOUR_NS = 3_600_000_000_000
 
 
@@ -25,7 +25,7 @@ def _kill(node: str, rig: Rig) -> None:
 
 
 def _kill_writer(node: str, rig: Rig) -> None:
-    """Kill who records as soon as more waits for the disk than may be lost; else after a while."""
+    """Kill the recorder as soon as more data waits for the disk than may be lost; otherwise after a while."""
     written, since_ns = rig.written(), rig.now_ns()
     end_ns = since_ns + _PATIENCE_NS
     while (now_ns := rig.now_ns()) < end_ns and now_ns - since_ns <= 1e9 * LONGEST_LOSS:
@@ -74,7 +74,7 @@ def _step_clock(offset_ns: int, rig: Rig) -> None:
 
 
 def _killed(node: str) -> Exercise:
-    """Of a stage before the slave: its last command runs out, then the arm brakes."""
+    """Exercise that kills a stage before the slave: its last command times out, then the arm brakes."""
     return Exercise(
         name=f"kill_{node}", text=f"{node} killed", inject=partial(_kill, node),
         states=(State.PAUSED,), faults=(Fault.SILENCE,), cures=(Cure.RESTART,),
@@ -101,7 +101,7 @@ def _let_go(numbers: Numbers) -> float:
 
 
 def _broken(name: str, text: str, inject: Callable[[Rig], None]) -> tuple[Exercise, Exercise]:
-    """A stage that breaks in a process of its own, and in that of all."""
+    """Exercises with a stage that breaks: in its own process, and in the process of all stages."""
     alone = Exercise(
         name=name, text=text, inject=inject, undo=_mend, states=(State.PAUSED,),
         faults=(Fault.SILENCE,), cures=(Cure.RESTART,), told=outage, watch=2.6, ways=(False,),
@@ -120,7 +120,7 @@ def _broken(name: str, text: str, inject: Callable[[Rig], None]) -> tuple[Exerci
 
 
 PROCESSES = (
-    Exercise(  # the stylus is let go of, and the arm holds as with the clutch pressed
+    Exercise(  # the hand releases the stylus, and the arm holds its position as with the clutch pressed
         name="kill_operator", text="operator killed", inject=partial(_kill, "operator"),
         motion=Motion.HOLDS, allowed=_let_go, master=Master.DEVICE, watch=2.6, warns=True,
         ways=(False,),
@@ -201,4 +201,4 @@ PROCESSES = (
         ways=(True,), cuts_recording=True,
     ),
 )  # fmt: skip
-"""What becomes of processes and of the machine that they run on."""
+"""Faults of processes and of their machine."""

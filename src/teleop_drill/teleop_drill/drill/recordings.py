@@ -1,4 +1,4 @@
-"""Recordings of a drill: whether what was recorded can be opened, by us and by others."""
+"""Recordings of a drill: whether our reader and others can open them."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,25 +18,25 @@ from teleop_drill.drill.outcome import Outcome
 Counted = dict[str, tuple[Stamps, Stamps]]
 """Names of streams to the times at which messages were sent, and their stamps [ns]."""
 LONGEST_LOSS = 0.2
-"""What the end of a process may cost at most [s]."""
+"""Largest loss of recorded time when a process ends [s]."""
 DISCOVERY = 1.5
-"""Time after which the middleware has told all of a node that starts again [s]."""
-_REPORT_NS = 1_500_000_000  # after which a node has reported what it counted
+"""Time after which all processes have discovered a node that starts again [s]."""
+_REPORT_NS = 1_500_000_000  # time after which a node has reported its counts
 
 _ON_THE_WAY_NS = 5_000_000
-"""What was sent so long before a fault may still be on its way to the recorder as the fault begins [ns]; assumed: some
-ticks, and a turn of the recorder."""
+"""Messages sent within this time before a fault may not have reached the recorder when the fault begins [ns]; assumed:
+some ticks, and a turn of the recorder."""
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """What became of a recording.
+    """State of a recording.
 
     Attributes:
         text: In words.
-        is_good: Whether that is as it should be.
-        is_saved: Whether what was recorded up to its end can be read, if only after ``recover``.
-        bag: It, or what ``recover`` made of it, if it can be read.
+        is_good: Whether the state is as expected.
+        is_saved: Whether the recording can be read up to its end, possibly only after ``recover``.
+        bag: The recording, or the result of ``recover``, if it can be read.
     """
 
     text: str
@@ -104,7 +104,7 @@ def missing(bag: Bag, name: str, heard: tuple[Stamps, Stamps]) -> Stamps:
 
 
 def told_lost(bag: Bag, name: str, begin_ns: int, end_ns: int) -> int:
-    """How many messages of a topic the recorder itself told that it lost in a time [ns]."""
+    """Number of messages of a topic that the recorder itself reported as lost in an interval [ns]."""
     reports = bag.reports(DIAGNOSTICS) if DIAGNOSTICS.name in bag.topics else []
     key = f"lost.{name}"
     counts = [(one.stamp_ns, int(one.values[key])) for one in reports if key in one.values]
@@ -114,19 +114,19 @@ def told_lost(bag: Bag, name: str, begin_ns: int, end_ns: int) -> int:
 
 
 def within(heard: Counted, begin_ns: int, end_ns: int) -> Counted:
-    """Messages that were sent in a time [ns], its end left out."""
+    """Messages that were sent in an interval [ns], without its end."""
     chosen = {name: (sent >= begin_ns) & (sent < end_ns) for name, (sent, _) in heard.items()}
     return {name: (heard[name][0][own], heard[name][1][own]) for name, own in chosen.items()}
 
 
 @dataclass(frozen=True)
 class Recorded:
-    """A recording and what became of the session meanwhile.
+    """A recording, and the faults of the session during it.
 
     Attributes:
         path: Its directory.
         outcomes: Faults during it, each with its begin [ns].
-        heard: What the drill's own tap heard.
+        heard: Messages that the drill's own tap received.
         until_ns: When it was to end [ns].
         killed_ns: When its writer lost its process or its disk [ns]; None if it was to close it.
     """
@@ -139,7 +139,7 @@ class Recorded:
 
 
 def judge_recording(one: Recorded, tick: float) -> None:
-    """Say of each fault during a recording what it did to it; ticks [s] are a message each."""
+    """Write into each outcome the effect of its fault on the recording; one message is expected per `tick` [s]."""
     verdict = check_recording(one.path, one.killed_ns)
     until_ns = one.until_ns
     if one.killed_ns is not None:
@@ -156,7 +156,8 @@ def judge_recording(one: Recorded, tick: float) -> None:
             outcome.recording, outcome.is_recorded = "intact", True
         lost = {name: int(np.sum((ns >= begin_ns) & (ns < end_ns))) for name, ns in gone.items()}
         if Cure.RESTART in outcome.exercise.cures and verdict.bag is not None:
-            # What a node says before its listeners have found it, if the recorder tells of it.
+            # Messages that a node sends before its readers have discovered it are accepted as missing if the recorder
+            # reports them.
             for name, count in lost.items():
                 told = told_lost(verdict.bag, name, begin_ns, end_ns) if count else 0
                 lost[name] = count - min(told, round(DISCOVERY / tick))
@@ -164,7 +165,7 @@ def judge_recording(one: Recorded, tick: float) -> None:
 
 
 def _repeats(stamps: Stamps) -> Stamps:
-    """How many equal ones come before each, shape (N,)."""
+    """Number of equal stamps before each stamp, shape (N,)."""
     order = np.argsort(stamps, kind="stable")
     ordered = stamps[order]
     begins = np.flatnonzero(np.diff(ordered, prepend=ordered[:1] - 1))

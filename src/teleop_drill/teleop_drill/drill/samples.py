@@ -20,11 +20,11 @@ from teleop_drill.drill.hand import Distortion
 
 _FOR = 1.0  # how long a stream is disturbed [s]
 _AHEAD_NS = 2_000_000_000
-_WATCH = 0.5  # for which an arm that goes on is watched afterwards [s]
+_WATCH = 0.5  # time for which an arm that keeps moving is observed afterwards [s]
 _SLOW = 0.05  # tool speed under which the hand shakes [m/s]
 _SHAKE, _SHAKES = 0.02, 3.0  # amplitude [m] and frequency [Hz] of a hand that shakes
-_PRESS, _STAY = 1.0, 1.5  # times in which a joint goes to its limit, and is pressed into it [s]
-_SHARE = 0.5  # of the hand's speed at which the tip goes there
+_PRESS, _STAY = 1.0, 1.5  # time for the motion of a joint to its limit, and time for pressing into the limit [s]
+_SHARE = 0.5  # share of the hand's speed with which the tip moves there
 _SHAKEN = hand.SPEED + 2.0 * math.pi * _SHAKE * _SHAKES
 
 
@@ -47,7 +47,7 @@ def _disturbed(
     stands: Time = never,
     warns: bool = False,
 ) -> Exercise:
-    """A hand whose samples do not arrive as they are: it is followed, or held as if clutched."""
+    """Exercise with distorted samples of the hand: the arm follows, or holds as if clutched."""
     is_going = motion is Motion.GOES_ON
     return Exercise(
         name=name,
@@ -62,7 +62,7 @@ def _disturbed(
 
 
 def _shake(rig: Rig) -> None:
-    """A hand far faster than the tool may be."""
+    """Move the hand far faster than the speed limit of the tool."""
     rig.set("slave", "operation.tool_speed", _SLOW)
     rig.mark()
     rig.distort(hand.shaken(_SHAKE, _SHAKES))
@@ -76,13 +76,13 @@ def _calm(rig: Rig) -> None:
 
 
 def _press_limit(rig: Rig) -> None:
-    """Drive a joint into the end of its range, keep on, and go back."""
+    """Drive a joint into the limit of its range, keep pressing, and go back."""
     rig.distort(hand.silent)
-    rig.wait(0.3)  # after which others may drive the arm
+    rig.wait(0.3)  # time after which other clients may drive the arm
     ways, tip = rig.way_to_limit()
     seconds = max(_PRESS, tip / (_SHARE * hand.SPEED))
     speeds = ways / seconds
-    rig.drive(speeds, seconds - _PRESS)  # a long way is gone as slowly as the hand goes
+    rig.drive(speeds, seconds - _PRESS)  # over a long distance the tip moves at the speed of the hand
     rig.mark()
     rig.drive(speeds, _PRESS + _STAY)
     rig.drive(-speeds, _PRESS)
@@ -128,7 +128,7 @@ def _spoof(rig: Rig) -> None:
 
 
 def _garble(topic: Topic, rig: Rig) -> None:
-    """Bytes that are no message of the topic."""
+    """Send bytes that are not a message of the topic."""
     rng = np.random.default_rng(1)
     rig.mark()
     for length in (0, 1, 3, 4, 5, 8, 16, 64, 200, 1000):
@@ -153,7 +153,7 @@ def _leave_all(topics: tuple[Topic, ...], rig: Rig) -> None:
 
 
 def _flood(rig: Rig) -> None:
-    """As many samples as go through, all of the hand's own place a moment ago."""
+    """Send as many samples as possible, all with the hand's own pose a moment ago."""
     rig.mark()
     place = hand.circle(0.0)
     for _ in range(20_000):
@@ -233,4 +233,4 @@ SAMPLES = (
         states=(State.ENABLED, State.PAUSED), cures=(Cure.NOTHING, Cure.RESUME),
     ),
 )  # fmt: skip
-"""What becomes of messages on their way, or comes from others."""
+"""Faults of messages in transport, and messages from others."""

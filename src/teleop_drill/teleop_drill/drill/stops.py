@@ -1,4 +1,4 @@
-"""Exercises with what people do: stop buttons, their silence, wrong parameters."""
+"""Exercises with actions of people: stop buttons, silent buttons, wrong parameters."""
 
 import math
 from functools import partial
@@ -11,13 +11,13 @@ from teleop_drill.drill.inside import RACES, STICKS, WORKS
 HEARTBEAT = 0.5
 """Silence of the stop button that counts as pressed, while it is drilled [s]."""
 _SERVICE = 0.02
-"""What a service may take to reach the arm's loop through the executors of both sides [s]."""
+"""Time in which a service call must reach the arm's loop, through the executors of both sides [s]."""
 _RACE = 0.1
-"""Time in which a joint at twice its speed is to be found: the drill pushes it every 5 ms [s]."""
+"""Time in which the slave must detect a joint at twice its speed [s]; the drill pushes the joint every 5 ms."""
 _STILL = 0.3  # less than what pauses the arm [s]
 _BEAT = 0.02  # from one message of a stop button to the next [s]
 _REFUSED = "refused"
-_ROUNDS = 2.0  # within this time [s] the circle of the hand has pulled every way
+_ROUNDS = 2.0  # within this time [s] the circle of the hand has pulled in every direction
 
 
 def _press(rig: Rig) -> None:
@@ -28,7 +28,7 @@ def _press(rig: Rig) -> None:
 def _press_briefly(rig: Rig) -> None:
     """A press that a short queue would lose: one message, then many that say released.
 
-    The process of the slave stands still meanwhile, so that all of them wait for it.
+    The process of the slave stands still during this time, so that all these messages wait for it.
     """
 
     def press() -> None:
@@ -82,7 +82,7 @@ def _note_answer(rig: Rig, *, is_taken: bool) -> None:
 def _press_while_masked(rig: Rig) -> None:
     """Press and ask for a reset; then release, and ask for motion without a reset."""
     rig.press(is_pressed=True)
-    rig.wait(0.5)  # until it is at rest: before, enable is refused anyway
+    rig.wait(0.5)  # until the arm is at rest: before that, enable is refused anyway
     is_taken = rig.command("reset")
     rig.press(is_pressed=False)
     is_taken = rig.command("enable") or rig.command("resume") or is_taken
@@ -106,7 +106,7 @@ def _resume_early(rig: Rig) -> None:
 
 
 def _hold_fast(fault: Fault, rig: Rig) -> None:
-    """Friction that no drive overcomes: as a payload far too heavy, or a hand that holds."""
+    """Friction that no drive overcomes, like a payload that is far too heavy, or a hand that holds the arm."""
     others = [one.word for one in _STUCK if one is not fault]
     rig.set("slave", "operation.reported", others)
     if fault is Fault.TIP:
@@ -116,7 +116,7 @@ def _hold_fast(fault: Fault, rig: Rig) -> None:
 
 
 def _run_away(rig: Rig) -> None:
-    """A drive that obeys nobody: one joint races, and its speed alone may stop the arm."""
+    """A drive that follows no command: one joint races, and only the check of its speed may stop the arm."""
     rig.set("slave", "operation.reported", [one.word for one in _STUCK if one is not Fault.OVERSPEED])
     rig.mark()
     rig.control(RACES)
@@ -132,9 +132,9 @@ _STUCK = (Fault.TRACKING, Fault.TIP, Fault.EFFORT, Fault.OVERSPEED)
 
 
 def _stuck(fault: Fault, told: Time) -> Exercise:
-    """Exercise with joints that do not move, for one fault; the other faults that would find it only report.
+    """Exercise with joints that do not move, for one fault; other faults that detect this are only reported.
 
-    The drives are off then; the setpoint goes back to the arm, across the circle at worst.
+    The drives are off after the fault; the setpoint moves back to the arm, at worst across the whole circle.
     """
     return Exercise(
         name=f"stuck_{fault.word}", text=f"joints held fast; {fault.word} alone may stop them",
@@ -152,7 +152,7 @@ def _take_bad_gains(rig: Rig) -> None:
 
 
 def _take_slack_gains(rig: Rig) -> None:
-    """A bandwidth at which the arm follows nothing."""
+    """A bandwidth so low that the arm follows no motion."""
     rig.mark()
     is_taken = rig.set("slave_sim", "controller.pid.bandwidth", [0.1] * len(rig.setpoint()))
     _note_answer(rig, is_taken=is_taken)
@@ -226,4 +226,4 @@ STOPS = (
         undo=_take_good_gains, motion=Motion.GOES_ON, watch=2.0, said=_REFUSED,
     ),
 )  # fmt: skip
-"""What people do, rightly and wrongly."""
+"""Exercises with correct and wrong actions of people."""

@@ -1,4 +1,4 @@
-"""Conformance: looks at a CRTK arm from outside, its topics first, then what it does when told.
+"""Conformance: tests a CRTK arm from outside, first its topics, then its reactions to commands.
 
 It is a stock client: reliable, keep last, stamped with the time of the machine. The arm needs no software of this
 project.
@@ -28,10 +28,10 @@ def examine(arm: Arm, *, may_move: bool, report: Report = lambda _: None, robot:
 
     Args:
         arm: The arm.
-        may_move: Whether states are commanded and small motions made: a few millimetres and
-            hundredths of a radian, each back again.
-        report: Told what is done now.
-        robot: What it should be; its forward kinematics are held against the measured tip.
+        may_move: Whether the test commands states and small motions: a few millimetres and hundredths of a radian,
+            each back again.
+        report: Called with a text for each step.
+        robot: Expected robot; its forward kinematics are compared with the measured tip.
     """
     findings: dict[str, Finding] = {}
     for row in CRTK_TOPICS:
@@ -46,7 +46,7 @@ def examine(arm: Arm, *, may_move: bool, report: Report = lambda _: None, robot:
 
 
 def left_behind(arm: Arm, *, may_move: bool) -> str:
-    """How a test that was interrupted leaves an arm, in words."""
+    """State in which an interrupted test leaves an arm, in words."""
     if not may_move:
         return "nothing was commanded"
     state = arm.newest("operating_state", 0.5)
@@ -99,10 +99,10 @@ def _try(arm: Arm, findings: dict[str, Finding], report: Report, robot: Robot | 
 
 
 def _watched(trials: Trials, name: str, findings: dict[str, Finding], robot: Robot | None) -> Outcome:
-    """Try a command; what the arm measures meanwhile must be what it was told.
+    """Test a command; the measurement of the arm during the motion must agree with the command.
 
-    A command that moved the setpoint alone moved nothing. From outside nobody knows which of the two is wrong, so both
-    rows fail.
+    A command that moved only the setpoint did not move the arm. From outside it is unknown which of the two is wrong,
+    so both rows fail.
     """
     watch = Watch(trials.arm, None if robot is None else robot.fk)
     verdict, note = TRIALS[name](trials)

@@ -16,17 +16,17 @@ from teleop_drill.conformance.crtk_topics import CRTK_TOPICS
 
 _BY_NAME = {row.name: row for row in CRTK_TOPICS}
 _TURN = 0.005
-_SETTLED = 15  # tenths of a second without new ends after which all are known
+_SETTLED = 15  # tenths of a second without a new publisher or reader after which discovery counts as complete
 
 
 class Tap:
-    """What comes on one topic: how many messages, and the newest.
+    """Messages of one topic: their number, and the newest one.
 
     Args:
         node: Node that listens.
         name: Full name of the topic.
         ros_type: Type of its messages.
-        depth: How many may wait.
+        depth: Largest number of waiting messages.
     """
 
     def __init__(self, node: Node, name: str, ros_type: str, depth: int = 2000) -> None:
@@ -38,10 +38,10 @@ class Tap:
         self._kept: list[tuple[int, bytes]] = []
 
     def read(self, every: Callable[[Any], None] | None = None) -> int:
-        """Read what has come; returns how many messages there were.
+        """Read all waiting messages; returns their number.
 
         Args:
-            every: Called with each of them; without it only the newest is read.
+            every: Called with each message; without it only the newest message is decoded.
         """
         data, count = None, 0
         while (taken := self._taker.take()) is not None:
@@ -55,7 +55,7 @@ class Tap:
         return count
 
     def drain(self) -> bool:
-        """Keep what has come, unread; returns whether anything is kept."""
+        """Keep all waiting messages undecoded; returns whether any message is kept."""
         while (taken := self._taker.take()) is not None:
             self._kept.append((taken.sent_ns, taken.data))
         return bool(self._kept)
@@ -74,7 +74,7 @@ class Arm(Guest):
     world: Middleware and time of the client.
 
     Attributes:
-        interrupt: What ends a wait with KeyboardInterrupt.
+        interrupt: Ends a wait with KeyboardInterrupt.
 
     Raises:
         MessageTypeError: A package of messages is not installed, such as crtk_msgs.
@@ -98,7 +98,7 @@ class Arm(Guest):
     # -- what is there ---------------------------------------------------------------------------
 
     def is_there(self, timeout: float) -> bool:
-        """Whether any of its topics appears within a time [s]; then waits until all have."""
+        """Whether any of its topics appears within a time [s]; if so, wait until no more topics appear."""
         if not self.wait(lambda: self._ends() > 0, timeout):
             return False
         counts = [0]
@@ -108,15 +108,15 @@ class Arm(Guest):
         return True
 
     def _ends(self) -> int:
-        """How many publishers and readers its topics have, beside us."""
+        """Number of publishers and readers of its topics, without our own."""
         return sum(len(self.publishers(r.name)) + len(self.readers(r.name)) for r in CRTK_TOPICS)
 
     def publishers(self, name: str) -> list[Endpoint]:
-        """Who sends a topic, beside us."""
+        """Publishers of a topic, without our own."""
         return [end for end in self.ros.publishers(self.path(name)) if end.node != self._own]
 
     def readers(self, name: str) -> list[Endpoint]:
-        """Who reads a topic, beside us."""
+        """Readers of a topic, without our own."""
         return [end for end in self.ros.readers(self.path(name)) if end.node != self._own]
 
     def others(self, name: str) -> int:
@@ -128,7 +128,7 @@ class Arm(Guest):
     # -- listening and speaking ------------------------------------------------------------------
 
     def tap(self, name: str) -> Tap:
-        """What comes on one of its topics, from the first call on."""
+        """Tap of one of its topics, which receives messages from the first call on."""
         if name not in self._taps:
             self._taps[name] = Tap(self.ros, self.path(name), _BY_NAME[name].ros_type)
         return self._taps[name]
@@ -139,17 +139,17 @@ class Arm(Guest):
             self._taps.pop(name).close()
 
     def keep(self, names: list[str], timeout: float = 2.0) -> None:
-        """Keep all messages of some topics, beside what :meth:`tap` takes.
+        """Keep all messages of some topics, in addition to those of :meth:`tap`.
 
-        Returns once there is one of each, or after a time [s]: until a publisher has found a new
-        reader, nothing that it sends is kept, and a motion that begins earlier is not seen whole.
+        Returns when each topic has a message, or after a time [s]. Until a publisher has discovered the new reader,
+        its messages are missed, and a motion that begins earlier would be incomplete.
         """
         made = [Tap(self.ros, self.path(name), _BY_NAME[name].ros_type) for name in names]
         self._keeping.update(zip(names, made, strict=True))
         self.wait(lambda: all(tap.drain() for tap in made), timeout)
 
     def kept(self) -> dict[str, list[tuple[int, Any]]]:
-        """What was kept, with the times at which it was sent [ns]; nothing is kept any longer."""
+        """Kept messages, with the times at which they were sent [ns]; ends the keeping."""
         found = {}
         for name, tap in self._keeping.items():
             tap.drain()
@@ -175,7 +175,7 @@ class Arm(Guest):
         """Publisher of a command, once the arm reads it."""
         row = _BY_NAME[name]
         if row.name not in self._publishers:
-            quality = Qos(is_latched=row.name == "state_command")  # as the stock client has it
+            quality = Qos(is_latched=row.name == "state_command")  # as in the stock client
             own = self.ros.create_publisher(message_type(row.ros_type), self.path(row.name), quality)
             self._publishers[row.name] = own
             self.wait(lambda: own.get_subscription_count() > 0, 3.0)

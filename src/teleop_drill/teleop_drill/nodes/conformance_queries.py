@@ -1,4 +1,4 @@
-"""Queries: whether a topic is there, of the right type, sound, stamped, and for every reader."""
+"""Queries: whether a topic exists, has the right type, valid numbers and stamps, and reaches every reader."""
 
 from itertools import pairwise
 from typing import Any
@@ -12,7 +12,7 @@ from teleop_drill.nodes.conformance_arm import Arm, numbers_of, stamp_of
 
 _LOOK = 0.5  # time in which messages are counted [s]
 _FIRST = 2.5  # time within which the first must come [s]
-_OLD = 1.0  # a measurement may lie back by this [s]
+_OLD = 1.0  # largest age of a measurement [s]
 _UNIT = 1e-3
 
 

@@ -17,10 +17,10 @@ TURN = 0.01
 """How far a joint is moved [rad or m]."""
 WAY = 0.003
 """How far the tip is moved [m]."""
-_NEAR = 0.05  # share of the way that may be missing in the end
-_MOVED = 0.3  # share of the way that is a motion at all
+_NEAR = 0.05  # share of the displacement that may be missing at the end
+_MOVED = 0.3  # least share of the displacement that counts as a motion
 _PATIENCE = 10.0  # of a move [s]
-_NOTHING = 1.5  # without any motion for so long nothing will come [s]
+_NOTHING = 1.5  # after this time without any motion, none is expected [s]
 _STATE = 3.0  # of a change of state [s]
 _STILL = 1e-4  # joints that moved by less stand still [rad or m]
 Outcome = tuple[Verdict, str]
@@ -37,10 +37,11 @@ class Trials:
     def __init__(self, arm: Arm) -> None:
         self.arm = arm
         self._start = np.empty(0)
-        self._joint, self._axis = ((-1, 0.0), (-1, 0.0))  # of which the direction is free, and its sign
+        self._joint, self._axis = ((-1, 0.0), (-1, 0.0))  # joint or axis whose direction is known to be free, and the
+        # sign
 
     def unfit(self) -> str:
-        """Why nothing can be tried; empty if it can."""
+        """Reason why no trial is possible; empty if trials are possible."""
         state = self.arm.newest("operating_state", 3.0)
         if state is None:
             return "no operating_state: whether it may be moved is not known"
@@ -57,7 +58,7 @@ class Trials:
     # -- where it is -----------------------------------------------------------------------------
 
     def joints(self) -> Array:
-        """Its joints: where it is told to be, or else where it is."""
+        """Its joints: the setpoint, or the measurement if there is no setpoint."""
         name = "setpoint_js" if self.arm.publishers("setpoint_js") else "measured_js"
         return self._fresh(name)["position"]
 
@@ -88,7 +89,7 @@ class Trials:
     # -- commands --------------------------------------------------------------------------------
 
     def state_command(self) -> Outcome:
-        """Pause, refuse to move, resume; words that are no commands change nothing."""
+        """Pause, refuse to move, resume; unknown commands must change nothing."""
         arm = self.arm
         self._say("no such command")
         arm.pause(0.3)
@@ -121,7 +122,7 @@ class Trials:
         return self.arm.wait(lambda: self._state() == state, _STATE)
 
     def move_joints(self, name: str, *, is_relative: bool) -> Outcome:
-        """Move a joint and back; busy meanwhile, and not afterwards."""
+        """Move a joint and back; the arm must report busy during the motion, and not afterwards."""
         for joint, sign in self._candidates(self._joint, len(self._start)):
             begin = self.joints()
             step = np.zeros(len(begin))
@@ -133,13 +134,13 @@ class Trials:
         return Verdict.FAILED, "no joint moves, neither way"
 
     def _move(self, name: str, begin: Array, goal: Array, sent: Array) -> Outcome | None:
-        """What became of a move of joints; None if nothing moved."""
+        """Result of a move of joints; None if nothing moved."""
         message = self.arm.message(name, position=sent.tolist())
         off = partial(self._off, self.joints, goal)
         return self._watch_move(name, message, off, float(np.abs(goal - begin).max()))
 
     def move_tip(self, name: str) -> Outcome:
-        """Move the tip by a few millimetres; busy meanwhile, and not afterwards."""
+        """Move the tip by a few millimetres; the arm must report busy during the motion, and not afterwards."""
         for axis, sign in self._candidates(self._axis, 3):
             p, q = self.place()
             goal = p.copy()
@@ -174,7 +175,7 @@ class Trials:
         return (Verdict.FAILED, "still busy at its goal") if tap.newest.is_busy else _OK
 
     def _candidates(self, known: tuple[int, float], count: int) -> list[tuple[int, float]]:
-        """Directions to try: the one that is known to be free, or all."""
+        """Directions to try: only the one that is known to be free, or all."""
         return [known] if known[0] >= 0 else list(product(range(count), (1.0, -1.0)))
 
     def stream_joints(self, name: str, rate: float, *, is_relative: bool = False) -> Outcome:
@@ -219,7 +220,7 @@ class Trials:
     def _stream(
         self, name: str, rate: float, sent: Callable[[float, float], Any], where: Callable[[], float]
     ) -> Outcome | None:
-        """What became of a stream whose share of the way rises to 1 and falls to 0."""
+        """Result of a stream whose share of the displacement rises to 1 and falls to 0."""
         self.arm.publisher_of(name)
         count, last, farthest = round(2.0 * rate), 0.0, 0.0
         for i in range(count + 1):
@@ -260,7 +261,7 @@ class Trials:
         return Verdict.FAILED, "the tip runs along no axis, neither way"
 
     def _run(self, name: str, message: Any, halt: Any, where: Callable[[], float]) -> Outcome | None:
-        """What became of half a second at twice the way per second."""
+        """Result of half a second at a speed of twice the displacement per second."""
         self.arm.publisher_of(name)
         for _ in range(25):
             self.arm.send(name, message)

@@ -1,4 +1,4 @@
-"""Watch of a conformance test: all that an arm measures while it is told to move."""
+"""Watch of a conformance test: all measurements of an arm during a commanded motion."""
 
 from collections.abc import Callable
 
@@ -12,16 +12,16 @@ from teleop_drill.nodes.conformance_arm import Arm, numbers_of, stamp_of
 JOINTS, TIP = "measured_js", "measured_cp"
 _NAMES = ("setpoint_js", JOINTS, "setpoint_cp", TIP, "measured_cv")
 _JOINT_WAY, _TIP_WAY = 3e-3, 1e-3
-"""Ways of joints [rad or m] and of the tip [m] below which nothing is compared."""
-_AFTERWARDS = 0.5  # for which it is watched after a motion: who is late comes now [s]
+"""Smallest displacements of joints [rad or m] and of the tip [m] that are compared."""
+_AFTERWARDS = 0.5  # time of observation after a motion, for delayed measurements [s]
 
 
 class Watch:
-    """Everything that an arm measures, from making to :meth:`lies`.
+    """All measurements of an arm, from the creation of this object to :meth:`lies`.
 
     Args:
         arm: The arm.
-        fk: Its forward kinematics: joints (n,) to the tip's pose (4, 4); None if nobody gave any.
+        fk: Its forward kinematics: joints (n,) to the tip's pose (4, 4); None if they are unknown.
     """
 
     def __init__(self, arm: Arm, fk: Callable[[Array], Array] | None) -> None:
@@ -29,7 +29,7 @@ class Watch:
         arm.keep([name for name in _NAMES if arm.publishers(name)])
 
     def lies(self) -> dict[str, str]:
-        """What does not agree, by the topic that says it; ends the watch."""
+        """Disagreements by topic; ends the watch."""
         self._arm.pause(_AFTERWARDS)
         trails = {name: _trail(messages) for name, messages in self._arm.kept().items()}
         none = _trail([])
@@ -59,7 +59,7 @@ def _trail(messages: list[tuple[int, object]]) -> Trail:
 
 
 def _with_places(twist: Trail, tip: Trail) -> Trail:
-    """Speeds of the tip with the places at their stamps."""
+    """Velocities of the tip, with the positions at the same stamps."""
     if not len(twist) or not len(tip):
         return Trail(twist.sent[:0], twist.stamp[:0], np.empty((0, 3)), np.empty((0, 3)))
     at = np.clip(np.searchsorted(tip.stamp, twist.stamp), 0, len(tip) - 1)

@@ -35,10 +35,10 @@ _CIRCLE = (
     "operator.patience=0.0",
     "operator.rotation=0.0",
 )
-_MEASURED = 2.0  # time in which this machine's own lateness is measured [s]
-_STOOD_STILL = 0.5  # of the command timeout: nobody can judge an arm on a machine that does
-_MORE = 2  # times that an exercise is done again for that reason
-_STEADY = 4  # looks, a tenth of a second apart, at an arm that follows
+_MEASURED = 2.0  # time in which the wake-up delay of this machine is measured [s]
+_STOOD_STILL = 0.5  # share of the command timeout: if the machine stands still that long, a result is not valid
+_MORE = 2  # how often an exercise is repeated for that reason
+_STEADY = 4  # checks, a tenth of a second apart, that the arm follows
 Say = Callable[[str], None]
 
 
@@ -53,10 +53,10 @@ def drill(
     drives: Sequence[str] = (),
     arm: Sequence[str] = (),
 ) -> list[Outcome]:
-    """Do exercises in sessions of their own, on a ROS domain of their own.
+    """Run exercises in separate sessions, on a separate ROS domain.
 
-    Loops and the drill's own tap take SCHED_FIFO where the system grants it and ``texts`` name no
-    priority: seven processes on two cores are late by themselves.
+    Loops and the drill's own tap take SCHED_FIFO if the system grants it and ``texts`` set no priority, because seven
+    processes on two cores are late even without a fault.
 
     Args:
         exercises: What is done, as of :func:`teleop_drill.drill.chosen`.
@@ -65,10 +65,10 @@ def drill(
         is_composed: Whether all nodes share one process.
         files: Parameter files over the scenario ``free_motion``.
         texts: Parameters ``key=value`` over all files.
-        drives: Command of drives that the slave leads in place of the simulated ones, with its
-            arguments; exercises that break the simulator are left out.
-        arm: Command of what the drives lead, such as the controller of a real arm. It is started
-            before them, and nothing is done to it.
+        drives: Command line of drives that replace the simulated ones; exercises that break the simulator are left
+            out.
+        arm: Command line of the process that the drives command, such as the controller of a real arm. It is started
+            before them, and the drill does not break it.
 
     Raises:
         TeleopError: A parameter is wrong, or a session cannot be started.
@@ -86,7 +86,8 @@ def drill(
 
 
 Sites = Callable[[Master, Configuration, Path, Interrupt], Site]
-"""Where a session is drilled, by who moves the hand, what runs, where files go, what ends it."""
+"""Makes the site of a session from the source of the hand's motion, the configuration, the folder of files, and the
+interrupt."""
 
 
 def drill_at(
@@ -141,7 +142,7 @@ class _Drill:
         """Whether it was stopped before its end."""
 
     def run(self, exercises: Sequence[Exercise]) -> list[Outcome]:
-        """Do them, and look at the recordings when all is over."""
+        """Run the exercises, and check the recordings at the end."""
         outcomes: list[Outcome] = []
         try:
             for exercise in exercises:
@@ -171,7 +172,7 @@ class _Drill:
     # -- sessions --------------------------------------------------------------------------------
 
     def _prepared(self) -> LiveRig:
-        """As :meth:`_ready`; a session that cannot go on is given up once."""
+        """As :meth:`_ready`; if a session cannot continue, a new one is tried once."""
         if self._rig is None:
             return self._ready()
         try:
@@ -206,7 +207,7 @@ class _Drill:
         self._say(f"this machine is late by {late}; twice the worst is granted to every time")
 
     def _await_following(self, rig: LiveRig) -> None:
-        """Wait until the slave follows, and help it; raises SessionError where it does not."""
+        """Wait until the slave follows, and help it; raises SessionError if it does not follow."""
         deadline = rig.now() + _FOLLOWS
         steady = 0
         while steady < _STEADY:
@@ -246,7 +247,7 @@ class _Drill:
         return outcome
 
     def _repeated(self, exercise: Exercise, rig: LiveRig) -> Outcome:
-        """The worst of all repetitions, which end with the first that fails; medians as well."""
+        """The worst of all repetitions, which end with the first failure, with the medians of all."""
         found = [self._once(exercise, rig)]
         while len(found) < exercise.repeats and not found[-1].failures():
             try:
@@ -289,7 +290,7 @@ class _Drill:
 
 
 def _configuration(master: Master, files: Sequence[Path], texts: Sequence[str]) -> Configuration:
-    """Configuration of a session: the hand goes round at constant speed."""
+    """Configuration of a session in which the hand moves on a circle at constant speed."""
     own: tuple[str, ...] = _CIRCLE
     if master is Master.DRILL:
         load_own_parts([Path(inside.__file__)])

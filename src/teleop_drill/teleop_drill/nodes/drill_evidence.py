@@ -1,4 +1,4 @@
-"""Evidence of a drill: what a session says of a fault, what the tap hears, what recovery takes."""
+"""Evidence of a drill: the reports of a session about a fault, the messages of the tap, and the recovery."""
 
 from teleop_core.graph import topics
 from teleop_core.slave.operation import Fault, State
@@ -14,7 +14,7 @@ _STRENGTH = (Cure.NOTHING, Cure.RESUME, Cure.RESET, Cure.RESTART)
 
 
 def note_state(outcome: Outcome, rig: LiveRig, before: dict[str, float]) -> None:
-    """State that followed, and who told first."""
+    """Note the state that followed, and the node that reported it first."""
     begin_ns = rig.begin_ns
     told: list[tuple[int, str]] = []
     for sent_ns, report in rig.tap.reports(topics.SLAVE_OPERATION):
@@ -37,10 +37,10 @@ def note_state(outcome: Outcome, rig: LiveRig, before: dict[str, float]) -> None
 
 
 def seen_of(outcome: Outcome, rig: LiveRig, time_ns: tuple[int, int], scheduling: Scheduling) -> Seen:
-    """What the tap has heard of a fault, beside what the slave says of itself.
+    """Messages of the tap about a fault, and the reports of the slave about itself.
 
     Args:
-        outcome: With what was told.
+        outcome: Outcome with the reports.
         rig: The session.
         time_ns: Begin and end of the fault [ns].
         scheduling: How late this machine was at the start.
@@ -49,7 +49,7 @@ def seen_of(outcome: Outcome, rig: LiveRig, time_ns: tuple[int, int], scheduling
     true_cp, measured_cp, setpoints, joints = rig.tap.traces(
         topics.SLAVE_TRUE_CP, topics.SLAVE_MEASURED_CP, topics.SLAVE_SETPOINT_JS, topics.SLAVE_MEASURED_JS
     )
-    tip = true_cp if len(true_cp) else measured_cp  # the true one only a simulator tells
+    tip = true_cp if len(true_cp) else measured_cp  # only a simulator publishes the true pose
     told_ns = None if outcome.told is None else begin_ns + round(1e9 * outcome.told)
     warned = [ns for ns in rig.warned.values() if ns >= begin_ns]
     return Seen(

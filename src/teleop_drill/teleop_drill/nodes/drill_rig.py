@@ -34,11 +34,11 @@ from teleop_drill.nodes.drill_tap import Tap
 _NUMBERS = re.compile(r"[-+]?[0-9][0-9.e]*")
 _SLAVE = ("slave", "slave_sim")
 _TEXTS = ("operation.reported",)
-_PERIOD_NS = 1_000_000_000  # of reports: what comes later tells of the time since the fault
+_PERIOD_NS = 1_000_000_000  # period of reports: later reports describe the time after the fault
 _ANSWER = 3.0  # patience with a service [s]
 _FOUND = 3.0  # patience with discovery [s]
 _DRIVE_PERIOD = 0.01
-_FRESH = 0.3  # a setpoint that is older is none of a running slave [s]
+_FRESH = 0.3  # an older setpoint does not come from a running slave [s]
 
 
 class LiveRig:
@@ -62,8 +62,9 @@ class LiveRig:
         self._node, self._own = Guest("drill", domain, world), Guest("drill_hand", domain, world)
         self._executor = self._node.world.executor()
         self._executor.add_node(self._node.ros)
-        # Latched, as a good button is: who keeps no state counts as pressed until it speaks. Made long before they are
-        # pressed: a message sent while a button and the slave discover each other comes a tenth of a second later.
+        # Latched, as a good button is: a button that keeps no state counts as pressed until it sends. Created long
+        # before they are pressed, because a message sent during discovery between button and slave arrives a tenth of
+        # a second late.
         self._buttons = [
             self._node.ros.create_publisher(Bool, STOP_TOPIC, Qos(depth=100, is_latched=True)) for _ in range(2)
         ]
@@ -98,12 +99,12 @@ class LiveRig:
         self._warned_before = self._warnings()
 
     def _warnings(self) -> dict[str, str]:
-        """What each node warns of now, but for the numbers, which change with every report."""
+        """Present warnings of each node, without numbers, because numbers change with every report."""
         told = self.observer.statuses.items()
         return {n: _NUMBERS.sub("", s.message) for n, s in told if s.level >= WARNING}
 
     def note(self, text: str) -> None:
-        """Say something that belongs beside the state."""
+        """Add a note, which the table shows beside the state."""
         self.said = text
 
     def now_ns(self) -> int:
@@ -133,9 +134,9 @@ class LiveRig:
         return np.array(rows[-1] if len(rows) else self._robot.home)
 
     def way_to_limit(self) -> tuple[Array, float]:
-        """Way (n,) of one joint, that which moves the tip least, to its nearer limit [rad or m].
+        """Displacement (n,) to the nearer limit of the joint that moves the tip least [rad or m].
 
-        With it the way of the tip, as it sets out [m].
+        Also returns the resulting displacement of the tip, by its initial speed [m].
         """
         q, robot = self.setpoint(), self._robot
         up, down = robot.upper - q, robot.lower - q
@@ -158,10 +159,10 @@ class LiveRig:
         return reports[-1][1] if reports else {}
 
     def is_following(self) -> bool:
-        """Whether the slave is at work, enabled and homed, and its arm goes where the hand leads.
+        """Whether the slave runs, is enabled and homed, and its arm follows the hand.
 
-        An arm that makes up slowly for what it lags behind, or that is driven, moves too, while
-        nothing leads it.
+        Motion alone is no proof: an arm that slowly catches up, or that another client drives, also moves without
+        following the hand.
         """
         operation, told = self.operation(), self.tap.reports(TELEOP_STATE)
         if told and not told[-1][1]["is_following"]:
@@ -181,7 +182,7 @@ class LiveRig:
         return wanted, measured
 
     def complaints(self) -> str:
-        """What nodes complain of, in one line."""
+        """Complaints of the nodes, in one line."""
         age = self.tap.age(SLAVE_SETPOINT_JS)
         told = [f"{n}: {s.message}" for n, s in self.observer.statuses.items()]
         moved, went = (int(np.sum(np.any(np.diff(rows, axis=0) != 0.0, axis=1))) for rows in self._recent_joints())
@@ -201,7 +202,7 @@ class LiveRig:
         return sum(file.stat().st_size for file in self.session.recordings[-1].glob("*.mcap"))
 
     def freeze(self, node: str, seconds: float, meanwhile: Callable[[], None] = lambda: None) -> None:
-        """Stop a node's process for a time [s], do something, then let it go on."""
+        """Stop a node's process for a time [s], call `meanwhile` during the stop, then let the process continue."""
         self.mark()
         self.session.send(node, signal.SIGSTOP)
         begin = self.now()
@@ -214,7 +215,7 @@ class LiveRig:
             self.session.send(node, signal.SIGCONT)
 
     def limit_files(self, node: str, room: int | None) -> None:
-        """Let files of a node's process grow by so many bytes only; None: as they like."""
+        """Let files of a node's process grow by at most `room` bytes; None for no limit."""
         self.session.limit_files(node, room)
 
     def hog(self, seconds: float) -> None:
@@ -226,7 +227,7 @@ class LiveRig:
             self.session.relieve()
 
     def start_bystander(self) -> None:
-        """Start a ROS process of others that listens to all streams."""
+        """Start a foreign ROS process that subscribes to all streams."""
         self.session.start_bystander()
 
     def kill_bystander(self) -> None:
@@ -234,13 +235,13 @@ class LiveRig:
         self.session.kill_bystander()
 
     def control(self, word: int, offset_ns: int = 0) -> None:
-        """Say what the drill's own stage does, and by how much all clocks are off [ns]."""
+        """Set what the drill's own stage does, and the error of all clocks [ns]."""
         self._control.write(word, offset_ns)
 
     # -- topics ----------------------------------------------------------------------------------
 
     def distort(self, distortion: Distortion) -> None:
-        """Let something become of the hand's samples on the way."""
+        """Apply a distortion to the hand's samples before they are sent."""
         self.tap.distortion = distortion
 
     def mute_buttons(self, *, is_mute: bool) -> None:
@@ -253,7 +254,7 @@ class LiveRig:
         self._intruder(topic).publish(form.encode_one(stamp_ns, values))
 
     def publish_bytes(self, topic: Topic, data: bytes) -> None:
-        """Send bytes that are no message as another publisher of the topic would."""
+        """Send bytes that are not a valid message, as another publisher of the topic would."""
         self._intruder(topic).publish(data)
 
     def leave(self, topic: Topic) -> None:
@@ -263,7 +264,7 @@ class LiveRig:
             self._own.ros.destroy(publisher)
 
     def _intruder(self, topic: Topic) -> Any:
-        """Other publisher of a topic, once somebody hears it; the fault begins with it."""
+        """Other publisher of a topic, once it has a reader; the fault begins then."""
         if topic.name not in self._intruders:
             kind = message_type(topic.kind.ros_type)
             made = self._own.ros.create_publisher(kind, f"/{topic.name}", profile(topic))
@@ -288,11 +289,11 @@ class LiveRig:
     # -- services --------------------------------------------------------------------------------
 
     def command(self, name: str) -> bool:
-        """Ask the slave for something by service; whether it was done."""
+        """Call a service of the slave; returns whether the command was done."""
         return self.commands(name)[0]
 
     def commands(self, *names: str) -> list[bool]:
-        """As :meth:`command`, some at once, without waiting for the answers in between."""
+        """As :meth:`command`, but several commands at once, without waiting for the answers in between."""
         if not all(self._services[name].wait_for_service(_FOUND) for name in names):
             return [False] * len(names)
         asked = [self._services[name].call_async(Trigger.Request()) for name in names]
@@ -300,7 +301,7 @@ class LiveRig:
         return [one is not None and one.success for one in found]
 
     def set(self, node: str, name: str, value: object) -> bool:
-        """Set a parameter of a running node; whether it was taken."""
+        """Set a parameter of a running node; returns whether it was accepted."""
         kind = str if name in _TEXTS else float
         given = tuple(value) if isinstance(value, list) else value
         request = SetParameters.Request(parameters=[to_message(name, given, kind)])

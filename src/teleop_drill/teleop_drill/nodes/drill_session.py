@@ -1,4 +1,4 @@
-"""Processes of a drill: the nodes of one session, each of which may be broken and started anew."""
+"""Processes of a drill: the nodes of one session, each of which may be broken and restarted."""
 
 import os
 import resource
@@ -32,22 +32,22 @@ from teleop_drill.nodes.drill_site import Steering
 _NEVER_NS = 2**62
 _HAND, _MASTER = "operator", "haptic_master"
 SIMULATOR = "slave_sim"
-"""Node in whose place drives stand."""
+"""Node that foreign drives replace."""
 ARM = "arm"
-"""Process that the drives lead; it is started first, and nothing is done to it."""
+"""Process that the drives command; it is started first, and the drill does not break it."""
 _BUSY = "while True: pass"
 _BYSTANDER = "from teleop_drill.nodes.drill_tap import stand_by; stand_by()"
 _MIDDLEWARE = ("FASTRTPS_", "FASTDDS_", "ROS_AUTOMATIC", "ROS_LOCALHOST", "ROS_STATIC")
 
 
 class DrillSession:
-    """The nodes of a session in processes that this one has started; it touches no others.
+    """The nodes of a session in processes that this process has started; it affects no other processes.
 
     Args:
         configuration: What runs.
         folder: Where the recordings go.
         env: Environment of the processes.
-        observer: Who hears what nodes say of themselves.
+        observer: Receives the reports of the nodes.
         is_composed: Whether all nodes share one process.
         master: Who moves the hand.
         foreign: Commands of processes that are none of ours, by name: of drives in the place of
@@ -79,10 +79,10 @@ class DrillSession:
     # -- start and end ---------------------------------------------------------------------------
 
     def start(self) -> None:
-        """Start what does not run, the recorder first, and wait until all are at work.
+        """Start all processes that do not run, the recorder first, and wait until all are ready.
 
         Raises:
-            SessionError: One ends, or is not at work within three minutes.
+            SessionError: A process ends, or is not ready within three minutes.
         """
         for crew in self._crews():
             waiting = []
@@ -133,7 +133,7 @@ class DrillSession:
         """Make sure that all processes run, those of foreign commands too.
 
         Raises:
-            SessionError: One has ended; says how, with what it wrote last.
+            SessionError: A process has ended; the text has its exit code and its last output.
         """
         for child in self._children.values():
             if not child.is_running:
@@ -157,7 +157,7 @@ class DrillSession:
             file.close()
 
     def until_ns(self, recording: Path) -> int:
-        """When the recording after one was begun [ns]; later than all without another."""
+        """When the recording after the given one was begun [ns]; later than all times if there is none."""
         place = self.recordings.index(recording) + 1
         return self._begun_ns[place] if place < len(self._begun_ns) else _NEVER_NS
 
@@ -183,13 +183,13 @@ class DrillSession:
         os.kill(self._pid(node), number)
 
     def await_end(self, node: str, timeout: float) -> None:
-        """Wait until a node's process has ended, or for so long [s]."""
+        """Wait until a node's process has ended, for at most `timeout` [s]."""
         deadline = time.monotonic() + timeout
         while self.is_running(node) and time.monotonic() < deadline:
             time.sleep(0.01)
 
     def limit_files(self, node: str, room: int | None) -> None:
-        """Let files of a node's process grow by so many bytes only; None: as they like."""
+        """Let files of a node's process grow by at most `room` bytes; None for no limit."""
         if not self.is_running(node):
             return
         pid = self._pid(node)
@@ -199,7 +199,7 @@ class DrillSession:
         resource.prlimit(pid, resource.RLIMIT_FSIZE, (soft, hard))
 
     def hog(self) -> None:
-        """Start a process on each core that does nothing but work."""
+        """Start a process on each core that only consumes processor time."""
         for _ in range(os.cpu_count() or 1):
             self._others.append(subprocess.Popen([sys.executable, "-S", "-c", _BUSY]))
 
@@ -268,7 +268,7 @@ class LiveSite:
         return os.getloadavg()[0] / (os.cpu_count() or 1)
 
     def session(self, observer: Observer) -> DrillSession:
-        """Processes of a session, of which an observer hears."""
+        """Processes of a session, whose reports the observer receives."""
         return DrillSession(
             self._configuration,
             self._folder,

@@ -20,7 +20,7 @@ class Session(Protocol):
     recordings: list[Path]
 
     def start(self) -> None:
-        """Start what does not run, and wait until all are at work; raises SessionError."""
+        """Start all processes that do not run, and wait until all are ready; raises SessionError."""
 
     def check(self) -> None:
         """Make sure that all processes run; raises SessionError."""
@@ -29,7 +29,7 @@ class Session(Protocol):
         """End all, in order."""
 
     def until_ns(self, recording: Path) -> int:
-        """When the recording after one was begun [ns]; later than all without another."""
+        """When the recording after the given one was begun [ns]; later than all times if there is none."""
 
     def is_running(self, node: str) -> bool:
         """Whether the process of a node runs."""
@@ -41,10 +41,10 @@ class Session(Protocol):
         """Send a signal to a node's process."""
 
     def await_end(self, node: str, timeout: float) -> None:
-        """Wait until a node's process has ended, or for so long [s]."""
+        """Wait until a node's process has ended, for at most `timeout` [s]."""
 
     def limit_files(self, node: str, room: int | None) -> None:
-        """Let files of a node's process grow by so many bytes only; None: as they like."""
+        """Let files of a node's process grow by at most `room` bytes; None for no limit."""
 
     def hog(self) -> None:
         """Keep all processors busy."""
@@ -53,17 +53,17 @@ class Session(Protocol):
         """Let them rest."""
 
     def start_bystander(self) -> None:
-        """Start a process of others that listens to all streams."""
+        """Start a foreign process that subscribes to all streams."""
 
     def kill_bystander(self) -> None:
         """Kill it."""
 
 
 class Steering(Protocol):
-    """Who says to the processes what is to break inside of them."""
+    """Controls what breaks inside of the processes."""
 
     def write(self, word: int = inside.WORKS, offset_ns: int = 0) -> None:
-        """Say what the stage does and by how much the clock is off [ns]."""
+        """Set what the stage does and the error of the clock [ns]."""
 
 
 class Site(Protocol):
@@ -86,7 +86,7 @@ class Site(Protocol):
     interrupt: Interrupt
 
     def session(self, observer: Observer) -> Session:
-        """Processes of a session, of which an observer hears."""
+        """Processes of a session, whose reports the observer receives."""
 
     def load(self) -> float:
         """Load of the machine, per processor."""

@@ -1,4 +1,4 @@
-"""Tap of a drill: the hand of the drill on its topics, and what the slave says, in one thread."""
+"""Tap of a drill: one thread that publishes the drill's hand and receives the messages of the slave."""
 
 import struct
 from array import array
@@ -30,7 +30,7 @@ from teleop_drill.drill.numbers import Scheduling
 from teleop_drill.drill.recordings import Counted
 
 STREAMS_HEARD = (SLAVE_SETPOINT_JS, SLAVE_MEASURED_JS, SLAVE_MEASURED_CP, SLAVE_TRUE_CP)
-"""Streams that are heard, and counted against the recording."""
+"""Streams that are received, and compared with the recording."""
 _HEARD = (*STREAMS_HEARD, SLAVE_OPERATION, TELEOP_STATE)
 _STAMP = struct.Struct("<iI")
 _DAY_NS = 86_400 * SECOND_NS
@@ -42,16 +42,16 @@ Heard = list[tuple[int, int, bytes]]
 
 
 class Tap:
-    """Hears the slave, and moves the hand if asked to; works from its making until :meth:`close`.
+    """Receives the messages of the slave, and moves the hand if it is the master; runs until :meth:`close`.
 
     Args:
         owner: Node that owns its topics; no executor serves it.
         joint_names: Of the slave.
-        real_time: What its thread asks of the system.
+        real_time: Priority and other settings of its thread.
         has_hand: Whether it is the master.
 
     Attributes:
-        distortion: What becomes of the hand's samples.
+        distortion: Distortion of the hand's samples.
         is_mute: Whether no buttons are sent.
     """
 
@@ -64,7 +64,7 @@ class Tap:
         self._heard: dict[str, Heard] = {topic.name: [] for topic in _HEARD}
         self._counted = {topic.name: (array("q"), array("q")) for topic in STREAMS_HEARD}
         self._late: list[tuple[int, float]] = []
-        self._listened_ns = 0  # when it last began to take what had come
+        self._listened_ns = 0  # when it last began to take waiting messages
         self._subscriptions = [Subscription(owner, t, f"/{t.name}", _QUEUE) for t in _HEARD]
         self._hand = _Hand(owner, self) if has_hand else None
         self._is_running, self._lock = True, self._world.lock()
@@ -79,7 +79,7 @@ class Tap:
             subscription.close()
 
     def clear(self) -> None:
-        """Forget what was heard, but the last of each topic that is sent where it changes."""
+        """Forget all messages, except the last message of topics that are sent only when they change."""
         with self._lock:
             self._late.clear()
             for topic in _HEARD:
@@ -87,10 +87,10 @@ class Tap:
                 self._heard[topic.name] = self._heard[topic.name][keep:]
 
     def traces(self, *topics: Topic) -> list[Trace]:
-        """What was heard of streams, all until one moment.
+        """Messages of all streams, all up to the same moment.
 
-        Reading thousands of messages takes a busy machine a tenth of a second: of what came
-        meanwhile, the stream that is read first would seem to have fallen silent.
+        On a busy machine, reading thousands of messages takes a tenth of a second. Without a common end, the stream
+        that is read first would seem to have fallen silent.
         """
         with self._lock:
             heard = [list(self._heard[topic.name]) for topic in topics]
@@ -132,7 +132,7 @@ class Tap:
         return np.array(rows) if rows else np.empty((0, form.width))
 
     def _read(self, topic: Topic, form: Layout, data: bytes) -> tuple[int, Values] | Refusal:
-        """Stamp and values of a message, of ours or of anybody's."""
+        """Stamp and values of a message, of our own or of a foreign publisher."""
         return form.decode_one(data) or read_any(topic.kind, data, self._joint_names)
 
     def age(self, topic: Topic) -> float:
@@ -142,7 +142,7 @@ class Tap:
             return 1e-9 * (self._world.time_ns() - heard[-1][0]) if heard else float("inf")
 
     def is_commanded(self) -> bool:
-        """Whether the newest setpoint was made from a command: else the arm goes its own way."""
+        """Whether the newest setpoint was computed from a command; otherwise the arm moves without one."""
         with self._lock:
             _, stamps = self._counted[SLAVE_SETPOINT_JS.name]
             return bool(stamps) and stamps[-1] != NO_COMMAND_NS
@@ -170,7 +170,7 @@ class Tap:
             self._listen()
             due += hand.PERIOD
             now = self._now()
-            if due <= now:  # its own work took longer than a period: nothing is known of the machine
+            if due <= now:  # its own work took longer than a period, so the delay says nothing about the machine
                 due = now if due < now - _FAR_BEHIND else due
                 continue
             self._world.sleep(due - now)
@@ -229,7 +229,7 @@ def sender(owner: Owner, topic: Topic, joint_names: tuple[str, ...]) -> Callable
 
 
 def stand_by() -> None:
-    """Listen to all streams as a process of others, and say so; until it is killed."""
+    """Subscribe to all streams as a foreign process, and report this; runs until it is killed."""
     from teleop_core.graph.topics import STREAMS
     from teleop_core.middleware.ros import ROS
 

@@ -1,9 +1,8 @@
 """Bus: topics and services between simulated processes, as ROS 2 on Fast DDS carries them.
 
-What it models: both sides of a topic discover each other at different times; what is sent before is heard only by
-readers that ask for the last messages of a latched topic; a queue that is full
-loses its oldest; a socket that nobody reads loses what comes, and reliable writers send it again as
-far as they still have it; each writer numbers its messages.
+The model: both sides of a topic discover each other at different times. Earlier messages reach only readers that ask
+for the last messages of a latched topic. A full queue loses its oldest message. A full socket loses arriving messages,
+and reliable writers send them again as long as they still have them. Each writer numbers its messages.
 """
 
 from collections.abc import Callable, Iterable
@@ -16,14 +15,14 @@ from teleop_drill.simulation.machine import Process
 from teleop_drill.simulation.scheduler import Scheduler
 
 _SOCKET = 4 << 20
-"""Bytes that wait for a process that stands still, as the middleware's profile has it."""
+"""Bytes that can wait for a process that stands still, as in the middleware's profile."""
 _LEASE_NS = 20_000_000_000
 """Time after which a process that was killed counts as gone [ns]."""
 _GID = 16
 _TOLD_NS, _TOLD_SPREAD_NS = 1_000_000, 20_000_000
-"""Time in which one that is known tells of a new topic, and what may be added [ns]."""
+"""Least time in which a known process announces a new topic, and the largest random addition [ns]."""
 _CALL_NS, _SPREAD_NS = 150_000, 300_000
-"""Least time that a request or an answer takes, and what may be added [ns]."""
+"""Least time of a request or an answer, and the largest random addition [ns]."""
 
 
 @dataclass
@@ -31,11 +30,11 @@ class Line:
     """Quality of the line between two processes.
 
     Attributes:
-        loss: Share that is lost on the way.
-        delay: Time that each takes beside what this machine needs [s].
-        jitter: Mean of the time beside that [s].
-        repeats: Share that comes twice.
-        reorders: Share that is overtaken.
+        loss: Share of messages that are lost.
+        delay: Time that each message takes in addition to that of this machine [s].
+        jitter: Mean of the random addition to the delay [s].
+        repeats: Share of messages that arrive twice.
+        reorders: Share of messages that are overtaken.
     """
 
     loss: float = 0.0
@@ -67,9 +66,9 @@ class Bus:
         self.lines: dict[tuple[str, str], Line] = {}
         """Lines that are not perfect, by the names of both processes; * for any."""
         self.seen: dict[str, Callable[[Taken], None]] = {}
-        """Who sees the messages of a topic as they are sent, by its full name."""
+        """Observers of the messages of a topic when they are sent, by the full name of the topic."""
         self.heard: dict[str, Callable[[Reader, Taken], None]] = {}
-        """Who sees them as they are taken."""
+        """Observers of the messages when they are taken."""
         self._plain = Line()
         self.find = (0.07, 0.3, 1.6)
         """Least, usual and longest time in which one end finds another [s]."""
@@ -133,9 +132,9 @@ class Bus:
         return self.found_ns(process, entity) <= self.scheduler.now_ns
 
     def found_ns(self, process: Process, entity: Writer | Reader | Service) -> int:
-        """When a process has found an entity of another, or will have [ns].
+        """When a process has found an entity of another process, or will find it [ns].
 
-        Processes find each other first, which takes long; then what each has is told in a moment.
+        Processes first discover each other, which takes long; then they exchange their topics quickly.
         """
         key = (process, entity)
         if key not in self._known:
@@ -190,7 +189,7 @@ class Bus:
     # -- messages --------------------------------------------------------------------------------
 
     def line(self, one: Process, other: Process) -> Line:
-        """What becomes of messages between two processes."""
+        """Quality of the line between two processes."""
         if not self.lines or one is other:
             return self._plain
         for key in ((one.name, other.name), (one.name, "*"), ("*", other.name), ("*", "*")):
@@ -225,7 +224,7 @@ class Bus:
             reader.put(came_ns + 50_000, taken)
 
     def send_again(self, reader: Reader, taken: Taken) -> bool:
-        """Whether a message that a reader's socket did not take comes all the same."""
+        """Whether a message that a reader's socket lost still arrives, because its writer sends it again."""
         for writer in self.writers.get(reader.topic, ()):
             if writer.sender != taken.sender:
                 continue
@@ -243,7 +242,7 @@ class Bus:
                     room = reader.wake_up(since_ns, room)
 
     def _leave(self, process: Process, *, is_orderly: bool) -> None:
-        """A process has ended: at once for itself, and for others when they hear of it."""
+        """A process has ended: its own ends are removed at once, and other processes notice it later."""
         for reader in [r for rs in self.readers.values() for r in rs if r.process is process]:
             self.leave_reader(reader)
         writers = [w for ws in self.writers.values() for w in ws if w.process is process]

@@ -89,7 +89,7 @@ class Disk:
         SYSTEM.cut(file, size)
 
     def sync(self, file: BinaryIO) -> None:
-        """Find all on the disk already, if there is one; raises OSError."""
+        """Do nothing, because all data is on the disk already; raises OSError without a disk."""
         self._insist()
 
     def _insist(self) -> None:

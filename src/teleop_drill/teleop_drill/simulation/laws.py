@@ -1,4 +1,4 @@
-"""Laws: what must hold whatever goes wrong, judged by who sees all at once."""
+"""Laws: conditions that must be true whatever goes wrong, checked by an observer of the whole machine."""
 
 import math
 import re
@@ -31,19 +31,19 @@ _SLACK = 1e-6
 _CURVED = 1e-2
 """Share by which the tip's way in a tick exceeds that of joints whose steps were shortened."""
 _TELL = 0.3
-"""Time within which the operator is told a new state [s], of the time in which the arm works."""
+"""Time within which a new state is reported to the operator [s]; only time in which the arm works counts."""
 _OBEY = 0.1
-"""Time within which a pressed stop is in force [s], of the time in which the arm works."""
+"""Time within which a pressed stop is in force [s]; only time in which the arm works counts."""
 _DOUBT = 0.7
-"""The same since the slave has found a button that was pressed before: half a second, and two looks [s]."""
+"""The same time after the slave has discovered a button that was pressed before: half a second plus two checks [s]."""
 _FOUND_NS, _ON_THE_WAY_NS = 1_600_000_000, 300_000_000
-"""Time in which a recorder hears of all topics, and in which what was sent is recorded [ns]."""
+"""Time in which a recorder discovers all topics, and time in which a sent message is recorded [ns]."""
 _OLD = 1.0
 """Age of the oldest command by which an enabled arm moves [s]."""
 _JOINING = 20
-"""Setpoints in which one that was enabled goes to where the arm is, by no command."""
+"""Number of setpoints in which an enabled slave moves its setpoint to the arm, without a command."""
 _AFTER_STEP_NS = 5_000_000_000
-"""Time for which stamps of before a step of the clock may come [ns]."""
+"""Time for which stamps from before a step of the clock may arrive [ns]."""
 _QUEUES = 2500
 """Messages that may wait anywhere: what the recorder's longest queue holds, and some."""
 LAWS = ("speed", "tool speed", "motion", "told", "stop", "owner", "age", "ends", "queues", "recorded", "recovery")
@@ -66,17 +66,17 @@ class Broken:
 
 
 def _saved(said: Sequence[str]) -> int | None:
-    """Messages that a recorder has said to be safe when its disk failed; None if it has not."""
+    """Messages that a recorder reported as safe when its disk failed; None without such a report."""
     found = [_SAFE.search(text) for text in said]
     return next((int(one[1]) for one in reversed(found) if one), None)
 
 
 class Laws:
-    """Judge of one session; looks at every setpoint, and at all else two hundred times a second.
+    """Checks one session: every setpoint, and everything else two hundred times a second.
 
     Args:
         stage: The session.
-        numbers: What its drives and its parameters say.
+        numbers: Numbers from its drives and parameters.
 
     Attributes:
         broken: First breach of each law.
@@ -145,7 +145,7 @@ class Laws:
         self._last, self._stage.setpoint = (q, tip, process), q
 
     def _judge_owner(self, slave: Any, process: Process | None, stamp_ns: int) -> None:
-        """One sender leads at a time."""
+        """Only one sender commands the arm at a time."""
         self._count("owner")
         is_driven = slave.stage is not None and slave.stage.motion.source == "velocity"
         if wrong := self._owner.judge(process, stamp_ns, is_driven=is_driven):
@@ -181,7 +181,7 @@ class Laws:
             return
         self._count("age")
         master: Any = self._stage.session.node("haptic_master")
-        # Who started under another clock goes on to stamp by it.
+        # A process that started with another clock keeps stamping by it.
         epoch_ns = getattr(master, "epoch_ns", offset_ns)
         age = 1e-9 * (self._scheduler.now_ns + epoch_ns - stamp_ns)
         self._old = self._old + 1 if age > _OLD + self._late() else 0
@@ -194,7 +194,7 @@ class Laws:
         self._scheduler.at(self._scheduler.now_ns + _LOOK_NS, self._look)
         stage = self._stage
         slave, process = stage.session.node("slave"), stage.session.process_of("slave")
-        if process is not self._process:  # what the one before has told says nothing of this one
+        if process is not self._process:  # the reports of the former process do not concern this one
             self._process, stage.operation = process, {}
         if slave is not self._slave:
             self._slave, self._seen_state, self._press = slave, -1, None
@@ -210,7 +210,7 @@ class Laws:
         self._judge_queues()
 
     def _judge_state(self, slave: Any) -> None:
-        """An arm that may not move rests; its state is told in time."""
+        """An arm that may not move rests; its state is reported in time."""
         state = int(slave.stage.operation["state"])
         if state != self._seen_state:
             self._seen_state, self._since = state, self._worked
@@ -230,8 +230,8 @@ class Laws:
     def _judge_stop(self, slave: Any, process: Process) -> None:
         """A pressed stop is in force soon, and never lost.
 
-        A press that was sent to nobody is in force soon after the slave has found its button. One that was released
-        before that is nothing to an arm that was disabled.
+        A press without a reader is in force soon after the slave has discovered its button. If it was released before
+        that, it does not concern an arm that was disabled.
         """
         stage, now_ns, operation = self._stage, self._scheduler.now_ns, slave.stage.operation
         if len(stage.presses) > self._presses:
@@ -289,11 +289,11 @@ class Laws:
     # -- at the end ------------------------------------------------------------------------------
 
     def judge_recording(self, path: Path, told: Mapping[str, str]) -> None:
-        """What was sent is recorded, or counted as lost; of a disk that failed, what was saved.
+        """Sent messages are recorded or counted as lost; if the disk failed, this applies to saved messages.
 
         Args:
             path: A recording whose recorder was not killed, while no clock was stepped.
-            told: What the recorder tells at the end; empty if it has ended before.
+            told: Final report of the recorder; empty if it has ended before.
         """
         self._count("recorded")
         said = [one.text for one in self._stage.machine.log if str(path) in one.text]
@@ -322,11 +322,11 @@ class Laws:
             self._break("recorded", f"{sent} setpoints were sent, {kept} recorded, {lost} counted")
 
     def judge_recovery(self, seconds: float | None, bound: float) -> None:
-        """After the cure the arm follows again, or says why not.
+        """After the recovery the arm follows again, or reports why not.
 
         Args:
-            seconds: After how long it did [s]; None if it did not.
-            bound: Within which it must [s].
+            seconds: Time after which it followed [s]; None if it did not.
+            bound: Time within which it must follow [s].
         """
         self._count("recovery")
         if seconds is None:

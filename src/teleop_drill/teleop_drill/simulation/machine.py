@@ -1,4 +1,4 @@
-"""Machine: simulated processes, what may become of them, and the sockets between them."""
+"""Machine: simulated processes, their faults, and the sockets between them."""
 
 import traceback
 from collections import deque
@@ -17,8 +17,8 @@ class Clock:
     """The system's clock of a machine.
 
     Attributes:
-        offset_ns: By how much it is off [ns].
-        drift: By how much faster than right it goes.
+        offset_ns: Error of the clock [ns].
+        drift: How much faster the clock runs than real time, as a share.
     """
 
     offset_ns: int = 0
@@ -49,7 +49,7 @@ class Process(Turns):
         work: Its main thread; what it returns is the exit code.
 
     Attributes:
-        exit_code: Of its end; None as long as it runs, negative where a signal ended it.
+        exit_code: Exit code; None while it runs, negative if a signal ended it.
     """
 
     def __init__(self, machine: "Machine", name: str, work: Callable[[], int]) -> None:
@@ -58,7 +58,7 @@ class Process(Turns):
         self.exit_code: int | None = None
         self.stopped_ns, self.clock = 0, machine.clock
         self.room: int | None = None
-        """Bytes that it may write still; None: as many as it likes."""
+        """Bytes that it may still write; None for no limit."""
         self.disk_delay = 0.0
         """What each of its writes waits for the disk [s]."""
         self.disk_error = 0
@@ -68,9 +68,9 @@ class Process(Turns):
         self.lines: list[SocketEnd] = []
         self.listeners: list[Listener] = []
         self.on_end: list[Callable[[bool], None]] = []
-        """Told when it ends, and whether it could say so."""
+        """Called when it ends, with whether it ended in order."""
         self.on_resume: list[Callable[[int], None]] = []
-        """Told when it goes on, and since when it stood still [ns]."""
+        """Called when it continues, with the time at which it was stopped [ns]."""
         self.main = machine.scheduler.spawn(self, "main", self._run)
 
     def start(self) -> None:
@@ -169,7 +169,7 @@ class Machine:
         scheduler: Its time.
         clock: Its system's clock, of the processes that do not have one of their own.
         processes: All that ever were, in their order.
-        places: Who listens where.
+        places: Listeners by address.
         log: What nodes have said.
     """
 
@@ -207,7 +207,7 @@ class Machine:
         return found[0]
 
     def outsider(self, name: str) -> Process:
-        """Process of whoever stands outside and lets time pass, such as a test."""
+        """Process of an outside caller that lets time pass, such as a test."""
         process = Process(self, name, lambda: 0)
         self.processes.append(process)
         return process

@@ -1,4 +1,4 @@
-"""Owner: who leads the arm, by what was sent, what the slave took, and what it says it follows."""
+"""Owner: which sender commands the arm, judged by messages sent, messages taken, and the slave's own report."""
 
 import struct
 
@@ -14,17 +14,17 @@ _STAMP = struct.Struct("<4xiI")
 _SLACK_NS = 10_000_000
 """By how much two looks at a clock, or two turns, may differ [ns]."""
 _SILENCE_NS = round(1e9 * NodeParameters().owner_silence) - _SLACK_NS
-"""Silence of the sender that leads, after which another one may."""
+"""Silence of the commanding sender after which another one may command."""
 _STREAM = 3
 """Commands in a row that nothing else may interrupt."""
 
 
 class Owner:
-    """Finds out whether two lead an arm at once.
+    """Detects whether two senders command an arm at the same time.
 
     Args:
         bus: The middleware, whose commands it notes.
-        timeout: Silence after which a stream of commands leads no longer [s].
+        timeout: Silence after which a stream no longer commands the arm [s].
 
     Attributes:
         followed_ns: When a setpoint followed another command than the one before [ns].
@@ -44,12 +44,12 @@ class Owner:
         self._stamp_ns = self._new_ns = self.followed_ns = self._in_row = 0
 
     def judge(self, process: Process | None, stamp_ns: int, *, is_driven: bool) -> str:
-        """What is wrong with who leads; empty if nothing is.
+        """Error in who commands the arm, in words; empty if there is none.
 
         Args:
             process: Whose setpoint it is.
             stamp_ns: Stamp of the command that it follows [ns].
-            is_driven: Whether it goes at a speed that somebody asks for.
+            is_driven: Whether a speed command moves the arm.
         """
         now_ns = self._bus.scheduler.now_ns
         if process is not self._process:

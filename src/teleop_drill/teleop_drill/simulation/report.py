@@ -1,4 +1,4 @@
-"""Report: what random schedules have found, and which faults met which states."""
+"""Report: results of random schedules, and which faults met which states."""
 
 from collections import Counter
 from dataclasses import dataclass, field
@@ -13,7 +13,7 @@ from teleop_drill.simulation.stage import NO_STATE
 
 @dataclass
 class Coverage:
-    """What was tried so far.
+    """Schedules that were run so far.
 
     Attributes:
         sessions: How many schedules were run.
@@ -73,11 +73,11 @@ class Coverage:
 
 
 def told(found: Found, shortest: Found, law: str) -> list[str]:
-    """What broke a law, and how to see it again.
+    """Text about a schedule that broke a law, with the command that reproduces it.
 
     Args:
         found: The schedule as it was drawn.
-        shortest: What of it is needed.
+        shortest: The faults that are needed to break the law.
         law: Which law.
     """
     (one,) = (broken for broken in shortest.broken if broken.law == law)

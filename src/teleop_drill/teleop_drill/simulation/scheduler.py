@@ -2,7 +2,7 @@
 
 A strand is a thread of a simulated process. One runs at a time, until it waits: for time, for a
 lock, for a message. Strands of one process share its interpreter, so that they exclude each other;
-processes run beside each other. Whatever happens is ordered by time, then by when it was arranged.
+processes run beside each other. Events are ordered by time, then by the order in which they were scheduled.
 """
 
 import heapq
@@ -16,15 +16,15 @@ from greenlet import GreenletExit, getcurrent, greenlet
 BEGIN_NS = 1_000_000_000_000
 """Where monotonic clocks begin [ns]."""
 EPOCH_NS = 1_800_000_000_000_000_000
-"""What the system's clocks are ahead of them [ns]."""
+"""How far the system's clocks are ahead of the monotonic clocks [ns]."""
 _LOOK_NS = 60
-"""What reading a clock costs: a loop that only looks at it goes on all the same [ns]."""
+"""Cost of reading a clock [ns], so that time passes in a loop that only reads the clock."""
 _BREAK_NS = 1_000_000
-"""Longest time for which a thread that was amid a turn waits for others of its process [ns]."""
+"""Longest time for which a thread that was interrupted in a turn waits for other threads of its process [ns]."""
 
 
 class Deadlock(Exception):  # noqa: N818
-    """Nothing will ever happen any more, and what was asked for has not."""
+    """No further event is scheduled, but the awaited one has not happened."""
 
 
 class Costs:
@@ -37,12 +37,12 @@ class Costs:
     def __init__(self, random: Random) -> None:
         self._random = random
         self.hiccups = 2e-4
-        """Share of the turns after which a process gets no processor for a while."""
+        """Share of the turns after which a process gets no processor time for a while."""
         self.crowd_ns = 0.0
-        """Mean of what a process without priority waits for a processor while others work."""
+        """Mean time for which a process without priority waits for a processor while others work."""
 
     def turn(self) -> int:
-        """Of a turn, beside what it publishes."""
+        """Cost of a turn, without that of its messages."""
         random = self._random.random
         cost = 20_000.0 + 40_000.0 * random()
         if random() < self.hiccups:
@@ -50,7 +50,7 @@ class Costs:
         return round(cost)
 
     def wake(self, *, has_priority: bool) -> int:
-        """From the time at which a strand is to go on until it does."""
+        """Delay from the time at which a strand is due until it runs."""
         late = self._random.expovariate(1.0 / 50_000.0)
         if self.crowd_ns and not has_priority:
             late += self._random.expovariate(1.0 / self.crowd_ns)
@@ -76,10 +76,10 @@ class Strand:
         self.name, self.process, self._work, self._scheduler = name, process, work, scheduler
         self.ident: int | None = next(self._numbers)
         self.native_id = self.ident
-        self.token = 0  # a wake-up for an earlier wait is none
+        self.token = 0  # a wake-up for an earlier wait is ignored
         self.has_priority = False
         self.error: BaseException | None = None
-        # Whoever makes a greenlet goes on when it ends, unless another parent is named.
+        # When a greenlet ends, its creator continues, unless another parent is set.
         self.greenlet = greenlet(self._run, parent=scheduler.hub)
         self._has_begun = self._has_ended = False
         self._joined: list[Strand] = []
@@ -161,7 +161,7 @@ class Scheduler:
     Attributes:
         now_ns: Time, as monotonic clocks have it [ns].
         hub: Greenlet in which the scheduler decides.
-        current: Who runs: a strand, or whoever made the scheduler and stands outside.
+        current: What runs now: a strand, or the creator of the scheduler outside of the simulation.
         costs: How long things take.
     """
 
@@ -182,7 +182,7 @@ class Scheduler:
     # -- for strands -----------------------------------------------------------------------------
 
     def look_ns(self) -> int:
-        """Time [ns], for whoever reads a clock."""
+        """Time [ns] for a caller that reads a clock."""
         self.now_ns += _LOOK_NS
         return self.now_ns
 
@@ -198,7 +198,7 @@ class Scheduler:
         self._switch(self.now_ns + max(0, round(1e9 * seconds)) + late)
 
     def wait(self, seconds: float | None) -> bool:
-        """Wait until somebody wakes this strand, for some time [s] at most; whether one did."""
+        """Wait until this strand is woken, at most for a time [s]; returns whether it was woken."""
         return self._switch(None if seconds is None else self.now_ns + round(1e9 * seconds))
 
     def _switch(self, until_ns: int | None) -> bool:
@@ -235,7 +235,7 @@ class Scheduler:
             self._push(self.now_ns, strand, token, value)
 
     def run(self, strand: Strand) -> None:
-        """Let time pass until a strand has ended; raises what ended it.
+        """Let time pass until a strand has ended; raises the error that ended it.
 
         Raises:
             Deadlock: It never will.

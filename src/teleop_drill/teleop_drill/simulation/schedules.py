@@ -18,18 +18,18 @@ BEGIN, END = 1.0, 9.0
 _LONGEST = 3.0  # that one lasts [s]
 _NAMES = sorted((*COMMANDS, "release"))
 _LEADS = {"": 8, "disable": 2, "kill": 3, "pause": 4, "press": 2}
-"""What goes before a fault, and how often: the more, the seldomer faults met what follows."""
+"""Commands before a fault, with their weights; states that faults met rarely have larger weights."""
 _CLOCK_NS = (200_000_000, 3_600_000_000_000)
 
 
 @dataclass(frozen=True)
 class Fault:
-    """Something that goes wrong, or somebody does.
+    """A fault, or an action of a person.
 
     Attributes:
         at: When it begins, from the time at which the arm follows [s].
         kind: What it is.
-        where: Process that it befalls; empty for all.
+        where: Process that it affects; empty for all.
         seconds: How long it lasts.
         amount: How much of it, from 0 to 1.
     """
@@ -47,14 +47,14 @@ class Fault:
 
 
 Act = Callable[[Stage, Fault], Callable[[], None] | None]
-"""Begins a fault; what ends it, None where nothing does."""
+"""Begins a fault; returns the function that ends it, or None."""
 
 
 def draw(seed: int, processes: tuple[str, ...]) -> tuple[Fault, ...]:
     """One to five faults of a seed, and commands before them, in the order of their times.
 
-    Before more than half of the faults a command brings the arm out of ENABLED, the state in which nearly all faults
-    would meet it otherwise.
+    Before more than half of the faults a command brings the arm out of ENABLED, because otherwise nearly all faults
+    would meet an ENABLED arm.
 
     Args:
         seed: What they are drawn from.
@@ -155,7 +155,7 @@ def _command(stage: Stage, fault: Fault) -> None:
 def _drive(stage: Stage, fault: Fault) -> Callable[[], None]:
     """Drive the joints as a client of CRTK does, far faster than they may go.
 
-    As long as the hand's commands come, the arm refuses others: who drives it silences these.
+    While the hand's commands arrive, the arm refuses others, so this fault first silences the hand's commands.
     """
     drives = stage.robot.drives
     assert drives is not None
@@ -172,7 +172,7 @@ def _drive(stage: Stage, fault: Fault) -> Callable[[], None]:
 
 
 def _intrude(stage: Stage, fault: Fault) -> Callable[[], None]:
-    """Command the joints beside where they are, as another publisher of the same topic does."""
+    """Command joints near the present ones, as another publisher of the same topic."""
     form, drives = layout(SLAVE_SERVO_JP, stage.robot.joint_names), stage.robot.drives
     assert drives is not None
     off = 0.05 * np.sin(np.arange(stage.robot.n) + 10.0 * fault.amount)

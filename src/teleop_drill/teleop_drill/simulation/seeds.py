@@ -26,7 +26,7 @@ from teleop_drill.simulation.schedules import KINDS, Fault, draw
 from teleop_drill.simulation.stage import Stage
 
 PROCESSES = {Processes.SIDES: ("hand_side", "slave_side", RECORDER_NAME), Processes.ONE: (SESSION, RECORDER_NAME)}
-"""What a schedule may befall, by how the nodes are shared out."""
+"""Processes that a schedule may affect, by the distribution of the nodes."""
 _START, _CURED = 20.0, 15.0
 """Time in which the arm must follow, at first and after all is cured [s]."""
 _CIRCLE = (
@@ -40,16 +40,16 @@ _CIRCLE = (
     "slave.start_speed=1.0",
 )
 _ROUND = 20  # schedules that are chosen at once
-_PER_CHILD = 25  # sessions of one process of this machine: what was killed in them stays
+_PER_CHILD = 25  # sessions per process of this machine: killed simulated processes stay in memory
 
 
 @dataclass
 class Found:
-    """What became of one schedule.
+    """Result of one schedule.
 
     Attributes:
         seed: Of everything.
-        faults: What was done.
+        faults: The faults that were injected.
         processes: How the nodes were shared out.
         breaks: Share of the looks at a clock at which another thread of the process went on.
         broken: Laws that did not hold.
@@ -162,7 +162,7 @@ class _Run:
         self._scheduler.sleep(seconds)
 
     def _await(self, patience: float) -> float | None:
-        """Wait until the arm follows, and help it; after how long it did [s]."""
+        """Wait until the arm follows, and help it; returns the time that this took [s]."""
         begin_ns = self._scheduler.now_ns
         steady = 0
         while (elapsed := 1e-9 * (self._scheduler.now_ns - begin_ns)) < patience:
@@ -176,7 +176,7 @@ class _Run:
 
 
 def shrink(found: Found, law: str) -> Found:
-    """Fewest faults of a schedule under which a law is broken still."""
+    """Smallest set of faults of a schedule that still breaks a law."""
     best, must_look = found, True
     while must_look:
         must_look = False
@@ -192,10 +192,9 @@ def shrink(found: Found, law: str) -> Found:
 def run_seeds(
     first: int, count: int, workers: int | None = None, processes: Processes = Processes.SIDES, breaks: float = 0.0
 ) -> Iterator[Found]:
-    """Run schedules on all cores: of three seeds each the one whose faults have met least.
+    """Run schedules on all cores: of each three seeds, the one with the rarest combination of fault and state.
 
-    Which these are is decided after every :data:`_ROUND` schedules, so that the same call runs the
-    same seeds.
+    The choice is made after every :data:`_ROUND` schedules, so that the same call runs the same seeds.
 
     Args:
         first: Seed of the first schedule, which is run whatever it is.
@@ -217,7 +216,7 @@ def run_seeds(
 
 
 def _known(seed: int, met: Counter[tuple[str, str]], processes: Processes) -> float:
-    """How well the faults of a schedule are known: how often each met its rarest state, in mean."""
+    """Mean, over the faults of a schedule, of how often each fault met its rarest state."""
     states = [state.name for state in State]
     rarest = [min(met[one.kind, s] for s in states) for one in draw(seed, PROCESSES[processes])]
     return sum(rarest) / len(rarest)

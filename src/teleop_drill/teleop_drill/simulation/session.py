@@ -28,9 +28,9 @@ _STARTED = 60.0  # patience with the start [s]
 _ENDED = 10.0  # patience with the end [s]
 _NEVER_NS = 2**62
 ARM = "arm"
-"""Process that drives lead; it is started first, and nothing is done to it."""
+"""Process that the drives command; it is started first, and the drill does not break it."""
 _DRILLED = ("operator", "haptic_master")
-"""Nodes in whose place the drill may be."""
+"""Nodes that the drill may replace."""
 Processes = Mapping[str, tuple[str, ...]]
 """Names of processes, each with its nodes; the recorder's comes first."""
 
@@ -44,7 +44,7 @@ class SimulatedSession:
         configuration: What runs.
         processes: How the nodes are shared out.
         folder: Where the recordings go.
-        observer: Who hears what nodes say of themselves.
+        observer: Receives the reports of the nodes.
         master: Who moves the hand.
         foreign: Processes that are none of ours, by name: drives in the place of the simulator, and
             the arm that these lead.
@@ -165,7 +165,7 @@ class SimulatedSession:
             process.end(-signal.SIGKILL, is_orderly=False)
 
     def until_ns(self, recording: Path) -> int:
-        """When the recording after one was begun [ns]; later than all without another."""
+        """When the recording after the given one was begun [ns]; later than all times if there is none."""
         place = self.recordings.index(recording) + 1
         return self._begun_ns[place] if place < len(self._begun_ns) else _NEVER_NS
 
@@ -203,16 +203,16 @@ class SimulatedSession:
         what[number]()
 
     def await_end(self, node: str, timeout: float) -> None:
-        """Wait until a node's process has ended: it has."""
+        """Do nothing, because a simulated process ends at once."""
 
     def limit_files(self, node: str, room: int | None) -> None:
-        """Let files of a node's process grow by so many bytes only; None: as they like."""
+        """Let files of a node's process grow by at most `room` bytes; None for no limit."""
         process = self.process_of(node)
         if process is not None:
             process.room = room
 
     def hog(self) -> None:
-        """Keep all processors busy: who has no priority waits for one."""
+        """Keep all processors busy: processes without priority wait for a processor."""
         self._machine.scheduler.costs.crowd_ns = 3e6
 
     def relieve(self) -> None:

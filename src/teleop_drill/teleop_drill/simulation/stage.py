@@ -36,7 +36,7 @@ _FRESH_NS = 200_000_000
 
 
 class Stage:
-    """A session, and who does things to it; one process holds all of the drill.
+    """A session, and the faults and commands applied to it; one process contains the whole drill.
 
     Args:
         bus: The middleware.
@@ -71,11 +71,11 @@ class Stage:
         self.kills = 0
         """How many processes of nodes were killed."""
         self.lost_disk: set[Process] = set()
-        """Processes that may end for want of a disk, if they say what they have saved."""
+        """Processes that may end because their disk failed, if they report what they have saved."""
         self.stopped: list[tuple[Process, int]] = []
         """Processes that were stopped, each with the time [ns]."""
         self.presses: list[int] = []
-        """Which button each press was of."""
+        """Button of each press."""
         self.held: set[int] = set()
         """Buttons that are pressed."""
         self._buttons = [self._node.create_publisher(Bool, STOP_TOPIC, Qos(depth=100)) for _ in range(2)]
@@ -86,7 +86,7 @@ class Stage:
         self.operation: dict[str, float] = {}
         """Newest report of the slave, by the names of its numbers."""
         self.is_following = False
-        """Whether the mapping has said so."""
+        """Whether the motion scaling has reported that the slave follows."""
         self.setpoint: Array = robot.home
         """Newest setpoint of the joints (n,) [rad or m]."""
         self.commanded_ns = 0
@@ -119,7 +119,7 @@ class Stage:
         self.stopped.append((process, self.machine.scheduler.now_ns))
 
     def fail_disk(self, error: int) -> Callable[[], None]:
-        """Let writes of the recorder fail by an error's number; what is returned mends the disk."""
+        """Let writes of the recorder fail with an error number; returns the function that repairs the disk."""
         process = self.process(RECORDER_NAME)
         process.disk_error = error
         self.lost_disk.add(process)
@@ -133,12 +133,12 @@ class Stage:
         process.end(-9, is_orderly=False)
 
     def restart(self, name: str) -> None:
-        """Start a process again that has ended, as who supervises it does."""
+        """Restart a process that has ended, as a supervisor does."""
         if self.process(name).is_dead:
             self.session.launch(name)
 
     def press(self, button: int, *, is_pressed: bool) -> None:
-        """Send a message of a stop button, which only those hear whom it has found."""
+        """Send a message of a stop button, which reaches only discovered readers."""
         if is_pressed:
             self.presses.append(button)
             self.held.add(button)
@@ -157,7 +157,7 @@ class Stage:
         self._clients[name].call_async(Trigger.Request())
 
     def lead(self, *, by_hand: bool) -> None:
-        """Have what the hand commands sent to the arm or not, without waiting for the answer."""
+        """Switch whether the hand's commands are sent to the arm, without waiting for the answer."""
         request = ChangeState.Request()
         request.transition.label = "activate" if by_hand else "deactivate"
         self._hand.call_async(request)
@@ -174,7 +174,7 @@ class Stage:
         self._publishers[topic.name].publish(data)
 
     def every(self, period: float, work: Callable[[], None]) -> Callable[[], None]:
-        """Do something again and again after a period [s]; what is returned ends it."""
+        """Repeat an action with a period [s]; returns the function that ends it."""
         timer = self._node.create_timer(period, work)
         return timer.cancel
 
@@ -191,7 +191,8 @@ class Stage:
         if state == State.PAUSED:
             self.command("resume")
         elif state == State.FAULT:
-            for button in self._buttons if told["is_pressed"] else ():  # one that was not heard yet counts as pressed
+            for button in self._buttons if told["is_pressed"] else ():  # a button without a message so far counts as
+                # pressed
                 button.publish(Bool(data=False))
             self.command("reset")
         elif state == State.DISABLED:
@@ -201,12 +202,12 @@ class Stage:
 
     @property
     def state(self) -> str:
-        """Name of the arm's state, as it told last; ``none`` before it told any."""
+        """Name of the last reported state of the arm; ``none`` before the first report."""
         state = self.operation.get("state")
         return NO_STATE if state is None else State(int(state)).name
 
     def follows(self) -> bool:
-        """Whether the arm says that it goes where the hand leads."""
+        """Whether the arm reports that it follows the hand."""
         told = self.operation
         return bool(
             not self.session.dead()

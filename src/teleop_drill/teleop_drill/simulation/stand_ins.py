@@ -1,4 +1,4 @@
-"""Stand-ins: a watch of processes without signals and accounts of the system; a stranger."""
+"""Stand-ins: a watchdog of processes without signals and system statistics; a foreign process."""
 
 from collections.abc import Callable
 from typing import Any
@@ -19,7 +19,7 @@ _END_PATIENCE = 4.0
 
 
 class SimulatedWatch:
-    """Finds loops that hang, and ends a process that does not come to its end.
+    """Finds loops that hang, and ends a process that does not end by itself.
 
     Args:
         world: Where it is.

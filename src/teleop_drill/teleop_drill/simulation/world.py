@@ -1,4 +1,4 @@
-"""World: what one simulated process sees of everything, as nodes ask for it."""
+"""World: the simulated machine as seen by one process, with the interface that nodes use."""
 
 from collections.abc import Callable, Mapping
 from typing import Any

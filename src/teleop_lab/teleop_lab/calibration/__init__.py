@@ -1,4 +1,4 @@
-"""Calibration: how an arm was really built, from measured places of its tip.
+"""Calibration: the real geometry of an arm, from measured positions of its tip.
 
 :func:`simulate` measures an arm with known errors, :func:`calibrate` takes measurements of yours::
 
@@ -43,22 +43,22 @@ __all__ = [
     "simulate",
 ]
 FRESH = 500
-"""Poses at which a simulated calibration is tried."""
+"""Number of poses at which a simulated calibration is tested."""
 
 
 @dataclass(frozen=True, eq=False)
 class Calibration:
-    """What a calibration found, and what it is worth.
+    """Result of a calibration, and its accuracy.
 
     Attributes:
-        robot: The arm as drawn.
+        robot: The nominal arm.
         measured: The readings.
         found: Link errors and their confidence intervals.
-        fitted: Accuracy at the poses measured.
-        tried: Accuracy at poses that the errors were not found from; None where they are too few.
+        fitted: Accuracy at the measured poses.
+        tried: Accuracy at poses that were not used to find the errors; None if there are too few poses.
         truth: Errors of a simulated arm; None for a real one.
-        equivalent: What a perfect fit would give the entries found for it; an entry that others act
-            as is the sum of all. Empty for a real arm.
+        equivalent: Values of the found entries that a perfect fit would give for ``truth``. If several entries have
+            the same effect, the found entry stands for their sum. Empty for a real arm.
     """
 
     robot: Robot
@@ -81,7 +81,7 @@ class Calibration:
         return content(self)
 
     def table(self) -> "Table":
-        """The arm as found, as a table for :func:`teleop_core.robots.robot_from_table`."""
+        """The calibrated arm, as a table for :func:`teleop_core.robots.robot_from_table`."""
         from teleop_lab.calibration.corrected import corrected_table
 
         return corrected_table(self.robot, self.found.errors)
@@ -101,13 +101,13 @@ def calibrate(
         robot: The arm as drawn; a chain of links.
         measured: Points or distances of the tip, as of :func:`read_measured`.
         fit: "all" link errors, joint "offsets", or names such as ["d3", "theta2"].
-        finds_frame: Whether points are in a frame whose place is not known, as those of a tracker.
+        finds_frame: Whether points are in a frame with an unknown pose, like those of a tracker.
         keeps_all: Whether errors stay that are not told from zero.
 
     Raises:
         ParameterError: The robot is no chain.
         UnknownNameError: ``fit`` names what is no link error.
-        CalibrationError: Too few poses, errors that cannot be told apart, or no convergence.
+        CalibrationError: Too few poses, errors that cannot be distinguished, or no convergence.
     """
     model = Model.of(robot)
     found = identify(model, measured, fit, finds_frame=finds_frame, keeps_all=keeps_all)
@@ -130,20 +130,19 @@ def simulate(
 
     Args:
         robot: The arm as drawn; a chain of links.
-        poses: How many are measured.
-        noise: Standard deviation of a tracker on each axis [m], or "ruler" of 0.5 mm, which is laid
-            along one axis after the other.
+        poses: Number of measured poses.
+        noise: Standard deviation of a tracker on each axis [m], or "ruler" for a ruler with 0.5 mm divisions that
+            measures along one axis after the other.
         errors: Tolerances and values as of :func:`~teleop_lab.calibration.simulate.true_errors`;
             None for "cnc", of the rcrt1 with the published offset of d3.
-        fit: As of :func:`calibrate`; None for "all", of a ruler for "offsets".
+        fit: As in :func:`calibrate`; None for "all", or for "offsets" with a ruler.
         choose: "optimal" or "random" poses of a tracker.
-        finds_frame: Whether the tracker has a frame of its own, which is found too.
+        finds_frame: Whether the tracker has an unknown frame, which is estimated too.
         keeps_all: Whether errors stay that are not told from zero.
-        seed: Of poses, errors and noise.
+        seed: Seed of poses, errors and noise.
 
     Raises:
-        ParameterError, UnknownNameError, CalibrationError: As of :func:`calibrate`, and for values
-            that are not possible.
+        ParameterError, UnknownNameError, CalibrationError: As in :func:`calibrate`, and for impossible values.
     """
     model, rng = Model.of(robot), np.random.default_rng(seed)
     truth = true_errors(robot, default_errors(robot) if errors is None else errors, rng)
@@ -172,7 +171,7 @@ def simulate(
 def _tried(
     found: Found, truth: LinkErrors, measured: Measured, finds_frame: bool, rng: np.random.Generator
 ) -> Accuracy | None:
-    """Accuracy at fresh poses, without noise; of a tracker elsewhere at poses left out."""
+    """Accuracy at fresh poses, without noise; for a tracker with an unknown frame, by cross-validation."""
     if finds_frame:
         return left_out(found, measured)
     q = random_poses(found.model.robot, FRESH, rng)

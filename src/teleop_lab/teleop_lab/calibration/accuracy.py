@@ -13,12 +13,13 @@ from teleop_lab.calibration.model import FRAME
 
 AXES, TOTAL = ("x", "y", "z"), "total"
 _FOLDS = 5
-# What is left of a reading, over the typical, from which on it looks misread: of normal noise one in a million is.
+# Residual of a reading, divided by the typical residual, above which it looks misread: with normal noise one reading
+# in a million.
 _MISREAD = 5.0
 
 
 class Spread(NamedTuple):
-    """Of errors [m]: root mean square, standard deviation (n - 1), largest magnitude."""
+    """Statistics of errors [m]: root mean square, standard deviation (n - 1), largest magnitude."""
 
     rms: float
     deviation: float
@@ -26,7 +27,7 @@ class Spread(NamedTuple):
 
 
 def spread(errors: Array) -> Spread:
-    """Spread of errors (N,) [m], N >= 1; of a single one the deviation is 0."""
+    """Spread of errors (N,) [m], N >= 1; the deviation of a single error is 0."""
     deviation = float(np.std(errors, ddof=1)) if len(errors) > 1 else 0.0
     return Spread(float(np.sqrt(np.mean(errors**2))), deviation, float(np.abs(errors).max()))
 
@@ -37,8 +38,8 @@ class Accuracy:
 
     Attributes:
         where: At which poses, in words.
-        before: Spread by the arm as drawn.
-        after: Spread by what was found.
+        before: Spread with the nominal arm.
+        after: Spread with the found errors.
     """
 
     where: str
@@ -47,9 +48,10 @@ class Accuracy:
 
 
 def of_points(errors: Array) -> dict[str, Spread]:
-    """Spreads of errors (N, 3); NaN stands for what was not read.
+    """Spreads of errors (N, 3); NaN for a coordinate that was not read.
 
-    The total is of their lengths; if no point was read along all three axes, of all readings.
+    The total is the spread of the lengths (N,); if no point was read along all three axes, it is the spread of all
+    readings.
     """
     out = {}
     for axis, column in zip(AXES, errors.T, strict=True):
@@ -86,7 +88,7 @@ def at_measured(found: Found, measured: Measured) -> Accuracy:
 
 
 def at_fresh(found: Found, fresh: Measured) -> Accuracy:
-    """Accuracy at other poses, whose points are true."""
+    """Accuracy at other poses, with exact points."""
     accuracy = at_measured(found, fresh)
     return Accuracy(f"at {len(fresh)} fresh poses", accuracy.before, accuracy.after)
 
@@ -94,7 +96,7 @@ def at_fresh(found: Found, fresh: Measured) -> Accuracy:
 def left_out(found: Found, measured: Measured) -> Accuracy | None:
     """Accuracy by cross-validation: a fifth of the measured poses is left out at a time.
 
-    None where the others are too few.
+    None if too few poses remain.
     """
     links = [name for name in found.names if name not in FRAME]
     finds_frame = len(links) < len(found.names)
@@ -114,7 +116,7 @@ def left_out(found: Found, measured: Measured) -> Accuracy | None:
 
 
 class Misread(NamedTuple):
-    """Pose that does not fit: its number from 1, what is left of it [m], over the typical."""
+    """Pose that does not fit: its number from 1, its residual [m], and the ratio to the typical residual."""
 
     pose: int
     off: float

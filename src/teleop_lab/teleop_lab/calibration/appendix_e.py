@@ -1,8 +1,9 @@
 """Appendix E: the accuracy test of the RCRT-1 with a ruler, as printed, and the poses behind it.
 
-Ten targets along each axis, 10 mm apart, with the tool as at home. Along x and z the moves begin at home; along y,
-where home lies on the edge of what can be reached, 30 mm before it, and the ruler lies between home and the tip all the
-same. The source prints no directions: -x, +y and +z are those that can be reached (±y mirror each other).
+Ten targets along each axis, 10 mm apart, with the orientation of the tool at home. Along x and z the moves begin at
+home. Along y home lies on the edge of the workspace, so these moves begin 30 mm away from home; the ruler still
+measures from home to the tip. The source does not print directions: -x, +y and +z are those that are reachable (±y
+mirror each other).
 
 Source:
     Vongbunyong 2008, appendix E.1, tables E.1-E.3.
@@ -20,8 +21,8 @@ STEP = 0.5e-3
 WAY = 0.1
 """Length of the longest move [m]."""
 ESCAPE = 0.03
-"""From home to where a move begins that is not possible at home [m]."""
-# Distance from home [m]; of table E.2 the column read on the ruler.
+"""Distance from home to the begin of a move that is not possible at home [m]."""
+# Distance from home [m]; for table E.2 the column with the ruler's reading.
 READ = {
     "x": (10.25, 20.0, 30.0, 40.25, 50.25, 60.5, 70.5, 79.5, 90.0, 100.25),
     "y": (31.5, 36.0, 43.0, 50.5, 58.5, 68.0, 77.0, 86.5, 96.0, 105.5),
@@ -29,7 +30,7 @@ READ = {
 }
 """Ruler's readings [mm] for commands of 10, 20 ... 100 mm along each axis."""
 OFFSET_OF_D3 = 5.5e-3
-"""Offset of joint 3 [m] that explains most of them, derived from these tables."""
+"""Offset of joint 3 [m] that explains most of these readings, derived from the tables."""
 
 
 def published(robot: Robot) -> Measured:
@@ -46,11 +47,11 @@ def published(robot: Robot) -> Measured:
 
 
 def ruler_moves(robot: Robot, count: int) -> Measured:
-    """Poses of such a test for any arm, with the distances that the arm as drawn would show.
+    """Poses of such a test for any arm, with the distances of the nominal arm.
 
     Args:
         robot: An arm that controls x, y and z.
-        count: Number of poses, shared out to the axes, x first.
+        count: Number of poses, distributed over the axes, x first.
 
     Raises:
         CalibrationError: No straight move along an axis, from home or 30 mm beside it.

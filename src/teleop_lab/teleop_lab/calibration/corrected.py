@@ -1,4 +1,4 @@
-"""Corrected arm: what a calibration found as a Denavit-Hartenberg table that sessions take."""
+"""Corrected arm: the result of a calibration as a Denavit-Hartenberg table for sessions."""
 
 import math
 from collections.abc import Iterator, Mapping
@@ -20,8 +20,8 @@ _STATED = ("inertia", "viscous", "coulomb", "friction_speed", "effort_limit", "s
 def corrected_table(robot: Robot, errors: LinkErrors) -> Table:
     """Table of the arm as built, in the standard convention, radians and metres.
 
-    Joint vectors, limits, postures and drives stay those of the robot; link inertias, which a
-    table has none of, are lost.
+    Joint vectors, limits, postures and drives stay those of the robot. Link inertias are lost, because a table has
+    none.
 
     Raises:
         ParameterError: The robot is no chain.
@@ -42,7 +42,7 @@ def corrected_table(robot: Robot, errors: LinkErrors) -> Table:
 
 
 def _rows(robot: Robot, chain: Chain, errors: LinkErrors) -> Iterator[Comparison]:
-    """A row for each link, with one before them and one after where the chain has more."""
+    """A row for each link, plus one row before and one after them if the chain has further transforms there."""
     first, S = _links(chain.fixed[0])
     if any(abs(value) > 0.0 for value in first.values()):
         yield dict(first)
@@ -63,7 +63,7 @@ def _rows(robot: Robot, chain: Chain, errors: LinkErrors) -> Iterator[Comparison
 
 
 def _links(F: Array) -> tuple[Mapping[str, float], tuple[float, float]]:
-    """Numbers of one transform, and the turn and slide along the next axis that are left."""
+    """Parameters of one transform, and the remaining rotation and translation along the next axis."""
     S = next_axis_motion(F)
     L = F @ np.linalg.inv(S)
     theta, alpha = math.atan2(L[1, 0], L[0, 0]), math.atan2(L[2, 1], L[2, 2])

@@ -1,8 +1,8 @@
-"""Identifiability: which entries of a model measurements tell apart, and what hides the others.
+"""Identifiability: which entries of a model the measurements can distinguish, and why not the others.
 
-It is found by the singular values of the identification Jacobian with columns of unit length: as
-long as the ratio of the largest to the smallest is above a bound, one entry of the weakest
-combination is left at zero, a length or a twist before a joint offset.
+The method uses the singular values of the identification Jacobian with columns of unit length. While the ratio of the
+largest to the smallest is above a bound, one entry of the weakest combination is fixed at zero; lengths and twists are
+fixed before joint offsets.
 
 Source:
     Bound of 100: Schröer 1993, as quoted in the chapter on model identification by Hollerbach, Khalil and Gautier of
@@ -18,10 +18,10 @@ from teleop_core.kernels.geometry import Array
 from teleop_lab.calibration.model import FRAME, Model
 
 WORST_CONDITION = 100.0
-# Motion of the tip [m] per metre of an entry, or of the arm's length times its angle, below which
-# it does not move it; and share of a column below which what others leave of it is rounding.
+# Motion of the tip [m] per metre of an entry, or per arm length times angle, below which the entry has no effect.
+# Second: share of a column below which its part independent of other columns is rounding.
 _NOTHING, _SAME = 1e-9, 1e-6
-# How readily an entry is left out: links before offsets, and the frame last.
+# Order in which entries are left out: links before offsets, and the frame last.
 _LINK, _OFFSET, _FRAME = 1.0, 0.2, 0.01
 
 
@@ -36,7 +36,7 @@ class Left:
 def select(
     model: Model, J: Array, names: Sequence[str], worst_condition: float
 ) -> tuple[tuple[str, ...], tuple[Left, ...]]:
-    """Names that readings with slopes J (m, 4n + 6) tell apart, and the others with reasons."""
+    """Names that readings with the Jacobian J (m, 4n + 6) can distinguish, and the others with reasons."""
     column = {name: J[:, model.names.index(name)] for name in names}
     lever = {name: model.size if model.unit(name) == "rad" else 1.0 for name in names}
     effect = {name: float(np.linalg.norm(column[name])) / lever[name] for name in names}
@@ -66,14 +66,14 @@ def condition(columns: Array) -> float:
 
 
 def _weakest(model: Model, column: dict[str, Array], kept: list[str]) -> str:
-    """Entry that has the largest part in the combination that readings tell the least of."""
+    """Entry with the largest part in the combination that the readings determine least."""
     _, _, Vt = np.linalg.svd(_unit_columns(np.column_stack([column[k] for k in kept])))
     ease = [_FRAME if name in FRAME else _OFFSET if name in model.offsets else _LINK for name in kept]
     return kept[int(np.argmax(np.abs(Vt[-1]) * ease))]
 
 
 def _reason(column: dict[str, Array], name: str, kept: Sequence[str]) -> str:
-    """What an entry cannot be told from."""
+    """Entries from which an entry cannot be distinguished, in words."""
     A = np.column_stack([column[k] for k in kept])
     share = np.linalg.lstsq(_unit_columns(A), column[name], rcond=None)[0]
     rest = column[name] - _unit_columns(A) @ share

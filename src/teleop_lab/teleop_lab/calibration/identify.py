@@ -1,4 +1,4 @@
-"""Identification: least squares of link errors over what measurements tell apart."""
+"""Identification: least squares for the link errors that the measurements can distinguish."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -16,23 +16,23 @@ from teleop_lab.calibration.model import FRAME, Model, aligned
 LEVEL = 0.95
 """Of the confidence intervals."""
 NOT_SURE = "is not told from zero"
-# Of an angle [rad], and of a length as a share of the arm's: beyond, no arm was built so.
+# Largest plausible error of an angle [rad], and of a length as a share of the arm's length.
 _ABSURD = 0.35
 
 
 @dataclass(frozen=True, eq=False)
 class Found:
-    """Least squares of a calibration.
+    """Result of the least squares of a calibration.
 
     Attributes:
         names: Entries that were found, k of them.
         values: Their values (k,) [m, rad].
         half_widths: Halves of their confidence intervals (k,) [m, rad].
-        vector: All entries of the model, zero where not found.
-        left: Entries that were asked for and left at zero.
+        vector: All entries of the model; zero for entries that were not found.
+        left: Requested entries that were fixed at zero.
         condition: Ratio of the largest to the smallest singular value.
-        residual: Root mean square of what is left of the readings, by degrees of freedom [m].
-        freedom: Readings less entries.
+        residual: Root mean square of the residuals, by degrees of freedom [m].
+        freedom: Number of readings minus number of entries.
         model: The model with the frame of the measurement.
     """
 
@@ -49,10 +49,10 @@ class Found:
     def equivalent(self, errors: LinkErrors, q: Array) -> dict[str, float]:
         """Values that a perfect fit would find for an arm with these errors [m, rad].
 
-        An entry stands for all entries with the same effect, so that their sum is found.
+        An entry represents all entries with the same effect, so their sum is found.
 
         Args:
-            errors: Of a simulated arm.
+            errors: Errors of a simulated arm.
             q: Joint vectors (N, n), many.
         """
         told = [left.name for left in self.left if left.reason.startswith(NOT_SURE)]
@@ -70,7 +70,7 @@ class Found:
 
 
 def residuals(model: Model, measured: Measured, vector: Array) -> Array:
-    """Readings that the model expects less those that were read, (m,) [m]."""
+    """Readings expected by the model minus the real readings, (m,) [m]."""
     tips = model.tips(measured.joints, vector)
     if measured.points is not None:
         return np.asarray((tips - measured.points)[np.isfinite(measured.points)])
@@ -81,7 +81,7 @@ def residuals(model: Model, measured: Measured, vector: Array) -> Array:
 
 
 def slopes(model: Model, measured: Measured, vector: Array) -> Array:
-    """Slopes of :func:`residuals` by all entries of the model, (m, 4n + 6)."""
+    """Derivatives of :func:`residuals` with respect to all entries of the model, (m, 4n + 6)."""
     J = model.jacobian(measured.joints, vector)
     if measured.points is not None:
         return np.asarray(J[np.isfinite(measured.points)])
@@ -116,22 +116,22 @@ def identify(
     keeps_all: bool = False,
     worst_condition: float = WORST_CONDITION,
 ) -> Found:
-    """Link errors that make the model say what was measured, by least squares.
+    """Link errors for which the model agrees best with the measurement, by least squares.
 
     Args:
         model: The arm as drawn.
         measured: Readings.
-        fit: "all" link errors, joint "offsets", or names of entries, which then all must be told apart.
-        finds_frame: Whether the base's place in the frame of the measurement is found too.
-        keeps_all: Whether entries stay whose confidence interval holds zero; without it they are
-            left at zero, the least certain first, unless they were named. An entry that is not
-            told from zero takes up noise, and the tip is off where nothing was measured.
+        fit: "all" link errors, joint "offsets", or names of entries, which must then all be distinguishable.
+        finds_frame: Whether the base's pose in the frame of the measurement is estimated too.
+        keeps_all: Whether entries are kept whose confidence interval contains zero. Otherwise they are fixed at zero,
+            the least certain first, unless ``fit`` names them. An entry that does not differ from zero fits noise, and
+            causes errors of the tip where nothing was measured.
         worst_condition: Ratio of singular values above which entries are left out, > 1.
 
     Raises:
         UnknownNameError: ``fit`` names what is no link error.
-        CalibrationError: Too few readings, named entries that cannot be told apart, or a search
-            that does not end near the drawing.
+        CalibrationError: Too few readings, named entries that cannot be distinguished, or a search that does not end
+            near the nominal arm.
     """
     is_named = fit not in ("all", "offsets")
     names = wanted_names(model, fit)
@@ -169,10 +169,10 @@ def _pruned(found: Found, measured: Measured) -> Found:
 
 
 def aligned_model(model: Model, measured: Measured) -> Model:
-    """The model in the frame in which the arm as drawn lies next to the points.
+    """The model in the frame in which the nominal arm fits the points best.
 
     Raises:
-        CalibrationError: Fewer than three whole points.
+        CalibrationError: Fewer than three points with all three coordinates.
     """
     assert measured.points is not None
     whole = np.isfinite(measured.points).all(axis=1)
@@ -224,7 +224,7 @@ def _solved(model: Model, measured: Measured, names: tuple[str, ...], left: tupl
 
 
 def _drawn(model: Model, measured: Measured, left: tuple[Left, ...]) -> Found:
-    """Result of a search that found nothing: the arm is as drawn, as far as these readings tell."""
+    """Result of a search that found no error: the readings agree with the nominal arm."""
     vector, none = np.zeros(len(model.names)), np.zeros(0)
     rest = residuals(model, measured, vector)
     spread = float(np.sqrt(np.mean(rest**2)))

@@ -1,4 +1,4 @@
-"""Measured: what an instrument says of the tip, pose by pose, and where such tables come from."""
+"""Measured: readings of the tip by an instrument, pose by pose, and how to read them from tables."""
 
 import re
 from collections.abc import Iterable
@@ -18,12 +18,12 @@ if TYPE_CHECKING:
 
 _LENGTHS = {"": 1.0, "m": 1.0, "cm": 1e-2, "mm": 1e-3, "in": 0.0254}
 _ANGLES = {"": 1.0, "rad": 1.0, "deg": np.pi / 180.0}
-# Farther beyond the limits, in shares of their distance, is no pose of the arm but another unit.
+# Joints farther beyond the limits than this share of the range are taken for values in another unit.
 _BEYOND = 0.5
 
 
 class CalibrationError(TeleopError):
-    """Measurements do not tell what is asked of them; the text says why, and what would."""
+    """Measurements are not sufficient for the request; the text has the reason, and what would help."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -31,15 +31,15 @@ class Measured:
     """Readings of an instrument at poses of an arm; the arrays are read-only copies.
 
     Args:
-        joints: What the encoders said, (N, n) [rad, m].
-        points: Place of the tip (N, 3) [m], NaN where an axis was not read; None for distances.
-        distances: Distance (N,) [m] of the tip from where it was at ``origins``; None for points.
+        joints: Encoder readings, (N, n) [rad, m].
+        points: Position of the tip (N, 3) [m], NaN for an axis that was not read; None for distances.
+        distances: Distance (N,) [m] of the tip from its position at ``origins``; None for points.
         origins: Joint vectors (N, n) from which distances count; None for points.
-        labels: A name for each reading under which errors of distances are counted, such as the
-            axis along which the tip went; empty for none.
+        labels: A name for each distance, by which errors are grouped, such as the axis along which the tip moved;
+            empty for none.
 
     Raises:
-        ShapeError: Arrays that do not belong together.
+        ShapeError: Arrays whose shapes do not match.
         ParameterError: Neither points nor distances, or joints that are not finite.
     """
 
@@ -101,13 +101,13 @@ class Measured:
 def read_measured(path: Path, robot: Robot) -> Measured:
     """Measured poses from a CSV file: a column per joint, and x, y, z of the tip.
 
-    Joints are called as the robot calls them, or q1 ... qn, in metres and radians; ``x [mm]``, ``theta1_deg`` and their
-    like say another unit. Cells of x, y, z may be empty. Other columns are left out.
+    Joint columns have the robot's joint names, or q1 ... qn, in metres and radians; names such as ``x [mm]`` and
+    ``theta1_deg`` set another unit. Cells of x, y, z may be empty. Other columns are ignored.
 
     Raises:
-        RecordingError: It cannot be read, or is no table of text.
-        CalibrationError: Columns are missing, cells are no numbers, or joints are far beyond their
-            limits, which are in another unit as a rule.
+        RecordingError: The file cannot be read, or is not a text table.
+        CalibrationError: Columns are missing, cells are not numbers, or joints are far beyond their limits, usually
+            because they have another unit.
     """
     import pandas as pd
 
@@ -148,7 +148,7 @@ def _missing(path: Path, what: str, columns: Iterable[str]) -> CalibrationError:
 def _numbers(
     path: Path, frame: "pd.DataFrame", column: str, units: dict[str, float], *, may_miss: bool = False
 ) -> Array:
-    """Column in SI units; NaN only where cells may miss."""
+    """Column in SI units; NaN for empty cells if these are allowed."""
     import pandas as pd
 
     cells = frame[column]

@@ -1,7 +1,7 @@
-"""Model of a calibration: where the tip of an arm with link errors is, and how errors move it.
+"""Model of a calibration: the position of the tip of an arm with link errors, and its derivatives.
 
-Derivatives are analytic: an error of theta or d turns or slides everything after it about or along
-the joint's axis, one of alpha or a about or along the link's common normal.
+Derivatives are analytic: an error of theta (d) rotates (translates) all later links about (along) the joint's axis; an
+error of alpha (a) does so about (along) the link's common normal.
 
 Source:
     Mooring, Roth and Driels 1991, Fundamentals of manipulator calibration:
@@ -19,7 +19,7 @@ from teleop_core.robots.link_errors import Chain, LinkErrors, error_names, next_
 from teleop_core.robots.robot import Robot
 
 FRAME = ("frame_x", "frame_y", "frame_z", "frame_rx", "frame_ry", "frame_rz")
-"""Where the arm's base is in the frame of the measurement: place [m], rotation vector [rad]."""
+"""Pose of the arm's base in the frame of the measurement: position [m], rotation vector [rad]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,10 +42,10 @@ class Frame:
 
 @dataclass(frozen=True, eq=False)
 class Model:
-    """Tip of a chain over the vector of what can be found: 4n link errors, then :data:`FRAME`.
+    """Tip of a chain as a function of the vector of unknowns: 4n link errors, then :data:`FRAME`.
 
     Args:
-        robot: The arm as drawn.
+        robot: The nominal arm.
         chain: The same as transforms.
         frame: Frame of the measurement.
     """
@@ -59,7 +59,7 @@ class Model:
         """Model of a robot that is a chain.
 
         Raises:
-            ParameterError: It is none.
+            ParameterError: The robot is not a chain.
         """
         chain = chain_of(robot)
         if chain is None:
@@ -74,12 +74,12 @@ class Model:
 
     @property
     def offsets(self) -> tuple[str, ...]:
-        """Names of the joint offsets, from the base on."""
+        """Names of the joint offsets, beginning at the base."""
         return tuple(f"{'theta' if abs(kind) < 1.5 else 'd'}{i + 1}" for i, kind in enumerate(self.chain.kinds))
 
     @property
     def size(self) -> float:
-        """Length [m] of the arm as a lever, by which its angles count as much as its lengths."""
+        """Length [m] of the arm, by which angles are multiplied to compare them with lengths."""
         return float(self.chain.row[self.chain.n])
 
     def unit(self, name: str) -> str:
@@ -87,11 +87,11 @@ class Model:
         return "rad" if name.startswith(("alpha", "theta", "frame_r")) else "m"
 
     def tips(self, q: Array, vector: Array) -> Array:
-        """Place of the tip (N, 3) [m], in the frame of the measurement, at joints (N, n)."""
+        """Position of the tip (N, 3) [m], in the frame of the measurement, at joints (N, n)."""
         return self._frames(q, vector)[0]
 
     def jacobian(self, q: Array, vector: Array) -> Array:
-        """Slopes of :meth:`tips` by the vector, (N, 3, 4n + 6); of the frame's turn at zero."""
+        """Derivatives of :meth:`tips` by the vector, (N, 3, 4n + 6); those by the frame's rotation are at zero."""
         tip, along, about, alpha_place, theta_place = self._frames(q, vector)
         turns = np.concatenate(
             (np.cross(along, tip[:, None] - alpha_place), np.cross(about, tip[:, None] - theta_place)), axis=1
@@ -130,7 +130,7 @@ class Model:
 
 
 def joint_motions(kind: float, q: Array) -> Array:
-    """Motions (N, 4, 4) of a joint at positions (N,), of kinds as in the kernels of chains."""
+    """Transforms (N, 4, 4) of a joint at positions (N,); kinds as in the kernels of chains."""
     out = np.tile(np.eye(4), (len(q), 1, 1))
     if abs(kind) > 1.5:
         out[:, 2, 3] = 0.5 * kind * q
@@ -151,7 +151,7 @@ def rotation_of(vector: Array) -> Array:
 
 
 def aligned(points: Array, measured: Array) -> Frame:
-    """Frame in which points (N, 3) lie next to where they were measured (N, 3).
+    """Frame in which points (N, 3) are nearest to their measured positions (N, 3), by least squares.
 
     Source:
         Kabsch 1976; Umeyama 1991, who keeps the rotation right-handed.

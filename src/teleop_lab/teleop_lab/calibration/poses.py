@@ -1,4 +1,4 @@
-"""Poses for a calibration: at random inside the limits, or those that tell most (D-optimality)."""
+"""Poses for a calibration: random inside the limits, or the most informative ones (D-optimality)."""
 
 from collections.abc import Sequence
 
@@ -10,24 +10,24 @@ from teleop_lab.calibration.model import Model
 
 CANDIDATES = 400
 """Random poses from which the best are chosen."""
-_START = 1e-6  # of the information about each entry before the first pose
+_START = 1e-6  # prior information about each entry before the first pose
 
 
 def random_poses(robot: Robot, count: int, rng: np.random.Generator) -> Array:
-    """Joint vectors (count, n), even inside the limits [rad, m]."""
+    """Joint vectors (count, n), uniformly distributed inside the limits [rad, m]."""
     return rng.uniform(robot.lower, robot.upper, (count, robot.n))
 
 
 def optimal_poses(model: Model, count: int, names: Sequence[str], rng: np.random.Generator) -> Array:
-    """Joint vectors (count, n) at which points of the tip tell most about some entries.
+    """Joint vectors (count, n) at which points of the tip are most informative about some entries.
 
-    Out of :data:`CANDIDATES` random ones, each the one that raises the determinant of the
-    information matrix JᵀJ most; none is taken twice before all were.
+    Each pose is the one of :data:`CANDIDATES` random poses that raises the determinant of the information matrix JᵀJ
+    most. No pose is taken twice before all were taken.
 
     Args:
         model: The arm as drawn.
         count: Number of poses.
-        names: Entries that can be told apart.
+        names: Entries that can be distinguished.
         rng: Source of the candidates.
 
     Source:

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 def text(calibration: "Calibration") -> str:
-    """Lines for the terminal: what was found, what was not, and the accuracy."""
+    """Lines for the terminal: the found entries, the other entries, and the accuracy."""
     found, measured = calibration.found, calibration.measured
     kind = "points" if measured.points is not None else "distances"
     head = (
@@ -55,7 +55,7 @@ def _table(accuracy: "Accuracy") -> Iterator[str]:
 
 
 def _verdict(calibration: "Calibration") -> Iterator[str]:
-    """What it is worth, and what is wrong with it."""
+    """Verdict on the result: its accuracy and its weaknesses."""
     odd = misread(calibration.found, calibration.measured) if calibration.truth is None else None
     if odd is not None:
         yield (
@@ -104,7 +104,7 @@ def _plain(spreads: object) -> dict[str, dict[str, float]]:
 
 
 def correction_file(calibration: "Calibration") -> str:
-    """The arm as found, as a YAML table for ``--set robot=FILE``; errors stand in its head."""
+    """The calibrated arm as a YAML table for ``--set robot=FILE``; the errors are in comments at its head."""
     found = calibration.found
     head = [f"# {calibration.robot.name} as calibrated from {len(calibration.measured)} poses."]
     for name, value, half in zip(found.names, found.values, found.half_widths, strict=True):

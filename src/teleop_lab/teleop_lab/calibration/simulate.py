@@ -15,16 +15,16 @@ from teleop_lab.calibration.model import Model, rotation_of
 from teleop_lab.calibration.poses import optimal_poses, random_poses
 
 TOLERANCES = {"cnc": 20e-6, "prototype": 100e-6}
-"""Half widths of tolerances [m], published: Vongbunyong 2008, chapter 3, of milled and of rapid-prototyped parts."""
+"""Half widths of tolerances [m] of milled and of rapid-prototyped parts, published: Vongbunyong 2008, chapter 3."""
 SEAT = 0.05
 """Lever [m] over which a tolerance turns an axis; assumed: the size of a bearing seat or a link."""
 RULER = "ruler"
 CHOICES = ("optimal", "random")
-_FAR = 0.5  # [m] from the base to a tracker whose place nobody knows
+_FAR = 0.5  # [m] from the base to a tracker with an unknown pose
 
 
 def default_errors(robot: Robot) -> tuple[str, ...]:
-    """Errors of an arm for which none are given: milled parts; of the rcrt1 the offset of d3."""
+    """Default errors of an arm: those of milled parts; for the rcrt1 also the offset of d3."""
     offset = (f"d3={appendix_e.OFFSET_OF_D3}",) if robot.name == "rcrt1" else ()
     return ("cnc", *offset)
 
@@ -34,9 +34,9 @@ def true_errors(robot: Robot, texts: Sequence[str], rng: np.random.Generator) ->
 
     Args:
         robot: The arm.
-        texts: Names of :data:`TOLERANCES`, of which every error is drawn evenly, and texts such as
-            ``d3=5.5e-3`` [m, rad], which replace what was drawn.
-        rng: Source of what is drawn.
+        texts: Names of :data:`TOLERANCES`, from which every error is drawn uniformly, and texts such as ``d3=5.5e-3``
+            [m, rad], which replace the drawn value.
+        rng: Source of the random errors.
 
     Raises:
         UnknownNameError: No such tolerance or error.
@@ -72,7 +72,7 @@ def _number(text: str, value: str) -> float:
 
 
 def chosen_poses(model: Model, count: int, choose: str, fit: str | Sequence[str], rng: np.random.Generator) -> Array:
-    """Joint vectors (count, n) for a tracker: "random", or "optimal" for what is to be found.
+    """Joint vectors (count, n) for a tracker: "random", or "optimal" for the entries to be found.
 
     Raises:
         UnknownNameError: No such choice, or ``fit`` names what is no link error.
@@ -93,15 +93,15 @@ def chosen_poses(model: Model, count: int, choose: str, fit: str | Sequence[str]
 def tracked(
     model: Model, errors: LinkErrors, q: Array, noise: float, rng: np.random.Generator, *, is_elsewhere: bool = False
 ) -> Measured:
-    """What a tracker says of the tip at poses: its place plus noise on each axis.
+    """Simulated readings of a tracker at poses: the position of the tip plus noise on each axis.
 
     Args:
-        model: The arm as drawn.
-        errors: How it was built.
+        model: The nominal arm.
+        errors: Its link errors.
         q: Joint vectors (N, n).
         noise: Standard deviation [m], >= 0.
         rng: Source of the noise.
-        is_elsewhere: Whether the tracker has a frame of its own, at a random place.
+        is_elsewhere: Whether the tracker has its own frame, at a random pose.
 
     Raises:
         ParameterError: Noise that is negative or not finite.
@@ -115,7 +115,7 @@ def tracked(
 
 
 def ruled(model: Model, errors: LinkErrors, count: int) -> Measured:
-    """What a ruler of 0.5 mm says along one axis after the other, as in appendix E."""
+    """Simulated readings of a ruler with 0.5 mm divisions, along one axis after the other, as in appendix E."""
     moves = appendix_e.ruler_moves(model.robot, count)
     assert moves.origins is not None
     way = true_tips(model, errors, moves.joints) - true_tips(model, errors, moves.origins)
@@ -124,5 +124,5 @@ def ruled(model: Model, errors: LinkErrors, count: int) -> Measured:
 
 
 def true_tips(model: Model, errors: LinkErrors, q: Array) -> Array:
-    """Places of the tip (N, 3) [m] of the arm as built, in its base."""
+    """Positions of the tip (N, 3) [m] of the arm with its errors, in its base."""
     return Model.of(model.robot).tips(q, np.concatenate((errors.vector, np.zeros(6))))

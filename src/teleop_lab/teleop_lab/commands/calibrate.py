@@ -1,4 +1,4 @@
-"""``teleop calibrate``: how an arm was really built, from measured places of its tip."""
+"""``teleop calibrate``: the real geometry of an arm, from measured positions of its tip."""
 
 import argparse
 import json

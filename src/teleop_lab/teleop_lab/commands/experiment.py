@@ -49,7 +49,7 @@ def _run(arguments: argparse.Namespace) -> int:
     check_places(arguments.json, arguments.html)
     is_all = not arguments.names or ALL in arguments.names
     outcomes = _outcomes(() if is_all else tuple(arguments.names), arguments.seed)
-    # Files come first: who reads the tables may have seen enough before their end.
+    # Files are written first, because a reader of the tables may close the pipe before their end.
     written = _write(outcomes, arguments.json, arguments.html)
     _show(outcomes)
     print("".join(f"{line}\n" for line in written), end="")
@@ -84,7 +84,7 @@ def _show(outcomes: "list[Outcome]") -> None:
 
 
 def _write(outcomes: "list[Outcome]", json_file: Path | None, html_file: Path | None) -> list[str]:
-    """Write what is wanted; returns a line for each file."""
+    """Write the requested files; returns a line for each file."""
     from teleop_core import __version__
     from teleop_core.evaluation.command import write_whole
 

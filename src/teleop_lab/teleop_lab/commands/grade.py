@@ -59,7 +59,7 @@ def _run(arguments: argparse.Namespace) -> int:
 
 
 def _page(table: Any, name: str) -> str:
-    """Page with a sortable-by-oddness table whose odd cells stand out."""
+    """Page with a table that can be sorted by oddness; odd cells are highlighted."""
     from html import escape
 
     from teleop_lab.grading import ODD, WORST

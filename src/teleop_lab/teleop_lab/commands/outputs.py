@@ -14,8 +14,8 @@ def add_study(
 
     Args:
         parser: Of the command.
-        what: What the file says.
-        line: What has a line of its own in the table.
+        what: Description of the file.
+        line: What each line of the table is for.
         only: When the outputs count, such as ``, of --compare``.
         must_keep: Whether a store has to be given.
     """
@@ -33,7 +33,7 @@ def add_files(parser: argparse.ArgumentParser, line: str, only: str = "") -> Non
 
 
 def check_outputs(arguments: argparse.Namespace) -> None:
-    """Make sure that there are processes, and places for the files.
+    """Check that the number of processes is valid, and that the files can be written.
 
     Raises:
         TeleopError: There are none.
@@ -46,7 +46,7 @@ def check_outputs(arguments: argparse.Namespace) -> None:
 
 
 def write_outputs(arguments: argparse.Namespace, csv: Callable[[], str], html: Callable[[], str]) -> None:
-    """Write the files that were asked for, whole or not at all, and say where they are."""
+    """Write the requested files, completely or not at all, and print their paths."""
     from teleop_core.evaluation.command import write_whole
 
     for name, place, text in (("numbers", arguments.csv, csv), ("page", arguments.html, html)):

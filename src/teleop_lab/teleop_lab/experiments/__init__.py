@@ -46,8 +46,8 @@ def run(name: str, *, seed: int = 1, bench: Bench | None = None) -> Outcome:
     Args:
         name: One of :func:`list_experiments`.
         seed: First seed of everything random in it.
-        bench: Where its sessions run, in place of a bench with that seed; experiments that share
-            one run a session that several of them need only once.
+        bench: Bench on which its sessions run, in place of a new bench with that seed. Experiments that share a bench
+            run a common session only once.
 
     Returns:
         Rows of numbers, published and predicted, and plots.
@@ -70,7 +70,8 @@ def run_several(
     Args:
         names: Names, each taken once; all experiments if there are none.
         bench: Where their sessions run.
-        began: Told the name of each as it begins, how many are done, and how many there are.
+        began: Called when an experiment begins, with its name, the number of finished experiments, and the number of
+            all.
 
     Raises:
         UnknownNameError: There is no such experiment, found before any of them runs.

@@ -20,10 +20,10 @@ from teleop_lab.fitting.rests import Mover
 
 DESIRED_MM = np.arange(10.0, 101.0, 10.0)
 ESCAPE_MM = 1e3 * ESCAPE
-"""Move along -x before those along y, for home lies on the edge of the reach."""
+"""Move along -x before the moves along y, because home lies on the edge of the workspace."""
 RULER_MM = 1e3 * STEP
 D3_OFFSET_MM = 1e3 * OFFSET_OF_D3
-"""What the true d3 is longer than the encoder says."""
+"""Difference between the true d3 and the encoder's value."""
 
 
 class Axis(NamedTuple):
@@ -32,9 +32,9 @@ class Axis(NamedTuple):
     Attributes:
         direction: Unit vector of the moves in the base.
         escape_mm: Move along -x before them [mm].
-        read_mm: What the ruler was read as, at each target (10,) [mm].
+        read_mm: Reading of the ruler at each target (10,) [mm].
         step_mm: Smallest step between those readings [mm].
-        error_mm: Desired less measured, as printed (10,) [mm].
+        error_mm: Desired minus measured, as printed (10,) [mm].
         rms: As printed [mm].
         deviation: As printed [mm].
         largest: As printed [mm].
@@ -65,21 +65,21 @@ AXES = {
 
 
 def moved(reading_mm: Array, escape_mm: float) -> Array:
-    """Way along the axis [mm] of readings [mm] from home, which lies ``escape_mm`` beside it."""
+    """Displacement along the axis [mm] for readings [mm] from home, which lies ``escape_mm`` beside the axis."""
     return np.sqrt(np.square(reading_mm) - escape_mm**2)
 
 
 Rest = Callable[[Array], Array]
-"""Joints that a controller goes to (n,) [rad or m], to where the tip then really is (3,) [m]."""
+"""Function from commanded joints (n,) [rad or m] to the true position of the tip at rest (3,) [m]."""
 
 
 def readings(robot: Robot, which: Axis, rest: Rest) -> Array:
-    """What an exact ruler says at each target (10,) [mm].
+    """Readings of an exact ruler at each target (10,) [mm].
 
     Args:
         robot: The arm as its controller knows it; its tool stays along x.
         which: The moves.
-        rest: Moves the arm and looks where it came to rest.
+        rest: Moves the arm and returns the position at which the tip rests.
 
     Raises:
         TeleopError: A target cannot be reached.
@@ -100,7 +100,7 @@ def as_read(exact: Array, step_mm: float) -> Array:
 
 
 def longer_d3(robot: Robot, offset_mm: float) -> Rest:
-    """An arm that comes to rest where it should, but for d3, which is longer than it knows."""
+    """An arm that rests exactly at its command, except that its true d3 is longer than the encoder's value."""
 
     def rest(q: Array) -> Array:
         true = q.copy()
@@ -196,7 +196,7 @@ def _rms(values: Array) -> float:
 
 
 def _total_rows(robot: Robot, longer: dict[str, Array], exact: dict[str, Array]) -> list[Comparison]:
-    """All readings as the ruler gives them, of y from home, less what models expect."""
+    """All readings of the ruler (along y from home) minus the readings that models predict."""
     read = np.concatenate([which.read_mm for which in AXES.values()])
     drawn = {name: readings(robot, which, longer_d3(robot, 0.0)) for name, which in AXES.items()}
     group = "all readings of the ruler, less what is expected of it"

@@ -1,4 +1,4 @@
-"""Bench: runs the sessions that experiments ask for, each once."""
+"""Bench: runs the sessions of experiments, each only once."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
@@ -26,8 +26,8 @@ Job = TypeVar("Job")
 Result = TypeVar("Result")
 _WHOLE = 16  # sessions whose streams are kept, 25 MB each
 SEEDS = 3
-"""Sessions with different hands of which figures are the mean."""
-# What experiments look at; the rest of a recording, most of its memory, is let go.
+"""Number of sessions with different hands over which figures are averaged."""
+# Topics that experiments read; the rest of a recording, most of its memory, is deleted.
 _KEPT = (
     "master/measured_cp",
     "slave/servo_cp",
@@ -44,13 +44,13 @@ _OF_SLAVE = ("slave/setpoint_js", "slave/setpoint_cp", "slave/measured_js", "sla
 
 @dataclass(frozen=True, eq=False)
 class Session:
-    """One session: its score, and the streams that experiments look at.
+    """One session: its score, and the streams that experiments read.
 
     Attributes:
         name: Scenario.
         seed: Its seed.
-        judge: Gives its score.
-        read: Gives the streams by topic.
+        judge: Returns its score.
+        read: Returns the streams by topic.
     """
 
     name: str
@@ -60,19 +60,19 @@ class Session:
 
     @property
     def score(self) -> Score:
-        """What it is worth; one that was not scored is run again, to the same bits."""
+        """Score of the session; if it was not scored, the session is run again, with the same bits."""
         return self.judge()
 
     @property
     def streams(self) -> Mapping[str, Stream]:
-        """Streams by topic; of an older session it is run again, to the same bits."""
+        """Streams by topic; if they are no longer kept, the session is run again, with the same bits."""
         return self.read()
 
     def __getitem__(self, topic: str) -> Stream:
         """A stream by its topic.
 
         Raises:
-            UnknownNameError: It was not recorded, or is not kept.
+            UnknownNameError: The topic was not recorded, or is not kept.
         """
         streams = self.streams
         if topic not in streams:
@@ -90,7 +90,7 @@ class Session:
 
     @property
     def is_followed(self) -> NDArray[np.bool_]:
-        """Whether the slave follows the hand, for each of its poses (N,): not on its way there."""
+        """Whether the slave follows the hand, for each of its poses (N,); false before it follows."""
         return self["slave/setpoint_cp"].stamp_ns > NO_COMMAND_NS
 
 
@@ -98,8 +98,8 @@ class Bench:
     """Runs sessions in virtual time, and remembers them.
 
     Args:
-        seed: First seed; sessions of several hands take those after it too.
-        progress: Told how far the session that is running is.
+        seed: First seed; sessions of several hands also use the next ones.
+        progress: Called with the progress of the running session.
         settings: Parameters of every session, over its scenario.
         workers: Processes that :meth:`map` spreads work over. With more than 1, a program must
             keep what it runs behind ``if __name__ == "__main__":``.
@@ -137,7 +137,7 @@ class Bench:
             scenario: One of ``teleop scenarios``.
             seed: Seed of everything random in it; None for the first of the bench.
             settings: Parameters over the scenario and the bench's settings.
-            is_scored: Whether its score will be asked for, which takes longer than the session itself.
+            is_scored: Whether its score is needed; scoring takes longer than the session itself.
 
         Raises:
             TeleopError: A setting or the scenario is wrong.
@@ -163,7 +163,7 @@ class Bench:
         return self._known[key]
 
     def _keep(self, key: object, streams: Mapping[str, Stream]) -> None:
-        """Keep streams, and let go of the oldest ones when there are many."""
+        """Keep streams, and delete the oldest ones if there are many."""
         self._streams[key] = streams
         if len(self._streams) > _WHOLE:
             del self._streams[next(iter(self._streams))]
@@ -187,13 +187,13 @@ class Bench:
     def signals(
         self, scenario: str, seconds: float, settings: Settings | None = None, motion: Motion | None = None
     ) -> Mapping[str, Array]:
-        """What the stages of a session say, a row for each tick, without its score: faster.
+        """Outputs of the stages of a session, a row for each tick; faster than a scored session.
 
         Args:
             scenario: One of ``teleop scenarios``.
             seconds: How long it lasts [s].
             settings: Parameters over the scenario and the bench's settings.
-            motion: What the hand wants, in place of the scenario's operator.
+            motion: Wanted motion of the hand, in place of the scenario's operator.
 
         Raises:
             TeleopError: A setting or the scenario is wrong.
@@ -207,7 +207,7 @@ class Bench:
         return {name: rows[name] for name in rows.dtype.names or ()}
 
     def map(self, work: Callable[["Bench", Job], Result], jobs: Sequence[Job]) -> list[Result]:
-        """Results of ``work(bench, job)`` in the order of the jobs, done side by side.
+        """Results of ``work(bench, job)`` in the order of the jobs, computed in parallel.
 
         Args:
             work: A function of a module; its bench has the seed and the settings of this one.
@@ -235,7 +235,7 @@ def _work(work: Callable[[Bench, Job], Result], seed: int, settings: Settings, j
 
 
 def _aligned(recording: Recording) -> Mapping[str, Stream]:
-    """Streams of the slave with rows of the same samples: its measured pose comes a tick later."""
+    """Streams of the slave, aligned so that a row has the same sample: the measured pose comes a tick later."""
     streams = {name: recording[name] for name in _KEPT}
     for name in _OF_SLAVE:
         streams[name] = streams[name].part(slice(0, -1))

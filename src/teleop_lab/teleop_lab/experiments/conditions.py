@@ -1,4 +1,4 @@
-"""Conditions: with which settings the source's machine is predicted, and what ours changes."""
+"""Conditions: the settings that predict the source's machine, and those with our controller."""
 
 from teleop_lab.experiments.bench import Settings
 
@@ -12,4 +12,4 @@ without overshoot, with the least change of effort from tick to tick. Its angles
 degree near home too, though not below the published largest yaw of the coarse mode.
 """
 RESTING: Settings = {"plant": "hardware", "controller": "pid"}
-"""For tests whose gains the source tuned for no error at rest, tracking ignored (appendix E)."""
+"""For tests whose gains the source tuned for zero error at rest, without regard to tracking (appendix E)."""

@@ -40,13 +40,13 @@ _CURVE = 10
 
 
 class Tracking(NamedTuple):
-    """What is compared of one session.
+    """Figures of one session that are compared.
 
     Attributes:
         rms: Error of the tip at the encoders, root mean square [µm].
-        largest: The same at the most [µm].
+        largest: Largest error of the tip at the encoders [µm].
         true_rms: Error of the true tip [µm].
-        true_spread: The same about its mean, which calibration would take away [µm].
+        true_spread: Error of the true tip about its mean [µm]; calibration would remove the mean.
         effort: Root mean square over joints and time of the effort over the drive's limit [%].
         chatter: The same of its change from tick to tick [%].
     """
@@ -60,7 +60,7 @@ class Tracking(NamedTuple):
 
 
 def tracking_of(session: Session) -> Tracking:
-    """What is compared of a session of the RCRT-1, from when its slave follows."""
+    """Figures of a session of the RCRT-1, from the time at which its slave follows."""
     kept = session.is_followed
     wanted, seen, true = (
         1e3 * session.places_mm(f"slave/{name}")[kept] for name in ("setpoint_cp", "measured_cp", "true_cp")
@@ -152,7 +152,7 @@ def _measure(bench: Bench) -> Findings:
         found, traces = {}, []
         for law, color in zip(LAWS, _COLORS, strict=True):
             sessions = compared(bench, scenario, law)
-            # Read at once, for a bench lets go of what its older sessions recorded.
+            # Read now, because a bench deletes the streams of older sessions.
             found[law] = [tracking_of(session) for session in sessions]
             traces.append(_error_trace(sessions[0], law, color))
         rows += _tracking_rows(scenario, found)

@@ -19,11 +19,11 @@ DELAYS = (0.0, 0.25, 0.5, 1.0)
 FOLLOWED = DELAYS[:3]
 GAINS = (1.0, 0.5, 0.2)
 SCALED = 0.5
-"""Of the commands where scales are compared [s]."""
+"""Delay of the commands when scales are compared [s]."""
 _KEYS = ("task.time_s", "task.error_share", "task.effective_width_mm", "task.throughput")
 _FIXED: Settings = {
     "teleop.stages": ("network", "display", "task"),
-    "feedback_timeout": 5.0,  # the line is late, not broken
+    "feedback_timeout": 5.0,  # the delay must not count as an outage
 }
 Scores = Callable[[str], "DataArray"]
 """Means over the seeds by the key of a score."""

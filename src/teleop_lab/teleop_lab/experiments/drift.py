@@ -21,11 +21,11 @@ ROUND_TRIPS = (0.2, 0.7)
 CONTACTS = 10
 GOAL_MM = 1.0
 """Drift that may be left when the next contact begins; assumed."""
-_READY = 4.0  # by when the arm follows [s], without the network
+_READY = 4.0  # time at which the arm follows [s], without the network
 _APPROACH, _PERIOD, _REST = 3.0, 2.0, 1.0  # of the hand [s]; assumed
-_WAY = 0.02  # of the hand [m], 9 mm of it within the object of palpation; assumed
+_WAY = 0.02  # displacement of the hand [m], 9 mm of it within the object of palpation; assumed
 _TOUCH = 0.01  # smallest force of a contact [N]
-_STILL = 200  # ticks at the end over which a place is the mean
+_STILL = 200  # ticks at the end over which a position is averaged
 
 Job = tuple[str, str, float]
 """Material, passivity and round trip [s]."""
@@ -33,14 +33,14 @@ Job = tuple[str, str, float]
 
 @dataclass(frozen=True, eq=False)
 class Drift:
-    """What ten contacts left.
+    """Drift after ten contacts.
 
     Attributes:
         leaving: Drift as the tip leaves the object in each contact that ended (N,) [m].
         left: Drift when the next contact may begin, a period after this one began (N,) [m].
         peak: Largest drift [m].
         rest: Distance of the tip from the hand's command, at rest after the last contact [m].
-        given: Energy that came out of both ports less what went in [J].
+        given: Energy that came out of both ports minus the energy that went in [J].
         force: Largest force on the tip [N].
     """
 
@@ -62,7 +62,7 @@ def _motion(times: Array) -> Array:
 
 
 def measure_drift(bench: Bench, job: Job) -> Drift:
-    """Drift over ten contacts of a hand that moves as it wants, whatever it feels.
+    """Drift over ten contacts of a hand that ignores the force.
 
     Args:
         bench: Where it runs.

@@ -1,4 +1,4 @@
-"""Experiment: what a source did, as a function from a bench to what was found."""
+"""Experiment: an experiment of a source, as a function from a bench to findings."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -12,10 +12,10 @@ _PLACE = "teleop_lab.experiments"
 
 @dataclass(frozen=True)
 class Experiment:
-    """What a source did and printed.
+    """An experiment of a source, and its printed results.
 
     Attributes:
-        name: What ``teleop experiment`` calls it.
+        name: Name of the experiment for ``teleop experiment``.
         title: What it is, in one line.
         source: Where the published figures stand.
         measure: ``measure(bench)`` runs it; sessions come from the bench, so that they run once.

@@ -21,13 +21,13 @@ MARKS = {True: "✓", False: "✗", None: ""}
 _COLORS = {True: "green", False: "red", None: "default"}
 _KEPT = {"printed": "published figures agree", "law": "laws hold", "goal": "goals are kept"}
 _WIDTH = 110
-_DIGITS = 6  # after the point, the most that any source prints
+_DIGITS = 6  # decimals, the most that any source prints
 
 
 def numbers(row: "Comparison") -> tuple[str, str, str, str]:
     """Texts of published, predicted, ours and difference.
 
-    What is predicted has a decimal more than what was printed, so that rounding shows.
+    A predicted number has one decimal more than the printed one, so that rounding is visible.
     """
     if row.published is None:
         return "", _plain(row.predicted), _plain(row.ours), ""
@@ -37,13 +37,13 @@ def numbers(row: "Comparison") -> tuple[str, str, str, str]:
 
 
 def _printed(published: float) -> str:
-    """A published number as it was printed; four digits of one that was computed from such."""
+    """A published number as it was printed, or four digits of a number that was computed from printed ones."""
     text = f"{published:.9g}"
     return text if len(text.partition(".")[2]) <= _DIGITS else f"{published:.4g}"
 
 
 def _beside(value: float | None, published: float) -> str:
-    """Text of a number with one decimal more than what was printed, or three digits if more."""
+    """Text of a number with one decimal more than the printed one, or with three digits if that is more."""
     if value is None:
         return ""
     if 0.0 < abs(published) < 1e-4:
@@ -80,7 +80,7 @@ def within(row: "Comparison") -> str:
 
 
 def summary(outcomes: "Sequence[Outcome]") -> str:
-    """One line: how many figures agree, how many laws and goals are kept."""
+    """One line: how many figures agree, and how many laws and goals are met."""
     found = {basis: np.sum([o.count(basis) for o in outcomes], axis=0) for basis in _KEPT}
     told = [f"{kept} of {of} {_KEPT[b]}" for b, (kept, of) in found.items() if of or b == "printed"]
     rest = sum(len(o.rows) for o in outcomes) - sum(of for _, of in found.values())
@@ -126,7 +126,7 @@ def outcome_table(outcome: "Outcome") -> Table:
 
 
 def show(outcome: "Outcome", console: Console) -> None:
-    """Print the table of an outcome, and what must be known to read it."""
+    """Print the table of an outcome, and its notes."""
     console.print(outcome_table(outcome))
     told = f"{MARKS[True]} agrees, {MARKS[False]} does not; {outcome.source}"
     for line in (told, *outcome.notes):
@@ -135,7 +135,7 @@ def show(outcome: "Outcome", console: Console) -> None:
 
 
 def terminal() -> Console:
-    """Console on standard output; as wide as a table needs where it is no terminal."""
+    """Console on standard output; if this is not a terminal, the console is as wide as a table needs."""
     console = Console(legacy_windows=False)
     return console if console.is_terminal else Console(width=_WIDTH, legacy_windows=False)
 

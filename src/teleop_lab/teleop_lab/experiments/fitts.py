@@ -1,4 +1,4 @@
-"""Fitts: how long people take to a target that they see late, and the operator who sees."""
+"""Fitts: movement times of people to a target on a delayed screen, and those of the operator `observer`."""
 
 import math
 
@@ -11,7 +11,7 @@ LAGS = (0.0083, 0.025, 0.075, 0.225)
 TIMES = (0.911, 0.934, 1.059, 1.493)
 """Mean times of movement at these lags [s], printed."""
 WAYS, WIDTHS = (96.0, 192.0, 384.0), (6.0, 12.0, 24.0, 48.0)
-"""Of the targets; in picture elements, for only their ratio counts."""
+"""Distances and widths of the targets in pixels; only their ratio matters."""
 LATENCIES = (0.033, 0.133, 0.333)
 """Of the display in sessions of the scenario ``point`` [s]."""
 

@@ -1,4 +1,4 @@
-"""Gravity: what its compensation on axis 2 does for the errors of the master-slave test."""
+"""Gravity: the effect of gravity compensation on axis 2 on the errors of the master-slave test."""
 
 import numpy as np
 

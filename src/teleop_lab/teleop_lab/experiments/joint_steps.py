@@ -8,7 +8,7 @@ from teleop_core.graph.signals import TICK_NS
 from teleop_core.kernels.geometry import Array
 from teleop_core.slave.pair import ArmParameters, SimulatedArm
 
-_STEP_S = 0.02  # a step is as large as what a joint makes in this time at full speed
+_STEP_S = 0.02  # a step is as large as the motion of a joint in this time at full speed
 _SETTLED_TICKS, _WAIT_TICKS, _REST_TICKS = 300, 1500, 2000
 
 
@@ -16,11 +16,10 @@ class StepAnswer(NamedTuple):
     """How a slave answers steps of its joints, one joint after the other.
 
     Attributes:
-        overshoot: What each joint (n,) makes beyond its goal at the most, share of the step.
+        overshoot: Largest overshoot of each joint (n,), as a share of the step.
         rest_error: Distance of the tip, by the encoders, from where the setpoints put it: root
             mean square over the rests after all steps [m].
-        rest_travel: Largest difference of what an encoder shows during a rest of two seconds,
-            largest of all steps, for each joint (n,) [counts].
+        rest_travel: Largest change of each encoder (n,) during a rest of two seconds, over all steps [counts].
     """
 
     overshoot: Array

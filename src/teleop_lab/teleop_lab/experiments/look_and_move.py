@@ -1,7 +1,7 @@
 """Look and move: how many looks a person needs to a target, and how long they take.
 
-It has the constants of the operator ``observer``, but no arm: what the law predicts for any motion that the eye
-guides.
+It has the constants of the operator ``observer``, but no arm: it computes the prediction of the law for any motion
+that the eye guides.
 """
 
 import numpy as np
@@ -17,7 +17,7 @@ CYCLE = 0.325
 
 
 def looks(way: float, width: float, passed: float = 1.0, seed: int = 1) -> tuple[float, float]:
-    """How many submovements a target takes on average, and how long they are together [s].
+    """Mean number of submovements to a target, and their total duration [s].
 
     Args:
         way: To the target [m].
@@ -44,7 +44,7 @@ def movement_time(way: float, width: float, lag: float) -> tuple[float, float]:
     Args:
         way: To the target [m].
         width: Of the target [m].
-        lag: By which it is seen late, beside the eye [s].
+        lag: Delay with which the target is seen, without that of the eye [s].
     """
     p = ObserverParameters()
     count, moving = looks(way, width)

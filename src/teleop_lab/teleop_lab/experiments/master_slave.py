@@ -22,29 +22,29 @@ _RATIO = FINE.position_mm[0] / COARSE.position_mm[0]
 _RMS, _TURN_RMS = percent(100.0 * POSITION_SHARE), factor(ANGLE_FACTOR)
 _MAX = factor(ANGLE_FACTOR)
 _CALLED = {"roll": "the source's yaw", "yaw": "the source's roll"}
-_PATH, _CURVE = 8, 2  # of how many samples one is drawn
+_PATH, _CURVE = 8, 2  # every how many samples one is drawn
 _QUATERNION = ["qw", "qx", "qy", "qz"]
 
 
 class Figures(NamedTuple):
-    """What is compared of one session: RMS and maximum of position [mm] and angles [°]."""
+    """Compared figures of one session: RMS and maximum of position [mm] and angles [°]."""
 
     position_mm: tuple[float, float]
     roll_deg: tuple[float, float]
     pitch_deg: tuple[float, float]
     yaw_deg: tuple[float, float]
     beyond_mm: float
-    """Largest way of the slave beyond the box [mm]."""
+    """Largest distance of the slave beyond the box [mm]."""
     least_mm: float
     """Smallest error of position [mm]."""
     offset_mm: float
-    """Mean error, as a way in one direction [mm]."""
+    """Length of the mean error vector [mm]."""
     about_mm: float
     """RMS of the position's error about that mean [mm]."""
 
 
 def figures_of(session: Session) -> Figures:
-    """What is compared of one session."""
+    """Figures of one session that are compared."""
     score = session.score
     turn = score.orientation_error_deg
     pairs = [(s.rms, s.max) for s in (score.position_error_mm, turn.roll, turn.pitch, turn.yaw)]
@@ -142,7 +142,7 @@ class Drawn(NamedTuple):
         times: Since the box came on (N,) [s].
         measured: Places of the tip (N, 3) [mm].
         reference: Places of its reference (N, 3) [mm].
-        turns: Roll, pitch and yaw of the tip less those of the reference (N, 3) [°].
+        turns: Roll, pitch and yaw of the tip minus those of the reference (N, 3) [°].
         center: Centre of the box (3,) [mm].
         size: Its sides (3,) [mm].
     """
@@ -262,7 +262,7 @@ def _turn_figure(name: str, found: Drawn) -> Figure:
 
 
 def _both_boxes(sessions: dict[str, Session]) -> Figure:
-    """Both boxes around one centre, as the source lays them over each other."""
+    """Both boxes around one centre, because the source overlays them in its figure."""
     traces = []
     for name, color in (("coarse_box", COMMAND), ("fine_box", MEASURED)):
         found, mode = drawn_of(sessions[name]), MODES[name].mode

@@ -1,4 +1,4 @@
-"""MMA frames: where the frames of the hybrid handle stand, in model and prototype (table 4.7)."""
+"""MMA frames: positions of the frames of the hybrid handle, in model and prototype (table 4.7)."""
 
 import numpy as np
 

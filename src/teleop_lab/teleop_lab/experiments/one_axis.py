@@ -1,4 +1,4 @@
-"""One axis: a hand before a spring whose force comes late, exactly and through our own stages."""
+"""One axis: a hand at a spring with a delayed force, computed exactly and with our own stages."""
 
 import math
 from collections import deque
@@ -18,11 +18,11 @@ from teleop_core.kernels.geometry import Array
 
 _AXIS = 1  # of the master's base, along which the hand is pushed
 _KICK = 1e-5  # speed that the hand is given [m/s]: far from every limit
-_SETTLE, _LOOK = 1.0, 3.0  # before the growth is looked at, and for how long [s]
-_SETTLED, _LOOKS = 10, 20  # the same besides, in delays of the force
+_SETTLE, _LOOK = 1.0, 3.0  # time before the growth is measured, and time for which it is measured [s]
+_SETTLED, _LOOKS = 10, 20  # additional times of the same kind, in units of the force's delay
 _BLOCK = 500  # ticks
 _GRID = 4000
-_LEAST_HAND = 0.01  # least mass of a hand that the parameters allow [kg]
+_LEAST_HAND = 0.01  # smallest mass of a hand that the parameters allow [kg]
 
 
 @dataclass(frozen=True)
@@ -31,8 +31,8 @@ class Grip:
 
     Attributes:
         mass: Hand and device together [kg].
-        stiffness: Towards where the hand wants the stylus [N/m].
-        damping: Of the same [N·s/m].
+        stiffness: Stiffness towards the wanted position of the stylus [N/m].
+        damping: Damping of the grip [N·s/m].
     """
 
     mass: float
@@ -41,12 +41,12 @@ class Grip:
 
 
 def exact_boundary(grip: Grip, delay: float, period: float = DT) -> float:
-    """Stiffness [N/m] up to which a hand stays calm before a spring whose force comes late.
+    """Largest stiffness [N/m] of a spring with a delayed force at which a hand is stable.
 
     Args:
         grip: The hand.
         delay: Of the force [s].
-        period: For which a force is held [s]; half of it is more delay.
+        period: Time for which a force is held [s]; half of it adds to the delay.
 
     Source:
         Roots of m s² + b s + k + K exp(-s t) on the imaginary axis: b w = K sin(w t) and
@@ -73,7 +73,7 @@ def exact_boundary(grip: Grip, delay: float, period: float = DT) -> float:
 
 
 def sampled_boundary(grip: Grip, ticks: int, damping: float = 0.0, period: float = DT) -> float:
-    """Stiffness [N/m] up to which a hand stays calm before a sampled wall, exactly.
+    """Largest stiffness [N/m] of a sampled wall at which a hand is stable, computed exactly.
 
     Args:
         grip: The hand.
@@ -82,8 +82,8 @@ def sampled_boundary(grip: Grip, ticks: int, damping: float = 0.0, period: float
         period: Between two samples, for which a force is held [s].
 
     Source:
-        Eigenvalues of the exact step of mass, spring and damper under a held force, with the
-        places and forces that are under way; the least K of which one leaves the unit circle.
+        Eigenvalues of the exact step of mass, spring and damper under a held force, with the delayed positions and
+        forces as states; the smallest K at which an eigenvalue leaves the unit circle.
     """
     free = np.zeros((3, 3))
     free[0, 1], free[1] = 1.0, np.array([-grip.stiffness, -grip.damping, 1.0]) / grip.mass
@@ -112,7 +112,7 @@ def sampled_boundary(grip: Grip, ticks: int, damping: float = 0.0, period: float
 
 
 class Mapped:
-    """Our hand, ideal device and mapping, tick by tick, before an arm that the caller has.
+    """Our hand, ideal device and mapping, tick by tick; the caller provides the arm.
 
     Args:
         grip: The hand.
@@ -130,11 +130,11 @@ class Mapped:
 
     @property
     def push(self) -> Array:
-        """Push (3,) that the hand is given in the next tick [N], in the master's base."""
+        """Force (3,) on the hand in the next tick [N], in the master's base."""
         return self.master.signals["master_servo_cf"][:3]
 
     def step(self, force: Array) -> Array:
-        """Go on by a tick; returns the command (3,) [m].
+        """Make one tick; returns the command (3,) [m].
 
         Args:
             force: On the tip (3,) [N], as it arrives, in the slave's base.
@@ -158,13 +158,13 @@ class Mapped:
 
 
 def growth(grip: Grip, delay: float, stiffness: float) -> float:
-    """Rate [1/s] at which our hand, device and mapping swing up before a spring; negative: down.
+    """Growth rate [1/s] of the oscillation of our hand, device and mapping at a spring; negative if it decays.
 
-    The device is rigid, without friction and steps of its reading, and never warm.
+    The device is rigid, without friction, encoder steps and thermal limit.
 
     Args:
         grip: The hand.
-        delay: Of the force, in whole ticks beside the one of the graph [s].
+        delay: Delay of the force, in whole ticks, in addition to the tick of the graph [s].
         stiffness: Of the spring [N/m], at the place where the slave's tip is commanded.
     """
     chain = Mapped(grip)
@@ -187,7 +187,7 @@ def growth_rate(speed: Array, period: float = DT) -> float:
     """Rate [1/s] at which speeds (N,), a period [s] apart, grow from their first half to the last.
 
     Returns:
-        The rate; negative where they die.
+        The rate; negative if the speeds decay.
     """
     half = len(speed) // 2
     before, after = (float(part @ part) for part in (speed[:half], speed[half:]))
@@ -195,7 +195,7 @@ def growth_rate(speed: Array, period: float = DT) -> float:
 
 
 def found_boundary(grip: Grip, delay: float) -> float:
-    """Stiffness [N/m] at which our hand, device and mapping neither swing up nor down."""
+    """Stiffness [N/m] at which oscillations of our hand, device and mapping neither grow nor decay."""
     start = 0.3 * exact_boundary(grip, delay + DT)
     return boundary_from_below(lambda stiffness: growth(grip, delay, stiffness), start)
 
@@ -203,11 +203,11 @@ def found_boundary(grip: Grip, delay: float) -> float:
 def boundary_from_below(rate_at: Callable[[float], float], start: float) -> float:
     """Stiffness [N/m] at which a rate of growth passes 0.
 
-    Searched from below, for what swings far is bounded by the largest force and grows no more.
+    The search begins at low stiffness, because the largest force bounds strong oscillations, which then do not grow.
 
     Args:
         rate_at: Rate of growth [1/s] by stiffness [N/m].
-        start: A stiffness that is calm [N/m].
+        start: A stable stiffness [N/m].
     """
     high, rate = start, -math.inf
     while rate < 0.0:
@@ -244,11 +244,11 @@ _IDEAL_DEVICE = {
 
 
 def ideal_device(grip: Grip, **own: float) -> HapticMasterParameters:
-    """Our hand and device with a grip: rigid, without friction and steps, never warm.
+    """Our hand and device with a grip: rigid, without friction, encoder steps and thermal limit.
 
     Args:
-        grip: The hand. Of one that is hardly heavier than our device, the device is lighter.
-        own: Parameters of the device in their place, such as ``friction``.
+        grip: The hand. If its mass is hardly larger than that of our device, a lighter device is used.
+        own: Parameters of the device that replace the ideal ones, such as ``friction``.
     """
     parameters = build(HapticMasterParameters, _IDEAL_DEVICE)
     device = min(parameters.device.apparent_mass, grip.mass - _LEAST_HAND)

@@ -1,4 +1,4 @@
-"""Outcome: what an experiment found, beside what its source printed."""
+"""Outcome: results of an experiment, beside the results that its source printed."""
 
 import math
 from dataclasses import dataclass
@@ -19,12 +19,12 @@ class Tolerance:
     """How far a prediction may be from a published figure and still agree with it.
 
     Attributes:
-        kind: "exact" but for rounding of the computer, "share" of the published figure, "absolute"
-            in the unit of the row, or "factor", which bounds the ratio of both from either side.
+        kind: "exact" except for rounding errors, "share" of the published figure, "absolute" in the unit of the row,
+            or "factor", which bounds the ratio of both in both directions.
         amount: Share (0.15), amount in the unit (0.5), or factor above 1 (1.6); of "exact" 0.
 
     Raises:
-        ParameterError: Another kind, or an amount that nothing can keep to.
+        ParameterError: An unknown kind, or an amount that no prediction can meet.
     """
 
     kind: str
@@ -48,7 +48,7 @@ class Tolerance:
                 return False
             return abs(math.log(predicted / published)) <= math.log(self.amount)
         room = self.amount * (abs(published) if self.kind == "share" else 1.0)
-        # A difference that is the tolerance itself, but for rounding, agrees.
+        # A difference equal to the tolerance, except for rounding, agrees.
         room += _ROUNDING * (room or max(1.0, abs(published)))
         return abs(predicted - published) <= room
 
@@ -89,9 +89,9 @@ class Comparison:
         quantity: What it is.
         unit: Its unit; empty for pure numbers.
         published: What the source printed, or another ``basis``.
-        predicted: What our model of the source's machine says.
-        ours: What another controller reaches on the same model.
-        within: What counts as agreement of ``predicted`` with ``published``; None: not judged.
+        predicted: Value of our model of the source's machine.
+        ours: Value with another controller on the same model.
+        within: Tolerance for agreement of ``predicted`` with ``published``; None if it is not judged.
         basis: What ``published`` is: "printed", a "law" of the source evaluated by us, or a "goal"
             of our own. Only what is printed counts as a published figure.
         lowest: Smallest of several seeds, of which ``predicted`` is the mean.
@@ -100,7 +100,7 @@ class Comparison:
         note: What must be known to read it, such as a misprint.
 
     Raises:
-        ParameterError: A number is not finite, or the basis is another.
+        ParameterError: A number is not finite, or the basis is unknown.
     """
 
     quantity: str
@@ -124,7 +124,7 @@ class Comparison:
                 continue
             if not math.isfinite(value):
                 raise ParameterError(f"{name} of {self.quantity}", value, "finite, or None")
-            object.__setattr__(self, name, float(value))  # whatever NumPy made of it
+            object.__setattr__(self, name, float(value))  # converts NumPy's types
 
     @property
     def difference(self) -> float | None:
@@ -209,7 +209,7 @@ class Outcome:
         """The row of a quantity.
 
         Raises:
-            UnknownNameError: There is none; those there are are listed.
+            UnknownNameError: There is no such row; the text lists the existing ones.
         """
         from teleop_core.base.errors import UnknownNameError
 

@@ -88,7 +88,7 @@ def _head(outcomes: Sequence[Outcome]) -> str:
 
 
 def _counts(outcome: Outcome) -> str:
-    """Of published figures, laws and goals, those that there are."""
+    """Counts of published figures, laws and goals, as far as the experiment has them."""
     found = {basis: outcome.count(basis) for basis in BASES}
     return "; ".join(
         f"{kept} of {of}" + f" {basis}s" * (basis != "printed") for basis, (kept, of) in found.items() if of

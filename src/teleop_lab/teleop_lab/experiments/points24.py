@@ -22,7 +22,7 @@ SCENARIO = "points24"
 INNER_MM = 0.5
 """Radius of the inner circle of a point; not published, half of a pad of 1 mm assumed."""
 POINTS = 24
-# Of a rest the second half counts: by then the low-pass has come near.
+# Only the second half of a rest counts, because the low-pass has almost settled then.
 _SETTLED = 0.5
 
 
@@ -31,7 +31,7 @@ class Visits(NamedTuple):
 
     Attributes:
         targets: Places of the points in the slave's base (24, 3) [mm].
-        missed_mm: Mean of tip less point while it rests there (24, 3) [mm].
+        missed_mm: Mean of tip minus point while the tip rests there (24, 3) [mm].
         off_mm: Largest distance of the tip from each while it rests there (24,) [mm].
         mean_mm: Mean distance of the tip from each while it rests there (24,) [mm].
         line_mm: Smallest distance of the line from each point (24,) [mm].
@@ -94,7 +94,7 @@ def _in_plane(off: Array) -> Array:
 
 
 def _visits(bench: Bench, settings: Settings, *, seeing: bool) -> list[Visits]:
-    """How each hand does the task; a hand that sees aims anew, corrected by its earlier misses."""
+    """How each hand does the task; a hand that sees repeats it with its aim corrected by the first errors."""
     from teleop_core.session.api import configuration
 
     made = configuration(SCENARIO).group("operator")
@@ -171,7 +171,7 @@ def _figure(visits: Visits, *, seeing: bool) -> Figure:
         (rings, "inner circles", FIRST, 1.5),
         (visits.visiting[::5], "stops", MEASURED if seeing else COMMAND, 1.2),
     ]
-    if not seeing:  # one that sees corrects each stop, of which the line knows nothing
+    if not seeing:  # a hand that sees corrects each stop, but not the line
         drawn.append((visits.tracing[::5], "line", MEASURED, 1.5))
     traces = [line(-path[:, 1], path[:, 0], name, color, width) for path, name, color, width in drawn]
     for trace in traces:

@@ -1,4 +1,4 @@
-"""Pose measures: position accuracy and repeatability of an arm that goes to a place repeatedly."""
+"""Pose measures: position accuracy and repeatability of an arm that moves to a position repeatedly."""
 
 import numpy as np
 
@@ -6,10 +6,10 @@ from teleop_core.kernels.geometry import Array
 
 
 def accuracy(attained: Array, commanded: Array) -> Array:
-    """How far the mean of the places that an arm came to is from the place it was sent to.
+    """Distance between the mean of the attained positions and the commanded position.
 
     Args:
-        attained: Places (..., N, 3) after N moves to the same place.
+        attained: Positions (..., N, 3) after N moves to the same position.
         commanded: That place (..., 3).
 
     Returns:
@@ -23,7 +23,7 @@ def accuracy(attained: Array, commanded: Array) -> Array:
 
 
 def repeatability(attained: Array) -> Array:
-    """Radius around the mean of the places that an arm came to: mean distance plus three S.D.
+    """Radius around the mean of the attained positions: mean distance plus three standard deviations.
 
     Args:
         attained: Places (..., N, 3) after N moves to the same place, N >= 2.

@@ -36,10 +36,10 @@ class Rests(NamedTuple):
     """Where the slave came to rest.
 
     Attributes:
-        off: Rest less target (6, runs, 6) [rad, m].
-        errors_mm: Distance of the tip from where the targets put it (6, runs) [mm].
+        off: Rest position minus target (6, runs, 6) [rad, m].
+        errors_mm: Distance of the tip from the position at the target joints (6, runs) [mm].
         tips_mm: Where the tip came to rest (6, runs, 3) [mm].
-        aims_mm: Where the targets put it (6, 3) [mm].
+        aims_mm: Position of the tip at the target joints (6, 3) [mm].
     """
 
     off: Array
@@ -61,7 +61,7 @@ def simulated_rests(bench: Bench, settings: Settings) -> Rests:
 
 
 def published_rests() -> Rests:
-    """The tables themselves; 7.4's error of run 5 follows from its joints, for it is misprinted."""
+    """The published tables; the error of run 5 in table 7.4 is computed from its joints, because it is misprinted."""
     table = _table()
     return _rests(table.rests, table.targets)
 

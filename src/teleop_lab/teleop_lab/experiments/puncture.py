@@ -31,10 +31,10 @@ WAYS: tuple[Way, ...] = (
 ROUND_TRIPS = (0.0, 0.1, 0.2, 0.4)
 """Half of it each way [s]."""
 SPEED = 0.01
-"""With which the hand pushes on [m/s]; assumed."""
+"""Speed with which the hand pushes [m/s]; assumed."""
 NOTICED = 0.1
 """The hand notices a puncture once its force fell by this share of the largest; assumed."""
-_TICKS_MS = 10.0  # of stages and of the fall until it is noticed; assumed
+_TICKS_MS = 10.0  # delay of the stages and of the fall until it is noticed; assumed
 _REACTION = HumanParameters().reaction_time
 _FELL = 0.1  # smallest fall of the force on the tip from tick to tick, as of a puncture [N]
 _WITHIN = 0.2  # time in which a fall of the force counts [s]; assumed
@@ -45,14 +45,14 @@ Job = tuple[Way, float]
 
 @dataclass(frozen=True)
 class Puncture:
-    """How a hand reacts to a puncture; infinity or NaN where it does not notice.
+    """How a hand reacts to a puncture; infinity or NaN if the hand does not notice it.
 
     Attributes:
         tip_drop: Largest fall of the force on the tip from tick to tick [N].
-        hand_drop: Largest fall of the force at the hand within 0.2 s after it can tell [N].
+        hand_drop: Largest fall of the force at the hand within 0.2 s after the puncture can be felt [N].
         notice: Time from the puncture until the hand notices [s].
-        overshoot: How far the tip goes on from the place of the puncture, until the hand that
-            stops a reaction time after it noticed has stopped it [m].
+        overshoot: How far the tip moves beyond the puncture point if the hand stops a reaction time after it noticed
+            [m].
     """
 
     tip_drop: float
@@ -98,9 +98,9 @@ def measure_puncture(bench: Bench, job: Job) -> Puncture:
     begin = int(falls.argmax())
     if falls[begin] < _FELL:  # it never got through
         return Puncture(float(falls[begin]), math.nan, math.nan, math.nan)
-    hears = begin + round(0.5e3 * late)  # nothing before it tells of the puncture
+    hears = begin + round(0.5e3 * late)  # the force before this time cannot show the puncture
     led = int(rows["teleop_state"][:, 0].argmax())  # the hand waits until the arm follows
-    end = led + round(1e3 * (_APPROACH + _PUSH))  # from here on the hand itself lets go
+    end = led + round(1e3 * (_APPROACH + _PUSH))  # from here on the hand itself reduces the force
     push = np.linalg.norm(rows["master_servo_cf"][hears:end, :3], axis=1)
     most = np.maximum.accumulate(push)
     fell = np.flatnonzero(push < (1.0 - NOTICED) * most)

@@ -1,4 +1,4 @@
-"""Filter: the low-pass on the joint references, and what it leaves of the gimbal's jitter."""
+"""Filter: the low-pass on the joint references, and how much of the gimbal's jitter remains."""
 
 import math
 

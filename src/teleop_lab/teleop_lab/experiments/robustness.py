@@ -47,14 +47,14 @@ DISTURBANCES: Mapping[str, Settings] = {
     "the same gears, motors of half the inertia": _LIGHT,
     "both": {**_LIGHT, _DELAY: 2e-3},
 }
-"""What the plants differ in; delays and gears are assumed, for no source tells them."""
+"""Differences of the plants; delays and gears are assumed, because no source has them."""
 _LONGEST, _STRONGEST, _ROUNDS = 30, 10.0, 7
 
 
 def error_of(bench: Bench, law: str, disturbance: str) -> tuple[float, float] | None:
     """Tracking error at the encoders in coarse_box, RMS and maximum [µm]; None: refused.
 
-    A slave refuses to begin where small errors grow, or large ones do not come back.
+    A slave refuses to start if small errors grow, or if large errors do not decay.
     """
     given = {**_PLANT, **LAWS[law], **DISTURBANCES[disturbance], "duration": _SECONDS}
     try:
@@ -65,7 +65,7 @@ def error_of(bench: Bench, law: str, disturbance: str) -> tuple[float, float] | 
 
 
 def is_stable(bench: Bench, law: str, more: Settings) -> bool:
-    """Whether a slave begins with a law on a plant: small errors die away, large ones come back."""
+    """Whether a slave starts with a law on a plant: small and large errors decay."""
     try:
         SimulatedArm(bench.slave({**_PLANT, **LAWS[law], **more, "slave.starts_at_home": True}))
     except ParameterError:
@@ -79,7 +79,7 @@ def delay_margin(bench: Bench, law: str) -> int:
 
 
 def gain_margin(bench: Bench, law: str) -> float:
-    """Largest gain of the drives with which a law is stable, over the one it supposes, up to 10."""
+    """Largest gain of the drives with which a law is stable, divided by the gain that the law assumes, up to 10."""
     low, high = 1.0, _STRONGEST
     if is_stable(bench, law, {_GAIN: high}):
         return high

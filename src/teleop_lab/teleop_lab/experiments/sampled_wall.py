@@ -1,4 +1,4 @@
-"""Sampled wall: our device and the hand that holds it before a wall that is sampled and held."""
+"""Sampled wall: our device and the hand that holds it, at a wall whose force is sampled and held."""
 
 from collections import deque
 from dataclasses import dataclass
@@ -14,9 +14,9 @@ from teleop_lab.experiments import one_axis
 AXIS = 1  # of the master's base, along which the hand is pushed
 _BLOCK = 500  # ticks for which noise is drawn at once
 _KICK = 1e-4  # speed that the hand is given [m/s]
-_SECONDS, _SETTLE = 0.6, 0.1  # how long a hand swings, and before the growth is looked at [s]
-_DELAYS, _SETTLED = 40, 10  # the same besides, in delays of the force
-_DEAD = 1e-12  # mean square root of speeds [m/s] below which rounding speaks
+_SECONDS, _SETTLE = 0.6, 0.1  # duration of a simulation, and time before the growth is measured [s]
+_DELAYS, _SETTLED = 40, 10  # additional times of the same kind, in units of the force's delay
+_DEAD = 1e-12  # RMS speed [m/s] below which rounding errors dominate
 _SHARES = (0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875)
 """Parts of a step of the wall's force by which a push exceeds one step."""
 _TAKEN, _RETURNED = (topics.MASTER_CONTACT.columns.index(name) for name in ("taken", "returned"))
@@ -38,7 +38,7 @@ class Wall:
 
 
 class SampledDevice:
-    """Our device before a wall; between two samples the force is held.
+    """Our device at a wall; between two samples the force is held.
 
     The spring is the chain's own (``walls.wall_force``, what ``wall=soft`` renders), without the
     bound of 5000 N/m that its parameter has.
@@ -72,7 +72,7 @@ class SampledDevice:
 
     @property
     def given(self) -> float:
-        """Energy that the present contact gave beyond what it took [J], by ``master/contact``."""
+        """Energy that the present contact gave minus the energy that it took [J], by ``master/contact``."""
         contact = self.master.signals["master_contact"]
         return float(contact[_RETURNED] - contact[_TAKEN])
 
@@ -81,7 +81,7 @@ class SampledDevice:
         self.master.state["speed"][AXIS] = self.master.state["hand_speed"][AXIS] = speed
 
     def aim(self, place: float) -> None:
-        """Let the hand want to be at a place [m], without a blow."""
+        """Set the wanted position of the hand [m], without an impact."""
         for name in ("wanted", "aim"):
             self.master.state[name][AXIS] = place
         self.master.signals["hand_servo_cp"][AXIS] = place
@@ -107,7 +107,7 @@ class SampledDevice:
 
 
 def wall_growth(grip: one_axis.Grip, wall: Wall) -> float:
-    """Rate [1/s] at which our hand and device swing up before a wall; negative: down."""
+    """Growth rate [1/s] of the oscillation of our hand and device at a wall; negative if it decays."""
     loop = SampledDevice(grip, wall)
     loop.move(_KICK)
     place = np.empty(round(_SECONDS / DT) + _DELAYS * wall.late)
@@ -116,12 +116,12 @@ def wall_growth(grip: one_axis.Grip, wall: Wall) -> float:
         place[i] = loop.place
     speed: Array = np.diff(place)[round(_SETTLE / DT) + _SETTLED * wall.late :] / DT
     rest = speed[len(speed) // 2 :]
-    # What is dead does not grow; its rounding may.
+    # A motion that has died out does not grow, although its rounding errors may.
     return -1.0 / DT if np.sqrt(np.mean(rest * rest)) < _DEAD else one_axis.growth_rate(speed)
 
 
 def wall_boundary(grip: one_axis.Grip, damping: float, late: int) -> float:
-    """Stiffness [N/m] of a wall at which our hand and device neither swing up nor down.
+    """Stiffness [N/m] of a wall at which oscillations of our hand and device neither grow nor decay.
 
     Args:
         grip: The hand.
@@ -133,10 +133,11 @@ def wall_boundary(grip: one_axis.Grip, damping: float, late: int) -> float:
 
 
 def press_energy(damping: float, wall: Wall, length: int, speed: float) -> float:
-    """Energy [J] that a hand gets of a press in a wall: in at one speed, out at the same.
+    """Energy [J] that a hand gets from a press into a wall: in at one speed, out at the same speed.
 
-    The hand is one that nothing stops. It has pressed once before, so the press begins within the wall. The wall's work
-    is that of ``master/contact``; our device has no viscous friction, so what that takes of the press is counted here.
+    No force changes the motion of this hand. It has pressed once before, so the press begins within the wall. The
+    wall's work is that of ``master/contact``. Our device has no viscous friction, so the energy that this friction
+    would take is computed here.
 
     Args:
         damping: Viscous friction of the device [N·s/m].
@@ -165,10 +166,10 @@ def passive_boundary(damping: float, wall_damping: float, length: int, speed: fl
 
 
 def is_restless(wall: Wall, friction: float, resolution: float, push: float) -> bool:
-    """Whether a wall that a loose hand presses keeps moving, by dry friction and steps of the reading.
+    """Whether a loose hand that presses on a wall keeps moving, because of dry friction and encoder steps.
 
-    A push between two steps of the wall's force finds rest only where friction spans half a step:
-    so 2 f >= K Delta. The force is looked at after 0.3 s, for 0.3 s.
+    A push between two steps of the wall's force comes to rest only if friction spans half a step: 2 f >= K Delta. The
+    force is checked after 0.3 s, for 0.3 s.
 
     Args:
         wall: The wall.

@@ -1,4 +1,4 @@
-"""Shares: what each fault of the plant adds to the errors, by switching it off alone."""
+"""Shares: how much each fault of the plant adds to the errors, found by switching off one fault at a time."""
 
 import numpy as np
 

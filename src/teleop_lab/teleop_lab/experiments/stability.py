@@ -34,9 +34,9 @@ _TWO_PORTS = ("tdpa",)
 _ROUNDS = 8
 _SECONDS = 8.0  # of each session: two touches
 _TOUCH = 2000  # ticks before the tip is on its path
-_WINDOW = 20  # ticks over which a speed is taken: steps of the reading are small beside its way
+_WINDOW = 20  # ticks over which a speed is measured: encoder steps are small compared with the motion in this time
 _THROWN = 2.0
-"""A hand is thrown that gets so many times as fast as the same hand without any object."""
+"""A hand counts as thrown if it gets this many times as fast as the same hand without any object."""
 _COLORS = (FIRST, SECOND, FIXTURE)
 _APPARENT_MASS = DeviceParameters().apparent_mass
 
@@ -58,7 +58,7 @@ def _settings(grip: one_axis.Grip, delay: float, stiffness: float, way: transmis
         "hand.mass": grip.mass - _APPARENT_MASS,
         "hand.stiffness": grip.stiffness,
         "hand.damping": grip.damping,
-        # An arm that is pressed into steel goes on: one that its fault stops would look calm.
+        # The fault of an arm that is pressed into steel is only reported, because a stopped arm would look stable.
         "operation.reported": ("effort",),
         "delays": tuple(late),
         "stages": (*channels.stages, *ports),
@@ -66,7 +66,7 @@ def _settings(grip: one_axis.Grip, delay: float, stiffness: float, way: transmis
 
 
 def fastest(bench: Bench, grip: one_axis.Grip, delay: float, stiffness: float, way: transmission.Way) -> float:
-    """Fastest that the hand gets [m/s] in ``palpation``, of an object without damper or friction.
+    """Largest speed of the hand [m/s] in ``palpation``, with an object without damper and friction.
 
     Args:
         bench: Where it runs.
@@ -82,12 +82,12 @@ def fastest(bench: Bench, grip: one_axis.Grip, delay: float, stiffness: float, w
 
 
 def calm_speed(bench: Bench, grip: one_axis.Grip) -> float:
-    """Largest speed [m/s] of a hand that is not thrown: that before the softest object without delay."""
+    """Largest speed [m/s] of a hand that is not thrown: its speed at the softest object without delay."""
     return _THROWN * fastest(bench, grip, 0.0, SOFTEST, _WAYS[0])
 
 
 def chain_boundary(bench: Bench, grip: one_axis.Grip, delay: float, way: transmission.Way, calm: float) -> float:
-    """Stiffness [N/m] up to which the whole chain leaves the hand calm, from 20 to 50 000 N/m.
+    """Largest stiffness [N/m] at which the hand is stable with the whole chain, from 20 to 50 000 N/m.
 
     The device has its friction and its steps, the arm its lag and the reference its filter.
 
@@ -96,7 +96,7 @@ def chain_boundary(bench: Bench, grip: one_axis.Grip, delay: float, way: transmi
         grip: The hand.
         delay: By which the force comes later [s].
         way: Architecture and passivity.
-        calm: Speed of the hand up to which it is calm [m/s], of :func:`calm_speed`.
+        calm: Speed of the hand up to which it counts as stable [m/s], from :func:`calm_speed`.
     """
 
     def is_calm(stiffness: float) -> bool:

@@ -1,4 +1,4 @@
-"""Tendons: pulley ratios of joints 5 and 6, and what a turn of joint 5 does to motor 6."""
+"""Tendons: pulley ratios of joints 5 and 6, and how a rotation of joint 5 moves motor 6."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""Transmission: both ports of the whole chain in virtual time, and what theory says of them."""
+"""Transmission: both ports of the whole chain in virtual time, and the values from theory."""
 
 from collections.abc import Iterable, Mapping
 from typing import NamedTuple
@@ -18,7 +18,7 @@ AIR = "air"
 WORLDS = (AIR, "tissue", "silicone")
 """Nothing to touch, and two of the chain's materials."""
 _BACK = 2.0 * DT  # a force waits for a tick before the network and for one before the mapping
-_SECONDS = 24.0  # the arm gets ready, the hand approaches, one period swings in
+_SECONDS = 24.0  # the arm becomes ready, the hand approaches, and one period passes until transients have decayed
 _MIDDLE = (0.0, -0.014, 0.02)  # of the hand's way [m], 3 mm within the object of palpation
 _TICK: Complex = np.exp(-DT * S)
 
@@ -29,14 +29,14 @@ Job = tuple[Way, float, str]
 
 
 class Channels(NamedTuple):
-    """What goes through a chain, beside the hand's place.
+    """Signals that a chain transmits, in addition to the hand's position.
 
     Attributes:
         force: Force at the hand over the one on the tip.
-        stiffness: Force at the hand over how far the tip is behind [N/m].
-        hand: Force that leads the slave over the hand's.
+        stiffness: Force at the hand divided by the lag of the tip [N/m].
+        hand: Force that commands the slave, divided by the hand's force.
         yields: Whether the slave has its stage ``impedance``.
-        architecture: What a session calls it; empty for its own name.
+        architecture: Name of the architecture in a session; empty if it is the same name.
     """
 
     force: float = 0.0
@@ -65,12 +65,12 @@ hand that feels its force."""
 
 
 class Cell(NamedTuple):
-    """What was measured of an architecture with a passivity over a round trip.
+    """Measurement of an architecture with a passivity and a round trip.
 
     Attributes:
         ports: By world.
         hybrid: Hybrid matrix (L, 2, 2) of all worlds together.
-        stray: Largest share of a force that is off the lines.
+        stray: Largest share of a force outside of the spectral lines.
     """
 
     ports: Mapping[str, Ports]
@@ -103,7 +103,7 @@ def far_settings(round_trip: float) -> Settings:
 
 
 def settings(way: Way, round_trip: float, world: str) -> Settings:
-    """Parameters of a session in which hand and device are firm and without faults.
+    """Parameters of a session with a stiff hand and an ideal device.
 
     Args:
         way: Architecture and passivity.
@@ -151,10 +151,10 @@ def measure_cells(
 
 
 def predicted_hybrid(arm: Complex, architecture: str, round_trip: float) -> Complex:
-    """Hybrid matrix (L, 2, 2) of an architecture without passivity, of how the arm moves alone.
+    """Hybrid matrix (L, 2, 2) of an architecture without passivity, predicted from the motion of the arm alone.
 
-    The arm follows its command with T and gives way with Y. Its command is the hand's place, and
-    the stage's admittance A of the hand's force less that on the tip; lags of the way are in both::
+    The arm follows its command with T and yields with Y. Its command is the hand's position plus the stage's
+    admittance A times (hand's force minus force on the tip). Both exchanges contain the delays::
 
         v_tip  = T (v_hand + s A (g f_hand - f_tip)) - Y f_tip
         f_hand = k f_tip + K/s (v_hand - v_tip)

@@ -20,20 +20,20 @@ PERIOD = 10.0
 """Of the excitation [s]: one line each 0.1 Hz."""
 _TICKS = round(PERIOD / DT)
 BINS = np.unique(2 * (np.geomspace(1.0, 300.0, 24) / 2.0).round().astype(int) + 1)
-"""Odd multiples of 1/PERIOD that are excited, 0.1 to 30 Hz: what squares a signal misses them."""
+"""Odd multiples of 1/PERIOD that are excited, 0.1 to 30 Hz: quadratic distortion has only even multiples."""
 LINES: Array = BINS / PERIOD
 """Frequencies that are excited (L,) [Hz]."""
 S: Complex = np.multiply(2j * np.pi, LINES, dtype=np.complex128)
 """Laplace's variable at the lines (L,) [rad/s]."""
 AMPLITUDE = 0.15e-3
 """Of each line of the hand's way [m]."""
-_APPROACH, _GROWTH = 3.0, 1.0  # of the hand to its middle, then of the multisine [s]
+_APPROACH, _GROWTH = 3.0, 1.0  # duration of the hand's approach to its centre, then of the rise of the multisine [s]
 _FIRM = Grip(0.02, 5000.0, 40.0)
-"""A hand that hardly yields, so that it does not depend on what it feels."""
+"""A hand that hardly yields, so that its motion does not depend on the force."""
 
 
 def multisine(times: Array) -> Array:
-    """Way (N,) [m] of the excitation at some times (N,) [s]; whole periods repeat exactly.
+    """Displacement (N,) [m] of the excitation at times (N,) [s]; whole periods repeat exactly.
 
     Source:
         Schroeder 1970: phases that grow with the square of a line's number keep the peak low.
@@ -45,7 +45,7 @@ def multisine(times: Array) -> Array:
 
 
 def excitation(times: Array) -> tuple[Array, Array]:
-    """Share of the approach (N,) that is done, and the way (N,) [m] that is added to it."""
+    """Completed share of the approach (N,), and the displacement (N,) [m] that is added to it."""
     grown = minimum_jerk((times - _APPROACH) / _GROWTH)
     return minimum_jerk(times / _APPROACH), grown * multisine(times)
 
@@ -59,8 +59,8 @@ class Ports:
         hand_force: Of the hand on the master [N].
         tip_speed: Of the slave's tip [m/s].
         tip_force: Of the tip on the world [N].
-        stray: Share of a force or of the tip's way, whichever is more, that is off the lines up to
-            the last of them: 0 for what is linear and swings in.
+        stray: Share of a force, or of the tip's displacement if that is larger, outside of the lines up to the last
+            line; 0 for a linear system in steady state.
     """
 
     hand_speed: Complex
@@ -71,7 +71,7 @@ class Ports:
 
     @classmethod
     def of(cls, hand: Array, push: Array, tip: Array, reaction: Array) -> "Ports":
-        """Ports of what was measured along one axis; the last period counts.
+        """Ports computed from measurements along one axis; only the last period is used.
 
         Args:
             hand: Place of the hand (N,) [m].
@@ -115,7 +115,7 @@ def _stray(values: Complex) -> float:
 
 
 def hybrid_matrix(experiments: Sequence[Ports]) -> Complex:
-    """Hybrid matrix (L, 2, 2) that explains some experiments best.
+    """Hybrid matrix (L, 2, 2) that fits the given experiments best.
 
     It maps speed of the hand and force on the world to force of the hand and the negative speed of the tip.
 
@@ -152,8 +152,8 @@ def felt_impedance(hybrid: Complex, world: Complex) -> Complex:
 def llewellyn(hybrid: Complex) -> Array:
     """Llewellyn's number (L,) of hybrid matrices (L, 2, 2): absolutely stable from 1 on.
 
-    Where either port alone is active it is below what it would be without that port. Infinite where
-    one direction is missing.
+    If one port alone is active, the number is smaller than without that port. The number is infinite if one direction
+    has no transmission.
 
     Source:
         Llewellyn 1952, in the form of Adams and Hannaford 1999 and Hashtrudi-Zaad and
@@ -170,10 +170,10 @@ def llewellyn(hybrid: Complex) -> Array:
 
 
 def bandwidth(gain: Complex) -> float:
-    """Frequency [Hz] at which a gain (L,), wanted 1, first falls by 3 dB, between the lines.
+    """Frequency [Hz] at which a gain (L,) with the ideal value 1 first falls by 3 dB, interpolated between the lines.
 
     Returns:
-        The frequency; 0 if the gain is too small at the first line, infinity if at none.
+        The frequency; 0 if the gain is too small at the first line, infinity if it is too small at no line.
     """
     size = np.abs(gain)
     low = np.flatnonzero(size < math.sqrt(0.5))
@@ -188,12 +188,12 @@ def bandwidth(gain: Complex) -> float:
 
 @dataclass(frozen=True)
 class Lag:
-    """An arm that follows its command as a lag of first order and yields, in ticks of 1 ms.
+    """An arm that follows its command with a first-order lag and yields to force, in ticks of 1 ms.
 
     Attributes:
         time: Time constant [s].
         compliance: How far it yields to the world's push [m/N].
-        late: Ticks by which a command, and a force, come later.
+        late: Delay of a command, and of a force, in ticks.
     """
 
     time: float
@@ -202,7 +202,7 @@ class Lag:
 
     @property
     def share(self) -> float:
-        """Share of the way to its goal in a tick."""
+        """Share of the remaining distance that the arm moves in a tick."""
         return -math.expm1(-DT / self.time)
 
     def hybrid(self) -> Complex:
@@ -221,10 +221,10 @@ class Lag:
         return matrix
 
     def ports(self, stiffness: float) -> Ports:
-        """Both ports of our hand, device and mapping before this arm on a spring.
+        """Both ports of our hand, device and mapping with this arm at a spring.
 
         Args:
-            stiffness: Of the spring [N/m], which pulls too; 0: nothing.
+            stiffness: Stiffness of the spring [N/m], which also pulls; 0 for no spring.
         """
         chain = Mapped(_FIRM, {"coarse_gain": 1.0})
         begin = chain.step(np.zeros(3))[2]

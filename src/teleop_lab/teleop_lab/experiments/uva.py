@@ -15,14 +15,14 @@ from teleop_lab.experiments.look_and_move import CYCLE, difficulty, looks
 from teleop_lab.experiments.outcome import Comparison, Findings, absolute
 
 LATENCY = 0.033 + 0.050
-"""Of the station by itself [s]: two frames at 60 Hz, and a video's encoder and decoder, which take
-50 ms (Nankaku et al. 2022)."""
+"""Latency of the station itself [s]: two frames at 60 Hz, and 50 ms for encoding and decoding the video (Nankaku et
+al. 2022)."""
 TOTAL = 22.1
 """Mean time of a transfer without faults [s], printed: the one number of the study that scales the prediction."""
 
 
 class Primitive(NamedTuple):
-    """A motion primitive of a transfer: what it aims at."""
+    """A motion primitive of a transfer, with its target."""
 
     name: str
     way: float  # [m]
@@ -40,12 +40,12 @@ PRIMITIVES = (
     Primitive("left reaches the goal", 0.055, 0.004),
     Primitive("left releases", 0.015, 0.002),
 )
-"""Ways from the geometry of the board; widths assumed: fingers on a block 2 mm, a peg through its
-hole 2 to 4 mm, clear of a peg 6 mm, out of the way 10 mm."""
+"""Distances are from the geometry of the board. Widths are assumed: fingers on a block 2 mm, a peg through its hole 2
+to 4 mm, clear of a peg 6 mm, out of the way 10 mm."""
 
 
 class Level(NamedTuple):
-    """A level of the study: what the line does."""
+    """A level of the study: the faults of its network."""
 
     name: str
     delay: float = 0.0  # mean [s]
@@ -71,8 +71,8 @@ LEVELS = (
 def _plain(primitive: Primitive, level: Level) -> float:
     """Time of a primitive at a level [s], before the one scale for all of them.
 
-    Each look costs a cycle, the station's latency and the delay. What is lost of a motion is to be
-    moved again. An outage costs its length and the cycle that it spoils.
+    Each look takes a cycle, the station's latency and the delay. Lost motion must be repeated. An outage costs its
+    length and the cycle that it interrupts.
     """
     count, _ = looks(primitive.way, primitive.width, 1.0 - level.loss)
     time = count * (CYCLE + LATENCY + level.delay)
@@ -91,7 +91,7 @@ def predict() -> dict[str, dict[str, dict[str, float]]]:
     """Times [s] by model, level and primitive; each model takes :data:`TOTAL` without faults.
 
     ``looks`` is the prediction; ``constant`` slows every primitive of every level by the same factor, the mean of the
-    printed totals; ``mackenzie`` is the law for pointing, which knows delays alone.
+    printed totals; ``mackenzie`` is the law for pointing, which considers only delays.
     """
     slower = sum((22.1, 24.4, 26.6, 36.2, 27.1, 34.1, 47.9, 28.9, 47.4, 64.3)) / 10.0 / TOTAL
     normal = LEVELS[0]
@@ -131,7 +131,7 @@ def published() -> tuple[Table, Table]:
     for row in _lines("uva_published.csv"):
         means.setdefault(row["level"], {})[row["primitive"]] = float(row["mean"])
         half = _T95 * float(row["deviation"]) / math.sqrt(PERSONS)
-        # Printed to 0.1 s: what is off by less agrees.
+        # Printed to 0.1 s: smaller differences count as agreement.
         halves.setdefault(row["level"], {})[row["primitive"]] = half + 0.05
     return means, halves
 

@@ -15,14 +15,14 @@ from teleop_lab.experiments.bench import Bench
 from teleop_lab.experiments.outcome import Comparison, Findings, absolute, percent
 
 BARE = one_axis.Grip(0.045, 1.0, 2.0)
-"""Our device's mass in a hand that holds it as loosely as the parameters allow, and its viscous
-friction; the friction is assumed."""
+"""Mass of our device in a hand that holds it as loosely as the parameters allow, and its viscous friction; the
+friction is assumed."""
 LATE = (0, 1, 2, 3, 5, 10)
 """Periods of 1 ms by which the wall's force comes later."""
 WALL_DAMPINGS = (0.0, 5.0)
 """Of the walls [N·s/m]; assumed."""
 DAMPINGS = ((2.0, 0.0), (5.0, 2.0), (5.0, 5.0))
-"""Viscous frictions of the device and dampings of the wall whose energy is looked at [N·s/m]."""
+"""Viscous frictions of the device and dampings of the wall for which the energy is computed [N·s/m]."""
 PRESSES = (1, 2, 5, 20, 50)
 """Lengths of the presses, in periods in and as many out."""
 SPEEDS = (0.005, 0.1)
@@ -35,7 +35,7 @@ DEVICES = (
 )
 """Dry frictions [N] and steps of the reading [m]: those of our device, and halves of them."""
 _WITHIN, _EXACT = percent(10.0), percent(2.0)
-_NONE = absolute(10.0)  # N/m; where a law allows no stiffness there is no share of it
+_NONE = absolute(10.0)  # N/m; if a law allows no stiffness, a relative difference is undefined
 _CASES = tuple((b, late) for b in WALL_DAMPINGS for late in LATE)
 _COLORS = (FIRST, SECOND)
 Boundaries = Mapping[tuple[float, int], float]
@@ -45,7 +45,7 @@ Bounds = Mapping[tuple[float, float, int], float]
 
 
 def linear_law(damping: float, wall_damping: float, delay: float) -> float:
-    """Stiffness [N/m] up to which a wall is stable, for little damping of a heavy device.
+    """Largest stable stiffness [N/m] of a wall, for a heavy device with little damping.
 
     Args:
         damping: Viscous friction of the device [N·s/m].
@@ -68,10 +68,10 @@ def passive_law(damping: float, wall_damping: float) -> float:
 
 
 def press_law(damping: float, wall_damping: float, length: int) -> float:
-    """Stiffness [N/m] above which a press gives energy that goes in and out at one speed.
+    """Stiffness [N/m] above which a press gives energy if the hand moves in and out at the same speed.
 
-    Each period the spring gives K T / 2 of the square of the speed, the device takes b and the
-    damper B; but in the period after each of the two reversals the damper gives it. The shortest
+    In each period, in units of the squared speed, the spring gives K T / 2, the device takes b and the damper takes B.
+    But in the period after each of the two reversals the damper gives B. The shortest
     press, a period in and one out, is :func:`passive_law`; the longest is :func:`linear_law`.
 
     Args:

@@ -1,4 +1,4 @@
-"""Fitting: numbers of a plant from what was measured on the machine.
+"""Fitting: numbers of a plant from measurements on the machine.
 
 :func:`fit_plant` does what ``teleop fit`` does::
 
@@ -38,20 +38,20 @@ def fit_plant(
     loss: str = "cauchy",
     progress: Callable[[float], None] = silent,
 ) -> FitResult:
-    """Fit the plant ``hardware`` of a robot to where its joints came to rest.
+    """Fit the plant ``hardware`` of a robot to the rest positions of its joints.
 
     Args:
         table: CSV as :func:`read_rests` takes it; None for the published one of the RCRT-1.
         robot: Whose joints it has.
-        free: What is fitted, as of :func:`fit`; None for what the table can tell.
-        files: Parameter files of the slave; what nothing says is the source's PID.
+        free: Names of the fitted numbers, as in :func:`fit`; None for those that the table determines.
+        files: Parameter files of the slave; without any, the controller is the source's PID.
         texts: Parameters of the slave over them, ``key=value``.
-        loss: One of :data:`LOSSES`: how fast points that no model explains are let go.
-        progress: Hears the share that is done, 0 to 1.
+        loss: One of :data:`LOSSES`: how much the weight of outliers is reduced.
+        progress: Called with the completed share, 0 to 1.
 
     Raises:
-        TeleopError: The table has another shape, a name is wrong, the fit does not converge, or
-            parameters cannot be told apart.
+        TeleopError: The table does not match the robot, a name is wrong, the fit does not converge, or parameters
+            cannot be distinguished.
     """
     from teleop_core.robots import load_robot_set
     from teleop_core.session.configuration import configure

@@ -1,8 +1,8 @@
-"""Fit: the faults of a real arm from where it comes to rest, by simulating the same moves.
+"""Fit: the faults of a real arm from its rest positions, by simulating the same moves.
 
-Free are the dry friction of joints, the bias of amplifiers, and weights that no source states.
-What a joint leaves to its target, under a controller without integral action, is their effort over
-Kp; so the numbers belong to the gains with which they were fitted.
+Free parameters are the dry friction of joints, the bias of amplifiers, and weights that no source states. Under a
+controller without integral action, the rest error of a joint is their effort over Kp. So the fitted numbers are valid
+only for the gains of the fit.
 """
 
 from collections.abc import Callable, Sequence
@@ -27,9 +27,9 @@ _STEP = 0.01  # of differences, in units of the start
 _SHARE = 0.95  # of intervals
 _ROUNDS = 60
 _UNITS = {"coulomb": "N·m or N", "bias": "N·m or N", "weight": "kg·m"}
-_WANDER = 0.3  # with which the answer to wandering friction is measured
-# Runs in which it is, over those of the table: where a joint sticks is as good as random, so that
-# a last bit changes the spread of ten runs by a tenth, that of forty by a thirtieth.
+_WANDER = 0.3  # with which the effect of varying friction is measured
+# Simulated runs divided by runs of the table. The position at which a joint sticks is practically random, so a change
+# of the last bit changes the spread of ten runs by a tenth, and that of forty runs by a thirtieth.
 _TIMES = 4
 
 
@@ -39,16 +39,16 @@ LOSSES: dict[str, Callable[[Array], Array]] = {
     "soft_l1": lambda r: 1.0 / np.sqrt(1.0 + r**2),
     "linear": np.ones_like,
 }
-"""Losses by the names of scipy, each with the weight of a residual: how fast it lets go."""
+"""Losses by the names of scipy, each with the weight that it gives to a residual."""
 
 
 class FitError(TeleopError):
-    """A fit has no answer: it does not converge, or its parameters cannot be told apart."""
+    """A fit has no solution: it does not converge, or its parameters cannot be distinguished."""
 
 
 @dataclass(frozen=True)
 class Fitted:
-    """One number with the interval that holds it with 95 %, in SI units."""
+    """One number with its 95 % confidence interval, in SI units."""
 
     name: str
     unit: str
@@ -59,20 +59,20 @@ class Fitted:
 
 @dataclass(frozen=True, eq=False)
 class FitResult:
-    """What a fit found.
+    """Result of a fit.
 
     Attributes:
         robot: Name of the robot.
         joint_names: Its joints.
         table: Name of the table.
         numbers: Fitted numbers in their order.
-        measured: Mean of rest less target in the table (k, n) [rad or m].
+        measured: Mean of rest position minus target in the table (k, n) [rad or m].
         predicted: The same, simulated with the fitted numbers.
         measured_spread: Standard deviation (n,) of the runs [rad or m].
         predicted_spread: The same, simulated.
         encoder_step: Smallest difference (n,) that is measured [rad or m].
-        one_sided: Axes (n,) that all moves approach from one side, of which the distance to the
-            target is fitted, not its side, because friction and bias cannot be told apart there.
+        one_sided: Axes (n,) that all moves approach from one side. For these axes the distance to the target is
+            fitted, not its sign, because friction and bias cannot be distinguished there.
     """
 
     robot: str
@@ -90,7 +90,7 @@ class FitResult:
         """A fitted number.
 
         Raises:
-            UnknownNameError: It was not fitted; those that were are listed.
+            UnknownNameError: The number was not fitted; the text lists the fitted ones.
         """
         found = {number.name: number.value for number in self.numbers}
         if name not in found:
@@ -124,7 +124,7 @@ class FitResult:
 
 
 class _Problem:
-    """Rests of a robot as a function of scaled numbers; 1 is of the size that the table shows."""
+    """Rest positions of a robot as a function of scaled numbers; 1 corresponds to the errors in the table."""
 
     def __init__(self, robot: Robot, parameters: pair.ArmParameters, table: RestTable, free: Sequence[str]) -> None:
         self.robot, self.parameters, self.table, self.free = robot, parameters, table, tuple(free)
@@ -154,7 +154,7 @@ class _Problem:
         return float(effort[axis] / lever[axis])
 
     def faults(self, x: Array, wander: Array | None = None) -> hardware.Hardware:
-        """The arm's faults with scaled numbers ``x`` in their place."""
+        """The arm's faults, with the scaled numbers ``x`` inserted."""
         base, model = faults_of(self.robot), self.robot.dynamics
         assert model is not None
         coulomb, bias = base.coulomb.copy(), np.zeros(self.robot.n)
@@ -170,7 +170,7 @@ class _Problem:
         return replace(base, coulomb=coulomb, bias=bias, wander=still, dynamics=row)
 
     def rests(self, x: Array, runs: int = 1, wander: Array | None = None) -> Array:
-        """Rest less target, simulated: (k, runs, n); without wandering smooth in ``x``."""
+        """Simulated rest position minus target: (k, runs, n); without varying friction it is smooth in ``x``."""
         faults, table = self.faults(x, wander), self.table
         inside = np.clip(table.targets, self.robot.lower, self.robot.upper)
         is_smooth = wander is None
@@ -178,7 +178,7 @@ class _Problem:
         return rests - inside[:, None]
 
     def residuals(self, x: Array) -> Array:
-        """Simulated less measured rests in standard deviations of the runs, flat."""
+        """Simulated minus measured rest positions in standard deviations of the runs, flattened."""
         predicted, measured = self.rests(x)[:, 0], self.table.mean
         predicted = np.where(self.one_sided, np.abs(predicted), predicted)
         measured = np.where(self.one_sided, np.abs(measured), measured)
@@ -201,10 +201,10 @@ def one_sided(robot: Robot, table: RestTable) -> NDArray[np.bool_]:
 
 
 def default_free(robot: Robot, table: RestTable) -> tuple[str, ...]:
-    """What a table can tell of a robot: names for :func:`fit`.
+    """Names for :func:`fit` of the numbers that a table determines for a robot.
 
-    Dry friction of every axis that gravity does not leave to an integrator; the bias of those among them that are
-    approached from both sides and not loaded by gravity; and weights that no source states.
+    These are the dry friction of every axis without an integrator for gravity, and weights that no source states. The
+    bias is included for those of these axes that are approached from both sides and not loaded by gravity.
     """
     from teleop_core.slave.controllers.source_pid import loaded_axes
 
@@ -232,24 +232,25 @@ def fit(
     *,
     loss: str = "cauchy",
 ) -> FitResult:
-    """Fit numbers of the plant ``hardware`` to where a machine came to rest.
+    """Fit numbers of the plant ``hardware`` to the rest positions of a machine.
 
-    Residuals count in standard deviations of the runs; Cauchy's loss lets go of points that no such model explains.
-    Intervals are those of M-estimates. The wandering of friction follows afterwards, from the spread of the runs.
+    Residuals count in standard deviations of the runs; Cauchy's loss gives little weight to points that the model
+    cannot explain.
+    Intervals are those of M-estimates. The variation of friction is computed afterwards, from the spread of the runs.
 
     Args:
         table: Measured rests.
         parameters: The slave, its controller and gains; its plant must be ``hardware``.
         free: ``coulomb.<joint>``, ``bias.<joint>``, ``weight.<name>``; None for
             :func:`default_free`.
-        progress: Hears the share that is done.
+        progress: Called with the completed share.
         loss: One of :data:`LOSSES`.
 
     Raises:
         ParameterError: Another plant.
         UnknownNameError: No such loss.
         UnknownNameError: ``free`` names what cannot be fitted.
-        FitError: The fit does not converge, or parameters cannot be told apart; they are named.
+        FitError: The fit does not converge, or parameters cannot be distinguished; the text names them.
     """
     robot = load_robot_set(parameters.robot, parameters.geometry)
     if parameters.plant.kind.kind != "hardware":
@@ -335,7 +336,7 @@ def _result(
 
 
 def _wander(problem: _Problem, x: Array, progress: Callable[[float], None]) -> tuple[list[Fitted], Array]:
-    """How much friction wanders about the fitted one, from the spread of the runs (n,)."""
+    """Variation (n,) of friction about its fitted value, from the spread of the runs."""
     runs = max(10, *(len(rests) for rests in problem.table.rests))
     robot, measured = problem.robot, problem.table.spread
 

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def text(found: "FitResult") -> str:
-    """Numbers with their intervals, and where the joints rest, measured beside simulated."""
+    """Numbers with their intervals, and measured beside simulated rest positions of the joints."""
     width = max(len(number.name) for number in found.numbers)
     lines = [f"{found.robot} from {found.table}, 95 % intervals", ""]
     lines += [

@@ -30,7 +30,7 @@ class RestTable:
 
     @property
     def mean(self) -> Array:
-        """Mean over the runs of rest less target (k, n) [rad or m]."""
+        """Mean over the runs of rest position minus target (k, n) [rad or m]."""
         pairs = zip(self.targets, self.rests, strict=True)
         return np.stack([(rest - target).mean(axis=0) for target, rest in pairs])
 
@@ -43,7 +43,7 @@ class RestTable:
 
 
 def read_rests(file: Path, robot: Robot) -> RestTable:
-    """Read a CSV: a row a run, with ``point``, ``target_<joint>``, ``<joint>`` [rad or m].
+    """Read a CSV with one row per run: ``point``, ``target_<joint>``, ``<joint>`` [rad or m].
 
     Args:
         file: The table.

@@ -1,4 +1,4 @@
-"""Rests: where the slave comes to rest when it is moved to joint targets again and again."""
+"""Rests: rest positions of the slave after repeated moves to joint targets."""
 
 import math
 from dataclasses import replace
@@ -19,7 +19,7 @@ _FINE = 1e-4  # of an encoder step
 
 @kernel
 def _drive(steps: Any, server: Any, simulated: Any, row: SlaveRow, way: Array, begin_ns: int, dt: float) -> None:
-    """Command a way (N, n), a joint vector a tick, from the tick after ``begin_ns`` on."""
+    """Command a joint path (N, n), one joint vector per tick, from the tick after ``begin_ns`` on."""
     for k in range(way.shape[0]):
         row.now_ns = begin_ns + (k + 1) * TICK_NS
         row.slave_servo_jp_ns = row.now_ns
@@ -32,11 +32,11 @@ class Mover:
     """A slave that is moved from target to target by cubics, as in the published precision test.
 
     Args:
-        parameters: Its parameters; it starts at home whatever they say.
+        parameters: Its parameters; the slave always starts at home.
         faults: The arm's faults in place of its own; None for its own.
         speed: Share of the speed limits that the moves use.
         settle: Time at rest after each move [s]; where joints stick, the rests do not depend on it.
-        is_smooth: Whether encoders and drives have no steps, for a fit needs slopes.
+        is_smooth: Whether encoders and drives have no steps, because a fit needs derivatives.
     """
 
     def __init__(
@@ -67,7 +67,7 @@ class Mover:
     def move(self, target: Array) -> Array:
         """Joints (n,) that the encoders show when the slave has come to rest at a target (n,).
 
-        A target outside the joint limits is approached as far as they allow.
+        A target outside the joint limits is replaced by the nearest joints within them.
         """
         slave, goal = self.slave, np.asarray(target, dtype=np.float64)
         time = shortest_move_time(self.goal, goal, self._limit)
@@ -81,7 +81,7 @@ class Mover:
         return np.array(slave.signals["slave_measured_js"][: len(goal)])
 
     def true_pose(self) -> Array:
-        """Where the tip really is: x, y, z [m] and a quaternion, (7,)."""
+        """True pose of the tip: x, y, z [m] and a quaternion, (7,)."""
         return np.array(self.slave.signals["slave_true_cp"])
 
 
@@ -94,7 +94,7 @@ def rest_positions(
 
     Args:
         parameters: Of the slave.
-        targets: Joint targets; what lies outside the limits is taken to them.
+        targets: Joint targets; values outside the limits are set to the limits.
         runs: Moves to each.
         faults: The arm's faults in place of its own.
         is_smooth: Whether encoders and drives have no steps.

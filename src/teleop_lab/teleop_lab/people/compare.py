@@ -1,4 +1,4 @@
-"""Compare: what people scored, as a data set like a study's, and beside the simulated operator."""
+"""Compare: scores of people as a data set like that of a study, and beside those of the simulated operator."""
 
 from html import escape
 from typing import TYPE_CHECKING, Any
@@ -24,10 +24,10 @@ _ABOUT = (
 
 
 def people_dataset(plan: Plan, journal: Journal) -> "xarray.Dataset":
-    """What people scored, as :meth:`Study.run` gives it, with a dimension ``participant`` in place of the seed.
+    """Scores of people, in the form of :meth:`Study.run`, with a dimension ``participant`` in place of the seed.
 
-    A value is the mean over the trials that count, practice left out; NaN where there is none. Questions
-    are variables too, 0 to 100, and so is ``trials``: how many were done.
+    A value is the mean over the valid trials without practice; NaN if there is none. Questions are variables too, 0 to
+    100, and so is ``trials``, the number of trials that were done.
     """
     import xarray
 

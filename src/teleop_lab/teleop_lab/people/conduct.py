@@ -28,7 +28,7 @@ def serve(plan: Plan, journal: Journal, port: int, host: str, token: str) -> tup
 
 
 def conduct(server: ConsoleServer, page: PeoplePage, plan: Plan, journal: Journal) -> None:
-    """Run trials as they are begun, until Ctrl-C; each is a recording, scored as any other."""
+    """Run trials when they are begun, until Ctrl-C; each is recorded and scored like any session."""
     score_all(plan, journal)
     while True:
         server.answers.situation = Situation(can_stop=False, chooses=True)
@@ -46,7 +46,7 @@ def conduct(server: ConsoleServer, page: PeoplePage, plan: Plan, journal: Journa
 
 
 def score_all(plan: Plan, journal: Journal) -> None:
-    """Score what was done and has no scores yet."""
+    """Score the trials that were done and have no scores yet."""
     for code in plan.codes:
         for trial in plan.trials(code):
             event = journal.event(code, trial.number)
@@ -56,7 +56,7 @@ def score_all(plan: Plan, journal: Journal) -> None:
 
 
 def scores_of(plan: Plan, bag: Path) -> tuple[dict[str, float | None], str]:
-    """Scores of a recording that the study compares, and its verdict; or why it has no scores."""
+    """Scores of a recording that the study compares, and its verdict, or the reason why it has no scores."""
     try:
         score = open_recording(bag).score()
         return {metric: score.value(metric) for metric in plan.study.metrics}, score.verdict.text

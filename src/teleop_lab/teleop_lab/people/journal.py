@@ -14,7 +14,7 @@ from teleop_lab.studies.store import write_whole
 
 FORMAT = 1
 DONE, SKIPPED, AGAIN, FAILED = "done", "skipped", "again", "failed"
-"""What became of a trial: ``again`` is to be done once more, ``failed`` waits for the conductor."""
+"""State of a trial: ``again`` must be done once more, ``failed`` waits for the conductor."""
 _ABOUT, _FILE = "people.json", "journal.json"
 
 
@@ -23,13 +23,13 @@ class Journal:
 
     Args:
         folder: Where it is kept, made if it is missing; recordings stand in a folder for each participant.
-        plan: What there is to do.
+        plan: Plan of the study.
 
     Attributes:
         now: Code of the participant who is taking part.
 
     Raises:
-        SessionError: The folder holds something else, or the journal of another plan or a newer version.
+        SessionError: The folder contains something else, or the journal of another plan or a newer version.
     """
 
     def __init__(self, folder: Path, plan: Plan) -> None:
@@ -102,7 +102,7 @@ class Journal:
         self._write(code)
 
     def score(self, code: str, trial: int, scores: Mapping[str, float | None], verdict: str) -> None:
-        """Note the scores of what was done in a trial at last."""
+        """Note the scores of the last run of a trial."""
         done = [one for one in self._own[code]["events"] if one["trial"] == trial and one["state"] == DONE]
         done[-1] |= {"scores": dict(scores), "verdict": verdict}
         self._write(code)
@@ -118,12 +118,12 @@ class Journal:
         return events[-1] if events else {}
 
     def answers(self, code: str, trial: int) -> Mapping[str, float]:
-        """Answers to the questions after a trial; empty where none are."""
+        """Answers to the questions after a trial; empty without answers."""
         found: Mapping[str, float] = self._own[code]["answers"].get(str(trial), {})
         return found
 
     def place(self, code: str, trial: int) -> Path:
-        """Where the recording of a trial that begins now goes: a directory that does not exist."""
+        """Path for the recording of a trial that begins now: a directory that does not exist yet."""
         name, tries = f"trial_{trial:02d}", 1
         while (path := self.folder / code / (name if tries == 1 else f"{name}_{tries}")).exists():
             tries += 1
@@ -143,13 +143,13 @@ class Journal:
         return "thanks", None
 
     def _was_done(self, code: str, trial: Trial, trials: Sequence[Trial]) -> bool:
-        """Whether something was done of what the questions after a trial are about."""
+        """Whether any of the trials was done that the questions after a trial are about."""
         about = [one.number for one in trials[: trial.number] if one.condition == trial.condition]
         about = [trial.number] if self._plan.people.ask == "trial" else about
         return any(self.event(code, number).get("state") == DONE for number in about)
 
     def rows(self) -> list[dict[str, object]]:
-        """A line for each trial that something became of: place, state, scores, and answers after it."""
+        """A row for each trial that has a state: its place, state, scores, and the answers after it."""
         found = []
         for code in self._plan.codes:
             for trial in self._plan.trials(code):

@@ -1,4 +1,4 @@
-"""Pages: one for the participant of a study, one for who conducts it; all that they may ask is here."""
+"""Pages: one for the participant of a study, one for its conductor, and all requests that they may send."""
 
 import http
 import queue
@@ -27,18 +27,18 @@ _CONDUCT = """<!doctype html><html lang="en"><head><meta charset="utf-8"><title>
 
 
 class PeoplePage:
-    """What both pages show and ask; methods may be called from any thread.
+    """Content and requests of both pages; methods may be called from any thread.
 
-    A participant's page says what comes next and may go on with it, if it drives. Who conducts has a key,
-    which is in no answer to anybody.
+    The participant's page shows the next step and may begin it, if the page drives. The conductor has a key, which no
+    answer contains.
 
     Args:
-        drivers: Which page is the participant's.
-        plan: What is done.
-        journal: What was done.
+        drivers: Knows which page is the participant's.
+        plan: Plan of the study.
+        journal: Journal of the study.
 
     Attributes:
-        key: Secret of who conducts.
+        key: Secret of the conductor.
         is_stopped: Whether the arms of the session that runs, or ran last, are stopped.
     """
 
@@ -69,11 +69,11 @@ class PeoplePage:
 
     @property
     def paths(self) -> frozenset[str]:
-        """Paths of requests: two of the participant, three of who conducts."""
+        """Paths of requests: two of the participant, three of the conductor."""
         return frozenset({"/people", "/go", "/conducting", "/act", "/table"})
 
     def link(self, url: str) -> str:
-        """Address of the page of who conducts, from that of the participant's page."""
+        """Address of the conductor's page, from that of the participant's page."""
         address, _, query = url.partition("?")
         return f"{address}conduct{'?' + query if query else ''}#{quote(self.key)}"
 
@@ -104,14 +104,14 @@ class PeoplePage:
         return code, trial
 
     def is_over(self, view: View) -> bool:
-        """Whether a trial is over, as seen in its session: by its attempts, or somebody's button."""
+        """Whether a trial is over, because of its attempts or because a person pressed a button."""
         told = [arm.get(TASK_STATE) for arm in view.arms.values()]
         self._tried = sum(int(one[_TRIED]) for one in told if one is not None)
         self.is_stopped = situation(view).is_stopped
         return self._ends.is_set() or 0 < self._plan.people.attempts <= self._tried
 
     def close(self, state: str, reason: str, bag: str) -> None:
-        """Note what became of the trial that ran, why, and the name of its recording."""
+        """Note the state of the trial that ran, the reason, and the name of its recording."""
         with self._lock:
             assert self._running is not None
             code, trial = self._running
@@ -144,7 +144,7 @@ class PeoplePage:
         return shown
 
     def _go(self, query: Query, page: int) -> Told:
-        """Go on with the step that a page shows; a second press of the same button does nothing."""
+        """Begin the step that a page shows; a second press of the same button does nothing."""
         if _word(query, "step") == "take":
             self._drivers.take(page)
         if not self._drivers.may_drive(page):

@@ -1,4 +1,4 @@
-"""Plan: what a study's participants do, in which order, and what they are asked."""
+"""Plan: trials of a study's participants, their order, and the questions."""
 
 import random
 from collections.abc import Mapping, Sequence
@@ -19,7 +19,7 @@ PEOPLE = "people"
 MOST = 200
 """Participants, and trials of one."""
 _TEXTS = {"title": 200, "consent": 10_000, "instructions": 2_000, "operator": 100}
-"""Texts that a plan cannot do without, with their longest lengths."""
+"""Texts that a plan must have, with their largest lengths."""
 
 
 @dataclass(frozen=True)
@@ -86,7 +86,7 @@ class Trial:
 
 @dataclass(frozen=True, kw_only=True)
 class PeopleParameters:
-    """What a study's file says below ``people``, but for its questions."""
+    """Entries of a study's file below ``people``, without its questions."""
 
     title: str = parameter("", doc="heading of the participants' page")
     consent: str = parameter("", doc="what a participant agrees to, before anything else")
@@ -115,8 +115,8 @@ class Plan:
 
     Attributes:
         study: Conditions, and the scores that are compared.
-        people: What its file says of them.
-        questions: Asked then.
+        people: Entries of its file about people.
+        questions: Questions after trials.
     """
 
     study: Study
@@ -144,7 +144,7 @@ class Plan:
         return found
 
     def configuration(self, code: str, trial: Trial) -> Configuration:
-        """What runs in a trial; the recording tells which one it was.
+        """Configuration of a trial; the recording contains the number of the trial.
 
         Raises:
             TeleopError: It cannot run.
@@ -198,7 +198,7 @@ def read_plan(path: Path | str) -> Plan:
         raise ParameterError(
             "people.repetitions", plan.people.repetitions, f"so few that there are {MOST} trials at most"
         )
-    study.points()  # whatever cannot run is told here
+    study.points()  # a trial that cannot run is reported here
     for trial in {trial.condition: trial for trial in trials}.values():
         stages = plan.configuration(plan.codes[0], trial).groups
         if plan.people.attempts and "task" not in stages:

@@ -1,1 +1,1 @@
-"""Planning: what a slave can follow of a hand's motion, before a session is run."""
+"""Planning: how much of a hand's motion a slave can follow, before a session is run."""

@@ -1,8 +1,8 @@
 """Aim: let the tool turn about the axes about which the hand turns.
 
-Turns of the stylus are turns of the tool in its own axes, by way of ``tool_axes`` and
-``tool_roll``. Seen from outside, the tool turns as the hand does, through the map of ``axes``, only
-if these fit the attitudes of stylus and tool at the moment of engagement.
+``tool_axes`` and ``tool_roll`` map rotations of the stylus to rotations of the tool about the tool's own axes. Seen
+from outside, through the map of ``axes``, the tool turns as the hand does only if these parameters fit the
+orientations of stylus and tool at engagement.
 """
 
 import math
@@ -17,7 +17,7 @@ from teleop_core.robots.robot import Robot
 from teleop_lab.planning.placement import Placement
 from teleop_lab.planning.turns import turns
 
-# What fits within this angle of the best is kept as it is given.
+# The given value is kept if it fits within this angle of the best one.
 _NEAR_ENOUGH = math.radians(5.0)
 _DIGITS = 4
 
@@ -28,7 +28,7 @@ class Aim:
     Args:
         robot: The slave.
         stylus: Attitude of the stylus, quaternion (4,), when it is engaged.
-        given: Placement whose values are kept where they fit.
+        given: Placement whose values are kept if they fit.
     """
 
     def __init__(self, robot: Robot, stylus: Array, given: Placement) -> None:
@@ -36,17 +36,17 @@ class Aim:
         self._stylus = rotations_from_quaternions(stylus)
 
     def wanted(self, placement: Placement) -> Array:
-        """Rotation (3, 3) from the tool's axes to the stylus' with which both turn alike."""
+        """Rotation (3, 3) from the tool's axes to those of the stylus with which both turn in the same way."""
         tool = self._robot.fk(np.array(placement.start))[:3, :3]
         return np.asarray(self._stylus.T @ axis_map("axes", placement.axes).T @ tool)
 
     def misfit(self, placement: Placement) -> float:
-        """Angle [rad] by which the axes of the tool's turns are off those of the hand's."""
+        """Angle [rad] between the rotation axes of the tool and those of the hand."""
         given = axis_map("tool_axes", placement.tool_axes).T @ rotation("z", placement.tool_roll)
         return _angle(np.trace(given.T @ self.wanted(placement)))
 
     def aimed(self, placement: Placement) -> Placement:
-        """The placement with tool axes and roll that fit best; as given if these fit as well."""
+        """The placement with the best tool axes and roll; the given ones if they fit as well."""
         left = _matrices() @ self.wanted(placement)
         rolls = np.arctan2(left[:, 1, 0] - left[:, 0, 1], left[:, 0, 0] + left[:, 1, 1])
         # Trace of Rz(-roll) times each of the matrices.

@@ -1,4 +1,4 @@
-"""Asked path: what the hand of a recording did, sample by sample."""
+"""Asked path: the motion of a recorded hand, sample by sample."""
 
 from dataclasses import dataclass
 
@@ -11,7 +11,7 @@ from teleop_core.graph.topics import MASTER_BUTTONS, MASTER_MEASURED_CP
 from teleop_core.kernels.geometry import Array
 
 STRETCHES = 10
-"""Stretches of a long path that stand for the whole."""
+"""Number of stretches that represent a long path."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,12 +51,12 @@ class AskedPath:
     def excerpt(self, rate: float, count: int) -> "AskedPath":
         """Fewer samples of the same motion.
 
-        At most ``rate`` samples a second are kept, and all at which a button changes. Of a path
-        that has more than ``count`` of these, ten stretches are, with the times between them.
+        At most ``rate`` samples a second are kept, and all samples at which a button changes. If there are more than
+        ``count`` of these, only ten stretches of the path are kept, with the times between them.
 
         Args:
             rate: Samples per second.
-            count: Most samples, but for those of buttons.
+            count: Largest number of samples, without those of buttons.
         """
         slots = np.floor(self.time * rate)
         is_kept = np.append(True, np.diff(slots) > 0.0)

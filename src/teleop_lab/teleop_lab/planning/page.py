@@ -1,4 +1,4 @@
-"""Page: what a slave can follow, in space and against time, as given and as proposed."""
+"""Page: the motion that a slave can follow, in space and against time, with the given and the proposed settings."""
 
 from collections.abc import Iterable, Sequence
 from html import escape
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from teleop_lab.planning.reach import Followed, Reach
 
 COLORS = {Limit.NONE: "#1c7c54", **LIMIT_COLORS}
-"""Of samples that are followed, and of those that are not by their causes."""
+"""Colours of samples that are followed, and of other samples by their causes."""
 # More points than these make the page slow and the picture no clearer.
 _POINTS, _WORKSPACE, _BINS = 6_000, 3_000, 1_500
 _ROWS = (2, 3)  # of the figure, with curves over the time
@@ -114,7 +114,7 @@ def _workspace(reach: "Reach") -> list[Any]:
 
 
 def _in_space(followed: "Followed") -> list[Any]:
-    """Path as it is asked for, coloured by what keeps the slave from following."""
+    """Path of the hand, coloured by the limit that keeps the slave from following."""
     walked, traces = followed.in_place, []
     kept = _spread(len(walked.asked), _POINTS)
     places, limits = walked.asked[kept, :3], walked.limit[kept]
@@ -171,7 +171,7 @@ def _add_band(figure: Any, row: int, bins: tuple[Array, Array], cause: Limit) ->
 
 
 def _bands(path: asked.AskedPath, walked: walk.Walked) -> Iterable[tuple[Limit, tuple[Array, Array]]]:
-    """Causes that occur, with begins of bins of time (M,) [s] and 1 where it occurs in one, or 0.
+    """Causes that occur, each with the begins of time bins (M,) [s], and 1 for a bin in which it occurs, else 0.
 
     No stretch is too short to be seen.
     """
@@ -191,5 +191,5 @@ def _label(cause: Limit) -> str:
 
 
 def _spread(count: int, most: int) -> Any:
-    """Indices of at most so many of ``count`` samples, evenly spread."""
+    """Indices of at most ``most`` of ``count`` samples, evenly spread."""
     return np.unique(np.linspace(0, count - 1, min(count, most)).round().astype(np.int64))

@@ -1,4 +1,4 @@
-"""Placement: where a slave starts, and how the hand's motion is turned and scaled for it."""
+"""Placement: the start of a slave, and how the hand's motion is rotated and scaled for it."""
 
 from dataclasses import dataclass
 
@@ -11,7 +11,7 @@ Setting = float | str | list[float] | list[str]
 
 @dataclass(frozen=True, kw_only=True)
 class Placement:
-    """How a slave is put to a hand's motion.
+    """How a slave is arranged for a hand's motion.
 
     Attributes:
         robot: Which slave: ``robot`` of the stages that have one.
@@ -20,7 +20,7 @@ class Placement:
         axes: The slave's x, y, z as axes of the master: ``motion_scaling.axes``.
         coarse_gain: Slave motion per hand motion in coarse mode.
         fine_gain: The same in fine mode.
-        rotation_gain: Share of the stylus' turn that the tool makes.
+        rotation_gain: Rotation of the tool divided by that of the stylus.
         tool_axes: The tool's x, y, z as axes of the stylus: ``motion_scaling.tool_axes``.
         tool_roll: Turn [rad] of the tool about its axis, after that.
     """

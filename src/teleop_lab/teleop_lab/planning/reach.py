@@ -1,4 +1,4 @@
-"""Reach: how much of a hand's motion a slave can follow, and with what it follows most of it."""
+"""Reach: how much of a hand's motion a slave can follow, and with which settings it follows most of it."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -17,10 +17,10 @@ from teleop_lab.planning.search import Search
 from teleop_lab.planning.walk import Walked, Walker
 
 GOAL = 0.99
-"""Share of the time that is to be followed if nothing else is said."""
+"""Default share of the time in which the slave must follow."""
 Progress = Callable[[int, int], None]
 Setting = float | str | bool | Sequence[float] | Sequence[str]
-# Samples that are walked at most: of the whole path, and of the excerpt on which the search goes.
+# Largest number of computed samples: of the whole path, and of the excerpt that the search uses.
 _WHOLE, _EXCERPT = 150_000, 6_000
 _EXCERPT_RATE = 20.0  # Hz
 # Walks that a search usually takes, for the progress.
@@ -31,14 +31,14 @@ _ATTEMPTS = 3
 
 @dataclass(frozen=True, eq=False)
 class Followed:
-    """A placement and what becomes of the path with it.
+    """A placement, and how the slave follows the path with it.
 
     Attributes:
         placement: Start, turn and gains.
         session: As in a session: limits cut the hand's motion, joints have their speeds.
-        in_place: The path where it is, nothing cut, joints as fast as needed.
-        at_given_gain: Share of the time that a session would follow with the gains that were given.
-        misfit: Angle [rad] by which the axes of the tool's turns are off those of the hand's.
+        in_place: The original path, with nothing cut off and joints as fast as needed.
+        at_given_gain: Share of the time in which a session would follow with the given gains.
+        misfit: Angle [rad] between the rotation axes of the tool and those of the hand.
     """
 
     placement: Placement
@@ -55,14 +55,14 @@ class Followed:
 
 @dataclass(frozen=True, eq=False)
 class Reach:
-    """What a slave can follow of a motion.
+    """How much of a motion a slave can follow.
 
     Attributes:
-        path: What the hand did.
+        path: Motion of the hand.
         robot: The slave.
-        goal: Share of the time that was to be followed.
+        goal: Share of the time in which the slave must follow.
         given: With the parameters as they are.
-        proposed: With the best that was found; the given one if that reaches the goal.
+        proposed: With the best placement; the given one if that reaches the goal.
         arm: Namespace of the arm; empty for the default one.
     """
 
@@ -75,7 +75,7 @@ class Reach:
 
     @property
     def is_given(self) -> bool:
-        """Whether the given parameters reach the goal, so that nothing is to be changed."""
+        """Whether the given parameters reach the goal, so that no change is needed."""
         return self.given.placement == self.proposed.placement
 
     def settings(self) -> dict[str, float | str | list[float] | list[str]]:
@@ -113,18 +113,18 @@ def reach(
     settings: Mapping[str, Setting] | None = None,
     texts: Iterable[str] = (),
 ) -> Reach:
-    """How much of a hand's motion a slave can follow, and with what it follows most of it.
+    """How much of a hand's motion a slave can follow, and with which settings it follows most of it.
 
     Args:
         source: A recording, its path, or the name of a scenario, which is run first. Its own configuration is the
-            start; of a recording of others, in any file that replay takes, the default one.
+            starting point; for a foreign recording, in any file that replay reads, it is the default configuration.
         robot: The slave, in place of the configuration's; its start then is the robot's own.
         geometry: Its lengths [m, rad] as ``symbol=value``.
         share: Share of the time that is to be followed, above 0 and at most 1.
         arm: Namespace of the arm; empty for the default one.
-        keeps_axes: Whether the map of axes from hand to slave is to stay as it is, as where a
-            camera looks at the slave from a fixed side.
-        progress: Told how far it is.
+        keeps_axes: Whether the map of axes from hand to slave must not change, for example because a camera looks at
+            the slave from a fixed side.
+        progress: Called with the progress.
         files: ROS 2 parameter files over the configuration.
         settings: Parameters over the files.
         texts: The same as ``key=value``, over the settings.
@@ -163,7 +163,7 @@ def _changes(
 def _configured(
     source: recording.Recording | Path | str, changes: list[Layer]
 ) -> tuple[configuration.Configuration, reader.Bag]:
-    """Configuration with the changes, and the recording; of a scenario one that is made now."""
+    """Configuration with the changes, and the recording; a scenario is run now to record one."""
     if isinstance(source, str) and not Path(source).exists():
         if Path(source).name != source or Path(source).suffix:
             reason = "does not exist; give a recording, or one of `teleop scenarios`"

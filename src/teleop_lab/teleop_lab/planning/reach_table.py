@@ -1,4 +1,4 @@
-"""Table: what a slave can follow, as given and as proposed, and how to take the proposal."""
+"""Table: the share that a slave can follow, with given and proposed settings, and how to use the proposal."""
 
 import math
 import shlex

@@ -1,7 +1,8 @@
 """Search: the placement, turn and gains with which a slave follows a hand's motion.
 
-The largest rotation gain that can reach the goal comes first, then the largest gain. Where the motion drifts against a
-limit the start is moved by what was cut off, which is how far from the middle of its room the arm began.
+The largest rotation gain that can reach the goal comes first, then the largest gain. If the motion drifts against a
+limit, the start is shifted by the motion that was cut off, which is the distance of the start from the centre of its
+free range.
 """
 
 import math
@@ -24,16 +25,17 @@ LEAST_GAIN = 0.1
 STARTS = 24
 """Postures that are tried as starts."""
 CUT = 0.03
-"""By how much less of the time than a session follows the path may be followed where it is, with
-nothing cut off: a placement lives from motion that fits, not from motion that is cut to fit."""
-# Another start, which the eye, and another turn, which the hand has to get used to, must be worth this factor of gain.
+"""How much smaller the followed share of the original path, with nothing cut off, may be than that of a session. So a
+placement must fit the motion; it is not enough that limits cut the motion to fit."""
+# Another start (the eye must get used to it) or other axes (the hand must get used to them) must increase the gain by
+# this factor.
 _WORTH = 1.25
-_IMPROVED = 3  # of those tried, the best so many
+_IMPROVED = 3  # number of the best tried placements that are kept
 _ROUNDS, _BISECTIONS = 3, 6
 _MOMENTS = (0.25, 0.5, 0.75, 1.0)
 _DIGITS = 4
 Found = tuple[float, Placement]
-"""Share of the time that is followed, and with what."""
+"""Share of the time that is followed, and the placement."""
 
 
 class Search:
@@ -80,7 +82,7 @@ class Search:
         return [given, *(gain for gain in ROTATION_GAINS if gain < given)]
 
     def _at_rest(self, rotation_gain: float) -> list[Found]:
-        """The best with the least gain, the best first: with the given start and axes if these do.
+        """The best placements with the least gain, best first: with the given start and axes if these are enough.
 
         Else other starts are tried, then other axes.
         """
@@ -102,7 +104,7 @@ class Search:
         return [replace(placement, axes=axes) for axes in self._turns]
 
     def _raised(self, found: Sequence[Found]) -> Found:
-        """The largest gain that reaches the goal, from what does so with the least."""
+        """The largest gain that reaches the goal, searched from placements that reach it with the least gain."""
         low, high, best = math.log(LEAST_GAIN), 0.0, found[0]
         pool = list(found)
         for i in range(_BISECTIONS + 1):
@@ -119,7 +121,7 @@ class Search:
         return best
 
     def _with_other(self, best: Found, others: Callable[[Placement], Iterable[Placement]]) -> Found:
-        """One of others in its place, if they allow a gain that is worth it."""
+        """One of the other placements in place of `best`, if its gain is larger by enough."""
         while (factor := _WORTH * self._factor(best[1])) <= 1.0:
             raised = self._scaled(self._given, factor, best[1])
             reached = self._first(self._sorted(others(raised))[:_IMPROVED])
@@ -129,7 +131,7 @@ class Search:
         return best
 
     def _first(self, tried: Iterable[Found]) -> Found | None:
-        """First that reaches the goal, with its start moved if it needs that."""
+        """First placement that reaches the goal, with its start shifted if needed."""
         for found in tried:
             better = found if found[0] >= self._goal else self._improved(found)
             if better[0] >= self._goal:
@@ -137,7 +139,7 @@ class Search:
         return None
 
     def _improved(self, found: Found) -> Found:
-        """The same with its start moved by what was cut off, as long as that helps."""
+        """The same placement with its start shifted by the motion that was cut off, as long as that helps."""
         for _ in range(_ROUNDS):
             if found[0] >= 1.0:
                 break
@@ -148,7 +150,7 @@ class Search:
         return found
 
     def _moved(self, placement: Placement) -> list[Placement]:
-        """Placements that start where the path would have stood had it been cut from the start."""
+        """Placements whose start is shifted by the motion that was cut off up to some sample."""
         self._tell()
         cut = self._walker.walk(placement)
         self._tell()
@@ -179,7 +181,7 @@ class Search:
         return self._known[placement], placement
 
     def _share(self, placement: Placement) -> float:
-        """Share of the time that a session would follow; below the goal an upper bound of it, found sooner."""
+        """Share of the time in which a session would follow; below the goal only an upper bound, which is faster."""
         self._tell()
         share = self._walker.share(placement, is_cut=False) + CUT
         if share < self._goal:
@@ -188,7 +190,7 @@ class Search:
         return min(share, self._walker.share(placement))
 
     def _sorted(self, placements: Iterable[Placement]) -> list[Found]:
-        """Shares of placements, the best first; of equals the first."""
+        """Shares of placements, the best first; equal ones keep their order."""
         found = [self._found(placement) for placement in dict.fromkeys(placements)]
         return sorted(found, key=_share, reverse=True)
 

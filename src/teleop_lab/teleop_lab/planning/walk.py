@@ -1,7 +1,7 @@
 """Walk: a hand's path through motion scaling and inverse kinematics alone.
 
-The stages of a session answer sample after sample, with a slave that is at once where it is told to be. So what is
-followed, what is cut off and why comes out as in a session, some hundred times faster.
+The stages of a session process sample after sample, with a slave that reaches every command at once. So the followed
+motion, the cut-off motion and the causes are the same as in a session, but computed about a hundred times faster.
 """
 
 from dataclasses import dataclass, replace
@@ -49,16 +49,16 @@ def walk(scale, solve, scaling, solving, s, r, fk, geometry, T, q, switch, sampl
 
 @dataclass(frozen=True, eq=False)
 class Walked:
-    """What became of a path.
+    """Result of a walk along a path.
 
     Attributes:
-        weights: Share of the time (N,) that each sample stands for; they add up to 1.
-        asked: Poses (N, 7) [m] that the slave was asked for.
+        weights: Share of the time (N,) that each sample represents; they add up to 1.
+        asked: Poses (N, 7) [m] commanded to the slave.
         reached: Poses (N, 7) [m] of its answer.
         q: Joints (N, n) [rad, m] of its answer.
         limit: :class:`~teleop_core.graph.topics.Limit` (N,) that kept it from following.
         joint: Joint (N,) that was at its limit; -1 for none.
-        residual: Distance [m] and angle [rad] (N, 2) from what was asked for.
+        residual: Distance [m] and angle [rad] (N, 2) from the commanded pose.
     """
 
     weights: Array
@@ -71,7 +71,7 @@ class Walked:
 
     @property
     def share(self) -> float:
-        """Share of the time in which the slave does what it is asked for."""
+        """Share of the time in which the slave follows the command."""
         return float(self.weights[self.limit == topics.Limit.NONE].sum())
 
     @property
@@ -85,8 +85,8 @@ class Walker:
     """Walks a path with one placement after the other.
 
     Args:
-        path: What the hand does.
-        scaling: Parameters of motion scaling; a placement stands over them.
+        path: Motion of the hand.
+        scaling: Parameters of motion scaling; a placement overrides them.
         solving: Parameters of inverse kinematics, with the robot.
     """
 
@@ -142,13 +142,13 @@ class Walker:
         return float(self.weights[is_followed].sum())
 
     def walk(self, placement: Placement, *, is_cut: bool = True, is_fast: bool = False) -> Walked:
-        """What becomes of the path.
+        """Compute how the slave follows the path.
 
         Args:
             placement: Start, turn and gains.
-            is_cut: Whether a limit cuts the hand's motion, as in a session. Else every pose of the
-                path is asked for where it is.
-            is_fast: Whether joints may be as fast as they would have to be.
+            is_cut: Whether a limit cuts the hand's motion, as in a session. Otherwise every pose of the original path
+                is commanded.
+            is_fast: Whether joints may be as fast as the path needs.
         """
         self._run(placement, is_cut=is_cut, is_fast=is_fast)
         answers, reach = self._answers, self._answers["reach"]
@@ -190,7 +190,7 @@ class Walker:
 
 
 def _weights(path: AskedPath, longest: float) -> Array:
-    """Share of the time (N,) that each sample stands for: up to the next, or the longest pause."""
+    """Share of the time (N,) that each sample represents: up to the next sample, at most the longest pause."""
     steps = np.diff(path.time)
     held = np.minimum(np.append(steps, np.median(steps)), max(longest, 3.0 * np.median(steps)))
     return np.asarray(held / held.sum(), dtype=np.float64)

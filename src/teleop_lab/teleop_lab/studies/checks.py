@@ -1,4 +1,4 @@
-"""Checks: what a study asks of sessions that they cannot give, told before the first of them runs."""
+"""Checks: requests of a study that its sessions cannot fulfil, reported before the first session runs."""
 
 from collections.abc import Sequence
 
@@ -12,14 +12,15 @@ from teleop_core.session.configuration import Configuration
 from teleop_core.slave.world.contents import WorldParameters
 
 _NEAR = 0.02
-"""An object that the tip comes so near to is within reach: other turns of the tool reach farther [m]."""
+"""An object counts as reachable if the tip comes this near [m], because other orientations of the tool reach farther.
+"""
 
 
 def insist_on_scores(made: Configuration, metrics: Sequence[str]) -> None:
     """Insist on sessions that have the scores.
 
     Raises:
-        ParameterError: A score is of topics that no stage writes, or of an object that is not there.
+        ParameterError: A score needs topics that no stage writes, or an object that does not exist.
     """
     written = {topic.name for topic in made.graph.topics}
     places = {metric.partition(".")[0]: metric for metric in metrics}

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 def swept_coordinates(study: "Study") -> dict[str, object]:
-    """Values of each swept parameter; those that are no plain value as texts."""
+    """Values of each swept parameter; values that are not plain are converted to texts."""
     return {
         name: [v if isinstance(v, int | float | str) else str(v) for v in values]
         for name, values in study.swept.items()
@@ -32,7 +32,7 @@ def dataset_of(study: "Study", points: Sequence[Point], store: Store) -> "xarray
     """Results as an xarray data set.
 
     A dimension for each parameter that is swept, and ``seed``; a variable for each score, NaN where
-    it does not apply or the session failed; ``error`` says why, and ``seconds`` how long it took.
+    it does not apply or the session failed; ``error`` has the reason, and ``seconds`` the duration of the session.
     """
     import xarray
 

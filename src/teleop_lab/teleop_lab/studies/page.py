@@ -132,7 +132,7 @@ def label_of(study: "Study", found: "xarray.Dataset", metric: str) -> dict[str, 
 
 
 def _heat(study: "Study", found: "xarray.Dataset", metric: str) -> tuple[Any, Any] | None:
-    """Means over everything else, of the first two parameters; None with fewer."""
+    """Means for the values of the first two parameters, over all others; None with fewer than two."""
     if len(study.swept) < 2:
         return None
     first, second = list(study.swept)[:2]

@@ -1,4 +1,4 @@
-"""Point: one session of a study, its key, and what comes of it."""
+"""Point: one session of a study, its key, and its result."""
 
 import hashlib
 import json
@@ -37,7 +37,7 @@ class Point:
         settings: All parameters that are given.
         seed: Its seed.
         length: How long the hand moves [s].
-        key: What its result depends on.
+        key: Digests of all that its result depends on.
     """
 
     place: Mapping[str, api.Setting]
@@ -49,20 +49,20 @@ class Point:
 
     @property
     def name(self) -> str:
-        """Name of its result, by its place alone."""
+        """Name of its result, which depends only on its place."""
         text = json.dumps({name: repr(value) for name, value in self.place.items()}, sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()[:20]
 
 
 @dataclass(frozen=True)
 class Result:
-    """What came of a point: scores, or the error in their place.
+    """Result of a point: scores, or an error.
 
     Attributes:
         name: Of the point.
         key: Its key.
         scores: Numbers by key of a score; None where it does not apply.
-        error: What went wrong; empty where nothing did.
+        error: Text of the error; empty without one.
         seconds: How long it took [s].
     """
 
@@ -105,7 +105,7 @@ def point_key(recipe: str, seed: int, metrics: Sequence[str], code: str) -> Key:
 
 @cache
 def code_digest() -> str:
-    """Digest of what ``teleop_core`` and installed packages with parts do: other code may give other numbers."""
+    """Digest of the code of ``teleop_core`` and installed parts, because other code may give other numbers."""
     groups = entry_points()
     names = {"teleop_core"}
     for group in groups.groups - _NO_PARTS:
@@ -116,7 +116,7 @@ def code_digest() -> str:
 
 
 def own_digest() -> str:
-    """Digest of what the files of own parts, and those beside them, do; empty where there are none."""
+    """Digest of the code of the files of own parts and of the files in their folders; empty without own parts."""
     found = [(path.name, path) for path in own_files()]
     return f"+{files_digest(found)}" if found else ""
 
@@ -139,7 +139,7 @@ def files_digest(files: Iterable[tuple[str, Path]]) -> str:
 
 
 def _done_by(code: CodeType) -> str:
-    """What compiled code does, wherever its lines stand."""
+    """Content of compiled code, independent of its line numbers."""
     constants = [
         _done_by(one) if isinstance(one, CodeType) else sorted(map(repr, one)) if isinstance(one, frozenset) else one
         for one in code.co_consts
@@ -151,7 +151,7 @@ def _done_by(code: CodeType) -> str:
 
 _NO_PARTS = {"teleop_core.commands", "teleop_core.pages", "teleop_core.readers"}
 _READ_MORE: set[tuple[str, ...]] = set()
-"""Scores for which everything has to be kept."""
+"""Scores for which all streams must be kept."""
 
 
 def _kept(metrics: tuple[str, ...]) -> frozenset[str] | None:
@@ -174,6 +174,6 @@ def compute(point: Point, metrics: Sequence[str], recordings: Path | None) -> Re
             scores = measure(run().bag, metrics)
     except TeleopError as raised:
         error = " ".join(str(raised).split())
-    except Exception as raised:  # a part of a user's: the study goes on, the point says why
+    except Exception as raised:  # a user's part may raise any error: the study continues, and the point has the error
         error = f"{type(raised).__name__}: {' '.join(str(raised).split())}"
     return Result(point.name, point.key, scores, error, time.monotonic() - begin)

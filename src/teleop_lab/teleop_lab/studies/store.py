@@ -1,4 +1,4 @@
-"""Store: results of a study on disk, each written whole as it comes."""
+"""Store: results of a study on disk, each written completely as soon as it is computed."""
 
 import json
 import os
@@ -31,7 +31,7 @@ class Store:
         """Store of a study, made if it is missing.
 
         Raises:
-            SessionError: It is of another study or of a newer version, or cannot be written.
+            SessionError: The store belongs to another study or a newer version, or cannot be written.
         """
         store = Store(None if folder is None else Path(folder))
         if store.folder is not None:
@@ -61,7 +61,7 @@ class Store:
             try:
                 result = Result.from_json(path.read_text("utf-8"))
             except (OSError, ValueError):
-                continue  # not whole: as if it were missing
+                continue  # an incomplete file counts as missing
             self._results[result.name] = result
 
     def result(self, point: Point) -> Result | None:
@@ -69,7 +69,7 @@ class Store:
         return self._results.get(point.name)
 
     def reason(self, point: Point) -> str:
-        """Why a point is to be run; empty if it is not."""
+        """Reason why a point must be run; empty if it need not."""
         found = self.result(point)
         if found is None:
             return "missing"
@@ -91,7 +91,7 @@ class Store:
 
 
 def write_result(folder: Path, result: Result) -> None:
-    """Write a result whole or not at all; a second time changes nothing.
+    """Write a result completely or not at all; writing it again changes nothing.
 
     Raises:
         SessionError: The disk cannot take it.

@@ -1,4 +1,4 @@
-"""Study: what is compared, its points, and how they are run."""
+"""Study: sessions that are compared, their points, and how they are run."""
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -27,7 +27,7 @@ _KEYS = ("scenario", "seeds", "set", "sweep", "metrics", "parts", "duration", "p
 _SPEED = 25.0
 """Simulated seconds that a process makes in a second, with scores; measured on a busy machine."""
 _BEGIN, _START = 0.1, 4.0
-"""Time that a session costs beside that, and the processes before the first one [s]."""
+"""Additional time of each session, and of the processes before the first session [s]."""
 _RESULT = 4096
 """Bytes of a stored result: a file takes a block of a disk."""
 _SECOND = 200_000
@@ -41,9 +41,9 @@ class Explained:
     Attributes:
         sessions: How many there are in all.
         to_run: Those that are missing, failed or changed.
-        why: How many of them for which reason: missing, failed, changed code, changed parameters.
+        why: Number of these sessions by reason: missing, failed, changed code, changed parameters.
         simulated: Time that those last [s].
-        wall: About how long that takes on the processes given [s].
+        wall: Estimated time for them with the given processes [s].
         stored: Bytes of all results.
         recorded: Bytes of their recordings, if they are kept.
     """
@@ -174,15 +174,15 @@ class Study:
     ) -> "xarray.Dataset":
         """Run what is missing, failed or changed, and give all results.
 
-        A call that was killed goes on where it was with the same store: results are written one by
-        one, as they come. A session that fails is a point with its error.
+        Results are written one by one as they are computed. So after a killed call, another call with the same store
+        continues the study. If a session fails, its point has the error.
 
         Args:
             store: Directory of the results, made if it is missing; None keeps them in memory.
             jobs: Processes of this machine, a session at a time in each; None: as many as processors.
-            client: A Dask client whose workers run the sessions in place of processes; nothing but values travels.
+            client: A Dask client whose workers run the sessions in place of processes; only values are sent.
             recordings: Directory for a recording of each session; None: none are kept.
-            progress: Told how many points are done, and how many there are.
+            progress: Called with the number of finished points, and the number of all.
 
         Raises:
             TeleopError: As :meth:`explain`, before the first session.
@@ -225,7 +225,7 @@ def sweep(
         scenario: One of ``teleop scenarios``.
         metrics: Keys of scores; a variable each.
         seed: Seeds.
-        settings: Parameters by name; a list is swept, anything else holds for all.
+        settings: Parameters by name; a list is swept, any other value applies to all sessions.
         parts: Files that register parts of your own.
         store: As in :meth:`Study.run`, and so those that follow.
         jobs: As there.
@@ -256,8 +256,8 @@ def _study(
 def read_study(path: Path | str) -> Study:
     """Study of a YAML file: scenario, set, sweep, seeds, metrics, parts, duration.
 
-    ``seeds`` is how many there are, from 1 on, or a list. ``parts`` are files beside it. What
-    stands below ``people`` is for :mod:`teleop_lab.people`.
+    ``seeds`` is the number of seeds, beginning with 1, or a list. ``parts`` are files in the same folder. Entries
+    below ``people`` are for :mod:`teleop_lab.people`.
 
     Raises:
         TeleopError: The file cannot be read, or says something else.

@@ -1,4 +1,4 @@
-"""Summary: means over the seeds with intervals, and what each value changes, pair by pair."""
+"""Summary: means over the seeds with intervals, and the effect of each value in paired comparisons."""
 
 from collections.abc import Callable, Iterator, Sequence
 from itertools import product
@@ -18,7 +18,7 @@ _SHARE = (2.5, 97.5)
 
 
 class Mean(NamedTuple):
-    """A mean or another figure, and its 95 % interval by the bootstrap; NaN where nothing is."""
+    """A mean or another figure, and its 95 % interval by the bootstrap; NaN without values."""
 
     value: float
     low: float
@@ -52,7 +52,7 @@ def median_of(values: Array) -> Mean:
 
 
 def apart(values: Array, others: Array) -> Mean:
-    """Median of some values (N,) minus that of others (M,), each drawn anew for itself."""
+    """Median of some values (N,) minus that of others (M,); both are resampled independently."""
     one, other = _known(values), _known(others)
     count = min(len(one), len(other))
     if not count:
@@ -77,13 +77,13 @@ def _known(values: Array) -> Array:
 
 
 def _drawn(known: Array, statistic: Statistic, seed: int) -> Array:
-    """Figure of samples drawn anew from some values (N,)."""
+    """Figure of each sample that is resampled from some values (N,)."""
     draws = np.random.default_rng(seed).integers(0, len(known), (_DRAWS, len(known)))
     return np.asarray(statistic(known[draws], axis=1))
 
 
 def conditions(study: "Study", found: "xarray.Dataset") -> "Iterator[tuple[dict[str, Any], Any]]":
-    """Each combination of the swept values, with its part of the data set, over seeds alone."""
+    """Each combination of the swept values, with its part of the data set, whose only dimension is the seed."""
     places = [range(len(values)) for values in study.swept.values()]
     for indices in product(*places):
         at = dict(zip(study.swept, indices, strict=True))
@@ -92,7 +92,7 @@ def conditions(study: "Study", found: "xarray.Dataset") -> "Iterator[tuple[dict[
 
 
 def differences(study: "Study", found: "xarray.Dataset", metric: str) -> dict[str, list[Mean]]:
-    """What each value of a parameter changes against its first, by seed and all other values."""
+    """Difference between each value of a parameter and its first value, paired by seed and all other values."""
     changes: dict[str, list[Mean]] = {}
     for name, values in study.swept.items():
         first = found[metric].isel({name: 0})

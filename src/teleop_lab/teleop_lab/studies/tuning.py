@@ -16,16 +16,16 @@ from teleop_lab.studies.workers import in_processes
 _KEYS = ("scenario", "seeds", "set", "tune", "minimize", "maximize", "parts", "duration")
 _TOGETHER = 5
 """Trials whose values are chosen before the first of them has run, so that processes share them.
-It is no option: what is found must not depend on the machine."""
+This is not an option, because the result must not depend on the machine."""
 
 
 class Range(NamedTuple):
-    """From where to where a parameter is searched; of whole numbers only such are tried.
+    """Range in which a parameter is searched; if both ends are whole numbers, only whole numbers are tried.
 
     Attributes:
         low: Least value.
         high: Greatest value.
-        is_log: Whether equal ratios are searched alike, not equal differences.
+        is_log: Whether the search is uniform in the logarithm.
     """
 
     low: float
@@ -34,12 +34,12 @@ class Range(NamedTuple):
 
 
 class Trial(NamedTuple):
-    """What came of some values.
+    """Result of some values.
 
     Attributes:
         values: By parameter.
         score: Mean over the seeds; None where a session failed or does not have it.
-        error: Why there is none.
+        error: Reason why there is no score.
     """
 
     values: Mapping[str, api.Setting]
@@ -67,7 +67,7 @@ class Tuning:
     Attributes:
         scenario: One of ``teleop scenarios``; None for the defaults.
         searched: A :class:`Range` or a list of choices for each parameter, named as on the command line.
-        seeds: Hands over which a score is averaged: values that suit one alone are no use.
+        seeds: Hands over which a score is averaged, because values that suit only one hand are useless.
         metric: Key of the score, such as ``task.time_s``.
         is_largest: Whether the largest score is the best one.
         settings: Parameters that are the same in all sessions.
@@ -94,7 +94,7 @@ class Tuning:
             if isinstance(where, Range) and where.is_log and where.low <= 0.0:
                 raise ParameterError(f"low of {name}", where.low, "above 0 with log")
         study = self._study()
-        for name, values in study.swept.items():  # each end by itself: a parameter names its own
+        for name, values in study.swept.items():  # each end separately, so that an error names its parameter
             for value in values:
                 first = {other: ends[0] for other, ends in study.swept.items()}
                 study.points_at({**first, name: value})
@@ -112,10 +112,10 @@ class Tuning:
         jobs: int | None = None,
         progress: Callable[[int, int], None] = runner.silent,
     ) -> Tuned:
-        """Try values, each chosen by what those before it were worth.
+        """Try values, each chosen by the scores of those before it.
 
-        With a store, a search that was killed goes on to the same values as if it had not been,
-        and one with more trials goes on from those that are there.
+        With a store, a search that was killed and continued tries the same values as an uninterrupted one, and a
+        search with more trials continues after the existing ones.
 
         Args:
             store: Directory of the results, made if it is missing; None keeps them in memory.
@@ -132,7 +132,7 @@ class Tuning:
         optuna = _optuna()
         study = self._study()
         kept = Store.open(store, study)
-        # Its numbers are drawn anew in each call: with the same results it asks for the same.
+        # The random numbers are the same in each call: with the same results the search proposes the same values.
         search = optuna.create_study(
             direction="maximize" if self.is_largest else "minimize", sampler=optuna.samplers.TPESampler(seed=0)
         )
@@ -156,7 +156,7 @@ class Tuning:
         found: dict[str, api.Setting] = {}
         for name, where in self.searched.items():
             if not isinstance(where, Range):
-                # Optuna knows plain values alone: a list is chosen by its place.
+                # Optuna supports only plain values, so a list is represented by its index.
                 found[name] = where[trial.suggest_categorical(name, list(range(len(where))))]
             elif isinstance(where.low, int) and isinstance(where.high, int):
                 found[name] = trial.suggest_int(name, where.low, where.high, log=where.is_log)
@@ -165,7 +165,7 @@ class Tuning:
         return found
 
     def _scores(self, study: Study, chosen: list[dict[str, api.Setting]], kept: Store, jobs: int | None) -> list[Trial]:
-        """What some values are worth; sessions that the store does not have are run."""
+        """Scores of some values; sessions that are missing in the store are run."""
         points, refused = [], []
         for values in chosen:
             try:

@@ -31,16 +31,16 @@ _TRIES = 3
 def in_processes(
     study: "Study", points: Sequence[Point], jobs: int | None, store: Path | None, recordings: Path | str | None
 ) -> Iterator[Result]:
-    """Results as they come, of processes of this machine with a session at a time each.
+    """Yield results as they are computed by processes of this machine, each with one session at a time.
 
-    Whoever computes a result writes it. A process that dies costs the sessions that were at work
-    then, which are tried again.
+    The process that computes a result writes it. If a process dies, the sessions that were running then are tried
+    again.
 
     Raises:
         SessionError: No process begins.
     """
     if getattr(current_process(), "_inheriting", False):
-        raise SystemExit(1)  # one of them reads a program that would begin others; who began it says so
+        raise SystemExit(1)  # the caller's program starts processes without a guard; the caller reports this
     place = None if recordings is None else Path(recordings)
     do = partial(_computed, metrics=tuple(study.metrics), store=store, recordings=place)
     count = max(1, min(jobs or len(os.sched_getaffinity(0)), len(points)))
@@ -65,14 +65,14 @@ def in_processes(
 
 
 def _begin(parts: tuple[Path, ...]) -> None:
-    """Make a process ready, which ends as soon as the one that began it is gone."""
+    """Prepare a process, which ends as soon as its parent process is gone."""
     Thread(target=_end_with, args=(parent_process(),), daemon=True).start()
     load_own_parts(parts)
 
 
 def _end_with(other: Any) -> None:
     other.join()
-    os._exit(1)  # what it has written is whole
+    os._exit(1)  # the results that it has written are complete
 
 
 def _as_they_come(pool: ProcessPoolExecutor, do: "partial[Result]", points: list[Point], most: int) -> Iterator[Result]:
@@ -96,7 +96,7 @@ def _computed(point: Point, metrics: tuple[str, ...], store: Path | None, record
 
 
 def on_dask(client: "Client", study: "Study", points: Sequence[Point]) -> Iterator[Result]:
-    """Results as they come, of the workers of a Dask cluster, which share no folder with us.
+    """Yield results as they are computed by the workers of a Dask cluster, which share no folder with this machine.
 
     Raises:
         SessionError: A worker has other code, or there is none.
@@ -121,7 +121,8 @@ def on_dask(client: "Client", study: "Study", points: Sequence[Point]) -> Iterat
             batch = futures.pop(future)
             if future.status == "finished":
                 yield from future.result()
-            elif future.key not in repeated and all(codes := _codes(client, own)):  # one with other code came later
+            elif future.key not in repeated and all(codes := _codes(client, own)):  # a worker with other code joined
+                # later
                 again = client.submit(do, batch, pure=False, retries=_TRIES, workers=codes[0])
                 futures[again] = batch
                 repeated.add(again.key)
@@ -137,7 +138,7 @@ def on_dask(client: "Client", study: "Study", points: Sequence[Point]) -> Iterat
 
 
 def _codes(client: "Client", own: str) -> tuple[list[str], dict[str, object]]:
-    """Addresses of workers with our code, and the code of each other; workers may come later than the study."""
+    """Addresses of workers with the same code, and the code of the other workers; workers may join later."""
     found = client.run(code_digest, on_error="return")
     return [worker for worker, code in found.items() if code == own], {w: c for w, c in found.items() if c != own}
 
@@ -148,7 +149,7 @@ def _batch(
     """Results of some points on a worker; parts of a user travel as texts.
 
     Raises:
-        SessionError: This worker came later and has other code.
+        SessionError: This worker joined later and has other code.
     """
     if code_digest() != code:
         raise SessionError(f"this worker has code {code_digest()}, must be {code}")
@@ -158,7 +159,7 @@ def _batch(
 
 @lru_cache(1)
 def _written(parts: tuple[tuple[str, str], ...]) -> list[Path]:
-    """Files of parts, for as long as this process lives; those of another study are forgotten."""
+    """Files of parts, kept as long as this process lives; files of another study are deleted."""
     forget_own_parts()
     folder = Path(tempfile.mkdtemp(prefix="teleop_parts_"))
     atexit.register(rmtree, folder, ignore_errors=True)
