@@ -219,7 +219,7 @@ MUTANTS = (
     Mutant("late_teleoperator", "who publishes later is never heard (as in lerobot #4166)",
            (("nodes/sender.py", "now_ns - self._heard_ns <= self._silence_ns",
              "now_ns - self._heard_ns <= 10**18"),
-            ("nodes/sender.py", 'gone."""\n        self._owner = b""', 'gone."""')),
+            ("nodes/sender.py", 'no longer exists."""\n        self._owner = b""', 'no longer exists."""')),
            ("kill_motion_scaling",), composed=(),
            schedule=Schedule("recovery", ((2.0, "kill", "hand_side", 1.0, 0.5),))),
     _mutant("drive_goes_on", "a joint goes on at its last speed when the link is lost (as in "

@@ -84,9 +84,8 @@ def make(model: str = "C", **geometry: float) -> Robot:
 def holding_torques(robot: Robot, q: object, wrench: object, spring: mma_balance.ShoulderSpring | None = None) -> Array:
     """Joint torques with which the handle is at rest and applies a wrench to the hand.
 
-    The gravity torque is known only for joint 2 (the source gives masses of the links but no mass centres), and only
-    in poses in which the links after the shoulder have the same orientation as at home. All other joints count as
-    balanced.
+    The source gives masses of the links but no mass centres. So the gravity torque is known only for joint 2, in poses
+    in which the links after the shoulder have the same orientation as at home. All other joints count as balanced.
 
     Args:
         robot: The MMA.

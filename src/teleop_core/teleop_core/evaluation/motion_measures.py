@@ -51,7 +51,7 @@ def stretches(times: Array, gap: float = GAP) -> list[slice]:
 
 
 def resampled(times: Array, rows: Array, rate: float = RATE) -> Array:
-    """Rows at equal time steps from the first time on, linearly interpolated, shape (M, columns).
+    """Rows at equal intervals from the first time on, linearly interpolated, shape (M, columns).
 
     Args:
         times: Rising times (N,) [s], at least one.
@@ -234,7 +234,7 @@ def tremor_power(position: Array, rate: float) -> float:
     """Mean square [m²] of the motion in :data:`TREMOR_BAND`, summed over the axes.
 
     Args:
-        position: Positions (N, 3) [m] at equal time steps, a window of a few seconds.
+        position: Positions (N, 3) [m] at equal intervals, a window of a few seconds.
         rate: Samples per second [Hz].
 
     Returns:

@@ -40,7 +40,7 @@ class Shape:
             point from the surface [m], negative inside.
         outline: ``outline(parameters)`` gives points (N, 3) [m] of one line along its edges around
             its middle; a row of NaN lifts the pen.
-        numbers: ``numbers(parameters)`` returns ``numbers``, if they are not simply the parameters.
+        numbers: ``numbers(parameters)`` returns ``numbers``, if they are not the parameters.
     """
 
     name: str

@@ -49,7 +49,7 @@ class Architecture:
             commanded to the measured tip position [m]. Both are in axes of the slave's base, have the delay of the
             network, and are zero while nothing arrives. ``period`` is the time since the last sample [s]. Writes the
             push (3,) in axes of the slave's base into ``out`` [N].
-        numbers: ``numbers(parameters)`` returns the ``numbers`` of ``push``, if they are not simply the numbers of the
+        numbers: ``numbers(parameters)`` returns the ``numbers`` of ``push``, if they are not the numbers of the
             parameters in their order.
         force_scale: ``force_scale(parameters)`` returns the force at the hand, divided by the tip force that causes
             it, > 0. Energies of hand and slave are compared by this factor.

@@ -40,7 +40,7 @@ class TremorFilter:
             sample to sample, and is zero at the start; ``value`` is the displacement from the first sample [m];
             ``period`` is the time since the last sample [s], 10 ms at most. Returns the filtered value [m]. It must
             return 0 as long as all values are 0.
-        numbers: ``numbers(parameters)`` returns the ``numbers`` of ``filter``, if they are not simply the numbers of
+        numbers: ``numbers(parameters)`` returns the ``numbers`` of ``filter``, if they are not the numbers of
             the parameters in their order.
     """
 

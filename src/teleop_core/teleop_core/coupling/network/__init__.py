@@ -39,7 +39,7 @@ class Network:
             ``numbers`` are those of the parameters; ``memory`` (4,) is kept from packet to packet, and zero at the
             start; ``chances`` (3,) are random numbers, uniform from 0 to 1; ``now`` is the time since the start [s].
             Returns the delay beyond the least delay [s], or :data:`LOST`.
-        numbers: ``numbers(parameters)`` returns the ``numbers`` of ``draw``, if they are not simply the numbers of the
+        numbers: ``numbers(parameters)`` returns the ``numbers`` of ``draw``, if they are not the numbers of the
             parameters in their order.
     """
 

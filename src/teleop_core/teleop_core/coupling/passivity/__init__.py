@@ -61,7 +61,7 @@ class Passivity:
             ``force`` (6,) is the wrench on the tip [N, N m], whose pose is ``tip`` (7,); ``last`` (7,) is the last
             command given to the slave; ``command`` (7,) is the command that came, and must be overwritten with the
             command to give.
-        numbers: ``numbers(parameters)`` returns the ``numbers`` of ``hand``, if they are not simply the numbers of the
+        numbers: ``numbers(parameters)`` returns the ``numbers`` of ``hand``, if they are not the numbers of the
             parameters in their order.
         needs_slave: Whether it works only together with a stage ``passivity``.
     """

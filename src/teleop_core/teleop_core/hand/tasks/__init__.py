@@ -68,7 +68,7 @@ class Task:
             follows. ``numbers`` are those of the parameters; ``memory`` (64,) is kept from tick to tick, and zero at
             first; ``scene`` has the numbers that :data:`SCENE` names; ``state`` has the numbers of ``task/state`` of
             the last tick, and is written.
-        numbers: ``numbers(parameters)`` returns the ``numbers`` of ``judge``, if they are not simply the numbers of
+        numbers: ``numbers(parameters)`` returns the ``numbers`` of ``judge``, if they are not the numbers of
             the parameters in their order.
     """
 
