@@ -80,7 +80,7 @@ class Recordings:
             ParameterError: A name is that of no recording, or the kind is another.
         """
         if kind not in _KIND or not names:
-            raise ParameterError("action", kind, f"one of {', '.join(_KIND)}, with a recording")
+            raise ParameterError("action", kind, f"one of {', '.join(_KIND)}, for a recording that is named")
         paths = [str(self.path(name)) for name in names]
         out = ["--out", f"{paths[0]}.csv"] if kind == "export" else []
         return [_KIND[kind], *(paths[:1] if kind == "export" else paths), *out]

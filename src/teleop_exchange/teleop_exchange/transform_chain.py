@@ -30,7 +30,9 @@ def chain_to(top: str, frame: str, parents: Mapping[str, Collection[str]]) -> li
             raise UnknownNameError(f"--parent (poses of {name} stand in several)", "", sorted(own))
         for parent in sorted(own):
             if not top and parent in ways:
-                raise ParameterError("--frame", frame, f"a frame that is not its own ancestor; {parent} is one")
+                raise ParameterError(
+                    "--frame", frame, f"a frame of a tree without a cycle; {parent} is its own ancestor"
+                )
             if parent not in ways:
                 ways[parent] = [*ways[name], (parent, name)]
                 queue.append(parent)

@@ -57,8 +57,8 @@ def fk(q: Array, geometry: Array, T: Array) -> None:
 def assemble(q: Array, geometry: Array, ask: Array, T: Array, out: Array) -> int:
     """Write ``T_base_object`` of nine joints; see :class:`kinematics.Kernels`.
 
-    The pose is the pose of the contact points, for any seed. The residual is the largest slip between two of them,
-    which may be up to :data:`AGREED`.
+    The object's pose is computed from the contact points; it does not depend on the seed. The residual is the largest
+    slip between two contact points, at most :data:`AGREED`.
     """
     points = np.empty((3, 3))
     contacts(q, geometry, points)

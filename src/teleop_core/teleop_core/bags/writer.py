@@ -252,7 +252,7 @@ class BagWriter:
             self._failure = self._failure or told
         finally:
             self._mcap.close()
-        for _ in jobs:  # callers must never wait for a dead thread
+        for _ in jobs:  # empty the queue, so that callers do not block
             pass
 
 

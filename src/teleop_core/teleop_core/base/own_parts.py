@@ -49,7 +49,7 @@ def own_files() -> list[Path]:
 
 
 def forget_own_parts() -> None:
-    """Remove the parts that all files have registered, and delete the files from the environment."""
+    """Unregister the parts of all loaded files, and remove the files' paths from the environment variable."""
     for name in tuple(_texts):
         _forget(name)
     os.environ.pop(VARIABLE, None)

@@ -180,7 +180,7 @@ class Stage:
                 raise PartError("stage", self.name, text) from error
 
     def remembered(self, joints: int) -> list[Field]:
-        """Fields of its state, for a robot with this many joints."""
+        """Fields of the stage's state, for a robot with this many joints."""
         if isinstance(self.state, type):
             return fields_of(self.state, joints)
         return list(self.state)

@@ -29,7 +29,8 @@ AssembliesKernel: TypeAlias = Callable[[Array, Array, Array], int]
 DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")
 # A pose counts as reached within this distance [m] and angle [rad].
 REACHED = 1e-9
-# If there are more joint readings than the pose needs, they may disagree by this much [m]: encoders, play.
+# If there are more joint readings than the pose needs, encoder errors and backlash may make
+# them disagree by this much [m].
 AGREED = 1e-4
 # Largest number of joint vectors of one pose: the three-fingered hand, with four for each finger.
 MAX_BRANCHES = 64

@@ -177,7 +177,7 @@ def run(
     if isinstance(scenario, Configuration):
         made = scenario
         if given:
-            raise ParameterError("settings", sorted(given), "part of the configuration given")
+            raise ParameterError("settings", sorted(given), "left out where a configuration is given: put them into it")
     else:
         made = configuration(
             scenario, files=files, settings=given, texts=(), operator=operator, fixture=fixture,

@@ -25,7 +25,7 @@ class Clock:
     drift: float = 0.0
 
     def ahead_ns(self, now_ns: int) -> int:
-        """What it is ahead of a monotonic time [ns]."""
+        """How far this machine's clock is ahead of the given monotonic time [ns]."""
         ahead_ns = EPOCH_NS + self.offset_ns
         return ahead_ns + round(self.drift * (now_ns - BEGIN_NS)) if self.drift else ahead_ns
 

@@ -116,10 +116,11 @@ def reach(
     """How much of a hand's motion a slave can follow, and with which settings it follows most of it.
 
     Args:
-        source: A recording, its path, or the name of a scenario, which is run first. Its own configuration is the
-            starting point; for a foreign recording, in any file that replay reads, it is the default configuration.
+        source: A recording, its path, or the name of a scenario, which is run first. The search starts
+            from the recording's own configuration. A foreign recording, in any file that replay reads, has none: then the
+            search starts from the default configuration.
         robot: The slave, in place of the configuration's; its start then is the robot's own.
-        geometry: Its lengths [m, rad] as ``symbol=value``.
+        geometry: Lengths and angles of the slave [m, rad] as ``symbol=value``.
         share: Share of the time that is to be followed, above 0 and at most 1.
         arm: Namespace of the arm; empty for the default one.
         keeps_axes: Whether the map of axes from hand to slave must not change, for example because a camera looks at

@@ -79,8 +79,8 @@ _SINGULAR, _SLOW = int(topics.Limit.SINGULARITY), int(topics.Limit.SPEED)
 _FOLLOWED, _NEAR_SINGULAR = int(IkStatus.FOLLOWED), int(IkStatus.NEAR_SINGULAR)
 # A step [rad or m] so large that it never limits the speed; the path is followed without a time limit.
 _ANY_STEP = 1e6
-# A single or first command may be as far away as full speed reaches in this time [s]. The slave accepts half a second
-# of it as one motion, and goes the whole distance.
+# A single or first command may be at most the distance covered at full speed in this time [s]. The slave accepts up to
+# 0.5 s of full-speed motion as one command.
 _ALONE = 0.45
 # A joint motion longer than this is too long for a tremor [s at full speed]; a prismatic joint moves a millimetre in
 # it.
