@@ -117,8 +117,8 @@ def reach(
 
     Args:
         source: A recording, its path, or the name of a scenario, which is run first. The search starts
-            from the recording's own configuration. A foreign recording, in any file that replay reads, has none: then the
-            search starts from the default configuration.
+            from the recording's own configuration. A foreign recording, in any file that replay reads, has none: then
+            the search starts from the default configuration.
         robot: The slave, in place of the configuration's; its start then is the robot's own.
         geometry: Lengths and angles of the slave [m, rad] as ``symbol=value``.
         share: Share of the time that is to be followed, above 0 and at most 1.
