@@ -14,7 +14,7 @@ from threading import Thread
 from typing import TYPE_CHECKING, Any
 
 from teleop_core.base.errors import SessionError
-from teleop_core.base.own_parts import forget_own_parts, load_own_parts
+from teleop_core.base.own_parts import forget_own_parts, load_own_parts, named_files
 from teleop_lab.studies.point import Point, Result, code_digest, compute
 from teleop_lab.studies.store import write_result
 
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 BATCH = 100
 """Sessions of a task on a cluster, at most: a scheduler copes with some 0.2 million tasks."""
 _TRIES = 3
+_FOLDER = "teleop_parts_"
 
 
 def in_processes(
@@ -159,10 +160,11 @@ def _batch(
 
 @lru_cache(1)
 def _written(parts: tuple[tuple[str, str], ...]) -> list[Path]:
-    """Files of parts, kept as long as this process lives; files of another study are deleted."""
+    """Files of the worker's own parts and of the study's, kept as long as this process lives; another study's go."""
+    own = [path for path in named_files() if not path.parent.name.startswith(_FOLDER)]
     forget_own_parts()
-    folder = Path(tempfile.mkdtemp(prefix="teleop_parts_"))
+    folder = Path(tempfile.mkdtemp(prefix=_FOLDER))
     atexit.register(rmtree, folder, ignore_errors=True)
     for name, text in parts:
         (folder / name).write_text(text, "utf-8")
-    return [folder / name for name, _ in parts]
+    return [*own, *(folder / name for name, _ in parts)]
