@@ -127,7 +127,7 @@ def test_a_starter_that_gets_no_further_is_given_up(tmp_path: Path) -> None:
     with Starter("", environment(), patience=0.5) as starter, (tmp_path / "log").open("wb") as log:
         os.kill(starter.pid, signal.SIGSTOP)
         try:
-            with pytest.raises(SessionError, match=r"no further for 0\.5 s"):
+            with pytest.raises(SessionError, match=r"no progress for 0\.5 s"):
                 starter.start(["true"], os.environ, {"out": log.fileno(), "err": log.fileno()})
         finally:
             os.kill(starter.pid, signal.SIGCONT)
