@@ -2,8 +2,8 @@
 
 The source's wall is a spring up to a constant force (:func:`wall_force`). A sampled spring returns more energy than it
 took: its force belongs to the position at the beginning of a period, and is held for the whole period. So the force is
-    too small on the way in and too large on the way out, by the motion of half a period. A damped wall
-    (:func:`damped_wall`) compensates this, up to :func:`passive_stiffness`.
+too small on the way in and too large on the way out, by the motion of half a period. A damped wall
+(:func:`damped_wall`) compensates this, up to :func:`passive_stiffness`.
 
 A passivity controller (Hannaford and Ryu 2002) was tried in addition, and left out. It cuts the force when the energy
 that a contact took is used up. With an encoder in steps and a compliant device it switches on and off. Contacts that

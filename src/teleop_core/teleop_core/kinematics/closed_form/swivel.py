@@ -2,10 +2,9 @@
 
 The distance between shoulder centre and wrist centre determines joint 4. The arm can then swivel about the line
 between them: the shoulder's rotation is A(psi) = P cos psi + Q sin psi + N. The psi at which a joint of shoulder or
-wrist has
-    a given angle follow from an equation linear in cos psi and sin psi. So the limits of all joints cut the circle of
-    psi exactly into arcs. Each arc, however narrow, is either completely legal or completely illegal. psi = 0 is the
-    seed's posture. The solution is the legal psi nearest to 0 that keeps a margin to the ends of its arc.
+wrist has a given angle follow from an equation linear in cos psi and sin psi. So the limits of all joints cut the
+circle of psi exactly into arcs. Each arc, however narrow, is either completely legal or completely illegal. psi = 0 is
+the seed's posture. The solution is the legal psi nearest to 0 that keeps a margin to the ends of its arc.
 
 In a path the arm makes the least move that follows. The swivel moves back to its margin when a joint is near a limit.
 When instead the axes of shoulder or wrist become coplanar, the swivel moves slowly to the side where the

@@ -3,8 +3,7 @@
 Once the push along the normal reaches the puncture force, the surface opens under the tip, and the spring of the
 surface vanishes there. The tip then moves in a straight channel along the normal at that point. Two forces act in the
 channel: the cutting force when the tip goes deeper than before, and the dry friction of the shaft, which grows with
-    depth. Both are springs that yield at a bound: they hold at rest, and release no more energy than was stored in
-    them.
+depth. Both are springs that yield at a bound: they hold at rest, and release no more energy than was stored in them.
 
 Source:
     Okamura, Simone and O'Leary 2004: stiffness before the puncture, then friction along the shaft
