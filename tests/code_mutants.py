@@ -95,6 +95,8 @@ CODE_MUTANTS = (
             "if _texts.get(name) == text:", "if name in _texts:", "studies"),
     _mutant("left_alone", "processes of a killed study stay for ever", "teleop_lab/studies/workers.py",
             "    other.join()\n", "    other.join()\n    return\n", "studies"),
+    _mutant("workers_forget", "a worker forgets the parts that it has of its own", "teleop_lab/studies/workers.py",
+            "return [*own, *(", "return [*(", "studies"),
     _mutant("late_other_code", "a worker that comes later with other code is not noticed",
             "teleop_lab/studies/workers.py", "if code_digest() != code:", "if False:", "studies"),
     _mutant("worst_is_best", "a search takes the worst values for the best", "teleop_lab/studies/tuning.py",

@@ -315,11 +315,17 @@ def test_dask_workers_give_the_same_bits_with_parts_of_ones_own_and_whoever_come
 ) -> None:
     _, data = found
     made, write = halves
+    theirs = tmp_path / "theirs.py"
+    theirs.write_text("")
     with dask(tmp_path / "dask") as client:
+        client.run(lambda: os.environ.update(TELEOP_PARTS=str(theirs)))
         again = study().run(client=client)
         for share in (0.5, 0.25):
             write(share)
             assert set(made().run(client=client)["halves.share"].values.ravel()) == {share}
+        named = client.run(os.getenv, "TELEOP_PARTS").values()
+        assert all(text.split(os.pathsep)[0] == str(theirs) for text in named)  # whoever runs the workers chose it
+        assert any(text.count("halves.py") == 1 for text in named)
         late = next(iter(client.run(os.getpid)))
 
         def have_other_code() -> None:  # in here it travels as a value
