@@ -33,6 +33,8 @@ AGREEING = {
     "parallel_robots": 6,
 }  # fmt: skip
 """Published figures, laws and goals that each experiment agrees with."""
+LONG_EXPERIMENTS = ("stability", "transparency")
+"""Half a minute each; tests/unit has their laws with fewer cases."""
 TRACKED_MM = {"coarse_box": 0.289, "fine_box": 0.260, "human": 0.114, "point": 0.126}
 """Root mean square of each scenario's position error, where it is above a tenth."""
 
@@ -44,7 +46,10 @@ def bench() -> experiments.Bench:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", experiments.EXPERIMENTS.names())
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(n, marks=[pytest.mark.soak] * (n in LONG_EXPERIMENTS)) for n in experiments.EXPERIMENTS.names()],
+)
 def test_every_experiment_runs_to_its_end_and_agrees_as_it_did(name: str, bench: experiments.Bench) -> None:
     outcome = experiments.run(name, bench=bench)
     assert sum(row.agrees is True for row in outcome.rows) == AGREEING[name]

@@ -25,7 +25,7 @@ LIMITED = ((4.0, 6.5, topics.Limit.JOINT), (9.0, 9.25, topics.Limit.SPEED), (12.
 # Plots of a recording with a time axis, by their titles.
 POSITION, ERROR, FORCE = "Position against time", "Position error", "Force on the hand"
 PLOTS = """
-(() => {
+((hasTraces) => {
   const isTime = ([key, axis]) => /^xaxis/.test(key) && axis.uirevision === 'time';
   const numbers = (values) => values && Array.from(values, (v) => (Number.isNaN(v) ? null : v));
   const traceOf = ({ name, type, mode, meta, x, y, customdata }) => ({
@@ -36,13 +36,13 @@ PLOTS = """
     id: plot.id, width: plot.clientWidth, right: plot.getBoundingClientRect().right,
     times: Object.entries(plot._fullLayout).filter(isTime).map(([, axis]) => axis.range),
     shapes: (plot._fullLayout.shapes || []).map(({ name, path }) => ({ name, path })),
-    traces: plot.data.map(traceOf),
+    traces: hasTraces ? plot.data.map(traceOf) : [],
   });
   const nameOf = (figure) => ['h2', 'h3'].map((tag, i) =>
     (i ? figure : figure.closest('section')).querySelector(tag).textContent).join('/');
   return Object.fromEntries([...document.querySelectorAll('figure.card')].map((figure) =>
     [nameOf(figure), plotOf(figure.querySelector('.js-plotly-plot'))]));
-})()
+})
 """
 WIDE_AS_THEIR_PLACES = """
 [...document.querySelectorAll('.js-plotly-plot')]
@@ -130,16 +130,17 @@ def opened(
         assert not tab.said
 
 
-def plots(tab: Any) -> Any:
+def plots(tab: Any, *, has_traces: bool = True) -> Any:
+    """What each plot shows, by the names of its recording and its own; traces of a whole page take a second."""
     tab.settled()
-    return tab.value(PLOTS)
+    return tab.value(f"{PLOTS}({json.dumps(has_traces)})")
 
 
 def ranges(tab: object, recording: str) -> list[Any]:
     """Visible times of all plots against time of a recording, each once."""
     found = {
         (round(begin, 6), round(end, 6))
-        for name, plot in plots(tab).items()
+        for name, plot in plots(tab, has_traces=False).items()
         if name.startswith(f"{recording}/")
         for begin, end in plot["times"]
     }
@@ -184,7 +185,7 @@ def curve(tab: object, title: str, name: str, recording: str = "one") -> Any:
 def test_zooming_one_plot_moves_all_of_that_recording_and_no_other(opened: Callable[..., Any], short: Any) -> None:
     tab = opened(short[0])
     whole = ranges(tab, "two")
-    plot = plots(tab)[f"one/{ERROR}"]["id"]
+    plot = plots(tab, has_traces=False)[f"one/{ERROR}"]["id"]
     drag(tab, f"#{plot} .nsewdrag", (0.25, 0.5), (0.5, 0.52))
     ((begin, end),) = ranges(tab, "one")
     assert np.allclose((begin, end), (5.0, 10.0), atol=0.05)
@@ -196,7 +197,7 @@ def test_zooming_one_plot_moves_all_of_that_recording_and_no_other(opened: Calla
 def test_panning_one_plot_moves_all(opened: Callable[..., Any], short: Any) -> None:
     tab = opened(short[0])
     show(tab, 8.0, 12.0)
-    plot = plots(tab)[f"one/{POSITION}"]["id"]
+    plot = plots(tab, has_traces=False)[f"one/{POSITION}"]["id"]
     mode = f"Plotly.relayout('{plot}', {{ dragmode: '%s' }}).then(() => 0)"
     tab.value(mode % "pan")
     drag(tab, f"#{plot} .nsewdrag", (0.5, 0.5), (0.25, 0.5))
@@ -208,7 +209,7 @@ def test_panning_one_plot_moves_all(opened: Callable[..., Any], short: Any) -> N
 def test_double_click_on_any_plot_shows_the_whole_recording(opened: Callable[..., Any], short: Any) -> None:
     tab = opened(short[0])
     show(tab, 8.0, 12.0)
-    plot = plots(tab)[f"one/{FORCE}"]["id"]
+    plot = plots(tab, has_traces=False)[f"one/{FORCE}"]["id"]
     left, top, width, height = area(tab, f"#{plot} .nsewdrag")
     place = (left + 0.5 * width, top + 0.5 * height)
     for _ in range(10):  # a busy machine may take the second click for a first one
@@ -324,7 +325,7 @@ def bounds(shape: Any) -> list[Any]:
 
 def test_every_plot_against_time_has_the_bands_of_the_state(opened: Callable[..., Any], short: Any) -> None:
     tab = opened(short[0])
-    timed = {name: plot for name, plot in plots(tab).items() if plot["times"]}
+    timed = {name: plot for name, plot in plots(tab, has_traces=False).items() if plot["times"]}
     assert len(timed) >= 8
     for name, plot in timed.items():
         found = {shape["name"]: bounds(shape) for shape in plot["shapes"] if shape["name"]}
@@ -370,7 +371,7 @@ def test_long_path_in_a_plane_becomes_the_time_that_was_spent(opened: Callable[.
 def test_page_fits_into_the_window(opened: Callable[..., Any], short: Any, width: int, columns: int) -> None:
     tab = opened(short[0], width)
     assert tab.value("document.documentElement.scrollWidth") <= width
-    for name, plot in plots(tab).items():
+    for name, plot in plots(tab, has_traces=False).items():
         assert plot["width"] > 0.8 * width / columns, name
         assert plot["right"] <= width, name
 

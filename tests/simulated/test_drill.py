@@ -17,7 +17,8 @@ from teleop_drill.simulation.drill import simulated_drill
 pytestmark = pytest.mark.slow
 PARTS = 4
 """Sessions that share the rows: each test is short, and two run at once."""
-MUTANTS = ("stop_late", "not_recorded", "braking_weak", "second_publishers")
+MUTANTS = ("stop_late", "not_recorded")
+"""Those that no law of random schedules finds, of each half of the drill: what moves, what is recorded."""
 
 
 def assert_it_behaves(folder: Path, rows: Sequence[str], *words: str) -> None:

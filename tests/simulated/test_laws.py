@@ -11,7 +11,8 @@ from teleop_drill.simulation.seeds import run_seed
 
 _NAMES = sorted((*COMMANDS, "release"))
 HOME = (_NAMES.index("home") + 0.5) / len(_NAMES)
-FOUND_BY_LAWS = tuple(one for one in MUTANTS if one.schedule is not None)
+FOUND_BY_LAWS = {one.schedule.law: one for one in MUTANTS if one.schedule is not None}
+"""One mutant of each law."""
 
 
 def test_a_stop_in_the_middle_of_a_move_leaves_nothing_to_go_on_with() -> None:
@@ -80,13 +81,13 @@ def test_a_session_that_began_under_a_slow_clock_stamps_by_it_and_moves_by_new_c
 
 
 def test_each_law_has_a_mutant_that_breaks_it() -> None:
-    assert {one.schedule.law for one in FOUND_BY_LAWS if one.schedule} == set(LAWS)
+    assert set(FOUND_BY_LAWS) == set(LAWS)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("mutant", FOUND_BY_LAWS, ids=lambda one: one.name)
-def test_a_schedule_finds_what_a_law_forbids_and_nothing_in_what_is_sound(mutant: Mutant) -> None:
+@pytest.mark.parametrize("mutant", FOUND_BY_LAWS.values(), ids=lambda one: one.name)
+def test_a_schedule_finds_what_a_law_forbids(mutant: Mutant) -> None:
+    """The other mutants, and that no schedule breaks a law of the sound package: make drill-mutants."""
     schedule = mutant.schedule
     assert schedule is not None
     assert schedule.law in dict(scheduled(mutant, schedule))
-    assert run_seed(schedule.seed, [Fault(*one) for one in schedule.faults]).broken == ()

@@ -21,13 +21,12 @@ pytestmark = pytest.mark.slow
 SIDES = PROCESSES[Processes.SIDES]
 PROCESSORS: tuple[dict[str, str], ...] = (
     {},
-    {"OPENBLAS_CORETYPE": "Sandybridge"},
     {"OPENBLAS_CORETYPE": "Haswell", "NPY_DISABLE_CPU_FEATURES": "X86_V3,X86_V4,AVX512_ICL,AVX512_SPR"},
 )
-"""What makes NumPy and OpenBLAS compute as on three processors."""
+"""What makes NumPy and OpenBLAS compute as on this processor and as on an older one."""
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(2))
 def test_all_laws_hold_under_a_random_schedule(seed: Any) -> None:
     found = run_seed(seed)
     assert found.broken == ()
@@ -90,7 +89,7 @@ def test_many_schedules_are_told_as_a_table_of_faults_and_states(tmp_path: Path)
 
 def test_of_three_seeds_the_one_is_run_whose_faults_have_met_least(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(seeds, "_ROUND", 1)
-    ran = [found.seed for found in seeds.run_seeds(30, 3, 1)]
+    ran = [found.seed for found in seeds.run_seeds(30, 2, 1)]
     assert ran[0] == 30
     met = Counter((one.kind, "ENABLED") for one in draw(30, SIDES))
     assert all(33 + 3 * k <= seed < 36 + 3 * k for k, seed in enumerate(ran[1:]))
