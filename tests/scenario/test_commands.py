@@ -19,7 +19,8 @@ from scipy.spatial.transform import Rotation
 from present import present
 from teleop_core.bags.reader import Bag
 from teleop_core.bags.writer import BagWriter
-from teleop_core.commands.progress import Progress, say_work
+from teleop_core.commands import progress as commands_progress
+from teleop_core.commands.progress import Progress, say_work, shown_progress
 from teleop_core.graph import topics
 from teleop_core.robots import load_robot
 
@@ -233,6 +234,17 @@ def test_compiling_is_told_while_something_compiles_and_at_no_other_time(capsys:
     with event.trigger_event("numba:compile"):  # what numba itself does around its compiler
         assert say_work()
     assert capsys.readouterr().err == f"{COMPILING}, once …\n"
+
+
+def test_long_work_without_a_terminal_says_how_far_it_is(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with shown_progress("study") as progress:
+        progress(1, 4)
+    monkeypatch.setattr(commands_progress, "EVERY", 0.0)
+    with shown_progress("study") as progress:
+        progress(1, 4)
+    assert capsys.readouterr().err == "study: 25 % after 0 s\n"
 
 
 def test_sessions_of_an_experiment_are_counted() -> None:

@@ -90,6 +90,9 @@ def test_page_that_watches_has_no_handles_until_it_takes_control(tab: Any) -> No
         tab.until(f"{seen} === false")
         tab.click("Take control")
         tab.until(f"{seen} === true")
+        tab.until(
+            "[...document.querySelectorAll('button')].some((b) => b.textContent === 'Take control' && b.disabled)"
+        )
 
 
 @pytest.mark.soak

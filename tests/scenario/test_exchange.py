@@ -148,6 +148,7 @@ def test_a_session_follows_the_recording_for_as_long_as_it_is(
         (("import", "nothing.csv", "--out", "{out}"), "does not exist"),
         (("import", "{hand}", "--out", "{out}", "--unit", "km"), "invalid choice"),
         (("import", "{hand}", "--out", "{bag}"), "exists already"),
+        (("console", "--out", "{bag}"), "exists already"),
         (("export", "{bag}", "--out", "{out}.csv", "--topics", "nowhere"), "master/measured_cp"),
         (("export", "{bag}", "--out", "{out}"), "lacks slave/measured_js"),
         (("export", "nothing", "--out", "{out}.csv"), "does not exist"),
@@ -162,6 +163,7 @@ def test_mistakes_are_one_line_and_leave_nothing(
     lines = [line for line in done.stderr.splitlines() if not line.startswith("note:")]
     assert len(lines) == 1, done.stderr
     assert text in lines[0]
+    assert not done.stdout  # such as the address of a page that never opens
     assert not list(tmp_path.iterdir())
 
 

@@ -51,7 +51,9 @@ def _run(arguments: argparse.Namespace) -> int:
         raise ParameterError("BAG", str(arguments.bag), "a recording, or --attach, not both")
     from teleop_console.answers import Situation
     from teleop_console.server import ConsoleServer
+    from teleop_core.bags.finding import check_new
 
+    check_new(arguments.out)
     with ConsoleServer(arguments.port, arguments.host, arguments.token) as server:
         is_told = arguments.attach or arguments.bag is not None or _is_told(arguments)
         server.answers.situation = Situation(doing="starting …" if is_told else "")

@@ -80,6 +80,8 @@
     if (spoken.textContent !== (shown.state || '')) spoken.textContent = shown.state || '';
     stop.hidden = !shown.can_stop;
     hand.hidden = !shown.can_press || !shown.drives;
+    for (const take of document.querySelectorAll('button')) // of viser's panel, which is the same for all pages
+      if (take.textContent === 'Take control') take.disabled = Boolean(shown.drives);
     starting.textContent = shown.doing;
     starting.hidden = !shown.doing;
     const seen = document.querySelector('canvas')?.getBoundingClientRect();

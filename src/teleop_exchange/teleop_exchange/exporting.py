@@ -11,6 +11,7 @@ import pyarrow as pa
 import pyarrow.csv as pc
 import pyarrow.parquet as pq
 
+from teleop_core.bags.finding import check_new
 from teleop_core.base.errors import ParameterError, RecordingError, UnknownNameError
 from teleop_core.graph.topics import BY_NAME, Kind
 from teleop_core.session.recording import Recording, open_recording
@@ -126,8 +127,7 @@ def export_recording(
         raise UnknownNameError("--format", chosen, FORMATS)
     if rate is not None and not 0.0 < rate <= 1e6:
         raise ParameterError("--rate", rate, "above 0 Hz")
-    if path.exists():
-        raise RecordingError(path, "exists already; choose another --out")
+    check_new(path)
     if not several:
         raise ParameterError("recording", [], "at least one recording")
     opened = [one if isinstance(one, Recording) else open_recording(one) for one in several]

@@ -12,6 +12,7 @@ from types import MappingProxyType
 import numpy as np
 
 from teleop_core.bags.arms import ARMS_KEY
+from teleop_core.bags.finding import check_new
 from teleop_core.bags.writer import BagWriter
 from teleop_core.base.errors import RecordingError
 from teleop_core.graph.topics import MASTER_BUTTONS, MASTER_MEASURED_CP, Topic
@@ -57,8 +58,7 @@ def import_recording(
     """
     path, out = Path(file), Path(out)
     wanted = options_of(options or ImportOptions(), arms, changes)
-    if out.exists():
-        raise RecordingError(out, "exists already; choose another --out")
+    check_new(out)
     motions = {arm: Motion(path, one) for arm, one in wanted.items()}
     first_ns = min(int(motion.stamp_ns[0]) for motion in motions.values())
     for motion in motions.values():

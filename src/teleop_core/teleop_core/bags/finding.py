@@ -8,6 +8,16 @@ from teleop_core.base import RecordingError, plain_yaml, shown
 METADATA = "metadata.yaml"
 
 
+def check_new(path: Path | None) -> None:
+    """Refuse the path of a new recording if something exists there; None is a path that is chosen later.
+
+    Raises:
+        RecordingError: The path exists.
+    """
+    if path is not None and path.exists():
+        raise RecordingError(path, "exists already; choose another --out")
+
+
 def mcap_files(path: Path) -> list[Path]:
     """MCAP files of a recording, in order.
 

@@ -1,12 +1,15 @@
-"""Progress of a long command: a bar on a terminal, nothing when piped."""
+"""Progress of a long command: a bar on a terminal, a line a minute when piped."""
 
 import sys
 import threading
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 PATIENCE = 2.0
 """Time [s] without progress after which the reason is shown."""
+EVERY = 60.0
+"""Time [s] between two lines of progress where there is no terminal."""
 
 
 class Progress:
@@ -34,7 +37,7 @@ class Progress:
 
 @contextmanager
 def shown_progress(text: str) -> Iterator[Progress]:
-    """Progress bar on a terminal, nothing when piped."""
+    """Progress bar on a terminal; when piped, a line on the standard error every :data:`EVERY` seconds."""
     progress, ended = Progress(), threading.Event()
     threading.Thread(target=_watch, args=(progress, ended), daemon=True).start()
     try:
@@ -69,8 +72,23 @@ def say_work(say: Callable[[str], None] | None = None) -> bool:
     return True
 
 
+def _lines(text: str) -> Callable[[int, int], None]:
+    """Function that prints a line of progress, the first one after :data:`EVERY` seconds."""
+    begin = last = time.monotonic()
+
+    def show(done: int, total: int) -> None:
+        nonlocal last
+        now = time.monotonic()
+        if now - last >= EVERY:
+            last = now
+            print(f"{text}: {100 * done // max(total, 1)} % after {now - begin:.0f} s", file=sys.stderr, flush=True)
+
+    return show
+
+
 def _shown(text: str, progress: Progress) -> Iterator[Progress]:
     if not sys.stderr.isatty():
+        progress.show = _lines(text)
         yield progress
         return
     from rich.console import Console

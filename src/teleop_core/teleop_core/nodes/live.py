@@ -9,7 +9,8 @@ from typing import IO, Any
 
 from rich.console import Console
 
-from teleop_core.base.errors import RecordingError, SessionError
+from teleop_core.bags.finding import check_new
+from teleop_core.base.errors import SessionError
 from teleop_core.base.plain_yaml import written
 from teleop_core.base.texts import printable
 from teleop_core.graph.graph import HAND, RECORDER_NAME
@@ -81,8 +82,7 @@ def live(
             closed even then.
     """
     out = Path(out).absolute()
-    if out.exists():
-        raise RecordingError(out, "exists already; choose another --out")
+    check_new(out)
     shared = crews(configuration.graph, processes, without)
     env = environment(domain)
     interrupt = interrupt or Interrupt()

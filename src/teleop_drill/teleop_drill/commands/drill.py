@@ -8,7 +8,8 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from teleop_core.base.errors import ParameterError, RecordingError
+from teleop_core.bags.finding import check_new
+from teleop_core.base.errors import ParameterError
 from teleop_core.commands.arguments import command, ros_module, setting_arguments
 
 if TYPE_CHECKING:
@@ -103,8 +104,7 @@ def _run(arguments: argparse.Namespace) -> int:
     if arguments.arm and not arguments.drives:
         raise ParameterError("--arm", shlex.join(arguments.arm), "with --drives, which lead it")
     check_places(arguments.json, arguments.markdown)
-    if arguments.out is not None and arguments.out.exists():
-        raise RecordingError(arguments.out, "exists already; choose another --out")
+    check_new(arguments.out)
     outcomes = _outcomes(exercises, arguments)
     _write(outcomes, arguments)
     code = _show(outcomes)

@@ -4,7 +4,8 @@ import argparse
 import json
 from pathlib import Path
 
-from teleop_core.base.errors import ParameterError, RecordingError
+from teleop_core.bags.finding import check_new
+from teleop_core.base.errors import ParameterError
 from teleop_core.commands.arguments import ros_module
 from teleop_core.nodes.crews import Processes
 
@@ -23,8 +24,7 @@ def run_schedules(arguments: argparse.Namespace) -> int:
         raise ParameterError("--seeds", count, "1 with --faults and --out")
     if not 0.0 <= arguments.breaks <= 0.1:
         raise ParameterError("--breaks", arguments.breaks, "from 0 to 0.1")
-    if out is not None and out.exists():
-        raise RecordingError(out, "exists already; choose another --out")
+    check_new(out)
     ros_module("seeds", "teleop_drill.simulation")
     processes = Processes.ONE if arguments.composed else Processes.SIDES
     if count == 1:
