@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from held_master import HeldMaster
-from teleop_core.base import NoParameters, ParameterError, PartError, Within, build, parameter
+from teleop_core.base import NoParameters, PartError, Within, build, parameter
 from teleop_core.hand.operators import OPERATORS, Operator, Setting, following, register_operator
 from teleop_core.hand.operators.behaviour import OperatorParameters
 from teleop_core.hand.operators.shapes import PHASES, minimum_jerk
@@ -146,18 +146,6 @@ def test_smooth_step_rests_at_both_ends() -> None:
     # Third order at the ends: 10 x³.
     assert math.isclose(steps[2], 1e-8, rel_tol=2e-3)
     assert math.isclose(1.0 - steps[4], 1e-8, rel_tol=2e-3)
-
-
-@pytest.mark.parametrize("points", [(), (0.1, 0.2), (0.1, 0.2, 0.3, 0.1)])
-def test_points_that_are_no_triples_and_a_recorded_path_without_a_recording_are_refused(
-    points: tuple[float, ...],
-) -> None:
-    with pytest.raises(ParameterError) as error:
-        build(OperatorParameters, {"kind": "points", "points": points})
-    assert (error.value.name, error.value.value) == ("operator.points", points)
-    with pytest.raises(ParameterError) as error:
-        build(OperatorParameters, {"kind": "bag"})
-    assert error.value.name == "operator.bag"
 
 
 # Own operators.

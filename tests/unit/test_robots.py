@@ -269,19 +269,3 @@ def test_a_robot_whose_vectors_do_not_fit_is_refused(change: Mapping[str, Any], 
     with pytest.raises(error) as caught:
         dataclasses.replace(robot_from_table({**TABLE, "rows": TABLE["rows"][:1]}), **change)
     assert caught.value.name == next(iter(change))
-
-
-@pytest.mark.parametrize(
-    ("change", "error"),
-    [
-        ({"speed_limit": [0.0]}, errors.ParameterError),
-        ({"viscous": [-1.0]}, errors.ParameterError),
-        ({"inertia": [np.inf]}, errors.ParameterError),
-        ({"bandwidth": [1.0, 1.0]}, errors.ShapeError),
-        ({"assumed": ("mass",)}, errors.UnknownNameError),
-    ],
-)
-def test_impossible_drives_are_refused_by_entry(change: Any, error: Any) -> None:
-    with pytest.raises(error) as caught:
-        Drives(**({name: [1.0] for name in ENTRIES} | change))
-    assert caught.value.name == next(iter(change))
