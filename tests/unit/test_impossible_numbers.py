@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -15,10 +16,15 @@ from teleop_core.hand.master.master_bridge import POSE_MESSAGES, MasterBridgePar
 from teleop_core.hand.operators.behaviour import ButtonParameters as HandButtons
 from teleop_core.hand.operators.behaviour import OperatorParameters
 from teleop_core.hand.operators.human import HumanParameters
+from teleop_core.hand.operators.remote import RemoteHand
 from teleop_core.hand.operators.tour import TourParameters
 from teleop_core.hand.tasks.insert import InsertParameters
-from teleop_core.robots.drives import ENTRIES, Drives
+from teleop_core.kernels.geometry import checked_array
+from teleop_core.robots import load_robot
+from teleop_core.robots.arms.as_chain import true_chain
+from teleop_core.robots.drives import ENTRIES, Drives, independent_axes
 from teleop_core.robots.hardware import Hardware
+from teleop_core.robots.inertias import LinkInertia, check_possible
 from teleop_core.robots.link_errors import LinkErrors
 from teleop_core.shapes.capsule import CapsuleParameters
 from teleop_core.shapes.cone import ConeParameters
@@ -33,11 +39,14 @@ from teleop_core.slave.bridges.names import JointMap
 from teleop_core.slave.jaw.jaw_sim import GripObjectParameters, PegParameters
 from teleop_core.slave.operation import OperationParameters
 from teleop_core.slave.slave import ReferenceFilterParameters
+from teleop_core.slave.trajectory import cubic_move, shortest_move_time
 from teleop_core.slave.world.button import ButtonParameters
 from teleop_lab.calibration import Measured
-from teleop_machines import mma_balance, mobility
+from teleop_machines import mma_balance, mma_models, mobility
+from teleop_machines.three_finger_hand import Hand
 
 ZERO, Q = (0.0, 0.0, 0.0), np.zeros((3, 6))
+BOX = LinkInertia(name="box", mass=1.0, center=np.zeros(3), inertia=np.eye(3))
 
 
 def built(group: type[object]) -> Callable[..., object]:
@@ -122,6 +131,31 @@ CASES = [
     *of(Measured, "origins", joints=Q, distances=np.zeros(3)), *of(Measured, "joints", joints=ZERO, points=Q[:, :3]),
     *of(Measured, "labels", joints=Q, distances=np.zeros(3), origins=Q, labels=("x",)),
     *of(Measured, "joints", joints=Q + np.nan, points=Q[:, :3]),
+    # values that come in arrays or by name
+    *((partial(checked_array, "q", np.zeros(shape), (3,)), "^q must have") for shape in ((2,), (2, 2, 3), (3, 1))),
+    *((partial(checked_array, "q", [0.0, bad, 0.0], (3,)), "^q is.*finite") for bad in (math.nan, math.inf, -math.inf)),
+    *((partial(cubic_move, np.zeros(2), np.ones(2), t, np.zeros(1)), "^move_time") for t in (0.0, -1.0, math.nan)),
+    *((partial(shortest_move_time, np.zeros(2), np.ones(2), np.array([1.0, most])), "^speed_limit")
+      for most in (0.0, -1.0, math.nan)),
+    (partial(cubic_move, np.zeros(2), np.zeros(3), 1.0, np.zeros(1)), "end"),
+    (partial(LinkErrors, a=np.zeros(2), alpha=np.zeros(3), d=np.zeros(2), theta=np.zeros(2)), "^alpha"),
+    (lambda: LinkErrors.of(load_robot("rcrt1"), {"d7": 0.1}), "link error is 'd7'.*d6"),
+    (lambda: LinkErrors.of(load_robot("rcrt1"), {"d3": math.inf}), "^link error d3"),
+    (lambda: true_chain(load_robot("rcrt1"), LinkErrors.none(5)), "^errors is.*for 6"),
+    *of(partial(replace, BOX), "center of link 'box' must have", center=np.zeros(2)),
+    *of(partial(replace, BOX), "mass of link 'box'", mass=np.inf),
+    *of(partial(replace, BOX), "inertia of link 'box'.*finite", inertia=np.diag([1.0, 1.0, np.nan])),
+    *of(partial(replace, BOX), "symmetric", inertia=np.eye(3) + 0.1 * np.eye(3, k=1)),
+    *((partial(check_possible, [replace(BOX, mass=mass)]), f"^mass of link 'box' is {mass}") for mass in (0.0, -1.0)),
+    *((partial(independent_axes, np.array([1.0, inertia])), "^inertia") for inertia in (0.0, -0.1, np.nan)),
+    (partial(mma_models.joints_of_model, np.zeros((2, 7)), "B"), "^q must have"),
+    (partial(mma_models.joints_of_model, np.zeros(7), "D"), "^model is 'D'"),
+    (partial(mma_models.model_table, "D", {}), "^model is 'D'"),
+    (partial(Hand({}).finger_solutions, 4, np.zeros(3)), "finger"),
+    (partial(Hand({}).contact_points, np.zeros(8)), "^q "),
+    (partial(Hand({}).object_pose, np.zeros((3, 3))), "points"), (partial(Hand({}).contacts_of, np.zeros((4, 4))), "T"),
+    (partial(RemoteHand().press, "gripper"), "clutch, fixture, mode"),
+    (partial(RemoteHand().want, np.zeros((2, 7))), r"pose must have shape \(7,\), has \(2, 7\)"),
 ]  # fmt: skip
 
 

@@ -7,7 +7,6 @@ import pytest
 
 from present import present
 from random_arms import standard_link
-from teleop_core.base.errors import ParameterError, ShapeError, UnknownNameError
 from teleop_core.kernels.geometry import Array
 from teleop_core.kinematics import dh_kernels
 from teleop_core.robots import link_errors, load_robot, robot_from_table
@@ -147,17 +146,3 @@ def test_names_and_vectors_are_in_one_order() -> None:
     assert np.array_equal(errors.vector, np.arange(8.0))
     assert errors.named()["d2"] == 5.0
     assert "a1" not in errors.named()
-
-
-def test_wrong_errors_are_refused_by_name() -> None:
-    robot = load_robot("rcrt1")
-    with pytest.raises(UnknownNameError) as unknown:
-        link_errors.LinkErrors.of(robot, {"d7": 0.1})
-    assert "d6" in unknown.value.alternatives
-    with pytest.raises(ParameterError) as infinite:
-        link_errors.LinkErrors.of(robot, {"d3": math.inf})
-    assert infinite.value.name == "link error d3"
-    with pytest.raises(ParameterError):
-        true_chain(robot, link_errors.LinkErrors.none(5))
-    with pytest.raises(ShapeError):
-        link_errors.LinkErrors(a=np.zeros(2), alpha=np.zeros(3), d=np.zeros(2), theta=np.zeros(2))

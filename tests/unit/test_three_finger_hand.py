@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from teleop_core.base.errors import ParameterError, ShapeError
 from teleop_core.kernels.geometry import Array, rotation, transform
 from teleop_core.robots import IkStatus, load_robot
 from teleop_core.robots.robot import Robot
@@ -123,14 +122,3 @@ def test_a_path_over_a_finger_axis_keeps_its_steps_and_goes_on(beside: float) ->
     path[:, :3, 3] += shares[:, None] * over
     found, _ = stepped(robot, path, robot.home, 0.02)
     assert np.allclose(robot.fk(found[-1]), home, atol=1e-6)
-
-
-def test_bad_questions_are_refused(robot: Robot, hand: three_finger_hand.Hand) -> None:
-    with pytest.raises(ParameterError):
-        hand.finger_solutions(4, np.zeros(3))
-    with pytest.raises(ShapeError):
-        hand.contact_points(np.zeros(8))
-    with pytest.raises(ParameterError):
-        hand.object_pose(np.zeros((3, 3)))
-    with pytest.raises(ParameterError):
-        hand.contacts_of(np.zeros((4, 4)))
