@@ -10,7 +10,7 @@ import yaml
 from scipy.spatial.transform import Rotation
 
 from present import present
-from teleop_core.base.errors import ParameterError, RecordingError, UnknownNameError
+from teleop_core.base.errors import RecordingError
 from teleop_core.kernels.geometry import Array
 from teleop_core.kinematics import dh_kernels
 from teleop_core.robots import load_robot, robot_from_table
@@ -399,24 +399,3 @@ def test_measurements_of_another_arm_are_refused() -> None:
     lost = Measured(joints=q, points=rng.uniform(-0.4, 0.4, (40, 3)))
     with pytest.raises(CalibrationError, match=r"far from the drawing|did not converge"):
         identify(Model.of(RCRT1), lost, "offsets")
-
-
-def test_wrong_names_and_robots_are_refused() -> None:
-    with pytest.raises(ParameterError, match="chain of links"):
-        simulate(load_robot("stewart"))
-    with pytest.raises(UnknownNameError, match="link error"):
-        simulate(RCRT1, fit=["d9"])
-    with pytest.raises(UnknownNameError, match="choose"):
-        simulate(RCRT1, choose="best")
-    with pytest.raises(UnknownNameError, match="cnc"):
-        simulate(RCRT1, errors=["milled"])
-    with pytest.raises(ParameterError, match="NAME=NUMBER"):
-        simulate(RCRT1, errors=["d3=much"])
-    with pytest.raises(ParameterError, match="noise"):
-        simulate(RCRT1, noise=-1e-3)
-    with pytest.raises(CalibrationError, match="ruler"):
-        simulate(RCRT1, noise="rule")
-    with pytest.raises(CalibrationError, match="appendix E measured the rcrt1"):
-        appendix_e.published(load_robot("scara"))
-    with pytest.raises(CalibrationError, match="frame"):
-        simulate(RCRT1, noise="ruler", finds_frame=True)

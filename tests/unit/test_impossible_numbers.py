@@ -41,7 +41,7 @@ from teleop_core.slave.operation import OperationParameters
 from teleop_core.slave.slave import ReferenceFilterParameters
 from teleop_core.slave.trajectory import cubic_move, shortest_move_time
 from teleop_core.slave.world.button import ButtonParameters
-from teleop_lab.calibration import Measured
+from teleop_lab.calibration import Measured, appendix_e, simulate
 from teleop_machines import mma_balance, mma_models, mobility
 from teleop_machines.three_finger_hand import Hand
 
@@ -131,6 +131,12 @@ CASES = [
     *of(Measured, "origins", joints=Q, distances=np.zeros(3)), *of(Measured, "joints", joints=ZERO, points=Q[:, :3]),
     *of(Measured, "labels", joints=Q, distances=np.zeros(3), origins=Q, labels=("x",)),
     *of(Measured, "joints", joints=Q + np.nan, points=Q[:, :3]),
+    *((partial(simulate, load_robot("rcrt1"), **values), name) for name, values in (
+        ("link error", {"fit": ["d9"]}), ("choose", {"choose": "best"}), ("cnc", {"errors": ["milled"]}),
+        ("NAME=NUMBER", {"errors": ["d3=much"]}), ("noise", {"noise": -1e-3}), ("ruler", {"noise": "rule"}),
+        ("frame", {"noise": "ruler", "finds_frame": True}))),
+    (lambda: simulate(load_robot("stewart")), "chain of links"),
+    (lambda: appendix_e.published(load_robot("scara")), "appendix E measured the rcrt1"),
     # values that come in arrays or by name
     *((partial(checked_array, "q", np.zeros(shape), (3,)), "^q must have") for shape in ((2,), (2, 2, 3), (3, 1))),
     *((partial(checked_array, "q", [0.0, bad, 0.0], (3,)), "^q is.*finite") for bad in (math.nan, math.inf, -math.inf)),
