@@ -10,8 +10,11 @@ from numpy.typing import ArrayLike, NDArray
 from led_tip import DT, PIECES, needle
 from teleop_core.kernels import Array, kernel, pointer, record, record_array
 from teleop_core.robots.drives import ACCELERATION
+from teleop_core.robots.robot import Robot
+from teleop_core.session.configuration import configure
 from teleop_core.shapes.hole import HoleParameters
 from teleop_core.slave import joints, simulation
+from teleop_core.slave.slave_sim import SlaveSim
 from teleop_core.slave.world.contact import ContactState, add_push, touch
 
 JOINTS = 6  # the tip's place along the base, and turns about the base's axes
@@ -200,3 +203,14 @@ def fly(
         "axis": slice(19, 22),
     }
     return {key: found[:, part] for key, part in keys.items()} | {"time": DT * np.arange(ticks)}
+
+
+def after_a_tick(robot: Robot, texts: list[str], joints: Any = None, plant: str = "ideal") -> tuple[Array, Array]:
+    """Speeds (n,) of an arm a tick after rest, at its start by default, and what its tip felt there (6,)."""
+    zero = [0.0] * robot.n
+    settings = [f"robot={robot.name}", f"plant={plant}", f"slave_sim.coulomb={zero}", *texts]
+    arm = SlaveSim(configure("free_motion", settings=settings).group("slave_sim"))
+    arm.arm.q[:] = arm.state["link"] = arm.state["carried"] = robot.start if joints is None else joints
+    arm.signals["slave_setpoint_js"] = arm.arm.q
+    arm.step()
+    return arm.arm.dq.copy(), arm.signals["slave_true_cf"].copy()

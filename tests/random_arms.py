@@ -153,3 +153,11 @@ def random_urdf(seed: int, n: int) -> tuple[str, str]:
                 f'effort="20" velocity="2"/></joint>'
             )
     return f'<robot name="random">{"".join(lines)}</robot>', f"l{link}"
+
+
+def standard_link(theta: float, d: float, a: float, alpha: float) -> Array:
+    """One link of a standard table, written out (Denavit and Hartenberg 1955)."""
+    ct, st, ca, sa = math.cos(theta), math.sin(theta), math.cos(alpha), math.sin(alpha)
+    return np.array(
+        [[ct, -st * ca, st * sa, a * ct], [st, ct * ca, -ct * sa, a * st], [0.0, sa, ca, d], [0.0, 0.0, 0.0, 1.0]]
+    )

@@ -32,7 +32,7 @@ class Desk:
 
     def step(
         self,
-        move: tuple[float, float, float] = (0, 0, 0),
+        move: tuple[float, float, float] | geometry.Array = (0, 0, 0),
         turn: Any = None,
         *,
         stamp_step_ns: int = TICK_NS,

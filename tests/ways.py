@@ -3,6 +3,7 @@
 from typing import Any
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from present import present
 from teleop_core.kernels.geometry import Array
@@ -35,3 +36,8 @@ def stepped(arm: Robot, path: Any, seed: Array, step: float) -> tuple[Array, lis
         found.append(joints)
         q = joints
     return np.array(found), statuses
+
+
+def turned(alpha: float, beta: float, gamma: float) -> Array:
+    """Turns about moving axes x, y, z [degrees]: the product of the hybrid's source."""
+    return Rotation.from_euler("XYZ", (alpha, beta, gamma), degrees=True).as_matrix()

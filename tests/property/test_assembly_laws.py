@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.optimize import fsolve
+from scipy.spatial.transform import Rotation
 
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots import FkStatus, load_robot
@@ -16,16 +17,8 @@ FOUND = 1e-10
 STARTS = 16
 
 
-def turned(vector: Any) -> Any:
-    """Rotation of a rotation vector (Rodrigues)."""
-    angle = np.linalg.norm(vector) + 1e-12
-    x, y, z = vector / angle
-    K = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    return np.eye(3) + math.sin(angle) * K + (1.0 - math.cos(angle)) * K @ K
-
-
 def platform_gaps(x: Any, legs: Any) -> Any:
-    ends = x[:3] + PAIRED.platform @ turned(x[3:]).T
+    ends = x[:3] + PAIRED.platform @ Rotation.from_rotvec(x[3:]).as_matrix().T
     return np.linalg.norm(ends - PAIRED.base, axis=1) - legs
 
 

@@ -113,7 +113,7 @@ def leaning(rng: np.random.Generator) -> tuple[Callable[[Array], Array], dict[st
     return motion, {"stiffness": firmness, "damping": max(damping, 0.1)}, stiffness
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(3))
 def test_no_contact_with_a_damped_wall_gives_back_more_than_it_took(seed: int, own_parts: None) -> None:
     rng = np.random.default_rng(seed)
     found = []
@@ -162,8 +162,7 @@ def test_a_wall_is_passive_within_its_bound_and_not_far_beyond_it(
     assert ((returned > taken)[is_contact].any()) == feeds
 
 
-@pytest.mark.parametrize("axis", [0, 1, 2])
-@pytest.mark.parametrize(("firmness", "damping"), [(50.0, 0.5), (300.0, 12.0), (2000.0, 5.0)])
+@pytest.mark.parametrize(("axis", "firmness", "damping"), [(0, 50.0, 0.5), (1, 300.0, 12.0), (2, 2000.0, 5.0)])
 def test_leaning_on_a_hard_wall_hand_and_force_are_still(
     axis: int, firmness: float, damping: float, own_parts: None
 ) -> None:

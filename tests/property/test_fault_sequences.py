@@ -5,8 +5,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from led_slave import LedSlave
 from present import present
 from teleop_core.kernels.geometry import Array
+from teleop_core.slave.commands import CommandStatus
 from teleop_core.slave.operation import OperationParameters, State
 from teleop_core.slave.operation.faults import Fault
 from teleop_core.slave.operation.states import COMMANDS
@@ -20,41 +22,31 @@ ROBOTS = ("rcrt1", "puma560", "scara_stewart")
 LIMIT = 1.0 + 1e-9
 
 
-class Chaos:
+class Chaos(LedSlave):
     """A slave that is sent anything, at any time."""
 
     def __init__(self, robot: str, seed: int) -> None:
         self.rng = np.random.default_rng(seed)
-        self.slave = SimulatedArm(
-            ArmParameters(
-                robot=robot,
-                starts_at_home=True,
-                operation=OperationParameters(
-                    longest_outage=0.15, standstill=("hold", "brake")[seed % 2], heartbeat=0.0
-                ),
-            )
-        )
-        self.row, self.ns = self.slave.signals, 10**9
+        standstill = ("hold", "brake")[seed % 2]
+        operation = OperationParameters(longest_outage=0.15, standstill=standstill, heartbeat=0.0)
+        super().__init__(SimulatedArm(ArmParameters(robot=robot, starts_at_home=True, operation=operation)))
+        self.now_ns = 10**9
         drives = present(self.slave.robot.drives)
         self.reach = drives.speed_limit * 1e-3
         self.goal = self.slave.robot.home.copy()
-        self.last = np.array(self.row["slave_setpoint_js"])
+        self.last = self.setpoint
         self.worst = 0.0
         self.states: set[Any]
         self.states = set()
 
-    def tick(self, command: Array | None = None, stamp_ns: int | None = None) -> None:
+    def tick(self, command: Array | None = None, stamp_ns: int | None = None) -> CommandStatus:
         """One tick; keeps the largest step over the drive's limit."""
-        self.ns += TICK_NS
-        self.row["now_ns"] = self.ns
-        if command is not None:
-            self.row["slave_servo_jp"] = command
-            self.row["slave_servo_jp_ns"] = self.ns if stamp_ns is None else stamp_ns
-        self.slave.step()
-        now = np.array(self.row["slave_setpoint_js"])
+        status = super().tick(command, stamp_ns)
+        now = self.setpoint
         self.worst = max(self.worst, float(np.max(np.abs(now - self.last) / self.reach)))
         self.last = now
         self.states.add(int(self.row["slave_operation"][0]))
+        return status
 
     def stream(self, ticks: int) -> None:
         """A stream of sound commands that wander about."""
@@ -76,7 +68,7 @@ class Chaos:
         elif kind == 2:
             self.tick(rng.choice([np.nan, np.inf, -np.inf, 1e308], size=n))
         elif kind == 3:
-            self.tick(self.goal, int(self.ns + rng.integers(-(10**12), 10**12)))
+            self.tick(self.goal, int(self.now_ns + rng.integers(-(10**12), 10**12)))
         elif kind == 4:
             for _ in range(int(rng.integers(1, 4))):
                 self.tick()
@@ -84,15 +76,15 @@ class Chaos:
             fault = Fault(int(rng.integers(1, len(Fault))))
             self.slave.server.fail(fault, float(rng.uniform(0, 10)), 1.0)
         elif kind == 6:
-            self.slave.server.press(is_pressed=bool(rng.integers(2)), heard_ns=self.ns)
+            self.slave.server.press(is_pressed=bool(rng.integers(2)), heard_ns=self.now_ns)
         elif kind == 7:
-            self.ns += int(rng.integers(0, 2 * 10**8))  # the loop stood still
+            self.now_ns += int(rng.integers(0, 2 * 10**8))  # the loop stood still
         else:
             self.slave.simulated.arm.dq[:] += rng.normal(size=n) * self.reach * 100.0  # a blow
 
     def recover(self) -> None:
         """Do what a person does to go on."""
-        self.slave.server.press(is_pressed=False, heard_ns=self.ns)
+        self.slave.server.press(is_pressed=False, heard_ns=self.now_ns)
         for word in ("reset", "enable", "resume", "home"):
             if word != "home" or not self.row["slave_operation"][1]:
                 self.slave.server.request(word)

@@ -8,20 +8,17 @@ import pytest
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
+from scaling_desk import ANY_HAND
 from teleop_core.bags.memory import MemoryBag
 from teleop_core.bags.series import Series
 from teleop_core.coupling.mapping.gains import MotionScalingParameters
 from teleop_core.coupling.mapping.inverse_kinematics import InverseKinematics, InverseKinematicsParameters
 from teleop_core.coupling.mapping.motion_scaling import MotionScaling
-from teleop_core.coupling.mapping.plausibility import PlausibilityParameters
 from teleop_core.graph import STATE, TICK_NS, topics
 from teleop_core.hand.operators.shapes import minimum_jerk
 from teleop_core.kernels.geometry import Array, pose_from_transform
 from teleop_core.robots import load_robot
 from teleop_core.session import api, runner, virtual
-
-ANY_HAND = PlausibilityParameters(speed=1000.0, acceleration=1e6, turn=1e4, reach=100.0, button_silence=0.0)
-"""A hand that may jump, as tests have it do."""
 
 REACH = {name: index for index, name in enumerate(topics.SLAVE_REACH.columns)}
 # The published map of the master's axes to the slave's.
@@ -105,7 +102,7 @@ def wander(chain: Chain, rng: np.random.Generator) -> tuple[Array, Array]:
     return move, turn
 
 
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize(("robot", "gain"), [("rcrt1", 1.0), ("rcrt1", 0.5), ("puma560", 1.0)])
 def test_a_hand_that_turns_back_from_beyond_reach_moves_the_slave_at_once(robot: str, gain: float, seed: int) -> None:
     rng = np.random.default_rng(seed)
@@ -141,8 +138,10 @@ def beyond(**values: Any) -> tuple[Chain, Array]:
     return chain, step
 
 
-def test_the_state_names_the_joint_at_its_limit_until_the_hand_has_come_back() -> None:
-    chain, step = beyond()
+def test_the_state_names_the_joint_at_its_limit_until_the_hand_has_come_back_without_a_force_too() -> None:
+    values = MotionScalingParameters().reach_force
+    chain, step = beyond(reach_force=type(values)(is_on=False))
+    assert not chain.force.any()
     assert chain.state("limit") == topics.Limit.JOINT
     assert chain.state("limited_joint") == 2
     chain.follow(1000)
@@ -150,28 +149,6 @@ def test_the_state_names_the_joint_at_its_limit_until_the_hand_has_come_back() -
     chain.follow(400, -step)
     assert chain.state("limit") == topics.Limit.NONE
     assert chain.state("limited_joint") == -1
-
-
-@pytest.mark.parametrize(("stiffness", "largest"), [(500.0, 1.5), (2000.0, 0.5)])
-def test_the_hand_feels_the_limit_up_to_a_bound_and_nothing_when_it_is_back(stiffness: float, largest: float) -> None:
-    force = {"is_on": True, "stiffness": stiffness, "max_force": largest}
-    values = MotionScalingParameters().reach_force
-    chain, step = beyond(reach_force=type(values)(**dict[str, Any](force)))
-    way = step / np.linalg.norm(step)
-    assert np.allclose(chain.force, -largest * way, rtol=0, atol=0.02 * largest)
-    depth = largest / stiffness
-    half = round(0.5 * depth / np.linalg.norm(step))
-    chain.follow(half, -step)
-    assert np.allclose(chain.force, -0.5 * largest * way, rtol=0, atol=0.05 * largest)
-    chain.follow(2 * half, -step)
-    assert not chain.force.any()
-
-
-def test_the_force_can_be_switched_off_and_the_limit_is_told_nevertheless() -> None:
-    values = MotionScalingParameters().reach_force
-    chain, _ = beyond(reach_force=type(values)(is_on=False))
-    assert not chain.force.any()
-    assert chain.state("limit") == topics.Limit.JOINT
 
 
 def test_a_clutch_stroke_beyond_reach_takes_the_slave_no_further_out() -> None:
@@ -219,7 +196,7 @@ def every(period_ns: int, end_ns: int = 4_000_000_000) -> NDArray[np.int64]:
 
 
 @pytest.mark.parametrize("interpolation", ["none", "linear", "minimum_jerk"])
-@pytest.mark.parametrize("rate_hz", [10, 30, 125, 250, 500])
+@pytest.mark.parametrize("rate_hz", [10, 125, 500])
 def test_a_slow_master_costs_one_of_its_periods_and_no_more(rate_hz: int, interpolation: str) -> None:
     times, fast = setpoints(every(TICK_NS))
     period = 1.0 / rate_hz

@@ -1,31 +1,25 @@
 """Architectures: what the hand feels of the slave, by each law, and over a network."""
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 import teleop_core as tc
-from teleop_core.base import PartError, UnknownNameError, build
+from palpation import on_the_slave, pressed
+from teleop_core.base import PartError, build
 from teleop_core.coupling.mapping.gains import MotionScalingParameters
 from teleop_core.graph import STATE
-from teleop_core.kernels import Array, kernel
+from teleop_core.kernels import kernel
 from teleop_core.session import configuration, virtual
 
 pytestmark = pytest.mark.usefixtures("own_parts")
 CALM = ("reach_force.is_on=false", "reflection.max_force=10.0")
 
 
-def pressing(*texts: str, ticks: int = 14_000) -> NDArray[np.void]:
-    """Signals of the scenario ``palpation``."""
-    return virtual.VirtualTime(configuration.configure("palpation", settings=[*CALM, *texts])).run(ticks)
-
-
-def on_the_slave(force: Array) -> Array:
-    """Forces (N, 3) of the hand along the slave's base."""
-    return np.column_stack((-force[:, 2], -force[:, 0], force[:, 1]))
+pressing = partial(pressed, *CALM, ticks=14_000)
 
 
 def test_position_position_is_a_spring_from_the_command_to_the_tip() -> None:
@@ -51,46 +45,6 @@ def test_the_hand_feels_no_spring_while_the_slave_goes_its_own_way() -> None:
     assert moved > 0.01  # the arm goes to where it starts
     assert not rows["master_servo_cf"][own_way].any()
     assert rows["master_servo_cf"][own_way.stop + 200 :].any()
-
-
-def test_position_position_over_a_network_is_a_spring_to_where_the_tip_was() -> None:
-    rows = pressing(
-        "teleop.stages=[network]",
-        "network.preset=delay_100",
-        "feedback_timeout=1.0",
-        "reflection.architecture=position_position",
-    )
-    away = rows["network_measured_cp"][:-1, :3] - rows["slave_servo_cp"][1:, :3]
-    force = on_the_slave(rows["master_servo_cf"][1:])
-    np.testing.assert_allclose(force[6000:], 150.0 * away[6000:], atol=1e-12)
-
-
-def test_a_unilateral_hand_feels_nothing_of_what_the_slave_presses() -> None:
-    rows = pressing("reflection.architecture=unilateral")
-    assert rows["slave_true_cf"].any()
-    assert not rows["master_servo_cf"].any()
-
-
-def swing(architecture: str, stiffness: float, delay: float) -> float:
-    """Fastest that the hand gets [m/s] where it presses a block of which it hears late."""
-    both = ",".join(f"slave/measured_{kind}@motion_scaling={delay}" for kind in ("cf", "cp"))
-    rows = pressing(
-        f"reflection.architecture={architecture}",
-        "world.material=own",
-        f"delays=[{both}]",
-        f"world.stiffness={stiffness}",
-        "world.damping=0.0",
-        "feedback_timeout=1.0",
-        ticks=16_000,
-    )
-    places = rows["master_measured_cp"][6000:, :3]
-    return np.linalg.norm(places[20:] - places[:-20], axis=1).max() / 0.02
-
-
-def test_a_spring_softer_than_the_grip_throws_no_hand_that_force_does() -> None:
-    calm = swing("unilateral", 20_000.0, 0.1)
-    assert swing("position_force", 20_000.0, 0.1) > 3.0 * calm
-    assert swing("position_position", 20_000.0, 0.1) < 1.5 * calm
 
 
 @pytest.mark.parametrize(("kind", "silent"), [("position_force", "cf"), ("position_position", "cp")])
@@ -151,8 +105,3 @@ def test_an_architecture_of_ones_own_is_one_call_and_remembers_twelve_numbers() 
 def test_an_architecture_that_cannot_work_is_refused_before_anything_runs(wrong: Callable[..., Any]) -> None:
     with pytest.raises(PartError, match="architecture"):
         tc.register_architecture(tc.Architecture("wrong", tc.NoParameters, wrong))
-
-
-def test_an_unknown_architecture_is_refused_with_those_there_are() -> None:
-    with pytest.raises(UnknownNameError, match="position_position"):
-        configuration.configure("palpation", settings=["reflection.architecture=five_channel"])

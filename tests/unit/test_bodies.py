@@ -104,13 +104,6 @@ def test_axes_of_bodies_are_those_of_a_table() -> None:
         assert poses[-1, :3] == pytest.approx(robot.fk(q)[:3, 3], abs=ROUNDING)
 
 
-def test_the_wrist_of_a_puma_is_one_point() -> None:
-    robot = tc.load_robot("puma560")
-    poses = bodies_of(robot).poses([0.3, -0.7, 0.4, 0.2, 0.5, 0.1])
-    assert poses[5, :3] == pytest.approx(poses[6, :3], abs=ROUNDING)
-    assert np.linalg.norm(poses[4, :3] - poses[3, :3]) > 0.01
-
-
 def test_both_branches_of_the_mma_meet_where_its_published_loop_closes() -> None:
     robot = tc.load_robot("mma")
     bodies, q = bodies_of(robot), robot.home + OFF

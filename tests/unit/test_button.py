@@ -149,10 +149,6 @@ def test_a_session_counts_what_its_score_counts() -> None:
     assert stage.presses == 0
 
 
-def test_without_a_button_there_are_no_presses() -> None:
-    assert tc.run("palpation", duration=1.0).score().value("touch.presses") is None
-
-
 def test_its_outline_lies_on_the_post_and_on_the_stop() -> None:
     outline = BUTTON.outline(ButtonParameters())
     post, stop = outline[:-42], outline[-41:]
@@ -162,17 +158,6 @@ def test_its_outline_lies_on_the_post_and_on_the_stop() -> None:
     np.testing.assert_allclose(stop[:, 2], 0.015 - 3e-3)
 
 
-@pytest.mark.parametrize(
-    ("texts", "name"),
-    [
-        (["world.button.stroke=0.002"], "stroke"),
-        (["world.button.stroke=0.02"], "stroke"),
-        (["world.button.contact_force=1.1"], "contact_force"),
-        (["world.button.hysteresis=1.1"], "hysteresis"),
-        (["world.puncture_force=1.0"], "puncture"),
-    ],
-)
-def test_numbers_that_no_button_has_are_refused_by_name(texts: list[str], name: str) -> None:
-    with pytest.raises(ParameterError, match=name) as error:
-        configuration.configure("palpation", settings=["world=button", *texts])
-    assert "\n" not in str(error.value)
+def test_a_button_has_no_membrane() -> None:
+    with pytest.raises(ParameterError, match="puncture"):
+        configuration.configure("palpation", settings=["world=button", "world.puncture_force=1.0"])

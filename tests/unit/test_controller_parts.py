@@ -7,9 +7,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from led_slave import LedSlave
 from present import present
-from teleop_core.base import ParameterError, PartError, build
-from teleop_core.graph import DT, TICK_NS
+from teleop_core.base import PartError, build
+from teleop_core.graph import DT
 from teleop_core.kernels import Array, kernel
 from teleop_core.robots import load_robot
 from teleop_core.slave.controllers import CONTROLLERS, Controller, register_controller
@@ -34,14 +35,7 @@ def slave(kind: str, **values: Any) -> SimulatedArm:
 
 def trace(arm: SimulatedArm, goal: Array, ticks: int) -> Array:
     """Measured joints, speeds and efforts (ticks, 18) under a constant command."""
-    rows = np.empty((ticks, 18))
-    for i in range(ticks):
-        arm.signals["now_ns"] += TICK_NS
-        arm.signals["slave_servo_jp"] = goal
-        arm.signals["slave_servo_jp_ns"] = arm.signals["now_ns"]
-        arm.step()
-        rows[i] = arm.signals["slave_measured_js"]
-    return rows
+    return LedSlave(arm).along([goal] * ticks)["slave_measured_js"]
 
 
 def test_pd_effort_is_that_of_its_formula() -> None:
@@ -60,12 +54,6 @@ def test_pd_gains_put_both_poles_at_the_bandwidth() -> None:
     assert np.allclose(gains[:, 0], present(drives).bandwidth ** 2 * present(drives).inertia, rtol=1e-12, atol=0)
     damping = (gains[:, 1] + viscous) / present(drives).inertia
     assert np.allclose(damping, 2.0 * present(drives).bandwidth, rtol=1e-12, atol=0)
-
-
-def test_pd_of_another_length_than_the_joints_is_refused() -> None:
-    with pytest.raises(ParameterError) as error:
-        PD.gains(PdParameters(bandwidth=(1.0,) * 5), ARM, present(ARM.drives).viscous)
-    assert error.value.name == "slave_sim.controller.pd.bandwidth"
 
 
 def test_pd_sags_under_gravity_that_the_pid_holds() -> None:
@@ -146,6 +134,7 @@ BAD = {
     "shift takes nothing": ({"shift": lambda: None}, FORM),
     "memory is too small": ({"memory": 0}, "no more memory than it declares, 0"),
     "parameters are no dataclass": ({"parameters": float}, "dataclass"),
+    "a wish for the model is no yes or no": ({"uses_model": "yes"}, "uses_model"),
 }
 
 

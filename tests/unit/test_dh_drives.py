@@ -7,13 +7,9 @@ import pytest
 
 from present import present
 from teleop_core.base.errors import ParameterError
-from teleop_core.robots import IkStatus, load_robot, robot_from_table
+from teleop_core.robots import robot_from_table
 from teleop_core.robots.drives import ENTRIES
-from ways import followed
 
-TABLES = tuple(
-    f"config/robots/{name}.yaml" for name in ("rcrt1", "scara", "five_axis_standard", "five_axis_sheth_uicker")
-)
 TABLE = {
     "name": "my_arm",
     "convention": "modified",
@@ -83,21 +79,3 @@ def test_joints_with_one_name_are_refused() -> None:
     with pytest.raises(ParameterError) as caught:
         robot_from_table({**TABLE, "rows": rows})
     assert caught.value.name == "rows"
-
-
-@pytest.mark.parametrize("path", TABLES)
-def test_chains_follow_a_path_inside_their_limits_and_speeds(path: str) -> None:
-    robot = load_robot(path)
-    way = np.sin(np.linspace(0.0, np.pi, 2000))[:, None]
-    q = np.clip(robot.home + 0.1 * way, robot.lower, robot.upper)
-    result = followed(robot, robot.fk(q), robot.home)
-    reached = np.isin(result.status, (IkStatus.FOLLOWED, IkStatus.NEAR_SINGULAR))
-    assert reached.mean() > 0.99
-
-
-@pytest.mark.parametrize("path", TABLES)
-def test_chains_held_back_by_their_speeds_stay_within_them(path: str) -> None:
-    robot = load_robot(path)
-    far = robot.fk(np.clip(robot.home + 0.5, robot.lower, robot.upper))
-    result = followed(robot, np.repeat(far[None], 50, axis=0), robot.home)
-    assert result.status[0] == IkStatus.LIMITED

@@ -10,13 +10,13 @@ import pytest
 import yaml
 
 from present import present
-from teleop_core.base import ParameterError, TeleopError, UnknownNameError, build
+from teleop_core.base import TeleopError, build
 from teleop_core.commands.cli import main
 from teleop_core.robots import load_robot
 from teleop_core.session.configuration import configure
 from teleop_core.slave.pair import ArmParameters
 from teleop_core.slave.plants.hardware import faults_of
-from teleop_lab.fitting.fit import FitError, FitResult, default_free, fit
+from teleop_lab.fitting.fit import FitResult, default_free, fit
 from teleop_lab.fitting.rest_table import PUBLISHED, RestTable, read_rests
 from teleop_lab.fitting.rests import rest_positions
 
@@ -101,11 +101,6 @@ def test_plain_squares_believe_point_1_and_weigh_less(published: RestTable, foun
     assert plain.value("weight.m2b_L0b") < 0.6 * found.value("weight.m2b_L0b")
 
 
-def test_an_unknown_loss_is_refused(published: RestTable) -> None:
-    with pytest.raises(UnknownNameError, match="cauchy, huber"):
-        fit(published, slave(), loss="tukey")
-
-
 def test_what_a_table_can_tell_leaves_out_what_an_integrator_hides(published: RestTable) -> None:
     free = default_free(ARM, published)
     assert "coulomb.d3" not in free
@@ -115,33 +110,35 @@ def test_what_a_table_can_tell_leaves_out_what_an_integrator_hides(published: Re
 
 
 @pytest.mark.parametrize(
-    ("free", "named"),
+    ("free", "plant", "loss", "told"),
     [
-        (["coulomb.theta4", "bias.theta4"], ["coulomb.theta4", "bias.theta4"]),
-        (["coulomb.theta1", "coulomb.d3"], ["coulomb.d3"]),
-        (["coulomb.theta2", "bias.theta2", "weight.m2b_L0b"], ["bias.theta2", "weight.m2b_L0b"]),
+        (
+            ["coulomb.theta4", "bias.theta4"],
+            "hardware",
+            "cauchy",
+            ["not identifiable", "coulomb.theta4", "bias.theta4"],
+        ),
+        (["coulomb.theta1", "coulomb.d3"], "hardware", "cauchy", ["not identifiable", "coulomb.d3"]),
+        (
+            ["coulomb.theta2", "bias.theta2", "weight.m2b_L0b"],
+            "hardware",
+            "cauchy",
+            ["not identifiable", "bias.theta2", "weight.m2b_L0b"],
+        ),
+        ([], "hardware", "cauchy", ["free"]),
+        (["coulomb.theta1"] * 2, "hardware", "cauchy", ["free"]),
+        (["coulomb.elbow"], "hardware", "cauchy", ["coulomb.theta1"]),
+        (None, "ideal", "cauchy", ["hardware"]),
+        (None, "hardware", "tukey", ["cauchy, huber"]),
     ],
 )
-def test_parameters_that_cannot_be_told_apart_are_named(
-    published: RestTable, free: list[str], named: list[str]
+def test_what_cannot_be_fitted_is_refused_by_name(
+    published: RestTable, free: list[str] | None, plant: str, loss: str, told: list[str]
 ) -> None:
-    with pytest.raises(FitError, match="not identifiable") as caught:
-        fit(published, slave(), free)
-    for name in named:
-        assert name in str(caught.value)
-
-
-@pytest.mark.parametrize("free", [[], ["coulomb.theta1"] * 2])
-def test_nothing_to_fit_is_refused(published: RestTable, free: Any) -> None:
-    with pytest.raises(ParameterError, match="free"):
-        fit(published, slave(), free)
-
-
-def test_an_unknown_parameter_and_another_plant_are_refused(published: RestTable) -> None:
-    with pytest.raises(UnknownNameError, match=r"coulomb\.theta1"):
-        fit(published, slave(), ["coulomb.elbow"])
-    with pytest.raises(ParameterError, match="hardware"):
-        fit(published, slave(**{"plant.kind": "ideal"}))
+    with pytest.raises(TeleopError) as caught:
+        fit(published, slave(**{"plant.kind": plant}), free, loss=loss)
+    for words in told:
+        assert words in str(caught.value)
 
 
 def changed(tmp_path: Path, change: Any) -> Path:

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from any_shape import KINDS, depth_of, found
 from scaling_desk import MM, Desk
-from teleop_core.base import ParameterError, build, parameter
+from teleop_core.base import build, parameter
 from teleop_core.coupling.mapping.gains import FixtureParameters
 from teleop_core.coupling.mapping.motion_scaling import to_slave_axes
 from teleop_core.graph import TICK_NS
@@ -307,9 +307,3 @@ def test_a_shape_that_does_not_lead_in_within_a_few_rounds_holds_the_slave_where
         desk.go((0.0, -2 * MM, 0.0))
     assert desk.moved()[1] < 20 * MM
     assert desk.outside() <= LEAVES
-
-
-def test_a_side_that_there_is_not_is_refused_by_name() -> None:
-    with pytest.raises(ParameterError) as error:
-        fixture("neither")
-    assert (error.value.name, error.value.value) == ("side", "neither")

@@ -72,22 +72,7 @@ def test_home_is_closed_in_the_mode_of_home_and_first_of_all_assemblies(name: st
 
 
 @loops
-def test_no_pose_of_fk_leaves_a_loop_open(name: str) -> None:
-    robot = load_robot(name)
-    q = legal(robot, 400, 2)
-    is_closed: Any = robot.solve_fk(q).status < FkStatus.NOT_CLOSED
-    assert is_closed.sum() > 100
-    for legs in q[is_closed]:
-        assert TORN[name](robot.fk(legs), legs) <= CLOSED
-    for legs in q[~is_closed]:
-        with pytest.raises(ClosureError) as refusal:
-            robot.fk(legs)
-        assert refusal.value.residual > CLOSED
-        assert refusal.value.value == legs.tolist()
-
-
-@loops
-def test_the_residual_is_the_error_of_the_loops_whatever_the_status(name: str) -> None:
+def test_the_residual_is_the_error_of_the_loops_whatever_the_status_and_none_is_left_open(name: str) -> None:
     robot = load_robot(name)
     q = legal(robot, 300, 3)
     for k, search in enumerate((True, False)):
@@ -99,6 +84,11 @@ def test_the_residual_is_the_error_of_the_loops_whatever_the_status(name: str) -
         assert (answer.residual[~is_closed] > CLOSED).all()
         assert np.isfinite(answer.T).all()
         assert (~is_closed).any() or (name, k) == ("rps3", 0)
+        for legs in q[~is_closed][:30] if search else ():
+            with pytest.raises(ClosureError) as refusal:
+                robot.fk(legs)
+            assert refusal.value.residual > CLOSED
+            assert refusal.value.value == legs.tolist()
 
 
 def test_the_triple_that_had_no_assembly_next_to_home_has_one() -> None:
@@ -150,7 +140,7 @@ def test_legs_of_a_real_pose_always_assemble() -> None:
 
 
 @loops
-def test_all_assemblies_close_differ_and_begin_with_that_of_fk(name: str) -> None:
+def test_all_assemblies_close_differ_begin_with_that_of_fk_and_are_kept_as_seeds(name: str) -> None:
     robot, checked = load_robot(name), 0
     for q in legal(robot, 12, 7, share=0.6):
         found = robot.fk_all(q)
@@ -161,17 +151,11 @@ def test_all_assemblies_close_differ_and_begin_with_that_of_fk(name: str) -> Non
         apart = np.abs(found[:, None] - found).max(axis=(2, 3)) + np.eye(len(found))
         assert apart.min() > SAME
         assert np.allclose(found[0], robot.fk(q), atol=SAME)
+        for T in found:
+            kept = robot.solve_fk(q, T)
+            assert kept.status <= FkStatus.NEAR_SINGULAR
+            assert np.allclose(kept.T, T, atol=SAME)
     assert checked > 5
-
-
-@loops
-def test_an_assembly_as_the_seed_is_kept(name: str) -> None:
-    robot = load_robot(name)
-    for q in legal(robot, 10, 8, share=0.6):
-        for T in robot.fk_all(q):
-            answer = robot.solve_fk(q, T)
-            assert answer.status <= FkStatus.NEAR_SINGULAR
-            assert np.allclose(answer.T, T, atol=SAME)
 
 
 @loops
@@ -191,7 +175,7 @@ def test_closed_is_the_end_of_the_straight_way_from_home(name: str) -> None:
 
 
 @loops
-def test_a_path_stays_in_its_assembly_and_moves_as_its_jacobian_says(name: str) -> None:
+def test_a_path_stays_in_its_assembly(name: str) -> None:
     robot, rng = load_robot(name), np.random.default_rng(10)
     angles = np.linspace(0.0, 2.0 * math.pi, 1500)[:, None] + rng.uniform(0.0, 6.0, robot.n)
     swing = 0.05 * (robot.upper - robot.lower)
@@ -204,11 +188,6 @@ def test_a_path_stays_in_its_assembly_and_moves_as_its_jacobian_says(name: str) 
         assert np.allclose(way.T[-1], seed, atol=SAME)  # the path is closed, and so is the way
     home = robot.follow_fk(path)
     assert (home.status == FkStatus.CLOSED).all()
-    some = np.arange(1, 1499, 20)
-    slope = (home.T[some + 1, :3, 3] - home.T[some - 1, :3, 3]) / 2.0
-    speed = (path[some + 1] - path[some - 1]) / 2.0
-    told = np.array([robot.jacobian(q)[:3] @ v for q, v in zip(path[some], speed, strict=True)])
-    assert np.abs(slope - told).max() < 1e-3 * np.abs(slope).max()
 
 
 def test_a_path_that_leaves_its_assembly_says_so_and_finds_back() -> None:

@@ -10,9 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from teleop_core.base import ParameterError, ShapeError
 from teleop_core.kernels import Array, geometry, kernel
-from teleop_core.robots import load_robot
 
 # Sums of a few products of numbers of size one.
 ROUNDING = 1e-14
@@ -57,22 +55,6 @@ def test_a_force_is_brought_from_tip_to_base_as_pinocchio_does(
     body, spatial = geometry.framed_wrenches(wrench, pose)
     found = pinocchio.SE3(matrix_of(q), place).act(pinocchio.Force(body))
     np.testing.assert_allclose(found.vector, spatial, atol=1e2 * ROUNDING)
-
-
-def test_a_force_in_another_frame_needs_the_same_effort_of_every_joint() -> None:
-    """As dVRK has it: each is what its own Jacobian's transpose turns into the joints' efforts."""
-    robot = load_robot("rcrt1")
-    pose = np.empty(7)
-    T = robot.fk(robot.home)
-    geometry.pose_from_transform(T, pose)
-    wrench = np.array([1.0, -2.0, 3.0, 0.1, 0.2, -0.3])
-    J = robot.jacobian(robot.home)  # linear rows first, along the base, of the tip
-    body, spatial = geometry.framed_wrenches(wrench, pose)
-    R = np.kron(np.eye(2), T[:3, :3].T)
-    of_base = J.copy()
-    of_base[:3] -= np.cross(J[3:].T, T[:3, 3]).T
-    np.testing.assert_allclose((R @ J).T @ body, J.T @ wrench, atol=TWICE_ROUNDED)
-    np.testing.assert_allclose(of_base.T @ spatial, J.T @ wrench, atol=TWICE_ROUNDED)
 
 
 def matrix_of(quaternion: Array) -> Array:
@@ -243,20 +225,6 @@ def test_checked_array_is_a_writable_copy_of_what_may_not_be_written() -> None:
     assert checked.flags.writeable
     checked[0] = 1.0
     assert locked[0] == 0.0
-
-
-@pytest.mark.parametrize("shape", [(2,), (4,), (2, 2, 3), (3, 1)])
-def test_checked_array_refuses_other_shapes(shape: tuple[int, ...]) -> None:
-    with pytest.raises(ShapeError) as error:
-        geometry.checked_array("q", np.zeros(shape), (3,))
-    assert (error.value.name, error.value.received) == ("q", shape)
-
-
-@pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
-def test_checked_array_refuses_what_is_not_finite(bad: float) -> None:
-    with pytest.raises(ParameterError) as error:
-        geometry.checked_array("q", [0.0, bad, 0.0], (3,))
-    assert error.value.name == "q"
 
 
 @given(st.integers(0, 2**32 - 1))

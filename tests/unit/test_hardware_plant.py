@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 
 from present import present
+from random_arms import standard_link
 from teleop_core.base import errors
 from teleop_core.base.parameters import MARKS, NoParameters, build, parameter, specs
 from teleop_core.graph.signals import TICK_NS
-from teleop_core.robots import hardware, link_errors, load_robot
+from teleop_core.robots import hardware, load_robot
 from teleop_core.robots.robot import Robot
 from teleop_core.session.configuration import configure
 from teleop_core.slave import pair, slave_sim
@@ -99,9 +100,7 @@ def test_true_tip_is_that_of_the_arm_as_built_behind_its_play() -> None:
     q, T = s["carried"], np.eye(4)
     for i, row in enumerate(table):
         a, alpha, d, theta = row + q[i] * np.eye(4)[2 if i == 2 else 3]
-        ct, st_, ca, sa = math.cos(theta), math.sin(theta), math.cos(alpha), math.sin(alpha)
-        T = T @ np.array([[ct, -st_ * ca, st_ * sa, a * ct], [st_, ct * ca, -ct * sa, a * st_],
-                          [0.0, sa, ca, d], [0.0, 0.0, 0.0, 1.0]])  # fmt: skip
+        T = T @ standard_link(theta, d, a, alpha)
     # The tip was seen at the start of the last tick, at rest.
     assert np.linalg.norm(mover.true_pose()[:3] - T[:3, 3]) < 1e-9
 
@@ -189,23 +188,3 @@ def test_what_is_no_plant_is_refused_with_the_reason(plant: str | Plant, needed:
 def test_wrong_numbers_of_a_plant_name_what_is_possible(setting: str, needed: str) -> None:
     with pytest.raises((errors.ParameterError, errors.UnknownNameError), match=needed):
         slave_sim.SlaveSim(configure(None, settings=["plant=hardware", setting]).group("slave_sim"))
-
-
-@pytest.mark.parametrize(
-    ("changed", "kind"),
-    [
-        ({"coulomb": [-1.0, 0.0]}, errors.ParameterError),
-        ({"play": [0.0]}, errors.ShapeError),
-        ({"coupling": np.zeros((3, 3))}, errors.ShapeError),
-        ({"coupling": np.ones((2, 2))}, errors.ParameterError),
-        ({"links": link_errors.LinkErrors.none(3)}, errors.ShapeError),
-        ({"sources": {"mass": "published: x"}}, errors.UnknownNameError),
-        ({"sources": {"play": "somewhere"}}, errors.ParameterError),
-    ],
-)
-def test_impossible_hardware_is_refused(changed: Any, kind: type[errors.TeleopError]) -> None:
-    zero = np.zeros(2)
-    given = {"coulomb": zero, "bias": zero, "wander": zero, "play": zero,
-             "coupling": np.zeros((2, 2))}  # fmt: skip
-    with pytest.raises(kind):
-        hardware.Hardware(**(given | changed))

@@ -3,14 +3,12 @@
 from collections.abc import Iterator
 from itertools import repeat
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
 import teleop_core as tc
 from led_tip import assert_none_gains_energy
-from present import present
 from teleop_console.world_nodes import object_outline
 from teleop_core.base.errors import ParameterError
 from teleop_core.kernels.geometry import Array
@@ -143,22 +141,6 @@ def test_no_motion_gains_energy_from_a_field(friction: float, folder: Path) -> N
         return way / np.abs(way).max() * (0.05, 0.04, 0.02) + (0.0, 0.0, 0.008)
 
     assert_none_gains_energy((loop() for _ in range(40)), "height_field", field(folder, "waves"), friction)
-
-
-def test_a_recording_replays_to_the_bit_when_its_file_is_gone(folder: Path, tmp_path: Path) -> None:
-    path = tmp_path / "ball.csv"
-    path.write_bytes((folder / "ball.csv").read_bytes())
-    settings: Any = {
-        "world": "height_field",
-        "world.height_field.file": str(path),
-        "world.place": [0.241, -0.236, -0.077],
-    }
-    recording = tc.run("palpation", duration=8.0, out=tmp_path / "bag", settings=settings)
-    before = recording["slave/true_cf"].values
-    assert np.abs(before).max() > 0.1
-    path.unlink()
-    again = tc.replay(present(recording.path))
-    np.testing.assert_array_equal(again["slave/true_cf"].values, before)
 
 
 def test_the_page_draws_the_field_where_it_lies(folder: Path) -> None:

@@ -9,7 +9,6 @@ import pytest
 
 import teleop_core as tc
 from free_tool import drag, fly
-from present import present
 from teleop_console.world_nodes import object_outline
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots import load_robot
@@ -129,9 +128,3 @@ def test_the_score_tells_depth_resistance_and_torque(session: tc.Recording) -> N
 def test_a_session_without_a_hole_has_no_insertion(tmp_path: Path) -> None:
     score = tc.run("free_motion", duration=1.0, out=tmp_path / "bag").score()
     assert score.value("insertion.depth_mm") is None
-
-
-def test_it_is_replayed_to_the_bit(session: tc.Recording) -> None:
-    again = tc.replay(present(session.path))
-    for topic in ("slave/true_cf", "slave/true_cp"):
-        np.testing.assert_array_equal(again[topic].values, session[topic].values)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from held_master import HeldMaster
-from teleop_core.base import ParameterError, build
+from teleop_core.base import build
 from teleop_core.hand.master.haptic_master import HapticMasterParameters
 from teleop_core.hand.operators import OPERATORS, Setting
 from teleop_core.hand.operators.behaviour import OperatorParameters
@@ -60,12 +60,6 @@ def test_motion_asked_for_an_earlier_time_begins_anew() -> None:
     first = asked(times)
     asked(times + 100.0)
     assert np.array_equal(asked(times), first)
-
-
-def test_each_seed_is_another_motion() -> None:
-    times = np.arange(0.0, 20.0, 0.01)
-    assert np.array_equal(motion(1)(times), motion(1)(times))
-    assert np.abs(motion(1)(times) - motion(2)(times)).max() > 1e-3
 
 
 def test_hand_starts_at_rest_and_has_approached_the_centre_in_time() -> None:
@@ -128,10 +122,6 @@ def test_far_targets_take_longer_by_a_time_per_bit() -> None:
         assert one.duration == pytest.approx(expected)
 
 
-def test_submovement_ends_its_duration_after_its_beginning() -> None:
-    assert Submovement(1.0, 0.5, np.zeros(6)).end == 1.5
-
-
 def test_hand_without_room_holds_still_but_for_its_tremor() -> None:
     rows = motion(size=(0.0, 0.0, 0.0), rotation=0.0)(np.arange(5.0, 60.0, 0.01))
     assert not np.ptp(rows[:, :3], axis=0).any()
@@ -180,8 +170,3 @@ def in_tremor_band(places: Array) -> float:
 def test_tremor_of_a_resting_human_is_in_the_reading_in_spite_of_friction_and_steps() -> None:
     assert in_tremor_band(resting("human")) == pytest.approx(63e-6, rel=0.15)
     assert in_tremor_band(resting("hold")) < 30e-6
-
-
-def test_tolerance_beyond_the_reach_is_refused() -> None:
-    with pytest.raises(ParameterError, match="tolerance"):
-        HumanParameters(tolerance=0.05)

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -9,11 +10,11 @@ import pytest
 from numpy.typing import NDArray
 from scipy.signal import lsim
 
+from palpation import on_the_slave, pressed
 from teleop_core.base import ParameterError, PartError, build
 from teleop_core.coupling.architectures.impedance import IMPEDANCE, ImpedanceParameters
 from teleop_core.graph import TICK_NS, Graph, build_graph, topics
-from teleop_core.kernels.geometry import Array
-from teleop_core.session import configuration, virtual
+from teleop_core.session import configuration
 from teleop_core.slave.slave_sim import SLAVE_SIM
 
 CALM = ("feedback_timeout=1.0", "reach_force.is_on=false", "gimbal_noise=0.0")
@@ -21,15 +22,7 @@ STAGES = "teleop.stages=[network,impedance,passivity]"
 LATE = ("network.there.least_delay=0.03", "network.back.least_delay=0.05")
 
 
-def pressing(*texts: str, stages: str = STAGES, ticks: int = 9000) -> NDArray[np.void]:
-    """Signals of the scenario ``palpation``, whose slave yields."""
-    settings = [stages, *CALM, *texts]
-    return virtual.VirtualTime(configuration.configure("palpation", settings=settings)).run(ticks)
-
-
-def on_the_slave(force: Array) -> Array:
-    """Forces (N, 3) of the hand along the slave's base."""
-    return np.column_stack((-force[:, 2], -force[:, 0], force[:, 1]))
+pressing = partial(pressed, STAGES, *CALM, ticks=9000)
 
 
 def slave(**values: float) -> tuple[Any, Callable[..., float]]:

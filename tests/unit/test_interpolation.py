@@ -8,8 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.interpolate import BPoly
 
+from led_slave import LedSlave
 from present import present
-from teleop_core.graph.signals import DT, TICK_NS
+from teleop_core.graph.signals import DT
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots import load_robot
 from teleop_core.slave.commands import CommandStatus
@@ -18,7 +19,7 @@ from teleop_core.slave.slave import INTERPOLATIONS
 
 ROBOT = load_robot("planar_3r")  # it starts at home, with room on all sides
 HOME, SPEED = ROBOT.home, present(ROBOT.drives).speed_limit
-PERIODS = [2, 8, 33, 100]  # of the commands, in ticks
+PERIODS = [2, 33]  # of the commands, in ticks
 # Joints of up to 3 rad after a polynomial of the fifth degree.
 ROUNDING = 1e-13
 
@@ -35,17 +36,12 @@ def way(
         robot: Name of the robot.
         after: Ticks after the last command.
     """
-    slave = SimulatedArm(ArmParameters(robot=robot, interpolation=interpolation))
-    row, now_ns, found = slave.signals, 0, []
+    led, found = LedSlave(SimulatedArm(ArmParameters(robot=robot, interpolation=interpolation))), []
     for command, ticks in zip(commands, [*ticks_between, after], strict=True):
         for tick in range(ticks):
-            now_ns += TICK_NS
-            row["now_ns"] = now_ns
-            if tick == 0:
-                row["slave_servo_jp"], row["slave_servo_jp_ns"] = command, now_ns
-            slave.step()
-            assert row["command_status"] in {CommandStatus.FRESH, CommandStatus.STALE}
-            found.append(slave.server.state["command"].copy())
+            status = led.tick(None if tick else command)
+            assert status in {CommandStatus.FRESH, CommandStatus.STALE}
+            found.append(led.slave.server.state["command"].copy())
     return np.array(found)
 
 
@@ -121,57 +117,29 @@ def test_minimum_jerk_way_is_the_polynomial_of_fifth_degree_with_smooth_ends(tic
     assert np.abs(found - least_jerk(commands, ticks, 50)).max() < ROUNDING
 
 
-def largest_changes(found: Array, period: int) -> list[tuple[float, float]]:
-    """Largest change per tick, of speed and of acceleration, near commands and between them."""
-    changes = []
-    for order in (2, 3):
-        change = np.abs(np.diff(found, n=order, axis=0)).max(axis=1)
-        # The first and last of the ticks that a difference spans have the middle tick between.
-        near = (np.arange(len(change)) + order) % period < order
-        changes.append((change[near].max(), change[~near].max()))
-    return changes
-
-
-def test_minimum_jerk_way_is_as_smooth_at_its_ends_as_on_the_way() -> None:
-    commands = wander(12, 100)
-    speed, acceleration = largest_changes(way("minimum_jerk", commands, [100] * 11, after=100)[100:], 100)
-    assert speed[0] <= speed[1]
-    assert acceleration[0] <= 1.1 * acceleration[1]
-    kinks = largest_changes(way("linear", commands, [100] * 11, after=100)[100:], 100)
-    assert kinks[0][0] > 20.0 * speed[0]
+def changing(kinds: dict[int, str], commands: Array) -> Array:
+    """Commands in force (N, 3) under commands, equally far apart, and with kinds that are other ones from a tick on."""
+    led, found = LedSlave(SimulatedArm(ArmParameters(robot="planar_3r", interpolation=kinds[0]))), []
+    for tick in range(600):
+        if tick in kinds:
+            led.slave.retune(ArmParameters(robot="planar_3r", interpolation=kinds[tick]))
+        k, rest = divmod(tick * len(commands), 600)
+        led.tick(None if rest else commands[k])
+        found.append(led.slave.server.state["command"].copy())
+    return np.array(found)
 
 
 @pytest.mark.parametrize(("first", "then"), [("linear", "minimum_jerk"), ("minimum_jerk", "linear")])
 def test_kinds_change_on_the_way_without_a_jump(first: str, then: str) -> None:
-    slave = SimulatedArm(ArmParameters(robot="planar_3r", interpolation=first))
-    row, found = slave.signals, []
-    for tick in range(600):
-        if tick == 300:
-            slave.retune(ArmParameters(robot="planar_3r", interpolation=then))
-        row["now_ns"] = (tick + 1) * TICK_NS
-        if tick % 50 == 0:
-            row["slave_servo_jp"] = HOME + 1e-3 * tick * 0.2 * SPEED
-            row["slave_servo_jp_ns"] = row["now_ns"]
-        slave.step()
-        found.append(slave.server.state["command"].copy())
+    found = changing({0: first, 300: then}, HOME + 1e-3 * np.arange(0.0, 600.0, 50.0)[:, None] * 0.2 * SPEED)
     # Commands run at constant speed, and so does the way, after a period to begin.
     steps = np.diff(found, axis=0)[100:]
     assert np.allclose(steps, 0.2e-3 * SPEED, rtol=1e-9, atol=0)
 
 
 def test_a_still_command_after_other_kinds_is_a_still_way() -> None:
-    slave = SimulatedArm(ArmParameters(robot="planar_3r", interpolation="minimum_jerk"))
-    row, found = slave.signals, []
-    kinds = {100: "none", 200: "linear", 300: "minimum_jerk"}
-    for tick in range(500):
-        if tick in kinds:
-            slave.retune(ArmParameters(robot="planar_3r", interpolation=kinds[tick]))
-        row["now_ns"] = (tick + 1) * TICK_NS
-        if tick % 20 == 0:
-            row["slave_servo_jp"] = HOME + 1e-3 * min(tick, 80) * 0.4 * SPEED
-            row["slave_servo_jp_ns"] = row["now_ns"]
-        slave.step()
-        found.append(slave.server.state["command"].copy())
+    kinds = {0: "minimum_jerk", 100: "none", 200: "linear", 300: "minimum_jerk"}
+    found = changing(kinds, HOME + 1e-3 * np.minimum(np.arange(0.0, 600.0, 20.0), 80.0)[:, None] * 0.4 * SPEED)
     assert np.ptp(found[:120], axis=0).min() > 0.05
     assert np.ptp(found[120:], axis=0).max() == 0.0
 
@@ -185,18 +153,12 @@ D3, TOP = 2, SLIDING.upper[2]
 
 def slide(interpolation: str, places: Sequence[float] | Array, ticks: int) -> Array:
     """Commands in force (N,) of d3 [m], under commands to some places below its upper end [m]."""
-    slave = SimulatedArm(ArmParameters(start=tuple(SLIDING.home), interpolation=interpolation))
-    row, now_ns, found = slave.signals, 0, []
+    led, found = LedSlave(SimulatedArm(ArmParameters(start=tuple(SLIDING.home), interpolation=interpolation))), []
     for place in places:
         for tick in range(ticks):
-            now_ns += TICK_NS
-            row["now_ns"] = now_ns
-            if tick == 0:
-                row["slave_servo_jp"], row["slave_servo_jp_ns"] = SLIDING.home, now_ns
-                row["slave_servo_jp"][D3] = TOP - place
-            slave.step()
-            assert row["command_status"] == CommandStatus.FRESH
-            found.append(float(slave.server.state["command"][D3]))
+            command = np.where(np.arange(6) == D3, TOP - place, SLIDING.home)
+            assert led.tick(None if tick else command) == CommandStatus.FRESH
+            found.append(float(led.slave.server.state["command"][D3]))
     return np.array(found)
 
 

@@ -5,7 +5,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from teleop_core.base.errors import ParameterError
 from teleop_core.graph.topics import NO_COMMAND_NS, OPERATION
 from teleop_core.kernels.geometry import Array
 from teleop_core.slave.bridges import hearing, jaw_bridge
@@ -103,8 +102,3 @@ def test_effort_of_a_sliding_gripper_does_the_same_work_as_ours() -> None:
     gripper.bridge.hear(hearing.Sample(("finger",), (0.01,), (0.05,), (8.0,), MS), MS)
     _, velocity, effort = gripper.told
     assert velocity * effort == pytest.approx(0.05 * 8.0)
-
-
-def test_a_scale_of_zero_is_refused() -> None:
-    with pytest.raises(ParameterError, match="scale"):
-        jaw_bridge.JawBridgeParameters(scale=0.0)

@@ -106,11 +106,6 @@ def test_what_the_decorators_made_is_told_from_other_functions() -> None:
     assert not any(map(is_kernel, (plain, plain(1), np.sin, None, [], kernel)))
 
 
-def test_python_function_of_a_kernel_does_the_same() -> None:
-    assert polynomial.py_func.__name__ == polynomial.__name__ == "polynomial"
-    assert polynomial(2.0) == 12.0
-
-
 def test_record_has_its_fields_as_attributes_and_shares_its_memory() -> None:
     rows = records([("gain", "f8"), ("point", "f8", (3,)), ("count", "i8")], 2)
     row = rows[1]

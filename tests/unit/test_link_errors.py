@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from present import present
-from teleop_core.base.errors import ParameterError, ShapeError, UnknownNameError
+from random_arms import standard_link
 from teleop_core.kernels.geometry import Array
 from teleop_core.kinematics import dh_kernels
 from teleop_core.robots import link_errors, load_robot, robot_from_table
@@ -35,14 +35,6 @@ def tip(row: Array, q: Array) -> Array:
 
 def joints(robot: Robot, rng: np.random.Generator) -> Array:
     return rng.uniform(robot.lower, robot.upper)
-
-
-def standard(theta: float, d: float, a: float, alpha: float) -> Array:
-    """One link, written out (Denavit and Hartenberg 1955)."""
-    ct, st, ca, sa = math.cos(theta), math.sin(theta), math.cos(alpha), math.sin(alpha)
-    return np.array(
-        [[ct, -st * ca, st * sa, a * ct], [st, ct * ca, -ct * sa, a * st], [0.0, sa, ca, d], [0.0, 0.0, 0.0, 1.0]]
-    )
 
 
 @pytest.mark.parametrize("name", CHAINS)
@@ -75,7 +67,7 @@ def test_errors_of_the_rcrt1_are_those_of_its_published_table() -> None:
         alpha = np.array([-right, right, 0.0, -right, right, 0.0]) + e[1]
         expected = np.eye(4)
         for i in range(6):
-            expected = expected @ standard(theta[i], d[i], e[0, i], alpha[i])
+            expected = expected @ standard_link(theta[i], d[i], e[0, i], alpha[i])
         row = present(true_chain(robot, link_errors.LinkErrors.from_vector(e.ravel())))
         assert np.allclose(tip(row, q), expected, rtol=0, atol=1e-14)
 
@@ -89,7 +81,7 @@ def test_errors_of_a_table_are_those_of_its_rows() -> None:
         a, alpha = np.array([0.1, 0.4, 0.0, 0.02]) + e[0], np.array([-1.2, 0, 1.57, 0.4]) + e[1]
         expected = np.eye(4)
         for i in range(4):
-            expected = expected @ standard(theta[i], d[i], a[i], alpha[i])
+            expected = expected @ standard_link(theta[i], d[i], a[i], alpha[i])
         row = present(true_chain(robot, link_errors.LinkErrors.from_vector(e.ravel())))
         assert np.allclose(tip(row, q), expected, rtol=0, atol=1e-14)
 
@@ -128,16 +120,16 @@ def test_every_transform_between_axes_has_a_common_normal() -> None:
     rng = np.random.default_rng(6)
     for _ in range(200):
         theta, d, a, alpha, turn, slide = rng.uniform(-1.5, 1.5, 6)
-        S = standard(turn, slide, 0.0, 0.0)
-        F = standard(theta, d, a, alpha) @ S
+        S = standard_link(turn, slide, 0.0, 0.0)
+        F = standard_link(theta, d, a, alpha) @ S
         # Alpha near 0 leaves the place of the normal to rounding over its sine.
         assert np.allclose(link_errors.next_axis_motion(F), S, rtol=0, atol=1e-13 / abs(math.sin(alpha)))
 
 
 @pytest.mark.parametrize("alpha", [0.0, math.pi])
 def test_parallel_axes_have_their_normal_where_the_link_is(alpha: float) -> None:
-    S = standard(0.4, 0.0, 0.0, 0.0)
-    F = standard(0.7, 0.2, 0.3, alpha) @ S
+    S = standard_link(0.4, 0.0, 0.0, 0.0)
+    F = standard_link(0.7, 0.2, 0.3, alpha) @ S
     assert np.allclose(link_errors.next_axis_motion(F), S, rtol=0, atol=1e-14)
 
 
@@ -154,17 +146,3 @@ def test_names_and_vectors_are_in_one_order() -> None:
     assert np.array_equal(errors.vector, np.arange(8.0))
     assert errors.named()["d2"] == 5.0
     assert "a1" not in errors.named()
-
-
-def test_wrong_errors_are_refused_by_name() -> None:
-    robot = load_robot("rcrt1")
-    with pytest.raises(UnknownNameError) as unknown:
-        link_errors.LinkErrors.of(robot, {"d7": 0.1})
-    assert "d6" in unknown.value.alternatives
-    with pytest.raises(ParameterError) as infinite:
-        link_errors.LinkErrors.of(robot, {"d3": math.inf})
-    assert infinite.value.name == "link error d3"
-    with pytest.raises(ParameterError):
-        true_chain(robot, link_errors.LinkErrors.none(5))
-    with pytest.raises(ShapeError):
-        link_errors.LinkErrors(a=np.zeros(2), alpha=np.zeros(3), d=np.zeros(2), theta=np.zeros(2))

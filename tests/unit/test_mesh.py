@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from trimesh import Trimesh
 
 import teleop_core as tc
-from led_tip import assert_none_gains_energy, lead
+from led_tip import assert_none_gains_energy
 from present import present
 from teleop_console.world_nodes import object_outline
 from teleop_core.bags import kept_files
@@ -167,28 +167,6 @@ def test_no_motion_gains_energy_from_a_mesh_whatever_edge_it_crosses(name: str, 
     assert_none_gains_energy(ways, "mesh", parameters(folder, name), friction)
 
 
-def test_a_sliding_tip_feels_the_friction_of_the_analytic_shape(folder: Path) -> None:
-    times = np.arange(4000) * 1e-3
-    tilt, turn = 0.4 * np.sin(3.0 * times) + 1.0, 1.9 * times
-    depth = 0.5e-3
-    way = (0.015 - depth) * np.column_stack((np.sin(tilt) * np.cos(turn), np.sin(tilt) * np.sin(turn), np.cos(tilt)))
-    made_of = {"world_stiffness": 1000.0, "world_friction": 0.6, "puncture_force": 0.0}
-    wanted, _, _ = lead(way, "sphere", **made_of)
-    force, _, _ = lead(way, "mesh", parameters(folder, "sphere"), **made_of)
-    pushed = 1000.0 * depth
-    assert np.linalg.norm(wanted[50:], axis=1).min() > 1.1 * pushed  # it slips
-    assert np.linalg.norm(force - wanted, axis=1).max() < 0.015 * pushed
-
-
-def test_a_session_presses_a_mesh_of_a_block_as_it_does_the_block(folder: Path) -> None:
-    settings = ["world=mesh", f"world.mesh.file={folder / 'box.stl'}"]
-    box, mesh = (virtual.VirtualTime(configuration.configure("palpation", settings=s)) for s in ([], settings))
-    field = "slave_true_cf"
-    wanted, force = box.run(16_000)[field], mesh.run(16_000)[field]
-    assert wanted[:, 2].max() > 0.9
-    assert np.abs(force - wanted).max() < 0.005
-
-
 def without(mesh: Trimesh, face: int) -> Trimesh:
     mesh.update_faces(np.arange(len(mesh.faces)) != face)
     return mesh
@@ -250,8 +228,9 @@ def test_a_mesh_that_is_inside_out_is_turned(folder: Path, tmp_path: Path) -> No
         assert distance[0] == pytest.approx(-3e-3, abs=1e-5)
 
 
-@pytest.mark.parametrize("text", ["", "solid", "v 0 0 nothing\nf 1 1 1\n", "\x00" * 90])
-@pytest.mark.parametrize("ending", ["stl", "obj", "txt", "zip"])
+@pytest.mark.parametrize(
+    ("text", "ending"), [("", "stl"), ("solid", "txt"), ("v 0 0 nothing\nf 1 1 1\n", "obj"), ("\x00" * 90, "zip")]
+)
 def test_what_is_no_mesh_is_refused_in_one_line(text: str, ending: str, tmp_path: Path) -> None:
     file = tmp_path / f"none.{ending}"
     file.write_text(text)
@@ -284,8 +263,7 @@ def obj(size: float, faces: NDArray[np.int64]) -> str:
         (1e-300, 4, "mesh"),
     ],
 )
-@pytest.mark.parametrize("write", [off, obj])
-@pytest.mark.parametrize("use", ["world", "fixture"])
+@pytest.mark.parametrize(("write", "use"), [(off, "world"), (obj, "fixture")])
 def test_a_mesh_without_triangles_or_of_no_size_is_refused_in_one_line(
     size: float, count: int, said: str, write: Callable[..., str], use: str, tmp_path: Path
 ) -> None:

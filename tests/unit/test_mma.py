@@ -1,12 +1,10 @@
 """MMA as a robot: Jacobian, rank, reach, torques for the hand, refusals."""
 
 import math
-from collections.abc import Mapping
 
 import numpy as np
 import pytest
 
-from teleop_core.base.errors import ParameterError, ShapeError, UnknownNameError
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots import load_robot
 from teleop_core.robots.robot import Robot
@@ -69,24 +67,3 @@ def test_shoulder_torque_lifts_against_gravity(mma: Robot) -> None:
     level[1] = 0.0
     # Residual of the published spring in the worst pose, 1.011 N·m, towards smaller θ2.
     assert math.isclose(holding_torques(mma, level, np.zeros(6))[1], -1.011, abs_tol=1e-3)
-
-
-@pytest.mark.parametrize(
-    ("options", "error"),
-    [
-        ({"model": "D"}, UnknownNameError),
-        ({"a4": 0.1}, UnknownNameError),
-        ({"a2": 0.0}, ParameterError),
-        ({"d1": math.nan}, ParameterError),
-    ],
-)
-def test_impossible_geometry_is_refused(options: Mapping[str, str | float], error: type[ParameterError]) -> None:
-    with pytest.raises(error):
-        load_robot("mma", **options)
-
-
-def test_bad_vectors_are_refused(mma: Robot) -> None:
-    with pytest.raises(ShapeError):
-        holding_torques(mma, np.zeros(6), np.zeros(6))
-    with pytest.raises(ParameterError):
-        holding_torques(mma, mma.home, np.full(6, np.nan))

@@ -8,7 +8,7 @@ import pinocchio
 import pytest
 from pinocchio import Model
 
-from teleop_core.base.errors import ParameterError, ShapeError, UnknownNameError
+from teleop_core.base.errors import ParameterError
 from teleop_core.kernels.geometry import Array, rotation
 from teleop_core.robots import load_robot
 from teleop_core.robots.robot import Robot
@@ -142,12 +142,3 @@ def test_pose_and_jacobian_in_pinocchio_are_the_same(mma: Robot) -> None:
         hybrid = columns.copy()
         hybrid[:, 2], hybrid[:, 3] = columns[:, 3], columns[:, 2] - columns[:, 3]
         assert np.abs(hybrid - mma.jacobian(q)).max() < EXACT
-
-
-def test_vectors_and_models_that_do_not_exist_are_refused(mma: Robot) -> None:
-    with pytest.raises(ShapeError):
-        mma_models.joints_of_model(np.zeros((2, 7)), "B")
-    with pytest.raises(UnknownNameError):
-        mma_models.joints_of_model(np.zeros(7), "D")
-    with pytest.raises(UnknownNameError):
-        mma_models.model_table("D", mma.geometry)

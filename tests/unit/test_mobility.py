@@ -1,10 +1,7 @@
 """Mobility: the counts of the lectures and the thesis."""
 
-from collections.abc import Callable
-
 import pytest
 
-from teleop_core.base.errors import ParameterError
 from teleop_machines import mobility
 
 
@@ -40,21 +37,3 @@ def test_passive_joints_are_those_without_a_motor(joints: int, freedoms: int, ex
 def test_independent_loops_of_mma_parallelogram_and_stewart_platform(links: int, joints: int, expected: int) -> None:
     # H13 and P6.
     assert mobility.independent_loops(links, joints) == expected
-
-
-@pytest.mark.parametrize(
-    ("call", "name"),
-    [
-        (lambda: mobility.degrees_of_freedom(0, 0, 0), "links"),
-        (lambda: mobility.degrees_of_freedom(4, 2, 2), "joints"),
-        (lambda: mobility.degrees_of_freedom(4, 4, 3), "joint_freedoms"),
-        (lambda: mobility.degrees_of_freedom(4, 4, 25), "joint_freedoms"),
-        (lambda: mobility.degrees_of_freedom(4, 4, 4, space=4), "space"),
-        (lambda: mobility.independent_loops(5, 3), "joints"),
-        (lambda: mobility.passive_joints(3, 4), "freedoms"),
-    ],
-)
-def test_counts_that_no_mechanism_has_are_refused_by_name(call: Callable[..., object], name: str) -> None:
-    with pytest.raises(ParameterError) as caught:
-        call()
-    assert caught.value.name == name

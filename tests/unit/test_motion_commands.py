@@ -11,6 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from led_slave import LedSlave
 from present import present
 from teleop_core.base import ShapeError, build
 from teleop_core.graph import DT, TICK_NS, topics
@@ -30,12 +31,12 @@ SMALL = np.array([0.05, -0.04, -0.02, 0.1, 0.06, -0.1])
 DIRECT = {"reference_filter.is_on": False}
 
 
-class Bench:
+class Bench(LedSlave):
     """A slave at rest in the middle of its range, and the ticks it makes."""
 
     def __init__(self, name: str = "rcrt1", middle: Array = MIDDLE, **values: float | bool) -> None:
         given = {"robot": name, "start_speed": 1.0, "start": tuple(np.asarray(middle).tolist())} | DIRECT | values
-        self.slave = pair.SimulatedArm(build(pair.ArmParameters, given))
+        super().__init__(pair.SimulatedArm(build(pair.ArmParameters, given)))
         self.robot, self.motion, self.now_ns = self.slave.robot, self.slave.server.motion, 10**9
         self.run(1)
         while self.slave.server.operation["is_busy"]:
@@ -45,23 +46,10 @@ class Bench:
     def run(self, ticks: int) -> Array:
         """Setpoints (ticks, n)."""
         found = np.empty((ticks, self.slave.robot.n))
-        for i in range(ticks):
-            self.now_ns += TICK_NS
-            self.slave.signals["now_ns"] = self.now_ns
-            self.slave.step()
-            found[i] = self.slave.signals["slave_setpoint_js"]
+        for row in found:
+            self.tick()
+            row[:] = self.row["slave_setpoint_js"]
         return found
-
-    def follow(self, command: Array, stamp_ns: Any = None) -> Array:
-        """One tick with a message of servo_jp."""
-        row = self.slave.signals
-        row["slave_servo_jp"] = command
-        row["slave_servo_jp_ns"] = self.now_ns + TICK_NS if stamp_ns is None else stamp_ns
-        return self.run(1)[0]
-
-    @property
-    def setpoint(self) -> Array:
-        return self.slave.signals["slave_setpoint_js"].copy()
 
     @property
     def tip(self) -> Array:
@@ -282,33 +270,33 @@ def test_a_robot_that_cannot_turn_its_tip_does_of_a_twist_what_it_can() -> None:
 
 def test_a_running_stream_is_not_taken_over_by_a_speed_and_a_speed_not_by_a_stream(bench: Bench) -> None:
     for _ in range(20):
-        bench.follow(MIDDLE + 1e-4)
+        bench.tick(MIDDLE + 1e-4)
     answer, text = bench.motion.drive_joints(SMALL, bench.now_ns)
     assert answer is Answer.REFUSED
     assert "stream of servo_jp" in text
     bench.run(TIMEOUT_TICKS + 1)  # the stream falls silent
     assert bench.motion.drive_joints(SMALL, bench.now_ns)[0] is Answer.DONE
     driven = bench.run(20)[-1]
-    bench.follow(MIDDLE)
+    bench.tick(MIDDLE)
     ahead = np.sign(SMALL) * (bench.setpoint - driven)
     assert (ahead > 0.0).all()
 
 
 def test_a_move_takes_over_from_a_stream_which_is_followed_again_afterwards(bench: Bench) -> None:
     for _ in range(20):
-        bench.follow(MIDDLE)
+        bench.tick(MIDDLE)
     bench.motion.move(MIDDLE + SMALL)
-    bench.follow(MIDDLE)
+    bench.tick(MIDDLE)
     while bench.slave.server.operation["is_busy"]:
-        bench.follow(MIDDLE)
+        bench.tick(MIDDLE)
     np.testing.assert_array_equal(bench.setpoint, MIDDLE + SMALL)
     for _ in range(200):
-        bench.follow(MIDDLE + 0.99 * SMALL)
+        bench.tick(MIDDLE + 0.99 * SMALL)
     np.testing.assert_allclose(bench.setpoint, MIDDLE + 0.99 * SMALL, atol=1e-9)
 
 
 def test_after_a_move_no_command_is_in_force(bench: Bench) -> None:
-    bench.follow(MIDDLE)
+    bench.tick(MIDDLE)
     bench.run(1)
     assert bench.slave.signals["slave_setpoint_js_ns"] > topics.NO_COMMAND_NS
     bench.motion.move(MIDDLE + SMALL)
@@ -331,7 +319,7 @@ def test_steps_add_up_from_the_setpoint_on_within_one_tick_too(bench: Bench) -> 
 
 def test_steps_are_taken_after_references_of_the_topic(bench: Bench) -> None:
     for _ in range(20):
-        bench.follow(MIDDLE)
+        bench.tick(MIDDLE)
     old_ns = int(bench.slave.signals["slave_servo_jp_ns"])
     for _ in range(10):
         bench.motion.servo_by(0.001 * SMALL, bench.now_ns + TICK_NS // 2)
@@ -344,7 +332,7 @@ def test_steps_are_taken_after_references_of_the_topic(bench: Bench) -> None:
 def test_references_by_command_are_followed_as_those_of_the_topic() -> None:
     one, other = Bench(), Bench()
     for share in np.linspace(0.0, 0.2, 200):
-        one.follow(MIDDLE + share * SMALL)
+        one.tick(MIDDLE + share * SMALL)
         other.motion.servo(MIDDLE + share * SMALL, other.now_ns + TICK_NS)
         other.run(1)
         np.testing.assert_array_equal(one.setpoint, other.setpoint)
@@ -357,7 +345,7 @@ def test_hold_brakes_what_moves_and_stays(bench: Bench, kind: str) -> None:
     elif kind == "speed":
         bench.motion.drive_joints(SMALL, bench.now_ns)
     else:
-        bench.follow(MIDDLE + 0.1 * SMALL)
+        bench.tick(MIDDLE + 0.1 * SMALL)
     path = [bench.run(30)]
     assert bench.motion.hold()[0] is Answer.DONE
     path.append(bench.run(500))
@@ -371,7 +359,7 @@ def test_hold_brakes_what_moves_and_stays(bench: Bench, kind: str) -> None:
 
 def test_after_a_pause_the_arm_stays_where_it_came_to_rest(bench: Bench) -> None:
     for share in np.linspace(0.0, 1.0, 200):
-        bench.follow(MIDDLE + share * SMALL)
+        bench.tick(MIDDLE + share * SMALL)
     bench.slave.server.request("pause")
     rest = bench.run(1000)[-1]
     assert np.abs(rest - MIDDLE - SMALL).max() > 1e-6  # braking takes it past the last reference
@@ -411,7 +399,8 @@ def test_whatever_is_commanded_no_step_exceeds_the_limits_of_the_drives(
         wild: Any = np.array(numbers)
         now_ns, motion = bench.now_ns, bench.motion
         if name == "stream":
-            path.append(bench.follow(bench.setpoint + 0.02 * wild)[None])
+            bench.tick(bench.setpoint + 0.02 * wild)
+            path.append(bench.setpoint[None])
         elif name in {"move", "pose", "joints", "tip", "step", "hold"}:
             acts: dict[str, Callable[[], object]] = {
                 "move": lambda: motion.move(bench.setpoint + wild),

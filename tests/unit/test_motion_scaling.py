@@ -156,14 +156,6 @@ def test_slave_that_does_not_follow_holds_the_command_at_its_setpoint() -> None:
     assert np.array_equal(desk.step(), stuck[:3])
 
 
-def test_pause_within_the_timeout_is_bridged() -> None:
-    desk = Desk()
-    desk.step()
-    before = desk.step()
-    after = desk.step((5 * MM, 0, 0), stamp_step_ns=100_000_000)
-    assert np.allclose(after - before, (0, -5 * MM, 0), rtol=0, atol=ROUNDING)
-
-
 @pytest.mark.parametrize(("silent", "follows"), [(2, True), (3, False)])
 def test_slave_of_a_slow_master_may_be_silent_for_two_samples(silent: int, follows: bool) -> None:
     desk = Desk()
@@ -251,22 +243,6 @@ def test_box_switched_on_while_clutched_stands_around_the_slave() -> None:
     assert math.isclose(np.abs(desk.row["master_servo_cf"]).max(), 0.0, abs_tol=1e-9)
     desk.step((1 * MM, 0, 0))
     assert math.isclose(desk.row["master_servo_cf"][0], -1.0, abs_tol=1e-9)
-
-
-def test_box_goes_with_the_hand_while_clutched_and_stays_at_the_slave() -> None:
-    desk = Desk()
-    desk.step()
-    desk.press("fixture")
-    desk.step((3 * MM, 1 * MM, 0))
-    before, _ = desk.box()
-    desk.hold("clutch")
-    for _ in range(20):
-        desk.step((-1 * MM, 2 * MM, 1 * MM))
-        assert np.allclose(desk.box()[0], before, rtol=0, atol=NANOMETRE)
-        assert not desk.row["master_servo_cf"].any()
-    desk.hold("clutch", is_held=False)
-    desk.step()
-    assert np.allclose(desk.box()[0], before, rtol=0, atol=NANOMETRE)
 
 
 def test_size_of_the_box_follows_the_gain_and_a_second_press_takes_it_and_its_force_away() -> None:

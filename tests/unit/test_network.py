@@ -12,7 +12,6 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 import teleop_core as tc
-from present import present
 from teleop_core.bags.reader import Bag
 from teleop_core.base import NoParameters, ParameterError, PartError, TeleopError, build
 from teleop_core.coupling.network import LOST, NETWORKS, Network, register_network
@@ -250,10 +249,11 @@ def test_outages_last_for_any_time_up_to_the_longest_and_pause_after_each(in_pac
     assert lengths.mean() == pytest.approx(200.0, rel=0.15)
 
 
-@pytest.mark.parametrize("unit", ["", "_packets"])
-@pytest.mark.parametrize(("level", "lost"), [("3_of_8", 1.5 / 10.0), ("1_of_1", 0.5 / 1.5), ("2_of_1", 1.0 / 2.0)])
-def test_the_published_outages_lose_the_share_that_outage_and_pause_give(level: str, unit: str, lost: float) -> None:
-    name = f"outages_{level}{unit}"
+@pytest.mark.parametrize(
+    ("level", "lost"), [("3_of_8", 1.5 / 10.0), ("3_of_8_packets", 1.5 / 10.0), ("1_of_1", 0.5 / 1.5), ("2_of_1", 0.5)]
+)
+def test_the_published_outages_lose_the_share_that_outage_and_pause_give(level: str, lost: float) -> None:
+    name = f"outages_{level}"
     rate = PRESETS[name]["there"].get("packet_rate", 1000.0)
     shares = [np.mean(drawn("outages", of_level(name), 1_000_000, seed, 1.0 / rate) == LOST) for seed in (2, 3)]
     # The standard deviation of two million packets is 0.009 at 3_of_8, less at the others.
@@ -476,27 +476,17 @@ def test_a_network_without_delay_changes_no_command() -> None:
 
 
 @pytest.mark.parametrize("preset", ["iss", "ets7", "delay_500", "loss_50"])
-def test_a_slave_behind_any_network_is_followed_and_stands_still_before_it_is(preset: str) -> None:
+def test_a_slave_behind_any_network_is_followed_without_a_jump_and_stands_still_before_it_is(preset: str) -> None:
     run = session(AT_HOME, f"network.preset={preset}")
-    rows = run.run(24_000)
+    rows = run.run(40_000 if preset == "ets7" else 24_000)
     following = rows["teleop_state"][:, 0] > 0.0
     first = int(following.argmax())
     assert following[-4000:].mean() > 0.9
     still = rows["slave_setpoint_cp"][: first + 100, :3]
     assert np.abs(still - still[0]).max() < 1e-4
-    again = session(AT_HOME, f"network.preset={preset}").run(24_000)
-    assert all((rows[name] == again[name]).all() for name in present(rows.dtype.names))
-
-
-@pytest.mark.parametrize("preset", ["iss", "ets7"])
-def test_the_command_never_jumps_back_to_where_a_far_slave_was(preset: str) -> None:
-    """News of a far slave are old: where they fail for a moment, the command holds."""
-    rows = session(AT_HOME, f"network.preset={preset}").run(40_000)
-    following = rows["teleop_state"][:, 0] > 0.0
-    began = int(following.argmax())
-    assert preset == "iss" or not following[began:].all()
-    steps = np.abs(np.diff(rows["slave_servo_cp"][began:, :3], axis=0)).max(axis=1)
-    assert steps.max() < 5e-4
+    # News of a far slave are old: where they fail for a moment, the command holds.
+    assert np.abs(np.diff(rows["slave_servo_cp"][first:, :3], axis=0)).max() < 5e-4
+    assert preset != "ets7" or not following[first:].all()
 
 
 def test_a_command_holds_while_nothing_is_heard_of_a_far_slave_and_goes_on_from_there() -> None:

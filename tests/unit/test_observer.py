@@ -27,13 +27,16 @@ WIDE = OperatorParameters(device=RoomParameters(workspace=(1.0, 1.0, 1.0)))
 COLUMN = {name: i for i, name in enumerate(topics.TASK_STATE.columns)}
 
 
-def pointing(lag: float, way: float, width: float, trials: int, seed: int = 1) -> list[float]:
-    """Times [s] from target to target of an observer whose pointer is seen late, to and fro."""
+def looker(p: ObserverParameters, seed: int = 1) -> tuple[tc.Seen, Observer]:
+    """A person before a screen, and what it shows."""
     seen = tc.Seen(np.zeros(7), np.zeros(7), np.zeros(6), np.zeros(len(STATE)), np.zeros(len(COLUMN)))
     seen.slave[3] = seen.state[STATE["gain"]] = 1.0
-    p = ObserverParameters(fastest=10.0, noise_across=0.0, axes=("+x", "+y", "+z"))
-    setting = tc.Setting(WIDE, np.zeros((6, 4)), seed, seen)
-    person = Observer(p, setting)
+    return seen, Observer(p, tc.Setting(WIDE, np.zeros((6, 4)), seed, seen))
+
+
+def pointing(lag: float, way: float, width: float, trials: int, seed: int = 1) -> list[float]:
+    """Times [s] from target to target of an observer whose pointer is seen late, to and fro."""
+    seen, person = looker(ObserverParameters(fastest=10.0, noise_across=0.0, axes=("+x", "+y", "+z")), seed)
     late = round(lag / TICK)
     begins = np.array([0.3, -0.2, 0.0])  # of the pointer: a tip at 0 is one that nobody told
     seen.slave[:3] = begins
@@ -78,10 +81,7 @@ def test_a_smaller_target_takes_longer_and_so_does_a_farther_one() -> None:
 
 
 def test_nobody_begins_while_the_arm_is_seen_to_go_to_its_start() -> None:
-    seen = tc.Seen(np.zeros(7), np.zeros(7), np.zeros(6), np.zeros(len(STATE)), np.zeros(len(COLUMN)))
-    seen.slave[3] = seen.state[STATE["gain"]] = 1.0
-    p = ObserverParameters(fastest=10.0, axes=("+x", "+y", "+z"))
-    person = Observer(p, tc.Setting(WIDE, np.zeros((6, 4)), 1, seen))
+    seen, person = looker(ObserverParameters(fastest=10.0, axes=("+x", "+y", "+z")))
     seen.task[COLUMN["number"]], seen.task[COLUMN["width"]], seen.task[COLUMN["goal_x"]] = 1.0, 0.01, 0.2
     rests, began = 1.0, None
     for tick in range(0, 2000, AHEAD):
@@ -95,10 +95,7 @@ def test_nobody_begins_while_the_arm_is_seen_to_go_to_its_start() -> None:
 
 @pytest.mark.parametrize("lag", [0.02, 0.2])
 def test_a_goal_that_is_suddenly_elsewhere_is_not_run_after_as_one_that_moves(lag: float) -> None:
-    seen = tc.Seen(np.zeros(7), np.zeros(7), np.zeros(6), np.zeros(len(STATE)), np.zeros(len(COLUMN)))
-    seen.slave[3] = seen.state[STATE["gain"]] = 1.0
-    p = ObserverParameters(fastest=10.0, noise=0.0, axes=("+x", "+y", "+z"))
-    person = Observer(p, tc.Setting(WIDE, np.zeros((6, 4)), 1, seen))
+    seen, person = looker(ObserverParameters(fastest=10.0, noise=0.0, axes=("+x", "+y", "+z")))
     begins, way, late = np.array([0.3, -0.2, 0.0]), 0.1, round(lag / TICK)
     pointer, went = deque([begins] * (late + 1), maxlen=late + 1), list[float]()
     seen.task[COLUMN["number"]], seen.task[COLUMN["act"]], seen.task[COLUMN["width"]] = 1.0, Act.PASS, 0.01
@@ -115,8 +112,7 @@ def test_a_goal_that_is_suddenly_elsewhere_is_not_run_after_as_one_that_moves(la
 
 
 def test_nobody_moves_without_a_goal() -> None:
-    seen = tc.Seen(*(np.zeros(n) for n in (7, 7, 6, len(STATE), len(COLUMN))))
-    person = Observer(ObserverParameters(), tc.Setting(WIDE, np.zeros((6, 4)), 1, seen))
+    _, person = looker(ObserverParameters())
     rows = np.vstack([person(np.arange(16 * k, 16 * k + 16, dtype=np.float64) * TICK) for k in range(100)])
     assert not rows.any()
 

@@ -8,8 +8,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from led_slave import LedSlave
 from present import present
-from teleop_core.base import ParameterError, UnknownNameError, build
+from teleop_core.base import UnknownNameError, build
+from teleop_core.graph import TICK_NS
 from teleop_core.kernels import Array, kernel, record
 from teleop_core.slave.operation import Answer, Event, Fault, OperationParameters, State, command_event
 from teleop_core.slave.operation.states import COMMANDS, TABLE, OperatingState, answer_text, change
@@ -97,15 +99,12 @@ def test_flags_agree_with_the_state_after_any_events(events: list[Event]) -> Non
         assert not s["is_stopped"] or s["state"] == F
 
 
-@pytest.mark.parametrize("text", ["stop", "stop@", "stop@x", "go@1", "stop@-1", "stop@nan"])
-def test_unknown_commands_and_scripts_of_another_form_are_refused(text: str) -> None:
+def test_unknown_commands_are_refused_with_the_known_ones() -> None:
     with pytest.raises(UnknownNameError, match="enable"):
         command_event("go")
-    with pytest.raises(ParameterError, match="command@seconds"):
-        OperationParameters(events=(text,))
 
 
-class Arm:
+class Arm(LedSlave):
     """A slave under a stream of commands that swing about home."""
 
     def __init__(
@@ -119,23 +118,18 @@ class Arm:
         chosen = {"controller.kind": law, "reference_filter.is_on": is_filtered}
         given = {f"operation.{name}": value for name, value in operation.items()}
         start = {"robot": "rcrt1", "starts_at_home": True}
-        self.slave = SimulatedArm(build(ArmParameters, start | chosen | given))
-        self.row, self.ns = self.slave.signals, 10**9
+        super().__init__(SimulatedArm(build(ArmParameters, start | chosen | given)))
+        self.now_ns = 10**9
         self.limit = present(self.slave.robot.drives).speed_limit
         self.home = self.slave.robot.home
-        self.setpoints = [np.array(self.row["slave_setpoint_js"])]
+        self.setpoints = [self.setpoint]
         self.run(seconds)
 
     def run(self, seconds: float, *, commanded: bool = True) -> None:
         for _ in range(round(seconds * 1000)):
-            self.ns += 10**6
-            self.row["now_ns"] = self.ns
-            if commanded:
-                swing = 0.1 * np.sin(2.0 * np.pi * 1e-9 * (self.ns - 10**9))
-                self.row["slave_servo_jp"] = self.home + swing * self.limit / self.limit.max()
-                self.row["slave_servo_jp_ns"] = self.ns
-            self.slave.step()
-            self.setpoints.append(np.array(self.row["slave_setpoint_js"]))
+            swing = 0.1 * np.sin(2.0 * np.pi * 1e-9 * (self.now_ns + TICK_NS - 10**9))
+            self.tick(self.home + swing * self.limit / self.limit.max() if commanded else None)
+            self.setpoints.append(self.setpoint)
 
     @property
     def steps(self) -> Array:
@@ -163,16 +157,10 @@ def test_a_slave_enables_and_homes_itself_unless_it_is_told_not_to() -> None:
 
 
 def test_homing_is_smooth_and_within_the_limits() -> None:
-    robot = "puma560"
-    slave = SimulatedArm(ArmParameters(robot=robot, operation=OperationParameters(starts_enabled=False)))
-    row, found, ns = slave.signals, [], 10**9
+    slave = SimulatedArm(ArmParameters(robot="puma560", operation=OperationParameters(starts_enabled=False)))
     slave.server.request("enable")
     slave.server.request("home")
-    for _ in range(10_000):
-        ns += 10**6
-        row["now_ns"] = ns
-        slave.step()
-        found.append(np.array(row["slave_setpoint_js"]))
+    found = LedSlave(slave).along([None] * 10_000)["slave_setpoint_js"]
     assert slave.server.operation["is_homed"] == 1.0
     start = slave.server.parameters["start"]
     assert np.allclose(found[-1], start, rtol=0, atol=1e-12)
@@ -198,7 +186,7 @@ def test_nothing_moves_outside_enabled_however_one_got_there(word: str) -> None:
 def test_from_an_emergency_stop_the_setpoint_stands_still_in_the_next_tick() -> None:
     arm = Arm(seconds=1.13)
     before = len(arm.setpoints)
-    arm.slave.server.press(is_pressed=True, heard_ns=arm.ns)
+    arm.slave.server.press(is_pressed=True, heard_ns=arm.now_ns)
     arm.run(1.0)
     assert not arm.steps[before - 1 :].any()
     values = arm.slave.server.operation
@@ -259,13 +247,13 @@ def test_after_a_long_outage_motion_is_resumed_on_purpose_only(gap: float) -> No
 
 def test_a_silent_heartbeat_is_a_stop() -> None:
     arm = Arm(seconds=0.05, heartbeat=0.1)
-    arm.slave.server.press(is_pressed=False, heard_ns=arm.ns)
+    arm.slave.server.press(is_pressed=False, heard_ns=arm.now_ns)
     arm.run(0.09)
     assert arm.state is E
     arm.run(0.03)
     assert arm.state is F
     assert arm.slave.server.request("reset")[0] is Answer.STOPPED
-    arm.slave.server.press(is_pressed=False, heard_ns=arm.ns)
+    arm.slave.server.press(is_pressed=False, heard_ns=arm.now_ns)
     assert arm.slave.server.request("reset")[0] is Answer.DONE
 
 
@@ -277,13 +265,7 @@ def test_a_script_commands_at_its_times() -> None:
     assert arm.state is F
 
 
-@pytest.mark.parametrize("word", ["stop", "heartbeat"])
-def test_no_session_can_have_an_emergency_stop_told_only(word: str) -> None:
-    with pytest.raises(ParameterError, match="reported"):
-        build(OperationParameters, {"reported": (word,)})
-
-
-@pytest.mark.parametrize("seconds", [0.03, 0.13, 0.27, 0.41, 0.66, 0.93, 1.21])
+@pytest.mark.parametrize("seconds", [0.03, 0.41, 1.21])
 @pytest.mark.parametrize("law", ["pid", "source_pid"])
 def test_resume_is_refused_while_a_joint_swings_though_it_stands_still_at_each_turn(law: str, seconds: float) -> None:
     arm = Arm(law=law, is_filtered=False, seconds=seconds)
@@ -293,7 +275,7 @@ def test_resume_is_refused_while_a_joint_swings_though_it_stands_still_at_each_t
     assert arm.slave.server.state["state"] == E
     paused = Arm(law=law, is_filtered=False, seconds=seconds)
     paused.slave.server.request("pause")
-    paused.run(1e-9 * (arm.ns - paused.ns))
+    paused.run(1e-9 * (arm.now_ns - paused.now_ns))
     for _ in range(200):  # nothing of the swing is left to come
         assert (np.abs(paused.slave.simulated.arm.dq) <= paused.slave.server.parameters["rest_speed"]).all()
         paused.run(0.001)
@@ -301,24 +283,16 @@ def test_resume_is_refused_while_a_joint_swings_though_it_stands_still_at_each_t
 
 def test_an_arm_that_was_paused_while_it_homed_homes_when_it_is_resumed() -> None:
     slave = SimulatedArm(ArmParameters(robot="puma560"))
-    row, ns = slave.signals, 10**9
-
-    def run(ticks: int) -> None:
-        nonlocal ns
-        for _ in range(ticks):
-            ns += 10**6
-            row["now_ns"] = ns
-            slave.step()
-
-    run(200)
+    led = LedSlave(slave)
+    led.along([None] * 200)
     assert slave.server.state["is_homing"]
     slave.server.fail(Fault.STALL, 3.0, 2.0)
-    run(1000)
+    led.along([None] * 1000)
     assert (slave.server.operation["state"], slave.server.operation["is_homed"]) == (P, 0.0)
     assert slave.server.request("resume")[0] is Answer.DONE
-    run(10_000)
+    led.along([None] * 10_000)
     assert slave.server.operation["is_homed"] == 1.0
-    assert np.allclose(row["slave_setpoint_js"], slave.server.parameters["start"], rtol=0, atol=1e-12)
+    assert np.allclose(led.setpoint, slave.server.parameters["start"], rtol=0, atol=1e-12)
 
 
 def test_unhome_and_disable_end_what_a_pause_left_of_homing() -> None:

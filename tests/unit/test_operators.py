@@ -1,8 +1,9 @@
 """Operators: rest at the start, region kept, stops reached, samples followed, own ones at work."""
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from held_master import HeldMaster
-from teleop_core.base import NoParameters, ParameterError, PartError, Within, build, parameter
+from teleop_core.base import NoParameters, PartError, Within, build, parameter
 from teleop_core.hand.operators import OPERATORS, Operator, Setting, following, register_operator
 from teleop_core.hand.operators.behaviour import OperatorParameters
 from teleop_core.hand.operators.shapes import PHASES, minimum_jerk
@@ -148,18 +149,6 @@ def test_smooth_step_rests_at_both_ends() -> None:
     assert math.isclose(1.0 - steps[4], 1e-8, rel_tol=2e-3)
 
 
-@pytest.mark.parametrize("points", [(), (0.1, 0.2), (0.1, 0.2, 0.3, 0.1)])
-def test_points_that_are_no_triples_and_a_recorded_path_without_a_recording_are_refused(
-    points: tuple[float, ...],
-) -> None:
-    with pytest.raises(ParameterError) as error:
-        build(OperatorParameters, {"kind": "points", "points": points})
-    assert (error.value.name, error.value.value) == ("operator.points", points)
-    with pytest.raises(ParameterError) as error:
-        build(OperatorParameters, {"kind": "bag"})
-    assert error.value.name == "operator.bag"
-
-
 # Own operators.
 
 
@@ -183,26 +172,6 @@ def test_given_samples_are_followed_linearly_and_their_buttons_held(columns: int
     assert np.array_equal(rest, rows[[0, -1]])
     rows[:] = 0.0  # what their owner does with the arrays is no matter
     assert np.array_equal(motion(np.array([-1.0, 99.0])), rest)
-
-
-BAD_SAMPLES = {
-    "no samples": (np.zeros(0), np.zeros((0, 3)), "not (0,), (0, 3)"),
-    "rows of another number": (np.arange(3), np.zeros((2, 3)), "not (3,), (2, 3)"),
-    "a single row": (np.arange(3), np.zeros(3), "not (3,), (3,)"),
-    "four columns": (np.arange(3), np.zeros((3, 4)), "it has 4"),
-    "a number that is none": (np.arange(2), np.array([[0, 0, 0], [0, np.nan, 0]]), "row 1"),
-    "a time that is none": (np.array([0.0, np.nan]), np.zeros((2, 3)), "row 1"),
-    "times that stand still": (np.array([0.0, 1.0, 1.0]), np.zeros((3, 3)), "row 2"),
-}
-
-
-@pytest.mark.parametrize("case", BAD_SAMPLES)
-def test_samples_that_are_no_motion_are_refused(case: str) -> None:
-    times, rows, expected = BAD_SAMPLES[case]
-    with pytest.raises(PartError) as error:
-        following("mine", times, rows)
-    assert (error.value.kind, error.value.name) == ("operator", "mine")
-    assert expected in error.value.expected
 
 
 def master_of(name: str, **values: float | tuple[float, float, float]) -> HeldMaster:
@@ -271,47 +240,40 @@ def test_own_operator_is_made_with_its_parameters_the_seed_and_its_phases(own_pa
     assert made == [(0.02, 1, PHASES)]
 
 
-BAD_MOTIONS = {
-    "takes no times": (lambda: np.zeros((1, 3)), "TypeError"),
-    "has four columns": (lambda times: np.zeros((len(times), 4)), "not (1000, 4)"),
-    "answers one row": (lambda times: np.zeros(3), "not (3,)"),
-    "answers no number": (lambda times: np.full((len(times), 3), np.nan), "at 0.001 s"),
-    "answers words": (lambda times: "up", "numbers"),
-    "raises": (lambda times: {}["up"], "KeyError"),  # type: ignore[index]
+def stepped(operator: Any) -> None:
+    register_operator("mine", operator)
+    master_of("mine").step()
+
+
+def put_together(**parts: Any) -> None:
+    stepped(Operator("mine", **{"make": lambda parameters, setting: motion_of("hold", 1), **parts}))
+
+
+WRONG: dict[str, tuple[Callable[[], object], str]] = {
+    "no samples": (partial(following, "mine", np.zeros(0), np.zeros((0, 3))), "not (0,), (0, 3)"),
+    "rows of another number": (partial(following, "mine", np.arange(3), np.zeros((2, 3))), "not (3,), (2, 3)"),
+    "a single row": (partial(following, "mine", np.arange(3), np.zeros(3)), "not (3,), (3,)"),
+    "four columns": (partial(following, "mine", np.arange(3), np.zeros((3, 4))), "it has 4"),
+    "a number that is none": (partial(following, "mine", np.arange(2), np.array([[0, 0, 0], [0, np.nan, 0]])), "row 1"),
+    "a time that is none": (partial(following, "mine", np.array([0.0, np.nan]), np.zeros((2, 3))), "row 1"),
+    "times that stand still": (partial(following, "mine", np.array([0.0, 1.0, 1.0]), np.zeros((3, 3))), "row 2"),
+    "takes no times": (partial(stepped, lambda: np.zeros((1, 3))), "TypeError"),
+    "has four columns": (partial(stepped, lambda times: np.zeros((len(times), 4))), "not (1000, 4)"),
+    "answers one row": (partial(stepped, lambda times: np.zeros(3)), "not (3,)"),
+    "answers no number": (partial(stepped, lambda times: np.full((len(times), 3), np.nan)), "at 0.001 s"),
+    "answers words": (partial(stepped, lambda times: "up"), "numbers"),
+    "raises": (partial(stepped, lambda times: {}["up"]), "KeyError"),  # type: ignore[index]
+    "is made by a number": (partial(put_together, make=5), "make can be called"),
+    "is made of too little": (partial(put_together, make=lambda parameters: None), "make(parameters, setting)"),
+    "is asked for no tick": (partial(put_together, ahead=0), ">= 1 tick"),
+    "has parameters of no dataclass": (partial(put_together, parameters=dict), "dataclass"),
 }
 
 
-@pytest.mark.parametrize("case", BAD_MOTIONS)
-def test_operator_who_answers_wrongly_is_refused_before_the_first_tick(own_parts: None, case: str) -> None:
-    motion: Any
-    motion, expected = BAD_MOTIONS[case]
-    register_operator("mine", motion)
-    master = master_of("mine")
+@pytest.mark.parametrize("case", WRONG)
+def test_operator_who_is_wrong_is_refused_before_the_first_tick(own_parts: None, case: str) -> None:
+    make, expected = WRONG[case]
     with pytest.raises(PartError) as error:
-        master.step()
+        make()
     assert (error.value.kind, error.value.name) == ("operator", "mine")
-    assert expected in error.value.expected
-    assert master.signals["master_measured_cv"].any() is np.False_
-
-
-def tried(operator: Operator) -> None:
-    register_operator("mine", operator)
-    master_of("mine")  # which calls make
-
-
-@pytest.mark.parametrize(
-    ("values", "expected"),
-    [
-        ({"make": 5}, "make can be called"),
-        ({"make": lambda parameters: None}, "make(parameters, setting)"),
-        ({"ahead": 0}, ">= 1 tick"),
-        ({"parameters": dict}, "dataclass"),
-    ],
-)
-def test_operator_that_is_put_together_wrongly_is_refused(
-    own_parts: None, values: Mapping[str, object], expected: str
-) -> None:
-    parts: Any = {"make": lambda parameters, setting: motion_of("hold", 1)}
-    with pytest.raises(PartError) as error:
-        tried(Operator("mine", **{**parts, **values}))
     assert expected in error.value.expected

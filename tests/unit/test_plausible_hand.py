@@ -45,34 +45,17 @@ def moved(pose: Array, by: list[float]) -> Array:
     return np.array([*(pose[:3] + np.asarray(by)), *pose[3:]])
 
 
-def test_a_hand_that_moves_moves_the_command() -> None:
-    hand = Hand()
+@pytest.mark.parametrize(("period", "gap"), [(10, 10), *((1, gap) for gap in (1, 25, 40, 60, 90))])
+def test_a_teleport_moves_nothing_and_the_hand_is_followed_from_there(period: int, gap: int) -> None:
+    hand = Hand(period * TICK_NS)
     before = hand.rest()
-    for k in range(100):
-        after = hand.give(moved(REST, [2e-4 * k, 0.0, 0.0]))
-    assert np.linalg.norm(after[:3] - before[:3]) == pytest.approx(99 * 2e-4, rel=1e-9)
-
-
-@pytest.mark.parametrize("period_ns", [TICK_NS, 10 * TICK_NS])
-def test_a_teleport_moves_nothing_and_the_hand_is_followed_from_there(period_ns: int) -> None:
-    hand = Hand(period_ns)
-    before = hand.rest()
+    hand.now_ns += (gap - period) * TICK_NS
     there = moved(REST, [0.1, 0.0, 0.0])
     assert np.array_equal(hand.give(there), before)
     assert np.allclose(hand.rest(pose=there), before, rtol=0, atol=1e-15)
     for k in range(20):
         after = hand.give(moved(there, [0.0, 2e-4 * k, 0.0]))
     assert np.linalg.norm(after[:3] - before[:3]) == pytest.approx(19 * 2e-4, rel=1e-6)
-
-
-@pytest.mark.parametrize("gap", [1, 25, 40, 60, 90])
-def test_a_teleport_in_a_gap_of_the_samples_moves_nothing(gap: int) -> None:
-    hand = Hand()
-    before = hand.rest()
-    hand.now_ns += (gap - 1) * TICK_NS
-    there = moved(REST, [0.1, 0.0, 0.0])
-    assert np.array_equal(hand.give(there), before)
-    assert np.allclose(hand.rest(pose=there), before, rtol=0, atol=1e-15)
 
 
 @pytest.mark.parametrize(("period", "gap"), [(1, 40), (50, 50), (50, 90)])

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 import teleop_core as tc
 from led_tip import PIECES, along_z, lead, wandering
 from present import present
-from teleop_core.base.errors import ParameterError
 from teleop_core.session.configuration import configure
 from teleop_core.session.virtual import VirtualTime
 
@@ -226,12 +225,3 @@ def test_without_a_puncture_force_nothing_of_a_needle_changes_a_bit() -> None:
     assert plain["slave_true_cf"].any()
     for name in present(plain.dtype.names):
         np.testing.assert_array_equal(plain[name], other[name])
-
-
-@pytest.mark.parametrize(
-    "setting", ["puncture_force=-0.1", "cutting_force=-1.0", "shaft_friction=nan", "hole_radius=0.0"]
-)
-def test_numbers_that_no_needle_has_are_refused_by_name(setting: str) -> None:
-    with pytest.raises(ParameterError, match=setting.partition("=")[0]) as error:
-        configure("puncture", settings=[f"world.{setting}"])
-    assert "\n" not in str(error.value)

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from present import present
-from teleop_core.base import ShapeError, UnknownNameError, specs
+from teleop_core.base import specs
 from teleop_core.coupling.mapping.plausibility import PlausibilityParameters
 from teleop_core.hand.master.operator import RunningOperator
 from teleop_core.hand.operators.remote import AHEAD, RemoteHand, RemoteParameters
@@ -21,7 +21,6 @@ from teleop_core.session.configuration import configure
 
 DT = 1e-3
 REST = rest_pose()
-LARGE = np.array([-1.0, -1.0, -1.0]), np.array([1.0, 1.0, 1.0])
 coordinate = st.floats(-0.3, 0.3)
 place = st.tuples(coordinate, coordinate, coordinate)
 
@@ -151,16 +150,6 @@ def test_silence_presses_the_clutch_in_time_and_brings_the_stylus_to_rest() -> N
     assert np.abs(np.diff(velocity)).max() / DT <= RemoteParameters().acceleration * (1.0 + 1e-6)
 
 
-def test_the_next_pose_is_a_new_grip_that_releases_the_clutch_and_does_not_move() -> None:
-    run = Run()
-    run.for_time(0.5, lambda t: pose([0.02 * t, 0.0, 0.0]))
-    run.for_time(1.0)
-    there, count = run.way[-1].copy(), len(run.way)
-    run.for_time(0.2, lambda t: pose([-0.1, 0.1, 0.05], [0.0, 1.0, 0.0]))
-    assert np.abs(run.way[count:] - there).max() < 1e-9
-    assert (run.rows[count:, 6] == 0.0).all()
-
-
 def test_letting_go_is_at_once_and_the_next_pose_is_a_new_grip_however_soon_it_comes() -> None:
     run = Run()
     run.for_time(0.5, lambda t: pose())
@@ -253,23 +242,6 @@ def test_a_pressed_clutch_leaves_the_stylus_to_the_hand() -> None:
     assert run.way[-1, 0] > 5e-3
     run.hand.press("clutch", is_pressed=False)
     assert run.for_time(0.02)[-1, 6] == 0.0
-
-
-def test_a_button_that_there_is_not_and_a_pose_of_another_shape_are_errors() -> None:
-    with pytest.raises(UnknownNameError, match="clutch, fixture, mode"):
-        RemoteHand().press("gripper")
-    with pytest.raises(ShapeError, match=r"pose must have shape \(7,\), has \(2, 7\)"):
-        RemoteHand().want(np.zeros((2, 7)))
-
-
-def test_a_hand_that_wants_too_far_waits_at_the_end_of_the_workspace_and_comes_back() -> None:
-    low, high = REST[:3] - 0.05, REST[:3] + 0.01
-    run = Run(RemoteHand(RemoteParameters(), room=(low, high)))
-    run.for_time(0.1, lambda t: pose())
-    run.for_time(1.0, lambda t: pose([0.2, -0.2, 0.0]))
-    np.testing.assert_allclose(run.way[-1], [0.01, -0.05, 0.0], atol=1e-6)
-    run.for_time(1.0, lambda t: pose([0.005, 0.0, 0.0]))
-    np.testing.assert_allclose(run.way[-1], [0.005, 0.0, 0.0], atol=1e-6)
 
 
 def test_poses_may_come_from_another_thread() -> None:

@@ -38,15 +38,6 @@ def test_model_of_the_arm_is_its_closed_form(q: Array, dq: Array) -> None:
     assert np.allclose(bias[:3], h + c[:3], rtol=ROUNDING, atol=ROUNDING)
 
 
-@given(angles, angles, angles)
-def test_model_and_forward_dynamics_undo_each_other(q: Array, dq: Array, wanted: Array) -> None:
-    q[2] = 0.35 + 0.01 * q[2]
-    bias, inertia = model(q, dq)
-    found = np.empty(6)
-    rcrt1_dynamics.DYNAMICS.acceleration(q, dq, inertia @ wanted + bias, ROW, found)
-    assert np.allclose(found, wanted, rtol=1e-7, atol=1e-7)
-
-
 @given(st.integers(1, 9), st.integers(0, 2**32 - 1))
 def test_inverse_of_a_positive_definite_matrix_is_that_of_lapack(n: int, seed: int) -> None:
     root = np.random.default_rng(seed).normal(size=(n, n))

@@ -9,10 +9,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from present import present
-from teleop_core.base.errors import ParameterError, UnknownNameError
 from teleop_core.kernels.geometry import Array, rotation, transform
 from teleop_core.robots import IkStatus, load_robot
-from ways import followed
+from ways import followed, turned
 
 # The source prints centimetres with four decimals; its inputs are rounded likewise, and near the
 # stretched arm that becomes 2e-4 degrees.
@@ -23,22 +22,16 @@ PAIRS = {"sigma_b": math.radians(15.0), "sigma_m": math.radians(15.0)}
 ROBOTS: Sequence[dict[str, Any]] = [{}, {"heading": "carried"}, PAIRS, {**PAIRS, "heading": "carried"}]
 
 
-def attitude(alpha: float, beta: float, gamma: float) -> Array:
-    """The source's product Rx Ry Rz, angles in degrees."""
-    a, b, c = np.radians([alpha, beta, gamma])
-    return rotation("x", a) @ rotation("y", b) @ rotation("z", c)
-
-
 def poses(rng: np.random.Generator, count: int, tilt: float = 40.0) -> Iterator[Array]:
     """Poses with the SCARA inside its ring, platform turned up to ``tilt`` about each axis."""
     for _ in range(count):
-        R = attitude(*rng.uniform(-tilt, tilt, 3))
+        R = turned(*rng.uniform(-tilt, tilt, 3))
         radius, angle = rng.uniform(0.1, 0.95), rng.uniform(-1.5, 1.5)
         s = np.array([radius * math.cos(angle), radius * math.sin(angle), rng.uniform(0.05, 0.45)])
         yield transform(R, s + [0.0, 0.0, 0.2] + 0.1 * R[:, 2])
 
 
-EXAMPLE = transform(attitude(30.0, 0.0, 0.0), np.array([0.933013, 0.20, 0.436603]))
+EXAMPLE = transform(turned(30.0, 0.0, 0.0), np.array([0.933013, 0.20, 0.436603]))
 EXAMPLE_LEGS = [0.223607, 0.267095, 0.267095, 0.223607, 0.191569, 0.191569]
 
 
@@ -50,17 +43,7 @@ def test_published_example_has_the_published_legs_joints_and_tip() -> None:
 
     T = load_robot("scara_stewart").fk([0.0, math.radians(30.0), 0.15, *q[3:]])
     assert np.allclose(T[:3, 3], [0.933013, 0.20, 0.436603], atol=PRINTED_M)
-    assert np.allclose(T[:3, :3], attitude(30.0, 0.0, 0.0), atol=SOLVED)
-
-
-@pytest.mark.parametrize("options", ROBOTS)
-def test_forward_of_inverse_is_the_pose_for_both_elbows(options: Mapping[str, str | float]) -> None:
-    robot, rng = load_robot("scara_stewart", **options), np.random.default_rng(1)
-    for T in poses(rng, 500):
-        solutions = robot.ik_all(T)
-        assert len(solutions) == 2
-        for q in solutions:
-            assert np.allclose(robot.fk(q), T, atol=SOLVED)
+    assert np.allclose(T[:3, :3], turned(30.0, 0.0, 0.0), atol=SOLVED)
 
 
 @pytest.mark.parametrize("options", ROBOTS)
@@ -93,7 +76,7 @@ def test_a_general_scara_with_unequal_links_and_a_raised_base() -> None:
 
 def test_out_of_the_ring_is_unreachable_and_finite() -> None:
     robot = load_robot("scara_stewart")
-    R = attitude(20.0, 0.0, 0.0)
+    R = turned(20.0, 0.0, 0.0)
     T = transform(R, np.array([1.3, 0.0, 0.4]) + 0.1 * R[:, 2])
     result = robot.ik(T)
     assert result.status == IkStatus.UNREACHABLE
@@ -109,7 +92,7 @@ def test_out_of_the_ring_is_unreachable_and_finite() -> None:
 def test_a_platform_tilted_too_far_is_limited_to_the_nearest_tilt() -> None:
     robot = load_robot("scara_stewart")
     for alpha, missing in ((100.0, 25.0), (170.0, 95.0)):
-        R = attitude(alpha, 0.0, 0.0)
+        R = turned(alpha, 0.0, 0.0)
         T = transform(R, np.array([0.6, 0.0, 0.45]) + 0.1 * R[:, 2])
         result = robot.ik(T)
         assert result.status == IkStatus.LIMITED
@@ -135,7 +118,7 @@ def test_the_turn_of_the_published_layout_is_known_as_the_square_of_the_tilt() -
     robot = load_robot("scara_stewart")
     error = 1e-7  # of one leg [m]
     for alpha in (1.0, 5.0, 30.0):
-        R = attitude(alpha, 0.0, 0.0)
+        R = turned(alpha, 0.0, 0.0)
         q = robot.ik_all(transform(R, np.array([0.6, 0.0, 0.45])))[0]
         q[4] += error
         T = robot.fk(q)
@@ -161,7 +144,7 @@ def test_in_pairs_the_platform_shifts_with_a_leg_and_in_line_its_centre_is_held(
 @pytest.mark.parametrize("beside", [0.0, 1e-6, -1e-6, 0.02, -0.02])
 def test_a_path_over_the_axis_of_joint_one_goes_on_at_the_other_side(heading: str, beside: float) -> None:
     robot = load_robot("scara_stewart", heading=heading)
-    R = attitude(30.0, 0.0, 0.0)
+    R = turned(30.0, 0.0, 0.0)
     x = np.concatenate((np.linspace(0.4, -0.4, 4000), np.full(4000, -0.4)))
     path = np.array([transform(R, np.array([value, beside, 0.4]) + 0.1 * R[:, 2]) for value in x])
     start = robot.ik(path[0], seed=robot.home).q
@@ -176,7 +159,7 @@ def test_a_path_over_the_axis_of_joint_one_goes_on_at_the_other_side(heading: st
 @pytest.mark.parametrize("reach", [0.9999, 1.0, 1.05])
 def test_a_path_to_the_stretched_arm_and_back_keeps_its_elbow(heading: str, reach: float) -> None:
     robot = load_robot("scara_stewart", heading=heading)
-    R = attitude(0.0, 25.0, 0.0)
+    R = turned(0.0, 25.0, 0.0)
     x = 0.8 + (reach - 0.8) * np.sin(np.linspace(0.0, math.pi, 6000))
     way = np.array([math.cos(0.1), math.sin(0.1), 0.0])
     up = np.array([0.0, 0.0, 0.4])
@@ -196,7 +179,7 @@ def test_a_path_through_the_level_platform_goes_on(options: Mapping[str, str | f
     path = np.array(
         [
             transform(R, np.array([0.7, 0.0, 0.4]) + 0.1 * R[:, 2])
-            for R in (attitude(angle, 0.1 * angle, 5.0) for angle in angles)
+            for R in (turned(angle, 0.1 * angle, 5.0) for angle in angles)
         ]
     )
     start = robot.ik(path[0], seed=robot.home).q
@@ -210,22 +193,10 @@ def test_legs_that_are_held_back_slow_down_together() -> None:
     robot = load_robot("scara_stewart")
     start = robot.home
     T = robot.fk(start)
-    T[:3, :3] = T[:3, :3] @ attitude(-20.0, 10.0, 0.0)
+    T[:3, :3] = T[:3, :3] @ turned(-20.0, 10.0, 0.0)
     result = robot.follow(T[None], seed=start, dt=1e-3)
     wanted = robot.ik(T, seed=start).q - start
     moved = result.q[0] - start
     assert result.status[0] == IkStatus.LIMITED
     assert math.isclose(np.abs(moved[3:]).max(), present(robot.drives).speed_limit[3] * 1e-3)
     assert np.allclose(moved[3:] / wanted[3:], moved[3] / wanted[3])
-
-
-def test_bad_options_and_lengths_are_refused() -> None:
-    with pytest.raises(UnknownNameError) as refusal:
-        load_robot("scara_stewart", heading="floating")
-    assert refusal.value.alternatives == ("fixed", "carried")
-    for symbol in ("l1", "r_b", "w_z"):
-        with pytest.raises(ParameterError) as refused:
-            load_robot("scara_stewart", **{symbol: 0.0})
-        assert refused.value.name == symbol
-    with pytest.raises(ParameterError):
-        load_robot("scara_stewart", sigma_b=1.0)

@@ -21,7 +21,7 @@ from teleop_core.slave.controllers.pid import PID, THIRD, PidParameters, pid_con
 from teleop_core.slave.slave import ReferenceFilterParameters
 
 ROBOTS = {name: load_robot(name) for name in ("rcrt1", "scara", "puma560", "stewart", "rps3")}
-AXES = [(name, axis) for name, robot in ROBOTS.items() for axis in range(robot.n)]
+AXES = [("rcrt1", 0), ("rcrt1", 2), ("rcrt1", 5), ("scara", 2), ("puma560", 1), ("stewart", 0), ("rps3", 0)]
 # The tick and the rate filter delay by 2 ms, which splits the triple pole a little.
 SAMPLED = 1.5e-3
 

@@ -26,11 +26,8 @@ from teleop_core.shapes.basis.directions import ON_AXIS
 from teleop_core.shapes.capsule import CapsuleParameters
 from teleop_core.shapes.cone import ConeParameters
 from teleop_core.shapes.cylinder import CylinderParameters
-from teleop_core.shapes.half_space import HalfSpaceParameters
-from teleop_core.shapes.hole import HoleParameters
 from teleop_core.shapes.line import LineParameters
 from teleop_core.shapes.path import PathParameters
-from teleop_core.shapes.plane import PlaneParameters
 from teleop_core.shapes.sphere import SPHERE, SphereParameters, sphere_distance, sphere_outline
 
 # Sums and products of numbers below one.
@@ -181,31 +178,6 @@ def test_the_earlier_of_two_pieces_leads_where_both_are_equally_near() -> None:
 def test_a_piece_of_no_length_is_a_point_and_64_of_them_are_taken() -> None:
     p = PathParameters(points=(0.0, 0.0, 0.0) * 64, radius=0.0)
     assert found("path", p, np.array([0.0, 0.03, 0.0]))[0] == 0.03
-
-
-@pytest.mark.parametrize(
-    ("group", "name", "value"),
-    [
-        (CylinderParameters, "cylinder.direction", (0.0, 0.0, 0.0)),
-        (CapsuleParameters, "capsule.direction", (0.0, 0.0, 0.0)),
-        (LineParameters, "line.direction", (0.0, 1e-200, 0.0)),
-        (HalfSpaceParameters, "half_space.normal", (0.0, 0.0, 0.0)),
-        (PlaneParameters, "plane.normal", (0.0, 0.0, 0.0)),
-        (ConeParameters, "cone.axis", (0.0, 0.0, 0.0)),
-        (HoleParameters, "hole.axis", (0.0, 0.0, 0.0)),
-        (HoleParameters, "hole.chamfer", 0.03),
-        (HoleParameters, "hole.plate_radius", 0.0075),
-        (PathParameters, "path.points", ()),
-        (PathParameters, "path.points", (0.01, 0.0)),
-        (PathParameters, "path.points", (0.01, 0.0, 0.0) * 65),
-    ],
-)
-def test_numbers_that_do_not_fit_together_are_refused_by_name(
-    group: Any, name: str, value: float | tuple[float, ...]
-) -> None:
-    with pytest.raises(ParameterError) as error:
-        group(**{name.partition(".")[2]: value})
-    assert (error.value.name, error.value.value) == (name, value)
 
 
 DIGEST = """

@@ -144,21 +144,6 @@ def test_an_intersection_leads_into_all_parts_or_out_of_the_one_that_is_farthest
     assert left <= INSIDE or distance == max(distances)
 
 
-@given(st.tuples(*[st.floats(0.002, 0.1)] * 3), places)
-def test_six_walls_at_right_angles_are_a_box(size: tuple[float, ...], offset: Any) -> None:
-    walls = [
-        f"half_space normal={(side * np.eye(3)[axis]).tolist()} room={0.5 * size[axis]}"
-        for axis in range(3)
-        for side in (1.0, -1.0)
-    ]
-    distance, out = found("intersection", whole("intersection", walls), offset)
-    box = SHAPES.find("box").parameters(size=size)
-    wanted, way = found("box", box, offset)
-    assert math.isclose(distance, wanted, abs_tol=1e-15)
-    if distance > SHALLOW:
-        np.testing.assert_allclose(distance * out, wanted * way, rtol=0.0, atol=1e-14)
-
-
 def test_a_thin_wedge_leads_to_its_edge() -> None:
     """Two walls that meet at 20 degrees, and a place 10 mm beyond their edge."""
     angle = math.radians(10.0)

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from scipy.linalg import expm
 from scipy.signal import lfilter
 
+from led_slave import LedSlave
 from present import present
 from teleop_core.base import ParameterError, build
 from teleop_core.graph import DT, TICK_NS
@@ -31,7 +32,7 @@ COUNT = DRIVES.encoder_step
 # Well inside the limits and off the singularities.
 MIDDLE = np.array([0.1, 1.7, 0.36, 0.2, 0.5, 0.1])
 TIMEOUT_TICKS = 100
-JOINTS = range(6)
+JOINTS = (0, 2, 5)
 
 
 def pid(**values: tuple[float, ...]) -> slave_sim.ControllerParameters:
@@ -39,22 +40,11 @@ def pid(**values: tuple[float, ...]) -> slave_sim.ControllerParameters:
     return build(slave_sim.ControllerParameters, {f"pid.{name}": value for name, value in values.items()})
 
 
-class Bench:
-    """A slave and the ticks that its commands come in."""
+class Bench(LedSlave):
+    """A slave that begins at home."""
 
     def __init__(self, **values: Any) -> None:
-        self.slave = pair.SimulatedArm(pair.ArmParameters(**{"start": AT_HOME} | values))
-        self.row, self.now_ns = self.slave.signals, 0
-
-    def tick(self, command: Array | None = None, stamp_ns: int | None = None) -> commands.CommandStatus:
-        """One tick, with a command or without; returns the status."""
-        self.now_ns += TICK_NS
-        if command is not None:
-            self.row["slave_servo_jp"] = command
-            self.row["slave_servo_jp_ns"] = self.now_ns if stamp_ns is None else stamp_ns
-        self.row["now_ns"] = self.now_ns
-        self.slave.step()
-        return commands.CommandStatus(self.row["command_status"])
+        super().__init__(pair.SimulatedArm(pair.ArmParameters(**{"start": AT_HOME} | values)))
 
     def trace(self, command: Array | None, ticks: int) -> tuple[Array, Array]:
         """True joints (ticks, 6) and efforts (ticks, 6) under a constant command."""
@@ -73,10 +63,6 @@ class Bench:
     @property
     def joints(self) -> Array:
         return self.slave.simulated.arm.q.copy()
-
-    @property
-    def setpoint(self) -> Array:
-        return self.row["slave_setpoint_js"].copy()
 
 
 # Integration.
@@ -151,12 +137,6 @@ def test_step_through_the_filter_overshoots_by_less_than_a_count(joint: int, sig
     beyond = sign * (joints[:, joint] - goal[joint])
     assert beyond.max() <= COUNT[joint]
     assert abs(joints[-1, joint] - goal[joint]) <= COUNT[joint]
-
-
-def test_gravity_is_held_to_a_count_without_any_compensation() -> None:
-    bench = Bench(gravity_compensation="none")
-    bench.go_to(MIDDLE)
-    assert (np.abs(bench.joints - MIDDLE) <= COUNT).all()
 
 
 def test_compensation_keeps_axis_2_nearer_to_a_moving_setpoint() -> None:
@@ -366,8 +346,7 @@ def test_refused_commands_do_not_count_as_fresh_ones() -> None:
     assert bench.tick() is commands.CommandStatus.STALE
 
 
-@pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf, 1e300])
-@pytest.mark.parametrize("joint", JOINTS)
+@pytest.mark.parametrize(("joint", "bad"), [(0, math.nan), (2, math.inf), (4, -math.inf), (5, 1e300)])
 def test_command_that_is_no_number_is_refused_and_harms_nothing(joint: int, bad: float) -> None:
     bench = Bench()
     bench.tick(ARM.home)
@@ -418,13 +397,10 @@ def test_stamp_of_the_command_in_force_is_passed_on() -> None:
 # Repeating and retuning.
 
 
-def wander(bench: Bench, ticks: int = 800) -> NDArray[np.void]:
-    out = []
-    for k in range(ticks):
-        swing = np.sin(1e-3 * k * np.array([2, 3, 1, 5, 4, 6]))
-        bench.tick(ARM.home - 0.02 * DRIVES.speed_limit * (1.0 + swing) * min(1.0, k / 400))
-        out.append(bench.row.copy())
-    return np.array(out)
+def wander(bench: Bench) -> NDArray[np.void]:
+    ticks = np.arange(800)[:, None]
+    swing = np.sin(1e-3 * ticks * np.array([2, 3, 1, 5, 4, 6]))
+    return bench.along(ARM.home - 0.02 * DRIVES.speed_limit * (1.0 + swing) * np.minimum(1.0, ticks / 400))
 
 
 def test_the_same_commands_and_a_reset_repeat_the_motion_to_the_bit() -> None:
@@ -497,13 +473,15 @@ def test_gains_that_change_before_the_first_tick_count_from_the_begin(law: str) 
     assert changed.signals["slave_measured_js"].tolist() == made.signals["slave_measured_js"].tolist()
 
 
-@pytest.mark.parametrize("length", [1, 5, 7])
-@pytest.mark.parametrize(
-    "name", ["viscous", "coulomb", *(f"controller.pid.{k}" for k in ("bandwidth", "kp", "ki", "kd"))]
-)
-def test_list_of_another_length_than_the_joints_is_refused(name: str, length: int) -> None:
+LISTS = ("viscous", "coulomb", *(f"controller.pid.{name}" for name in ("kp", "ki", "kd")))
+LISTS += tuple(f"controller.{law}.{'kp' if law == 'source_pid' else 'bandwidth'}" for law in CONTROLLERS.names())
+
+
+@pytest.mark.parametrize("name", LISTS)
+def test_list_of_another_length_than_the_joints_is_refused(name: str) -> None:
+    law = {"controller.kind": name.split(".")[1]} if "controller" in name else {}
     with pytest.raises(ParameterError) as error:
-        pair.SimulatedArm(build(pair.ArmParameters, {name: (1.0,) * length}))
+        pair.SimulatedArm(build(pair.ArmParameters, {**law, name: (1.0,) * 5}))
     assert error.value.name == f"slave_sim.{name}"
 
 

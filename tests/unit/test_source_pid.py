@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from present import present
-from teleop_core.base import ParameterError, build
+from teleop_core.base import build
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots import load_robot
 from teleop_core.slave.controllers.source_pid import SOURCE_PID, SourcePidParameters, loaded_axes
@@ -60,8 +60,3 @@ def test_a_constant_error_without_integral_action_gives_a_constant_effort() -> N
         SOURCE_PID.control(table, memory, off, zero, zero, limit, DT, effort)
         found.append(effort.copy())
     assert np.allclose(found[1:], table[:, 0] * 0.01, rtol=1e-12)
-
-
-def test_lists_of_another_length_are_refused() -> None:
-    with pytest.raises(ParameterError, match=r"source_pid\.kp"):
-        gains(kp=(1.0, 2.0))

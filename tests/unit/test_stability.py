@@ -75,12 +75,6 @@ def test_the_boundary_that_is_found_lies_where_nothing_grows() -> None:
     assert growth(MEDIUM, 0.02, 0.97 * found) < 0.0 < growth(MEDIUM, 0.02, 1.03 * found)
 
 
-def test_a_heavier_hand_stands_a_late_spring_no_better_but_a_damped_one_does() -> None:
-    heavy, damped = Grip(0.5, 300.0, 12.0), Grip(0.25, 300.0, 24.0)
-    assert exact_boundary(heavy, 0.05) < exact_boundary(MEDIUM, 0.05)
-    assert exact_boundary(damped, 0.05) > exact_boundary(MEDIUM, 0.05)
-
-
 def test_force_throws_a_hand_above_its_boundary_but_not_with_a_tank_or_by_a_soft_spring() -> None:
     bench, force = Bench(), ("position_force", "none")
     calm = calm_speed(bench, MEDIUM)

@@ -16,6 +16,7 @@ KINDS: Any = {
     "hardware": {"plant": "hardware", "operator": "human"},
     "jointed handle": {"device.handle": "mma", "plant": "hardware"},
     "another robot": {"robot": "puma560"},
+    "network": {"teleop.stages": ["network", "tremor_filter"], "network.preset": "loss_50", "operator": "human"},
 }
 
 

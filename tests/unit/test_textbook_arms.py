@@ -11,7 +11,6 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from random_arms import table
-from teleop_core.base.errors import ParameterError
 from teleop_core.kernels.geometry import Array, rotation, transform
 from teleop_core.kinematics.closed_form.decomposition import SEARCH
 from teleop_core.robots import IkStatus, load_robot
@@ -36,16 +35,7 @@ def apart(a: Array, b: Array) -> Array:
     return off
 
 
-def test_only_lengths_of_links_that_are_none_make_an_arm_that_is_searched() -> None:
-    for name in NAMES:
-        assert "closed form" in load_robot(name).solution
-        symbol = next(iter(load_robot(name).geometry))
-        with pytest.raises(ParameterError, match="between -10 and 10 m"):
-            load_robot(name, **{symbol: 11.0})
-    assert load_robot("scara", a1=0.0).solution == SEARCH.text
-
-
-def test_slides_and_first_joints_that_do_not_fit_the_plane_are_searched() -> None:
+def test_slides_first_joints_and_links_that_do_not_fit_the_plane_are_searched() -> None:
     turns: list[dict[str, Any]] = [{"theta": "q"}, {"a": 0.4, "theta": "q"}, {"a": 0.3, "theta": "q"}]
     leaning = {"alpha": 30, "a": 0.1, "d": "q", "lower": 0, "upper": 1}
     for rows, task in (
@@ -54,6 +44,7 @@ def test_slides_and_first_joints_that_do_not_fit_the_plane_are_searched() -> Non
         (turns, ["x", "y", "z"]),
     ):
         assert table(rows, task=task).robot().solution == SEARCH.text
+    assert load_robot("scara", a1=0.0).solution == SEARCH.text
 
 
 # PUMA 560.
@@ -128,7 +119,7 @@ def swung(tilt: float, most: float, count: int) -> Array:
     return np.array([transform(turn, pose[:3, 3]) for turn in turns])
 
 
-@pytest.mark.parametrize("tilt", [0.0, 1e-12, 1e-9, 1e-6, 1e-4, 1e-3, 1e-2, -0.1])
+@pytest.mark.parametrize("tilt", [0.0, 1e-9, 1e-4, 1e-2, -0.1])
 def test_the_wrist_passes_through_and_beside_its_singularity_without_a_halt(tilt: float) -> None:
     path = swung(tilt, 0.4, 2000)
     result = followed(PUMA, path, PUMA.ik(path[0], PUMA.home).q)
@@ -147,22 +138,16 @@ def test_a_slow_path_through_the_straight_wrist_has_no_error_at_all() -> None:
     assert np.abs(np.diff(result.q, axis=0)).max() < 1e-3
 
 
-def test_a_joint_of_the_wrist_on_its_stop_costs_no_place() -> None:
-    start = np.array([10.0, -45.0, -45.0, 150.0, 45.0, 20.0]) * DEGREE
-    path = np.tile(start, (2000, 1))
-    path[:, 3] += np.linspace(0.0, 1.0, 2000)
-    result = PUMA.follow(PUMA.fk(path), start, DT)
-    assert result.q[-1, 3] == PUMA.upper[3]
-    assert result.residual[:, 0].max() < 1e-12
-
-
-@pytest.mark.parametrize("beyond", [1.001, 1.05, 1.4])
-def test_reaching_out_beyond_the_stretched_arm_and_back_keeps_the_elbow(beyond: float) -> None:
-    q = np.array([0.1, -0.5, -1.3, 0.2, 0.7, 0.1])
-    pose = PUMA.fk(q)
-    reach = math.hypot(A2 + math.hypot(A3, D4), D3)
-    far = pose[:3, 3] * beyond * reach / np.linalg.norm(pose[:3, 3])
-    result = followed(PUMA, out_and_back(pose, far), q)
+@pytest.mark.parametrize("beyond", [1.001, 1.4])
+@pytest.mark.parametrize("arm", [PUMA, FIVE], ids=["puma560", "five_axis"])
+def test_reaching_out_beyond_the_stretched_arm_and_back_keeps_the_elbow(arm: Any, beyond: float) -> None:
+    is_puma = arm is PUMA
+    q = np.array([0.1, -0.5, -1.3, 0.2, 0.7, 0.1] if is_puma else [0.2, -0.6, 1.0, -0.4, 0.3])
+    reach = math.hypot(A2 + math.hypot(A3, D4), D3) if is_puma else arm.geometry["a2"] + arm.geometry["a3"]
+    pose = arm.fk(q)
+    far, held = pose[:3, 3].copy(), 3 if is_puma else 2  # directions in which it reaches out
+    far[:held] *= beyond * reach / np.linalg.norm(far[:held])
+    result = followed(arm, out_and_back(pose, far), q)
     assert (result.status == IkStatus.UNREACHABLE).any()
     assert result.residual[-1].max() < 1e-9
 
@@ -357,13 +342,3 @@ def test_no_other_attitude_of_the_arm_is_nearer_than_the_one_it_takes() -> None:
         for a, b in rng.uniform(-1e-4, 1e-4, (20, 2)):
             assert best <= miss(a, b) + 1e-12
     assert count > 10
-
-
-@pytest.mark.parametrize("reach", [1.001, 1.2])
-def test_stretching_beyond_reach_and_back_ends_on_the_path(reach: float) -> None:
-    q = np.array([0.2, -0.6, 1.0, -0.4, 0.3])
-    pose = FIVE.fk(q)
-    far = pose[:3, 3].copy()
-    far[:2] *= reach * (FIVE.geometry["a2"] + FIVE.geometry["a3"]) / np.linalg.norm(far[:2])
-    result = followed(FIVE, out_and_back(pose, far), q)
-    assert result.residual[-1].max() < 1e-9

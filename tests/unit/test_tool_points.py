@@ -7,16 +7,14 @@ import numpy as np
 import pytest
 from numpy.typing import ArrayLike
 
-from free_tool import drag, fly
+from free_tool import after_a_tick, drag, fly
 from present import present
 from teleop_core.base.errors import ParameterError
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots import load_robot
-from teleop_core.robots.robot import Robot
 from teleop_core.session.configuration import configure
 from teleop_core.session.virtual import VirtualTime
 from teleop_core.shapes import box, hole
-from teleop_core.slave.slave_sim import SlaveSim
 
 STILL = np.zeros((1, 6))
 
@@ -83,17 +81,6 @@ def test_each_point_has_its_own_bristle() -> None:
     assert np.abs(felt[-1, :2]).max() < 0.01
     distances = np.abs(np.linspace(-half, half, 4))
     assert about_middle[2] == pytest.approx(-0.3 * 1.0 * distances.sum(), rel=1e-3)
-
-
-def after_a_tick(robot: Robot, texts: list[str]) -> tuple[Array, Array]:
-    """Speeds (n,) of an arm a tick after rest at its start, and what its tip felt there (6,)."""
-    zero = [0.0] * robot.n
-    settings = [f"robot={robot.name}", f"slave_sim.coulomb={zero}", *texts]
-    arm = SlaveSim(configure("free_motion", settings=settings).group("slave_sim"))
-    arm.arm.q[:] = arm.state["carried"] = robot.start
-    arm.signals["slave_setpoint_js"] = robot.start
-    arm.step()
-    return arm.arm.dq.copy(), arm.signals["slave_true_cf"].copy()
 
 
 @pytest.mark.parametrize("name", ["rcrt1", "puma560"])

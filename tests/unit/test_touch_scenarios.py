@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 import teleop_core as tc
-from present import present
 from teleop_core.kernels.geometry import Array
 
 WALL, BALL, RADIUS = 0.24, np.array((0.25, -0.2357, -0.105)), 0.03
@@ -81,24 +80,9 @@ def test_while_it_slides_the_push_is_even(session: tuple[str, tc.Recording, Arra
     assert low < sliding.min() < sliding.max() < high
 
 
-def test_the_surface_takes_energy(session: tuple[str, tc.Recording, Array, Array]) -> None:
-    _, _, force, place = session
-    power = np.einsum("ij,ij->i", 0.5 * (force[1:] + force[:-1]), np.diff(place, axis=0))
-    given_to_it = np.cumsum(power)
-    assert given_to_it[-1] < -1e-3
-    assert given_to_it.max() <= 1e-3 * np.abs(power).sum()
-
-
 def test_the_score_tells_the_touch(session: tuple[str, tc.Recording, Array, Array]) -> None:
     _, recording, force, _ = session
     score, size = recording.score(), np.linalg.norm(force, axis=1)
     assert score.value("touch.count") == 1
     assert score.value("touch.peak_n") == pytest.approx(size.max(), rel=1e-6)
     assert score.value("touch.share") == pytest.approx(np.mean(size > 0.0), abs=0.01)
-
-
-def test_it_is_replayed_to_the_bit(session: tuple[str, tc.Recording, Array, Array]) -> None:
-    _, recording, _, _ = session
-    again = tc.replay(present(recording.path))
-    for topic in ("slave/true_cf", "slave/true_cp"):
-        np.testing.assert_array_equal(again[topic].values, recording[topic].values)

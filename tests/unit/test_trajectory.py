@@ -3,11 +3,9 @@
 import math
 
 import numpy as np
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from teleop_core.base.errors import ParameterError, ShapeError
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots.arms.rcrt1_dynamics import DRIVES
 from teleop_core.slave.trajectory import cubic_move, shortest_move_time
@@ -66,26 +64,3 @@ def test_move_to_where_the_arm_is_takes_no_time_and_stays() -> None:
     assert move_time == 0.0
     assert np.array_equal(place, [here, here])
     assert not speed.any()
-
-
-@pytest.mark.parametrize("move_time", [0.0, -1.0, math.nan, math.inf])
-def test_impossible_move_time_is_refused(move_time: float) -> None:
-    with pytest.raises(ParameterError) as error:
-        cubic_move(np.zeros(2), np.ones(2), move_time, np.zeros(1))
-    assert error.value.name == "move_time"
-
-
-@pytest.mark.parametrize("limit", [0.0, -1.0, math.nan])
-def test_speed_limit_that_allows_no_motion_is_refused(limit: float) -> None:
-    with pytest.raises(ParameterError) as error:
-        shortest_move_time(np.zeros(2), np.ones(2), np.array([1.0, limit]))
-    assert error.value.name == "speed_limit"
-
-
-def test_vectors_of_different_lengths_are_refused() -> None:
-    with pytest.raises(ShapeError) as error:
-        cubic_move(np.zeros(2), np.zeros(3), 1.0, np.zeros(1))
-    assert (error.value.name, error.value.expected, error.value.received) == ("end", (2,), (3,))
-    with pytest.raises(ShapeError) as error:
-        shortest_move_time(np.zeros(2), np.ones(2), np.ones(3))
-    assert error.value.name == "speed_limit"

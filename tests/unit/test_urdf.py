@@ -62,17 +62,6 @@ def test_an_engine_places_every_link_where_the_body_is(name: str) -> None:
             assert found[link].rotation == pytest.approx(expected, abs=ROUNDING)
 
 
-@pytest.mark.parametrize("name", ["rcrt1", "puma560", "scara", "planar_3r", "five_axis"])
-def test_all_joints_of_a_serial_robot_are_real_with_its_limits(name: str) -> None:
-    robot = tc.load_robot(name)
-    model = pinocchio.buildModelFromXML(urdf_of(robot))
-    assert tuple(model.names)[1:] == robot.joint_names
-    assert model.lowerPositionLimit == pytest.approx(robot.lower, abs=0.0)
-    assert model.upperPositionLimit == pytest.approx(robot.upper, abs=0.0)
-    assert model.velocityLimit == pytest.approx(present(robot.drives).speed_limit, abs=0.0)
-    assert model.effortLimit == pytest.approx(present(robot.drives).effort_limit, abs=0.0)
-
-
 def test_a_robot_with_loops_keeps_the_joints_that_move_one_body() -> None:
     kinds = {}
     for name in ("mma", "three_finger_hand", "scara_stewart"):

@@ -1,11 +1,13 @@
 """Waves: energy on its way, networks that only lose it, and what a hand feels of the world."""
 
+from functools import partial
 from typing import Any
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from palpation import pressed
 from teleop_core.base import ParameterError
 from teleop_core.coupling.passivity.port import (
     DRIFT,
@@ -24,7 +26,7 @@ from teleop_core.coupling.passivity.port import (
 from teleop_core.coupling.passivity.wave import draw, wave_hand, wave_slave
 from teleop_core.graph import topics
 from teleop_core.kernels import Array, kernel
-from teleop_core.session import configuration, virtual
+from teleop_core.session import configuration
 
 DT, ARM, STEP = 1e-3, 0.05, 55e-6
 """Tick [s], lag of the arm [s], step of the device's reading [m]."""
@@ -224,17 +226,14 @@ def test_a_hand_at_rest_feels_the_force_of_the_tip_and_a_spring_of_impedance_ove
     assert -arm[-1, DRIFT + 2] == pytest.approx(behind, abs=0.03 * behind + 7e-4)
 
 
-def pressing(*texts: str, ticks: int = 12_000, scenario: str = "palpation") -> NDArray[np.void]:
-    """Signals of ``palpation`` with waves and both stages."""
-    stages = "teleop.stages=[network,passivity]"
-    settings = (
-        stages,
-        "feedback_timeout=1.0",
-        "reach_force.is_on=false",
-        "gimbal_noise=0.0",
-        "reflection.passivity=wave",
-    )
-    return virtual.VirtualTime(configuration.configure(scenario, settings=[*settings, *texts])).run(ticks)
+pressing = partial(
+    pressed,
+    "teleop.stages=[network,passivity]",
+    "feedback_timeout=1.0",
+    "reach_force.is_on=false",
+    "gimbal_noise=0.0",
+    "reflection.passivity=wave",
+)
 
 
 @pytest.mark.parametrize("direction", [(0.0, 0.0, 1.0), (0.6, 0.0, 0.8)])
@@ -269,8 +268,7 @@ def held_in_rounds(rows: NDArray[np.void]) -> Array:
     return held(hand, arm)[(hand[:, ROUND] == arm[:, ROUND]) & (hand[:, LAW] == arm[:, LAW])]
 
 
-@pytest.mark.parametrize("delay", [0.1, 0.35])
-@pytest.mark.parametrize("material", ["tissue", "steel"])
+@pytest.mark.parametrize(("material", "delay"), [("steel", 0.1), ("tissue", 0.35)])
 def test_palpation_stays_calm_over_200_and_700_ms(material: str, delay: float) -> None:
     rows = pressing(f"world.material={material}", *late(delay))
     place = rows["master_measured_cp"][5000:, :3]

@@ -1,21 +1,17 @@
 """World: the push of a contact, and its energy."""
 
-from typing import Any
-
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+import palpation
 import teleop_core as tc
+from free_tool import after_a_tick
 from present import present
 from teleop_core.base.errors import ParameterError
 from teleop_core.graph.topics import SLAVE_TRUE_CF
-from teleop_core.kernels.geometry import Array
 from teleop_core.robots import load_robot
 from teleop_core.session import configuration, virtual
-from teleop_core.slave.slave_sim import SlaveSim
 from teleop_core.slave.world.contents import MATERIALS
 
 BLOCK = [0.241, -0.236, -0.087]
@@ -24,8 +20,7 @@ BLOCK = [0.241, -0.236, -0.087]
 
 def pressed(*texts: str, ticks: int = 20_000, seconds: float = 12.0) -> NDArray[np.void]:
     """Signals of the scenario ``palpation`` from ``seconds`` on."""
-    session = virtual.VirtualTime(configuration.configure("palpation", settings=list(texts)))
-    return session.run(ticks)[round(1e3 * seconds) :]
+    return palpation.pressed(*texts, ticks=ticks)[round(1e3 * seconds) :]
 
 
 def test_the_push_is_stiffness_times_depth_where_the_tip_is_truly() -> None:
@@ -36,17 +31,6 @@ def test_the_push_is_stiffness_times_depth_where_the_tip_is_truly() -> None:
     np.testing.assert_allclose(push[:, 2], np.maximum(1000.0 * depth, 0.0), atol=1e-9)
     assert np.all(np.hypot(push[:, 0], push[:, 1]) <= 0.3 * push[:, 2] + 1e-9)
     assert not push[:, 3:].any()
-
-
-def after_a_tick(robot: tc.Robot, joints: Array, texts: list[str], plant: str = "ideal") -> tuple[Array, Array]:
-    """Speeds (n,) that an arm at rest has after a tick, and what its tip felt at its begin (3,)."""
-    zero = [0.0] * robot.n
-    settings = [f"robot={robot.name}", f"plant={plant}", f"slave_sim.coulomb={zero}", *texts]
-    arm = SlaveSim(configuration.configure("free_motion", settings=settings).group("slave_sim"))
-    arm.arm.q[:] = arm.state["link"] = arm.state["carried"] = joints
-    arm.signals["slave_setpoint_js"] = joints
-    arm.step()
-    return arm.arm.dq.copy(), arm.signals["slave_measured_cf"][:3].copy()
 
 
 @pytest.mark.parametrize("name", ["rcrt1", "puma560", "planar_3r", "rps3", "stewart"])
@@ -64,8 +48,9 @@ def test_every_arm_is_accelerated_by_the_transposed_jacobian_of_the_push(name: s
         "world.material=own",
         "world.stiffness=500.0",
     ]
-    free, _ = after_a_tick(robot, pressed, [])
-    pushed, force = after_a_tick(robot, pressed, texts)
+    free, _ = after_a_tick(robot, [], pressed)
+    pushed, felt = after_a_tick(robot, texts, pressed)
+    force = felt[:3]
     assert force @ way == pytest.approx(-0.4, rel=0.05)
     found = [np.zeros(robot.n), np.zeros(robot.n)]
     effort = robot.jacobian(pressed)[:3].T @ force
@@ -81,7 +66,7 @@ def test_the_plant_that_is_the_machine_feels_the_push_behind_its_gears() -> None
     center = (robot.fk(robot.start)[:3, 3] - [0.0, 0.0, 0.0155]).tolist()
     down = robot.start + 1e-3 * np.linalg.pinv(robot.jacobian(robot.start)[:3])[:, 2] * -2.0
     texts = ["world=box", f"world.place={center}"]
-    (free, _), (pushed, force) = (after_a_tick(robot, down, more, "hardware") for more in ([], texts))
+    (free, _), (pushed, force) = (after_a_tick(robot, more, down, "hardware") for more in ([], texts))
     assert force[2] > 0.05
     assert np.abs(pushed - free).max() > 1e-9
 
@@ -96,7 +81,7 @@ def test_a_surface_that_is_left_fast_does_not_pull() -> None:
     assert push[:, 2].min() == 0.0
 
 
-@pytest.mark.parametrize("material", MATERIALS)
+@pytest.mark.parametrize("material", ["tissue", "rubber", "steel"])
 def test_a_contact_gives_back_no_more_than_it_took(material: str) -> None:
     """Of the work of the push on the tip, from a moment without touch on."""
     top = -0.0801 + 4.0 / MATERIALS[material].stiffness  # pressed with some 4 N
@@ -160,34 +145,6 @@ def test_the_hand_feels_the_push_along_its_own_axes_and_no_more_than_asked() -> 
     np.testing.assert_allclose(force[:, :3], asked / np.maximum(length, 1.0), atol=1e-12)
 
 
-def swing(stiffness: float, delay: float, passivity: str = "none") -> float:
-    """Fastest that the hand gets [m/s] where it presses a block whose force comes late."""
-    texts = [
-        "world.material=own",
-        f"world.stiffness={stiffness}",
-        "world.damping=0.0",
-        "world.friction_coefficient=0.0",
-        "reflection.max_force=10.0",
-        "feedback_timeout=1.0",
-        f"reflection.passivity={passivity}",
-        f"delays=[slave/measured_cf@motion_scaling={delay}]",
-    ]
-    places = pressed(*texts)["master_measured_cp"][:, :3]
-    return np.linalg.norm(places[20:] - places[:-20], axis=1).max() / 0.02
-
-
-def test_late_force_of_something_stiff_throws_the_hand_and_that_of_tissue_never_does() -> None:
-    calm = swing(200.0, 0.001)
-    assert all(swing(200.0, delay) < 1.1 * calm for delay in (0.05, 0.1, 0.3))
-    assert all(swing(20_000.0, delay) > 3.0 * calm for delay in (0.02, 0.1))
-
-
-def test_a_tank_keeps_late_force_of_something_stiff_from_throwing_the_hand() -> None:
-    calm = swing(200.0, 0.001)
-    for stiffness in (1000.0, 20_000.0):
-        assert all(swing(stiffness, delay, "tank") < 2.0 * calm for delay in (0.001, 0.02, 0.1, 0.3))
-
-
 def test_with_a_tank_no_touch_gives_back_more_than_it_took_and_pressing_feels_the_same() -> None:
     """By the account that the device keeps of its true motion."""
     scores = {}
@@ -199,60 +156,6 @@ def test_with_a_tank_no_touch_gives_back_more_than_it_took_and_pressing_feels_th
     assert present(returned["tank"]) <= 1.02
     largest = {name: score.value("force_n.max") for name, score in scores.items()}
     assert largest["tank"] == pytest.approx(largest["none"], rel=0.05)
-
-
-@settings(max_examples=6, deadline=None, derandomize=True)
-@given(
-    stiffness=st.floats(100.0, 50_000.0),
-    delay=st.sampled_from([0.001, 0.02, 0.1, 0.35]),
-    gain=st.floats(0.3, 5.0),
-    kind=st.sampled_from(["line", "human", "circle"]),
-)
-def test_a_tank_is_passive_but_for_a_step_of_the_reading_whatever_is_touched(
-    stiffness: float, delay: float, gain: float, kind: str
-) -> None:
-    """By what the tank can know: forces that were asked for, and places that were read."""
-    rows = pressed(
-        "reflection.passivity=tank",
-        f"reflection.position_force.force_gain={gain}",
-        "world.damping=0.0",
-        "world.material=own",
-        f"world.stiffness={stiffness}",
-        "reach_force.is_on=false",
-        f"delays=[slave/measured_cf@motion_scaling={delay}]",
-        "feedback_timeout=1.0",
-        f"operator.kind={kind}",
-        seconds=3.0,
-    )
-    force: Any
-    force, place = rows["master_servo_cf"][:-1, :3], rows["master_measured_cp"][:, :3]
-    steps = np.diff(place, axis=0)
-    # On the hand, but for the 5 mN that an empty tank allows.
-    work = np.einsum("ij,ij->i", force, steps) - 0.005 * np.linalg.norm(steps, axis=1)
-    largest = total = 0.0
-    for step, pushes in zip(work.tolist(), force.any(axis=1).tolist(), strict=True):
-        total = total + step if pushes else 0.0
-        largest = max(largest, total)
-    # The largest force over one step of the reading, which nobody sees in between.
-    assert largest < 3.3 * 55e-6
-
-
-def test_force_that_falls_silent_fades_within_a_tenth_of_a_second() -> None:
-    session = virtual.VirtualTime(configuration.configure("palpation", settings=["feedback_timeout=0.05"]))
-    stage = session.stages["motion_scaling"]
-    row = stage.signals
-    session.run(15_800)
-    assert row["master_servo_cf"][1] > 0.5
-    heard, pose_ns = int(row["slave_measured_cf_ns"]), int(row["master_measured_cp_ns"])
-    pushes = []
-    for tick in range(1, 201):
-        row["master_measured_cp_ns"] = pose_ns + tick * 1_000_000
-        row["slave_measured_cf_ns"] = heard
-        stage.step()
-        pushes.append(row["master_servo_cf"][1])
-    steps = np.abs(np.diff(pushes))
-    assert pushes[-1] == 0.0
-    assert steps.max() < 0.02 * pushes[0]
 
 
 def test_an_object_that_is_seen_from_another_base_is_the_same_object() -> None:

@@ -1,7 +1,5 @@
 """Z-width: our device renders walls as stiff as the laws of sampled walls allow, and no stiffer."""
 
-import itertools
-
 import pytest
 
 from present import present
@@ -51,14 +49,6 @@ def test_what_misses_is_the_linear_law_with_a_damper(outcome: Outcome) -> None:
     missed = {(row.group, row.quantity) for row in outcome.rows if row.agrees is False}
     damped = "stable, linear law of Gil 2009, B = 5 N·s/m"
     assert missed == {(damped, f"force {late} ms later") for late in (1, 2, 3, 5, 10)}
-
-
-def test_more_delay_never_allows_a_stiffer_wall(outcome: Outcome) -> None:
-    for row in rows(outcome, "stable"):
-        same = [other for other in outcome.rows if other.group == row.group]
-        for soon, late in itertools.pairwise(same):
-            assert present(late.published) < present(soon.published)
-            assert present(late.predicted) < present(soon.predicted)
 
 
 @pytest.mark.parametrize("damping", zwidth.WALL_DAMPINGS)

@@ -1,0 +1,172 @@
+"""Impossible numbers: what no part can be made of is refused by the name of the number."""
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+import pytest
+
+from teleop_core.base import TeleopError, build
+from teleop_core.coupling.filters.tremor_filter import TremorFilterParameters
+from teleop_core.coupling.fixtures.remote_centre import RemoteCentreParameters
+from teleop_core.coupling.mapping.jaw_command import JawCommandParameters
+from teleop_core.hand.master.master_bridge import POSE_MESSAGES, MasterBridgeParameters
+from teleop_core.hand.operators.behaviour import ButtonParameters as HandButtons
+from teleop_core.hand.operators.behaviour import OperatorParameters
+from teleop_core.hand.operators.human import HumanParameters
+from teleop_core.hand.operators.remote import RemoteHand
+from teleop_core.hand.operators.tour import TourParameters
+from teleop_core.hand.tasks.insert import InsertParameters
+from teleop_core.kernels.geometry import checked_array
+from teleop_core.robots import load_robot
+from teleop_core.robots.arms.as_chain import true_chain
+from teleop_core.robots.drives import ENTRIES, Drives, independent_axes
+from teleop_core.robots.hardware import Hardware
+from teleop_core.robots.inertias import LinkInertia, check_possible
+from teleop_core.robots.link_errors import LinkErrors
+from teleop_core.shapes.capsule import CapsuleParameters
+from teleop_core.shapes.cone import ConeParameters
+from teleop_core.shapes.cylinder import CylinderParameters
+from teleop_core.shapes.half_space import HalfSpaceParameters
+from teleop_core.shapes.hole import HoleParameters
+from teleop_core.shapes.line import LineParameters
+from teleop_core.shapes.path import PathParameters
+from teleop_core.shapes.plane import PlaneParameters
+from teleop_core.slave.bridges.jaw_bridge import JawBridgeParameters
+from teleop_core.slave.bridges.names import JointMap
+from teleop_core.slave.jaw.jaw_sim import GripObjectParameters, PegParameters
+from teleop_core.slave.operation import OperationParameters
+from teleop_core.slave.slave import ReferenceFilterParameters
+from teleop_core.slave.trajectory import cubic_move, shortest_move_time
+from teleop_core.slave.world.button import ButtonParameters
+from teleop_lab.calibration import Measured, appendix_e, simulate
+from teleop_machines import mma_balance, mma_models, mobility
+from teleop_machines.three_finger_hand import Hand
+
+ZERO, Q = (0.0, 0.0, 0.0), np.zeros((3, 6))
+BOX = LinkInertia(name="box", mass=1.0, center=np.zeros(3), inertia=np.eye(3))
+
+
+def built(group: type[object]) -> Callable[..., object]:
+    """Values of a group of parameters, built as from a file."""
+    return lambda **values: build(group, values)
+
+
+operator, operation, lag = built(OperatorParameters), built(OperationParameters), built(ReferenceFilterParameters)
+
+
+def joints(**values: object) -> object:
+    return JointMap(("a", "b"), **values)  # type: ignore[arg-type]
+
+
+def drives(**values: object) -> object:
+    return Drives(**({name: [1.0] for name in ENTRIES} | values))  # type: ignore[arg-type]
+
+
+def hardware(**values: object) -> object:
+    zero = np.zeros(2)
+    given = {"coulomb": zero, "bias": zero, "wander": zero, "play": zero, "coupling": np.zeros((2, 2))}
+    return Hardware(**(given | values))  # type: ignore[arg-type]
+
+
+def band(**values: object) -> object:
+    return build(TremorFilterParameters, {"kind": "band_stop"} | {f"band_stop.{k}": v for k, v in values.items()})
+
+
+def of(make: Callable[..., object], *names: str, **values: object) -> list[tuple[Callable[..., object], str]]:
+    """Cases of what is made of all values and told by each name; by default one of each value, told by its own."""
+    if names:
+        return [(partial(make, **values), name) for name in names]
+    return [(partial(make, **{name: value}), name) for name, value in values.items()]
+
+
+CASES = [
+    # shapes
+    *of(CylinderParameters, direction=ZERO), *of(CapsuleParameters, direction=ZERO), *of(PlaneParameters, normal=ZERO),
+    *of(LineParameters, direction=(0.0, 1e-200, 0.0)), *of(ConeParameters, axis=ZERO), *of(HoleParameters, axis=ZERO),
+    *of(HalfSpaceParameters, normal=ZERO), *of(HoleParameters, chamfer=0.03, plate_radius=0.0075),
+    *of(PathParameters, points=()), *of(PathParameters, points=(0.01, 0.0)),
+    *of(PathParameters, points=(0.01, 0.0, 0.0) * 65),
+    *of(ButtonParameters, stroke=0.002, contact_force=1.1), *of(ButtonParameters, stroke=0.02),
+    # the hand
+    *of(HandButtons, clutch=(1.0,), fixture=(1.0, 1.05), mode=(2.0, 1.95)), *of(HandButtons, clutch=(2.0, 1.0)),
+    *of(HandButtons, clutch=(1.0, 2.0, 3.0), mode=(1.0, 1.1)), *of(HumanParameters, tolerance=0.05),
+    *of(operator, "points", kind="points", points=()), *of(operator, "points", kind="points", points=(0.1,) * 4),
+    *of(operator, "bag", kind="bag"), *of(TourParameters, points=(0.1, 0.2)), *of(InsertParameters, axis=ZERO),
+    *of(MasterBridgeParameters, device_axes=("+x", "+y", "-z"), stylus_axes=("+x", "+x", "+z"), handle="scara"),
+    *of(MasterBridgeParameters, "handle", pose_message=POSE_MESSAGES[-1]),
+    # between hand and slave
+    *of(RemoteCentreParameters, "least_depth", depth=0.01, least_depth=0.02), *of(band, "high", low=12.0, high=9.0),
+    *of(RemoteCentreParameters, place=(0.0, 1.0), shaft=ZERO), *of(JawCommandParameters, closed_angle=1.0),
+    # the slave
+    *of(operation, reported=("stop",)), *of(operation, reported=("heartbeat",)),
+    *(case for text in ("stop", "stop@", "stop@x", "go@1", "stop@-1", "stop@nan")
+      for case in of(operation, events=(text,))),
+    *(case for values in ({"gain": 0.2}, {"gain": 0.0}, {"pole": 20.0}, {"zero": 50.0}, {"zero": 0.0})
+      for case in of(lag, "zero", **values)),
+    *of(GripObjectParameters, place=(0.0, 1.0)), *of(GripObjectParameters, place=(0.0, 1.0, 0.0, 0.0, 2.0, 0.1)),
+    *of(GripObjectParameters, place=(0.0,) * 21), *of(PegParameters, place=(0.0, 1.0, 2.0)),
+    *of(PegParameters, place=(0.0, 1.0, 0.0, 1.002)), *of(JawBridgeParameters, scale=0.0),
+    *of(joints, "joints", renamed=["c=x"]), *of(joints, "joints", renamed=["a"]),
+    *of(joints, "joints", renamed=["a=b"]), *of(joints, signs=[1.0], offsets=[1.0], order=["a", "a"]),
+    *of(joints, signs=[1.0, 0.5]),
+    # robots and their plants
+    *of(drives, speed_limit=[0.0], viscous=[-1.0], inertia=[np.inf], bandwidth=[1.0, 1.0], assumed=("mass",)),
+    *of(hardware, coulomb=[-1.0, 0.0], play=[0.0], coupling=np.zeros((3, 3))),
+    *of(hardware, coupling=np.ones((2, 2)), links=LinkErrors.none(3)),
+    *of(hardware, "source", sources={"play": "somewhere"}), *of(hardware, "source", sources={"mass": "published: x"}),
+    *of(mma_balance.ShoulderSpring, rate=0.0, anchor=math.nan), *of(mma_balance.coil, wire=-1.0, rate=1e6),
+    *of(mma_balance.matching_rate, "deflection", torque_difference=0.1, deflection=0.0, lever=0.02),
+    *of(mobility.degrees_of_freedom, "links", links=0, joints=0, joint_freedoms=0),
+    *of(mobility.degrees_of_freedom, "joints", links=4, joints=2, joint_freedoms=2),
+    *of(mobility.degrees_of_freedom, "joint_freedoms", links=4, joints=4, joint_freedoms=3),
+    *of(mobility.degrees_of_freedom, "joint_freedoms", links=4, joints=4, joint_freedoms=25),
+    *of(mobility.degrees_of_freedom, "space", links=4, joints=4, joint_freedoms=4, space=4),
+    *of(mobility.independent_loops, "joints", links=5, joints=3),
+    *of(mobility.passive_joints, "freedoms", joints=3, freedoms=4),
+    # measurements
+    *of(Measured, "points", joints=Q), *of(Measured, "points", joints=Q, points=np.zeros((2, 3))),
+    *of(Measured, "origins", joints=Q, distances=np.zeros(3)), *of(Measured, "joints", joints=ZERO, points=Q[:, :3]),
+    *of(Measured, "labels", joints=Q, distances=np.zeros(3), origins=Q, labels=("x",)),
+    *of(Measured, "joints", joints=Q + np.nan, points=Q[:, :3]),
+    *((partial(simulate, load_robot("rcrt1"), **values), name) for name, values in (
+        ("link error", {"fit": ["d9"]}), ("choose", {"choose": "best"}), ("cnc", {"errors": ["milled"]}),
+        ("NAME=NUMBER", {"errors": ["d3=much"]}), ("noise", {"noise": -1e-3}), ("ruler", {"noise": "rule"}),
+        ("frame", {"noise": "ruler", "finds_frame": True}))),
+    (lambda: simulate(load_robot("stewart")), "chain of links"),
+    (lambda: appendix_e.published(load_robot("scara")), "appendix E measured the rcrt1"),
+    # values that come in arrays or by name
+    *((partial(checked_array, "q", np.zeros(shape), (3,)), "^q must have") for shape in ((2,), (2, 2, 3), (3, 1))),
+    *((partial(checked_array, "q", [0.0, bad, 0.0], (3,)), "^q is.*finite") for bad in (math.nan, math.inf, -math.inf)),
+    *((partial(cubic_move, np.zeros(2), np.ones(2), t, np.zeros(1)), "^move_time") for t in (0.0, -1.0, math.nan)),
+    *((partial(shortest_move_time, np.zeros(2), np.ones(2), np.array([1.0, most])), "^speed_limit")
+      for most in (0.0, -1.0, math.nan)),
+    (partial(cubic_move, np.zeros(2), np.zeros(3), 1.0, np.zeros(1)), "end"),
+    (partial(LinkErrors, a=np.zeros(2), alpha=np.zeros(3), d=np.zeros(2), theta=np.zeros(2)), "^alpha"),
+    (lambda: LinkErrors.of(load_robot("rcrt1"), {"d7": 0.1}), "link error is 'd7'.*d6"),
+    (lambda: LinkErrors.of(load_robot("rcrt1"), {"d3": math.inf}), "^link error d3"),
+    (lambda: true_chain(load_robot("rcrt1"), LinkErrors.none(5)), "^errors is.*for 6"),
+    *of(partial(replace, BOX), "center of link 'box' must have", center=np.zeros(2)),
+    *of(partial(replace, BOX), "mass of link 'box'", mass=np.inf),
+    *of(partial(replace, BOX), "inertia of link 'box'.*finite", inertia=np.diag([1.0, 1.0, np.nan])),
+    *of(partial(replace, BOX), "symmetric", inertia=np.eye(3) + 0.1 * np.eye(3, k=1)),
+    *((partial(check_possible, [replace(BOX, mass=mass)]), f"^mass of link 'box' is {mass}") for mass in (0.0, -1.0)),
+    *((partial(independent_axes, np.array([1.0, inertia])), "^inertia") for inertia in (0.0, -0.1, np.nan)),
+    (partial(mma_models.joints_of_model, np.zeros((2, 7)), "B"), "^q must have"),
+    (partial(mma_models.joints_of_model, np.zeros(7), "D"), "^model is 'D'"),
+    (partial(mma_models.model_table, "D", {}), "^model is 'D'"),
+    (partial(Hand({}).finger_solutions, 4, np.zeros(3)), "finger"),
+    (partial(Hand({}).contact_points, np.zeros(8)), "^q "),
+    (partial(Hand({}).object_pose, np.zeros((3, 3))), "points"), (partial(Hand({}).contacts_of, np.zeros((4, 4))), "T"),
+    (partial(RemoteHand().press, "gripper"), "clutch, fixture, mode"),
+    (partial(RemoteHand().want, np.zeros((2, 7))), r"pose must have shape \(7,\), has \(2, 7\)"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("make", "name"), CASES)
+def test_what_no_part_can_be_made_of_is_refused_by_name_in_one_line(make: Callable[[], object], name: str) -> None:
+    with pytest.raises(TeleopError, match=name) as refused:
+        make()
+    assert "\n" not in str(refused.value)
