@@ -5,8 +5,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from teleop_core.base import NoParameters, ParameterError, PartError, TeleopError, UnknownNameError
-from teleop_core.graph import BUILT_IN, STAGES, Graph, Stage, build_graph, register_stage, topics
+from teleop_core.base import NoParameters, ParameterError, PartError, UnknownNameError
+from teleop_core.graph import BUILT_IN, STAGES, Graph, Stage, build_graph, topics
 from teleop_core.graph.graph import Delay
 from teleop_core.graph.topics import SLAVE_MEASURED_CP, SLAVE_SERVO_CP, Kind, Topic, in_force, passed_on
 from teleop_core.session.configuration import configure
@@ -251,23 +251,6 @@ def test_unknown_stage_and_parameters_that_are_no_dataclass_are_refused() -> Non
     with pytest.raises(UnknownNameError) as error:
         build_graph(stages=["limiter"])
     assert set(BUILT_IN) <= set(error.value.alternatives)
-
-
-@pytest.mark.parametrize(
-    "setting",
-    [
-        "teleop.stages=[reader]",
-        "teleop.stages=[slave_sim]",
-        "teleop.stages=[recorder]",
-        "teleop.arms=[left, left]",
-        "teleop.delays=[nothing=0.1]",
-    ],
-)
-def test_wrong_graph_is_refused_by_the_configuration_in_one_line(own_parts: None, setting: str) -> None:
-    register_stage(stage("reader", (UNWRITTEN,), ()))
-    with pytest.raises(TeleopError) as error:
-        configure(settings=[setting])
-    assert "\n" not in str(error.value)
 
 
 # Axis maps are checked with the parameters.

@@ -513,19 +513,6 @@ def test_nan_and_strange_quaternions_are_left_out_and_counted(tmp_path: Path) ->
     assert any("orientation" in text for text in report.warnings)
 
 
-@pytest.mark.parametrize("name", ["bag", "bag.bag", "bag.mcap", "bag.db3"])
-def test_what_is_no_recording_is_told_in_one_line(name: str, tmp_path: Path) -> None:
-    path = tmp_path / name
-    if path.suffix:
-        path.write_bytes(b"nothing of the kind" * 10)
-    else:
-        path.mkdir()
-    with pytest.raises(tc.RecordingError) as error:
-        teleop_exchange.import_recording(path, tmp_path / "out")
-    assert "\n" not in str(error.value)
-    assert not (tmp_path / "out").exists()
-
-
 def test_an_entry_that_a_recording_lacks_is_named(tmp_path: Path) -> None:
     (file,) = write2(tmp_path / "bag", poses(), StoragePlugin.SQLITE3).glob("*.db3")
     with sqlite3.connect(file) as storage:
