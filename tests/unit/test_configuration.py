@@ -100,8 +100,6 @@ def test_setting_of_another_form_is_refused(setting: str, told: str) -> None:
 @pytest.mark.parametrize(
     ("setting", "name"),
     [
-        ("duration=-1", "teleop.duration"),
-        ("duration=.nan", "teleop.duration"),
         ("duration=soon", "teleop.duration"),
         ("duration=", "teleop.duration"),
         ("seed=1.5", "operator.seed"),

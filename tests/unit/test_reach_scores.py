@@ -276,7 +276,7 @@ def test_asked_error_is_what_was_cut_off_since_the_last_clutch_stroke(path: Path
     assert np.allclose(error, (np.sqrt(np.mean(kept**2)), kept.max()), rtol=0, atol=EXACT_MM)
 
 
-@pytest.mark.parametrize("at", range(0, COUNT - 100, 700))
+@pytest.mark.parametrize("at", range(0, COUNT - 100, 2100))
 def test_no_sample_of_the_slave_is_left_out_of_the_asked_error(path: Path, at: int) -> None:
     session = Session()
     still = np.zeros(COUNT, bool)
