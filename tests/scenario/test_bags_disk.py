@@ -98,13 +98,6 @@ def test_a_full_disk_keeps_what_was_recorded_so_far(small_disk: str | None, tmp_
     assert_safe(path, result["told"])
 
 
-def test_a_file_that_may_not_grow_is_finished_within_its_limit(tmp_path: Path) -> None:
-    code, result = run_recorder(tmp_path / "bag", "none", 30, f"limit{LIMIT}")
-    assert code == 0
-    assert_safe(tmp_path / "bag", result["told"])
-    assert (tmp_path / "bag" / "bag_0.mcap").stat().st_size <= LIMIT
-
-
 def test_a_disk_without_any_room_leaves_nothing_behind(tmp_path: Path) -> None:
     code, result = run_recorder(tmp_path / "bag", "none", 1, "limit100")
     assert code == 0

@@ -15,7 +15,6 @@ from scipy.spatial.transform import Rotation
 from present import present
 from teleop_core.bags.reader import Bag
 from teleop_core.graph.topics import MASTER_MEASURED_CP, SLAVE_MEASURED_CP
-from teleop_core.hand.operators.rest import REST_POSITION
 
 if TYPE_CHECKING:
     from conftest import Run
@@ -123,22 +122,6 @@ def test_axes_with_a_minus_are_values_not_options(teleop_again: "Run", hand: Pat
             turn[row, "xyz".index(axis[-1])] = -1.0 if axis[0] == "-" else 1.0
         got = Bag(out).read(MASTER_MEASURED_CP).values[:, :3]
         assert np.allclose(got, 0.5 * PLACES @ turn.T, rtol=0, atol=1e-15)
-
-
-def test_a_session_follows_the_recording_for_as_long_as_it_is(
-    teleop_again: "Run", imported: Any, tmp_path: Path
-) -> None:
-    out, _ = imported
-    center = np.array([0.0, 0.01, 0.03])
-    settings = (f"operator.center={center.tolist()}", "operator.approach_time=1.0")
-    followed = tmp_path / "followed"
-    teleop_again("sim", "--out", followed, "--set", "operator=bag", f"operator.bag={out}", *settings)
-    series = Bag(followed).read(MASTER_MEASURED_CP)
-    end = REST_POSITION + center + PLACES[-1] - PLACES[0]
-    assert np.linalg.norm(series.values[-1, :3] - end) < 5e-3  # the hand lags behind
-    start = REST_POSITION + center
-    before = np.searchsorted(series.stamp_ns, series.stamp_ns[-1] - 9_966_000_000)
-    assert np.linalg.norm(series.values[before, :3] - start) < 5e-3
 
 
 @pytest.mark.parametrize(

@@ -53,12 +53,6 @@ def copies(p: Any, s: Any, row: Any, dt: float) -> None:
     row.test_answer[:] = row.slave_servo_cp
 
 
-def test_answer_that_nobody_reads_is_a_warning_with_the_way_out(own_parts: None) -> None:
-    told = "'own' writes test/answer, which no stage reads; replaces= would lead it to the"
-    with pytest.warns(UserWarning, match=told):
-        tc.run(duration=0.01, stages=stage(copies))
-
-
 FORGETFUL = """
 import teleop_core as tc
 from beside import NAME

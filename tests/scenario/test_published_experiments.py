@@ -1,7 +1,6 @@
 """Published experiments of the RCRT-1, repeated on the simulated system, beside their figures."""
 
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,7 +9,7 @@ from numpy.typing import NDArray
 from teleop_core.graph import STATE, TICK_NS, topics
 from teleop_core.kernels.geometry import Array, roll_pitch_yaw, rotations_from_quaternions
 from teleop_core.session.configuration import configure
-from teleop_core.session.runner import session_ticks, simulate
+from teleop_core.session.runner import session_ticks
 from teleop_core.session.virtual import VirtualTime
 from teleop_core.slave.commands import CommandStatus
 
@@ -127,11 +126,3 @@ def test_toggled_fixture_does_not_disturb_the_motion() -> None:  # case 31
     assert on["teleop_state"][:, STATE["is_fixture_on"]].any()
     for topic in ("slave_servo_jp", "slave_measured_js", "master_measured_cp"):
         assert np.array_equal(on[topic], off[topic]), topic
-
-
-def test_recorded_session_has_the_ticks_of_its_duration(tmp_path: Path) -> None:
-    configuration = configure("mode_switching", settings=["duration=2.5"])
-    ticks = simulate(configuration, tmp_path / "session")
-    lead = VirtualTime(configuration).lead  # the hand waits until the slave is where it starts
-    assert lead > 0
-    assert ticks == 2500 + lead

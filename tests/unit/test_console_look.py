@@ -117,8 +117,7 @@ def test_letters_of_the_stop_and_of_the_next_step_stand_out() -> None:
 def test_colors_of_the_page_stand_in_one_table() -> None:
     for file in Path(teleop_console.__path__[0]).glob("*.*"):
         if file.suffix in {".py", ".js"} and file.name != "look.py":
-            found = re.findall(r"#[0-9a-fA-F]{6}\b|rgba?\(|\(\d{2,3}, \d{1,3}, \d{2,3}\)", file.read_text())
-            assert not found, file.name
+            assert not COLOR.findall(file.read_text()), file.name
 
 
 def test_a_hand_that_rests_is_information_and_no_warning() -> None:
