@@ -14,6 +14,7 @@ import pytest
 import yaml
 from numba.core import event
 
+from one_line import COMPILING, one_line
 from present import present
 from teleop_core.bags.reader import Bag
 from teleop_core.bags.writer import BagWriter
@@ -23,8 +24,6 @@ from teleop_core.robots import load_robot
 
 if TYPE_CHECKING:
     from conftest import Run
-
-COMPILING = "compiling kernels"
 
 
 def lead() -> int:
@@ -39,14 +38,6 @@ def lead() -> int:
 
 # Of the recording: that move, and then twelve seconds of the hand.
 TICKS = lead() + 12_000
-
-
-def one_line(done: subprocess.CompletedProcess[str]) -> str:
-    """The only line on standard error, beside the one of compiling; nothing on standard output."""
-    assert done.stdout == ""
-    lines = [line for line in done.stderr.splitlines() if not line.startswith(COMPILING)]
-    assert len(lines) == 1, done.stderr
-    return lines[0]
 
 
 def test_sim_records_every_stream_at_1_khz(recording: Path) -> None:

@@ -1,6 +1,5 @@
 """A recording of others on its way through the commands: import, replay, follow, export."""
 
-import json
 import re
 import subprocess
 import sys
@@ -146,14 +145,3 @@ def test_mistakes_are_one_line_and_leave_nothing(
     assert len(lines) == 1, done.stderr
     assert text in lines[0]
     assert not list(tmp_path.iterdir())
-
-
-def test_a_data_set_of_several_recordings_is_made(teleop_again: "Run", imported: Any, tmp_path: Path) -> None:
-    _, text = imported
-    answer = next_command(text)[-1]
-    if not Bag(imported[0]).path.with_name("hand_replayed").exists():
-        teleop_again(*next_command(text))
-    said = teleop_again("export", answer, answer, "--out", tmp_path / "set", "--task", "draw")
-    assert "2 episodes" in said.stdout
-    info = json.loads((tmp_path / "set" / "meta" / "info.json").read_text())
-    assert info["robot_type"] == "rcrt1"

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from headless import Headless
+from one_line import one_line
 from teleop_lab import experiments
 from teleop_lab.experiments.bench import Bench
 from teleop_lab.experiments.outcome import Outcome
@@ -18,16 +19,6 @@ from teleop_lab.experiments.page import experiments_page
 
 if TYPE_CHECKING:
     from conftest import Run
-
-COMPILING = "compiling kernels"
-
-
-def one_line(done: subprocess.CompletedProcess[str]) -> str:
-    """The only line on standard error, beside the one of compiling; nothing on standard output."""
-    assert done.stdout == ""
-    lines = [line for line in done.stderr.splitlines() if not line.startswith(COMPILING)]
-    assert len(lines) == 1, done.stderr
-    return lines[0]
 
 
 def test_without_a_name_every_experiment_is_listed_in_a_line(teleop: "Run") -> None:

@@ -45,15 +45,13 @@ def test_poses_that_are_not_unit_or_not_finite_are_refused(peer: "Peer") -> None
     stamp = 0
 
     def refuse(key: str, pose: Callable[..., object] | list[Any]) -> None:
+        nonlocal stamp
+
         def refused() -> Any:
-            nonlocal stamp
-            stamp += MS
-            peer.send(topics.SLAVE_SETPOINT_JS, 0, HOME)
-            peer.send(topics.SLAVE_SERVO_CP, stamp, pose)
             status = peer.status("inverse_kinematics")
             return status and status.number(f"refused.slave/servo_cp.{key}") > 0
 
-        peer.wait(refused, key)
+        stamp = peer.feed(refused, key, {topics.SLAVE_SERVO_CP: pose}, {topics.SLAVE_SETPOINT_JS: HOME}, after=stamp)
 
     refuse("not_unit", [0.4, 0.0, -0.2, 0.9, 0.0, 0.0, 0.0])
     refuse("not_finite", [np.nan, 0.0, -0.2, 1.0, 0.0, 0.0, 0.0])
@@ -62,31 +60,19 @@ def test_poses_that_are_not_unit_or_not_finite_are_refused(peer: "Peer") -> None
 
 def drive(peer: "Peer", topic: Topic, wanted: Any, listener: "Listener", start: int = 0) -> int:
     """Send a value until the slave's setpoints carry its stamp; returns that stamp."""
-    stamp = start
-
-    def in_force() -> int | bool:
-        nonlocal stamp
-        stamp += MS
-        peer.send(topic, stamp, wanted)
-        return listener.take() and listener.stamps[-1] > start
-
-    peer.wait(in_force, "command in force")
-    return stamp
+    in_force = lambda: listener.take() and listener.stamps[-1] > start  # noqa: E731
+    return peer.feed(in_force, "command in force", {topic: wanted}, after=start)
 
 
 def test_slave_refuses_bad_commands_and_holds(peer: "Peer") -> None:
     setpoints = peer.listen(topics.SLAVE_SETPOINT_JS)
     peer.start("slave")
     wanted = HOME - 0.001 * np.eye(6)[0]
-    last = drive(peer, topics.SLAVE_SERVO_JP, wanted, setpoints)
 
-    def there() -> int | bool:
-        nonlocal last
-        last += MS
-        peer.send(topics.SLAVE_SERVO_JP, last, wanted)
-        return setpoints.take() and np.allclose(setpoints.values[-1], wanted, atol=1e-9)
+    def there() -> bool:
+        return bool(setpoints.take()) and np.allclose(setpoints.values[-1], wanted, atol=1e-9)
 
-    peer.wait(there, "rest")
+    last = peer.feed(there, "rest", {topics.SLAVE_SERVO_JP: wanted})
     setpoints.forget()
 
     def refuse(key: str, publish: Callable[..., object]) -> None:

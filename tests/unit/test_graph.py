@@ -117,13 +117,15 @@ def test_answer_like_its_input_that_nobody_reads_is_noted_unless_it_replaces_or_
 # Delays.
 
 
-def test_delay_is_on_all_links_of_its_topic_or_on_those_to_one_reader() -> None:
+def test_delay_is_on_all_links_of_its_topic_and_arm_or_on_those_to_one_reader() -> None:
     everywhere = Graph(BASE, delays=(Delay("slave/servo_cp", 0.02),))
     delayed = {link.reader.name for link in everywhere.links if link.delay}
     assert delayed == {"inverse_kinematics"}
     both = stage("watch", (SLAVE_SERVO_CP,), (LIMITED,))
     one = Graph((*BASE, both), delays=(Delay("slave/servo_cp", 0.02, "watch"),))
     assert [(link.reader.name, link.delay) for link in one.links if link.delay] == [("watch", 0.02)]
+    left = Graph(BASE, ("right", "left"), delays=(Delay("left/slave/servo_cp", 0.02),))
+    assert [link.reader.arm for link in left.links if link.delay] == ["left"]
 
 
 def test_delays_that_fit_one_link_add_up() -> None:

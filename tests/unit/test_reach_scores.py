@@ -1,6 +1,5 @@
 """Reach in scores: shares of time and asked errors are those of plain counts, in any windows."""
 
-import io
 from itertools import groupby
 from pathlib import Path
 from typing import Any
@@ -8,11 +7,10 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from rich.console import Console
 from scipy.spatial.transform import Rotation
 
 from present import present
-from recipes import JOINTS, START_NS, Recipe, state
+from recipes import JOINTS, START_NS, Recipe, state, terminal
 from teleop_core.bags import reader, reports
 from teleop_core.bags.writer import BagWriter
 from teleop_core.coupling.mapping.gains import MotionScalingParameters
@@ -84,7 +82,7 @@ def shares(score: Score) -> Any:
 
 def table_of(score: Score) -> str:
     """The table as a terminal shows it."""
-    shown = Console(width=80, file=io.StringIO(), record=True, color_system=None)
+    shown = terminal()
     for table in score_tables([score], 80):
         shown.print(table)
     return shown.export_text()
