@@ -103,9 +103,9 @@ def test_state_reports_every_change_of_clutch_mode_and_box(recording: Path) -> N
     assert "box" not in at[11.0]
 
 
-def test_evaluate_prints_a_table_and_writes_json_and_page(teleop: "Run", recording: Path, tmp_path: Path) -> None:
+def test_evaluate_prints_a_table_and_writes_json_and_page(teleop_again: "Run", recording: Path, tmp_path: Path) -> None:
     scores, page = tmp_path / "scores.json", tmp_path / "page.html"
-    done = teleop("evaluate", recording, "--json", scores, "--html", page)
+    done = teleop_again("evaluate", recording, "--json", scores, "--html", page)
     assert "position, RMS mm" in done.stdout
     assert "ideal plant" in done.stdout
     assert "0.338" not in done.stdout  # no machine beside an ideal arm

@@ -45,9 +45,7 @@ def tab(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
 @pytest.fixture(autouse=True)
 def _clean(tab: Any) -> None:
     """Each test begins with an empty tab and with no memory of errors."""
-    tab.call("Page.navigate", url="about:blank")
-    tab.value("0")
-    tab.errors.clear()
+    tab.clear()
 
 
 @contextmanager

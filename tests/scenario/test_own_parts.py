@@ -170,19 +170,6 @@ def limit(name: str, step: Callable[[object, object, object, float], None]) -> S
     )
 
 
-@pytest.mark.slow
-def test_plain_stage_gives_the_same_bits_as_the_same_function_compiled(own_parts: None) -> None:
-    register_stage(limit("limit", LIMIT))
-    register_stage(limit("plain_limit", limit_step))
-    compiled = session("teleop.stages=[limit]")
-    interpreted = session("teleop.stages=[plain_limit]")
-    assert_same_streams(compiled, interpreted, [*STREAMS, LIMITED])
-    steps = np.abs(np.diff(compiled["slave_limited_cp"][:, :3], axis=0))
-    # A place of 0.5 m is rounded to 1e-16 m.
-    assert 0.02 * MS - 1e-15 < steps.max() < 0.02 * MS + 1e-15
-    assert np.abs(np.diff(compiled["slave_servo_cp"][:, :3], axis=0)).max() > 0.02 * MS
-
-
 def test_parameters_of_an_own_stage_are_set_like_others(own_parts: None) -> None:
     register_stage(limit("limit", LIMIT))
     block = session("teleop.stages=[limit]", "limit.speed=0.01")

@@ -247,11 +247,6 @@ def test_commands_go_out_at_the_rate_that_was_asked_for(rate: int) -> None:
     assert sum(made.is_due(i * MS) for i in range(1000)) == rate
 
 
-def test_a_rate_between_whole_milliseconds_is_refused() -> None:
-    with pytest.raises(ParameterError, match="rate"):
-        build(arm_bridge.ArmBridgeParameters, {"rate": 300})
-
-
 def blank(_: str = "") -> SimpleNamespace:
     def time() -> SimpleNamespace:
         return SimpleNamespace(sec=0, nanosec=0)

@@ -88,7 +88,7 @@ def test_velocities_and_efforts_that_are_not_sent_are_nan() -> None:
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
-@pytest.mark.parametrize("column", range(7))
+@pytest.mark.parametrize("column", [0, 3, 6])
 def test_numbers_that_are_not_finite_are_refused(bad: float, column: int) -> None:
     values = POSE.copy()
     values[column] = bad
