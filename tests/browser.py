@@ -85,6 +85,14 @@ class Tab(Headless):
         for domain in ("Network", "Log"):
             self.call(f"{domain}.enable")
 
+    def clear(self, width: int = 1400, height: int = 900) -> None:
+        """Show nothing, in a window of a size, and forget what was before."""
+        self.call("Page.navigate", url="about:blank")
+        self.value("0")
+        self.resize(width, height)
+        for kept in (self.errors, self.asked, self.said):
+            kept.clear()
+
     def visit(self, url: Any) -> None:
         """Open a page of a server and wait until its scene is there."""
         self.call("Page.navigate", url=url)

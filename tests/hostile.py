@@ -256,11 +256,6 @@ def moves_time_and_asks_the_strip_for_too_much(watcher: PageClient, driver: Page
         assert driver.ask(path)[0] == 409, path
 
 
-def occupies_the_server_with_presses(watcher: Any, driver: Any) -> None:
-    for _ in range(60):
-        driver.click("Initialize")
-
-
 HOSTILE = (
     takes_the_callbacks_of_all_elements_away, drags_to_a_place_of_one_number,
     drags_what_another_page_drives, presses_the_buttons_of_the_driver,

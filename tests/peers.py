@@ -2,6 +2,7 @@
 
 import warnings
 from collections.abc import Callable, Mapping
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -260,6 +261,39 @@ class AnyPeer:
         """Publish one message as our own nodes would, once that many subscriptions are there."""
         data = layout(topic, JOINTS).encode_one(stamp_ns, np.asarray(values, np.float64))
         self.publisher(topic, readers).publish(data)
+
+    def feed(
+        self,
+        until: Callable[[], Any],
+        what: str,
+        fresh: Mapping[Topic, Any],
+        still: Mapping[Topic, Any] = MappingProxyType({}),
+        after: int = 0,
+    ) -> int:
+        """Send samples until something is so: fresh ones a millisecond after the last, still ones of time 0.
+
+        Args:
+            until: What the wait is for, looked at after each turn.
+            what: The same in words.
+            fresh: Values by topic.
+            still: Values by topic.
+            after: Stamp before the first [ns].
+
+        Returns:
+            Stamp of the last [ns].
+        """
+        stamp = after
+
+        def turn() -> Any:
+            nonlocal stamp
+            stamp += 1_000_000
+            for values, at in ((still, 0), (fresh, stamp)):
+                for topic, row in values.items():
+                    self.send(topic, at, row)
+            return until()
+
+        self.wait(turn, what)
+        return stamp
 
     def spin(self) -> Any:
         """Serve what has come for the test's own node; returns nothing, in front of an ``or``."""

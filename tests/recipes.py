@@ -1,9 +1,11 @@
 """Recipes: recordings made for a test, of a slave at rest to which something is done."""
 
+import io
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from rich.console import Console
 from scipy.spatial.transform import Rotation
 
 from teleop_core.bags import reader, reports
@@ -13,6 +15,11 @@ from teleop_core.kernels.geometry import Array
 
 JOINTS = tuple(f"joint_{i}" for i in range(1, 7))
 START_NS = 1_700_000_000 * 1_000_000_000
+
+
+def terminal(width: int = 80) -> Console:
+    """A terminal whose text can be exported."""
+    return Console(width=width, record=True, file=io.StringIO(), color_system=None)
 
 
 def pose_rows(

@@ -8,7 +8,7 @@ of them do more than open their file, for minutes or for as long as somebody loo
 import io
 import shutil
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
 from typing import Any
@@ -18,12 +18,10 @@ import pandas as pd
 import pytest
 from hypothesis import strategies as st
 from rosbags.rosbag1 import Writer as Writer1
-from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin
-from rosbags.rosbag2 import Writer as Writer2
-from rosbags.typesys import Stores, get_typestore
-from rosbags.typesys.store import Typestore
+from rosbags.rosbag2 import CompressionMode, StoragePlugin
 
 import teleop_core as tc
+from foreign_bags import Maker, write1, write2
 from fuzzing import NASTY, assert_one_line, damaged, fuzz
 from teleop_console.recorded import RecordedLink
 from teleop_core.bags.reader import Bag
@@ -102,46 +100,21 @@ def hand() -> pd.DataFrame:
     return table
 
 
-def messages(store: Typestore) -> Iterator[Any]:
+def messages(is_ros2: bool) -> Iterator[tuple[str, int, Any]]:
     """Poses and buttons, as the types of a version of ROS."""
-    types = store.types
-    more = {} if "rcl_interfaces/msg/Log" in types else {"seq": 0}
-    for stamp, (x, y, z) in zip(STAMPS.tolist(), PLACES.tolist(), strict=True):
-        at = types["builtin_interfaces/msg/Time"](*divmod(stamp, 1_000_000_000))
-        head = types["std_msgs/msg/Header"](stamp=at, frame_id="base", **more)
-        place = types["geometry_msgs/msg/Point"](x, y, z)
-        turn = types["geometry_msgs/msg/Quaternion"](0.0, 0.0, 0.0, 1.0)
-        pose = types["geometry_msgs/msg/Pose"](place, turn)
-        yield "/hand", stamp, types["geometry_msgs/msg/PoseStamped"](head, pose)
-        axes, buttons = np.zeros(2, np.float32), np.array([0, 1], np.int32)
-        yield "/joy", stamp, types["sensor_msgs/msg/Joy"](head, axes, buttons)
+    maker = Maker(is_ros2)
+    for stamp, place in zip(STAMPS.tolist(), PLACES, strict=True):
+        yield "/hand", stamp, maker.pose([*place, 1.0, 0.0, 0.0, 0.0], "PoseStamped", stamp)
+        yield "/joy", stamp, maker.joy(stamp, [0, 1])
 
 
 def bag1(path: Path, packing: Writer1.CompressionFormat | None = None) -> bytes:
-    store, writer = get_typestore(Stores.ROS1_NOETIC), Writer1(path)
-    if packing is not None:
-        writer.set_compression(packing)
-    _write(writer, store, store.serialize_ros1)
-    return path.read_bytes()
+    return write1(path, messages(False), packing).read_bytes()
 
 
 def bag2(path: Path, storage: StoragePlugin, mode: Any = None) -> bytes:
-    store = get_typestore(Stores.ROS2_JAZZY)
-    writer = Writer2(path, version=9, storage_plugin=storage)
-    if mode is not None:
-        writer.set_compression(mode, CompressionFormat.ZSTD)
-    _write(writer, store, store.serialize_cdr)
+    write2(path, messages(True), storage, mode)
     return next(file for file in path.iterdir() if file.suffix != ".yaml").read_bytes()
-
-
-def _write(writer: Writer1 | Writer2, store: Typestore, serialise: Callable[..., Any]) -> None:
-    known = {}
-    with writer:
-        for topic, stamp, message in messages(store):
-            kind = message.__msgtype__
-            if topic not in known:
-                known[topic] = writer.add_connection(topic, kind, typestore=store)
-            writer.write(known[topic], stamp, serialise(message, kind))
 
 
 # -- recordings of ours --------------------------------------------------------------------------

@@ -13,8 +13,6 @@ from teleop_core.bags.reader import Bag
 from teleop_core.base.errors import TeleopError
 from teleop_core.graph.layers import parse_layer
 from teleop_core.graph.topics import STREAMS
-from teleop_core.hand.operators import register_operator
-from teleop_core.kernels.geometry import Array
 from teleop_core.session import runner, virtual
 from teleop_core.session.configuration import Configuration, configure
 
@@ -106,26 +104,6 @@ def test_wrong_arms_are_refused_in_one_line_before_anything_runs(more: tuple[str
     with pytest.raises(TeleopError, match=says) as error:
         settings(*more)
     assert "\n" not in str(error.value)
-
-
-def waits(times: Any) -> Array:
-    """Rest until the slave follows, with the delay too; then swing by 20 mm."""
-    swing = 0.01 * (1.0 - np.cos(2.0 * np.pi * np.maximum(times - 0.1, 0.0)))
-    return np.column_stack((swing, -swing, 0.5 * swing))
-
-
-@pytest.mark.slow
-def test_delay_of_one_arm_is_not_one_of_the_other(own_parts: None) -> None:
-    register_operator("waits", waits)
-    # The scara starts at home; its hand begins at once, whenever it follows.
-    still = ("left/operator=waits", "left/patience=0.0", "left/tremor_amplitude=0.0", "left/gimbal_noise=0.0")
-    delay = "teleop.delays=[left/slave/servo_jp=0.02]"
-    block, both = (virtual.VirtualTime(settings(*ARMS, *still, *m)).run(TICKS) for m in ((delay,), ()))
-    assert np.array_equal(block["slave_setpoint_js"], both["slave_setpoint_js"])
-    assert np.ptp(both["slave_setpoint_cp"][LEAD:, :3], axis=0).min() > 1e-3
-    setpoints = [rows["left_slave_setpoint_js"] for rows in (block, both)]
-    assert np.allclose(setpoints[0][20:], setpoints[1][:-20], rtol=0, atol=1e-9)
-    assert np.ptp(setpoints[1][:, :3], axis=0).min() > 1e-3
 
 
 @pytest.mark.slow

@@ -10,7 +10,6 @@ import pytest
 
 pytest.importorskip("viser")
 
-from browser import Tab
 from desk import Desk, shown
 from teleop_console.app import choose
 from teleop_console.recorded_arms import parameters_of
@@ -83,12 +82,6 @@ MOVES = """document.getAnimations({ subtree: true }).map((one) => one.effect.get
     .filter((one) => one.endTime > 1).length"""
 
 
-@pytest.fixture(scope="module")
-def tab(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
-    with Tab(tmp_path_factory.mktemp("contrast")) as browser:
-        yield browser
-
-
 def media(tab: Any, **features: str) -> None:
     """What the person has asked the system for."""
     told = [{"name": name.replace("_", "-"), "value": value} for name, value in features.items()]
@@ -147,7 +140,6 @@ def test_texts_and_controls_of_the_form_stand_out(
 
 @pytest.mark.parametrize("size", SIZES)
 def test_texts_and_controls_of_a_session_stand_out_by_day_and_by_night(tab: Any, size: str) -> None:
-    media(tab)
     with session() as (server, desk):
         tab.resize(*SIZES[size])
         tab.visit(server.url)
@@ -196,4 +188,3 @@ def test_page_of_a_person_who_asks_for_less_motion_moves_nothing_but_the_arm(tab
         for name in ("Settings", "View", "Drive"):
             tab.click(name)
             assert tab.value(MOVES) == 0
-    media(tab)

@@ -1,6 +1,5 @@
 """Page of a session in a browser: the stylus is pulled, a browser goes, what was saved is scored, settings renew."""
 
-from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -34,18 +33,9 @@ PIXEL = f"""(() => {{
 PANEL = "document.querySelector('[data-testid=floating-panel]')?.getBoundingClientRect()"
 
 
-@pytest.fixture(scope="module")
-def tab(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
-    with Tab(tmp_path_factory.mktemp("desk"), 1000, 560) as browser:
-        yield browser
-
-
 def ready(tab: Any, url: str) -> None:
     """Open the page of a session, and wait until its camera stands still."""
-    tab.call("Page.navigate", url="about:blank")
-    tab.value("0")
-    tab.errors.clear()
-    tab.resize(1000, 560)
+    tab.clear(1000, 560)
     tab.visit(url)
     tab.shows("ENABLED")
     tab.until("document.querySelector('#t-starting').hidden")

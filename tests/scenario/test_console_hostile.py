@@ -50,13 +50,17 @@ def test_page_that(
         driver.sync()
         assert desk.asked == []
         assert {n: handle_state(server, u) for n, u in driver.elements.items()} == before
-        pressed = desk.stops
-        assert ask(server.port, "/stop", Teleop_Page="new")[0] == 204
-        assert desk.stops == pressed + 1
+        assert stops(server, desk)
         assert driver.ask("/alive")[1]["drives"] is True
         assert not driver.is_cut
     assert not [r for r in caplog.records if r.levelno >= logging.ERROR and "teleop" in r.name]
     until(lambda: len(connected(server)) == 1, "the page has gone")
+
+
+def stops(server: ConsoleServer, desk: Desk) -> bool:
+    """Whether a stop that a new page asks for is sent, once."""
+    pressed = desk.stops
+    return ask(server.port, "/stop", Teleop_Page="new")[0] == 204 and desk.stops == pressed + 1
 
 
 def handle_state(server: ConsoleServer, uuid: str) -> tuple[str | bool, str, bool, bool, int, bool] | None:
@@ -144,9 +148,7 @@ def test_stop_is_sent_while_the_loop_that_serves_the_pages_is_busy(
     loop.call_soon_threadsafe(work)
     assert is_busy.wait(60)
     try:
-        pressed = desk.stops
-        assert ask(server.port, "/stop", Teleop_Page="new")[0] == 204
-        assert desk.stops == pressed + 1
+        assert stops(server, desk)
         assert ask(server.port, "/alive", Teleop_Page="new")[0] == 200
     finally:
         goes_on.set()
@@ -158,9 +160,7 @@ def test_stop_is_sent_beside_requests_that_begin_and_never_end(served: tuple[Con
         for begun in (b"", b"GET /st", b"GET /stop HTTP/1.1\r\nHost: ") * (WAITING // 2):
             guest = guests.enter_context(socket.create_connection(("127.0.0.1", server.port)))
             guest.sendall(begun)
-        pressed = desk.stops
-        assert ask(server.port, "/stop", Teleop_Page="new")[0] == 204
-        assert desk.stops == pressed + 1
+        assert stops(server, desk)
     with PageClient(server.port) as page:
         page.sync()
 
@@ -177,7 +177,7 @@ def test_malformed_request_for_the_stop_is_none_and_ends_nothing(
         while guest.recv(4096):
             pass
     assert desk.stops == pressed
-    assert ask(server.port, "/stop", Teleop_Page="new")[0] == 204
+    assert stops(server, desk)
 
 
 def test_pages_that_send_too_much_together_lose_the_one_that_sends_most() -> None:

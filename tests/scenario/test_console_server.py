@@ -4,8 +4,10 @@ import asyncio
 import threading
 from collections import deque
 from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import partial
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -34,27 +36,25 @@ CENTER = (700, 450)
 """Of the window of a tab [px]; there the scene's origin is."""
 
 
-@pytest.fixture(scope="module")
-def tab(tmp_path_factory: pytest.TempPathFactory) -> Any:
-    with Tab(tmp_path_factory.mktemp("first")) as opened:
-        yield opened
+class Answer(BaseHTTPRequestHandler):
+    """A harmless page."""
+
+    def do_GET(self) -> None:
+        self.send_response(200)
+        self.end_headers()
+        self.wfile.write(b"<body>somewhere else</body>")
+
+    def log_message(self, *told: object) -> None:
+        pass
 
 
-@pytest.fixture(scope="module")
-def other(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Headless]:
-    with Tab(tmp_path_factory.mktemp("second")) as opened:
-        yield opened
-
-
-@pytest.fixture(autouse=True)
-def _clean(request: pytest.FixtureRequest) -> None:
-    """Each test has its tabs empty and with no memory of errors."""
-    for name in {"tab", "other"} & set(request.fixturenames):
-        opened = request.getfixturevalue(name)
-        opened.call("Page.navigate", url="about:blank")
-        opened.value("0")
-        for kept in (opened.errors, opened.asked, opened.said):
-            kept.clear()
+@contextmanager
+def elsewhere() -> Iterator[str]:
+    """Address of the page that another server of this machine has."""
+    with ThreadingHTTPServer(("127.0.0.1", 0), Answer) as server:
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        yield f"http://127.0.0.1:{server.server_port}/"
+        server.shutdown()
 
 
 def is_driven(server: ConsoleServer) -> bool:
@@ -110,33 +110,8 @@ def test_page_of_another_origin_gets_no_connection_no_frame_and_no_answer(tab: A
         assert server.drivers.pages == (0,)
 
 
-def elsewhere() -> "Elsewhere":
-    """Address of a harmless page that another server of this machine has."""
-    return Elsewhere()
-
-
-class Elsewhere:
-    class Answer(BaseHTTPRequestHandler):
-        def do_GET(self) -> None:
-            self.send_response(200)
-            self.end_headers()
-            self.wfile.write(b"<body>somewhere else</body>")
-
-        def log_message(self, *told: object) -> None:
-            pass
-
-    def __enter__(self) -> str:
-        self._server = ThreadingHTTPServer(("127.0.0.1", 0), self.Answer)
-        threading.Thread(target=self._server.serve_forever, daemon=True).start()
-        return f"http://127.0.0.1:{self._server.server_port}/"
-
-    def __exit__(self, *error: object) -> None:
-        self._server.shutdown()
-        self._server.server_close()
-
-
-def test_of_two_browsers_one_drives_and_a_reload_in_the_middle_keeps_it_so(tab: Any, other: Any) -> None:
-    with ConsoleServer(0) as server:
+def test_of_two_browsers_one_drives_and_a_reload_in_the_middle_keeps_it_so(tab: Any, tmp_path: Path) -> None:
+    with ConsoleServer(0) as server, Tab(tmp_path) as other:
         take = server.viser.gui.add_button("Take control")
         take.on_click(lambda event: server.drivers.take(present(event.client_id)))
         server.viser.make_public(take)

@@ -45,9 +45,7 @@ def tab(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
 @pytest.fixture(autouse=True)
 def _clean(tab: Any) -> None:
     """Each test begins with an empty tab and with no memory of errors."""
-    tab.call("Page.navigate", url="about:blank")
-    tab.value("0")
-    tab.errors.clear()
+    tab.clear()
 
 
 @contextmanager
@@ -70,6 +68,25 @@ def chosen(wishes: list[Wish], count: int) -> Iterator[ConsoleServer]:
                 waiting.join(0.1)
 
 
+@contextmanager
+def form(tab: Any, count: int, size: tuple[int, int] = (1400, 900)) -> Iterator[list[Wish]]:
+    """The form in a tab of a size, and the wishes that come from there."""
+    wishes = list[Wish]()
+    tab.resize(*size)
+    with chosen(wishes, count) as server:
+        tab.visit(server.url)
+        tab.until(READY)
+        yield wishes
+        assert not tab.faults()
+
+
+@pytest.fixture
+def _run_1(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A folder with a recording."""
+    shutil.copytree(EXAMPLE, tmp_path / "bags" / "run_1")
+    monkeypatch.chdir(tmp_path)
+
+
 def pick(tab: Any, label: str, word: str) -> None:
     """Choose a word in the list behind a label, as the keyboard does."""
     tab.value(f"""(() => {{
@@ -84,16 +101,9 @@ def pick(tab: Any, label: str, word: str) -> None:
 @browser
 @pytest.mark.slow
 @pytest.mark.parametrize("size", [(1400, 900), (390, 844)])
-def test_session_is_chosen_begun_and_repeated(
-    tab: Any, size: tuple[int, int], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    shutil.copytree(EXAMPLE, tmp_path / "bags" / "run_1")
-    monkeypatch.chdir(tmp_path)
-    wishes = list[Wish]()
-    tab.resize(*size)
-    with chosen(wishes, 3) as server:
-        tab.visit(server.url)
-        tab.until(READY)
+@pytest.mark.usefixtures("_run_1")
+def test_session_is_chosen_begun_and_repeated(tab: Any, size: tuple[int, int]) -> None:
+    with form(tab, 3, size) as wishes:
         tab.until(f"{WIDE} && {STOP_AND_START}")
         assert tab.value(UNNAMED) == 0
         pick(tab, "Scenario", "wall")
@@ -114,22 +124,15 @@ def test_session_is_chosen_begun_and_repeated(
         tab.click("Replay")
         until(lambda: len(wishes) == 3, "it is shown")
         assert wishes[2].recording == Path("bags/run_1")
-        assert not tab.faults()
 
 
 @browser
 @pytest.mark.slow
 @pytest.mark.parametrize("size", [(1400, 900), (390, 844)])
-def test_form_is_filled_and_a_recording_is_scored_and_replayed_by_keys_alone(
-    tab: Any, size: tuple[int, int], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    shutil.copytree(EXAMPLE, tmp_path / "bags" / "run_1")
-    monkeypatch.chdir(tmp_path)
-    wishes = list[Wish]()
-    tab.resize(*size)
-    with chosen(wishes, 2) as server:
-        tab.visit(server.url)
-        tab.until(f"{READY} && document.querySelector('.t-list input')")
+@pytest.mark.usefixtures("_run_1")
+def test_form_is_filled_and_a_recording_is_scored_and_replayed_by_keys_alone(tab: Any, size: tuple[int, int]) -> None:
+    with form(tab, 2, size) as wishes:
+        tab.until("document.querySelector('.t-list input')")
         tab.tab_to("[name=network]")
         tab.key("ArrowDown")
         tab.until("document.querySelector('[name=network]').value !== ''")
@@ -150,7 +153,6 @@ def test_form_is_filled_and_a_recording_is_scored_and_replayed_by_keys_alone(
         tab.key("Enter")
         until(lambda: len(wishes) == 2, "it is shown")
         assert wishes[1].recording == Path("bags/run_1")
-        assert not tab.faults()
 
 
 @browser
@@ -159,11 +161,7 @@ def test_urdf_that_is_dropped_on_the_form_is_the_robot(
     tab: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    wishes = list[Wish]()
-    tab.resize(1400, 900)
-    with chosen(wishes, 1) as server:
-        tab.visit(server.url)
-        tab.until(READY)
+    with form(tab, 1) as wishes:
         tab.value(f"""(() => {{
             const dropped = new DataTransfer();
             dropped.items.add(new File([{json.dumps(URDF.read_text())}], 'any_arm.urdf'));
@@ -180,7 +178,6 @@ def test_urdf_that_is_dropped_on_the_form_is_the_robot(
         tab.until(READY)
         tab.click("Start")
         until(lambda: wishes, "it is begun")
-        assert not tab.faults()
     told = {"operator": "remote", "robot": "robots/any_arm.urdf", "tip": "tool0"}
     assert wishes == [Wish(told)]
 

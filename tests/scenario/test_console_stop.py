@@ -41,9 +41,7 @@ def tab(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
 def _clean(tab: Any) -> Iterator[None]:
     """Each test begins with an empty tab and with no memory of errors."""
     yield
-    tab.call("Page.navigate", url="about:blank")
-    tab.value("0")
-    tab.errors.clear()
+    tab.clear()
 
 
 @pytest.mark.parametrize("size", [(390, 780), (780, 390), (1400, 900)])

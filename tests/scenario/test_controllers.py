@@ -60,13 +60,6 @@ def test_tracking_is_what_its_definition_gives_of_the_recording() -> None:
     assert math.isclose(found.chatter, 100.0 * np.sqrt((change**2).to_numpy().mean()), rel_tol=1e-9)
 
 
-def test_same_session_of_a_law_is_run_once(bench: Bench) -> None:
-    before = bench.session("fine_box", settings={"plant": "hardware", **LAWS["adaptive"]})
-    count = bench.runs
-    assert bench.session("fine_box", settings={"plant": "hardware", **LAWS["adaptive"]}) is before
-    assert bench.runs == count
-
-
 def test_sessions_compared_differ_in_their_hands_alone(bench: Bench) -> None:
     sessions = compared(bench, "fine_box", "adaptive")
     assert [one.seed for one in sessions] == [5, 6, 7]

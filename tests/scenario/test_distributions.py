@@ -106,21 +106,6 @@ def test_commands_of_the_core_ask_no_installed_package(
     assert "coarse_box" in capsys.readouterr().out
 
 
-@pytest.mark.parametrize(
-    ("words", "name"),
-    [
-        (["sim", "--out", "drill"], "sim"),
-        (["--parts", "sim", "drill", "--list"], "drill"),
-        (["--parts=sim", "drill"], "drill"),
-        (["--help"], None),
-        (["--parts"], None),
-        ([], None),
-    ],
-)
-def test_command_is_the_first_word_that_is_no_option(words: list[str], name: str | None) -> None:
-    assert cli._command_of(words) == name
-
-
 def test_command_that_cannot_be_loaded_is_named_and_the_others_work(
     entries: Callable[..., None], capsys: pytest.CaptureFixture[str]
 ) -> None:

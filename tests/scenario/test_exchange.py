@@ -1,6 +1,5 @@
 """A recording of others on its way through the commands: import, replay, follow, export."""
 
-import json
 import re
 import subprocess
 import sys
@@ -15,7 +14,6 @@ from scipy.spatial.transform import Rotation
 from present import present
 from teleop_core.bags.reader import Bag
 from teleop_core.graph.topics import MASTER_MEASURED_CP, SLAVE_MEASURED_CP
-from teleop_core.hand.operators.rest import REST_POSITION
 
 if TYPE_CHECKING:
     from conftest import Run
@@ -125,22 +123,6 @@ def test_axes_with_a_minus_are_values_not_options(teleop_again: "Run", hand: Pat
         assert np.allclose(got, 0.5 * PLACES @ turn.T, rtol=0, atol=1e-15)
 
 
-def test_a_session_follows_the_recording_for_as_long_as_it_is(
-    teleop_again: "Run", imported: Any, tmp_path: Path
-) -> None:
-    out, _ = imported
-    center = np.array([0.0, 0.01, 0.03])
-    settings = (f"operator.center={center.tolist()}", "operator.approach_time=1.0")
-    followed = tmp_path / "followed"
-    teleop_again("sim", "--out", followed, "--set", "operator=bag", f"operator.bag={out}", *settings)
-    series = Bag(followed).read(MASTER_MEASURED_CP)
-    end = REST_POSITION + center + PLACES[-1] - PLACES[0]
-    assert np.linalg.norm(series.values[-1, :3] - end) < 5e-3  # the hand lags behind
-    start = REST_POSITION + center
-    before = np.searchsorted(series.stamp_ns, series.stamp_ns[-1] - 9_966_000_000)
-    assert np.linalg.norm(series.values[before, :3] - start) < 5e-3
-
-
 @pytest.mark.parametrize(
     ("arguments", "text"),
     [
@@ -165,14 +147,3 @@ def test_mistakes_are_one_line_and_leave_nothing(
     assert text in lines[0]
     assert not done.stdout  # such as the address of a page that never opens
     assert not list(tmp_path.iterdir())
-
-
-def test_a_data_set_of_several_recordings_is_made(teleop_again: "Run", imported: Any, tmp_path: Path) -> None:
-    _, text = imported
-    answer = next_command(text)[-1]
-    if not Bag(imported[0]).path.with_name("hand_replayed").exists():
-        teleop_again(*next_command(text))
-    said = teleop_again("export", answer, answer, "--out", tmp_path / "set", "--task", "draw")
-    assert "2 episodes" in said.stdout
-    info = json.loads((tmp_path / "set" / "meta" / "info.json").read_text())
-    assert info["robot_type"] == "rcrt1"

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from headless import Headless
+from one_line import one_line
 from teleop_lab import experiments
 from teleop_lab.experiments.bench import Bench
 from teleop_lab.experiments.outcome import Outcome
@@ -19,16 +20,6 @@ from teleop_lab.experiments.page import experiments_page
 if TYPE_CHECKING:
     from conftest import Run
 
-COMPILING = "compiling kernels"
-
-
-def one_line(done: subprocess.CompletedProcess[str]) -> str:
-    """The only line on standard error, beside the one of compiling; nothing on standard output."""
-    assert done.stdout == ""
-    lines = [line for line in done.stderr.splitlines() if not line.startswith(COMPILING)]
-    assert len(lines) == 1, done.stderr
-    return lines[0]
-
 
 def test_without_a_name_every_experiment_is_listed_in_a_line(teleop: "Run") -> None:
     lines = teleop("experiment").stdout.splitlines()
@@ -36,8 +27,8 @@ def test_without_a_name_every_experiment_is_listed_in_a_line(teleop: "Run") -> N
     assert all(len(line.split()) > 3 for line in lines)
 
 
-def test_experiment_prints_published_beside_predicted(teleop: "Run") -> None:
-    shown = teleop("experiment", "resolution", "tendons").stdout
+def test_experiment_prints_published_beside_predicted(teleop_again: "Run") -> None:
+    shown = teleop_again("experiment", "resolution", "tendons").stdout
     assert re.search(r"tip, all axes.* 11\.355 +11\.3548 .* ✓", shown)
     assert re.search(r"motor 6 for joint 5 .* 1 +1\.39 .* ✗", shown)
     assert shown.splitlines()[-1].endswith("rows are not judged")
@@ -49,9 +40,9 @@ def test_help_teaches_what_a_mark_means(teleop_again: "Run") -> None:
     assert "not whether a number is small" in shown
 
 
-def test_json_holds_every_number_exactly(teleop: "Run", tmp_path: Path) -> None:
+def test_json_holds_every_number_exactly(teleop_again: "Run", tmp_path: Path) -> None:
     file = tmp_path / "found.json"
-    teleop("experiment", "hybrid", "resolution", "--json", file)
+    teleop_again("experiment", "hybrid", "resolution", "--json", file)
     found = json.loads(file.read_text(encoding="utf-8"))["experiments"]
     assert [entry["name"] for entry in found] == ["hybrid", "resolution"]
     assert found == [experiments.run(name).to_json() for name in ("hybrid", "resolution")]

@@ -38,18 +38,3 @@ def test_hand_moves_within_the_range_of_people(name: Any) -> None:
     assert (values >= low - room[0]).all()
     assert (values <= high + room[1]).all()
     assert low - 0.02 * abs(low) <= values.mean() <= high + 0.02 * abs(high)
-
-
-def test_median_speed_is_no_more_than_that_of_the_hand_of_the_uva_study() -> None:
-    """20 mm/s; surgeons of JIGSAWS moved at 9 to 15 mm/s by task."""
-    assert np.mean(figures("speed_median_mm_s")) <= 20.0
-
-
-def test_strokes_of_the_clutch_part_the_motion_into_segments() -> None:
-    for score in scores():
-        assert score.value("motion.clutch.count") == 2
-        assert score.value("motion.clutch.time_s") == pytest.approx(1.0, abs=0.1)
-        assert score.value("motion.segment_median.count") == 3
-        begins = [score.value(f"motion.segments.{n}.begin_s") for n in (1, 2, 3)]
-        ends = [score.value(f"motion.segments.{n}.end_s") for n in (1, 2, 3)]
-        assert begins[0] < ends[0] < begins[1] < ends[1] < begins[2] < ends[2]

@@ -170,19 +170,6 @@ def limit(name: str, step: Callable[[object, object, object, float], None]) -> S
     )
 
 
-@pytest.mark.slow
-def test_plain_stage_gives_the_same_bits_as_the_same_function_compiled(own_parts: None) -> None:
-    register_stage(limit("limit", LIMIT))
-    register_stage(limit("plain_limit", limit_step))
-    compiled = session("teleop.stages=[limit]")
-    interpreted = session("teleop.stages=[plain_limit]")
-    assert_same_streams(compiled, interpreted, [*STREAMS, LIMITED])
-    steps = np.abs(np.diff(compiled["slave_limited_cp"][:, :3], axis=0))
-    # A place of 0.5 m is rounded to 1e-16 m.
-    assert 0.02 * MS - 1e-15 < steps.max() < 0.02 * MS + 1e-15
-    assert np.abs(np.diff(compiled["slave_servo_cp"][:, :3], axis=0)).max() > 0.02 * MS
-
-
 def test_parameters_of_an_own_stage_are_set_like_others(own_parts: None) -> None:
     register_stage(limit("limit", LIMIT))
     block = session("teleop.stages=[limit]", "limit.speed=0.01")
@@ -240,28 +227,7 @@ def test_second_source_of_force_is_added_and_pushes_the_hand(own_parts: None, pl
 # Fixtures, controllers and operators.
 
 
-def test_sphere_holds_the_hand_at_the_same_distance_in_all_directions() -> None:
-    block = session("fixture=sphere", "fixture.sphere.radius=0.005", "fixture.wall=soft")
-    force = block["master_servo_cf"][:, :3]
-    center = block["master_measured_cp"][np.argmax(block["teleop_state"][:, STATE["is_fixture_on"]])]
-    is_free = ~block["master_buttons"][:, 0].astype(bool) & (np.arange(TICKS) < 890)
-    is_pushed = is_free & (np.linalg.norm(force, axis=1) > 0.01)
-    offset = block["master_measured_cp"][is_pushed, :3] - center[:3]
-    push = force[is_pushed]
-    assert is_pushed.sum() > 100
-    # Along the radius, inwards, by the spring of 1000 N/m.
-    assert np.allclose(np.cross(offset, push), 0.0, rtol=0, atol=1e-12)
-    depth = np.linalg.norm(offset, axis=1) - 5 * MS
-    expected = np.minimum(1000.0 * depth, 3.3)
-    assert np.allclose(np.linalg.norm(push, axis=1), expected, rtol=0, atol=1e-9)
-
-
 # Axis maps.
-
-
-def test_default_axis_map_is_the_published_one(plain: NDArray[np.void]) -> None:
-    named = session("axes=['-z', '-x', '+y']", "tool_axes=['+x', '-y', '-z']", ticks=300)
-    assert_same_streams(named, plain[:300])
 
 
 def test_other_axis_map_moves_the_slave_along_other_axes() -> None:
@@ -275,10 +241,8 @@ def test_other_axis_map_moves_the_slave_along_other_axes() -> None:
     still = (*line, "approach_time=0.5", "operator.period=2.0", "buttons.fixture=[]",
              "buttons.clutch=[]", "tremor_amplitude=0.0", "starts_at_home=false")  # fmt: skip
     axes = {
-        "['-z', '-x', '+y']": (1, -1.0),
-        "['+x', '+y', '+z']": (0, 1.0),
+        "['-z', '-x', '+y']": (1, -1.0),  # the published one
         "['+y', '+z', '+x']": (2, 1.0),
-        "['-x', '-y', '+z']": (0, -1.0),
     }
     for text, (axis, sign) in axes.items():
         block: Any = VirtualTime(configuration.configure("coarse_box", settings=[*still, f"axes={text}"]))
@@ -303,11 +267,3 @@ def test_another_kind_of_fixture_holds_from_the_next_block_on() -> None:
     assert not virtual.run(4000)["master_servo_cf"][1:].any()
     virtual.stages["motion_scaling"].retune(build(MotionScalingParameters, {}))
     assert virtual.run(4000)["master_servo_cf"].any()
-
-
-def test_reset_stages_repeat_the_session_with_a_jointed_handle_too() -> None:
-    virtual = VirtualTime(configuration.configure(settings=["device.handle=mma"]))
-    first = virtual.run(300)["master_measured_cp"]
-    for stage in virtual.stages.values():
-        stage.reset()
-    assert np.array_equal(virtual.run(300)["master_measured_cp"], first)

@@ -53,12 +53,6 @@ def copies(p: Any, s: Any, row: Any, dt: float) -> None:
     row.test_answer[:] = row.slave_servo_cp
 
 
-def test_answer_that_nobody_reads_is_a_warning_with_the_way_out(own_parts: None) -> None:
-    told = "'own' writes test/answer, which no stage reads; replaces= would lead it to the"
-    with pytest.warns(UserWarning, match=told):
-        tc.run(duration=0.01, stages=stage(copies))
-
-
 FORGETFUL = """
 import teleop_core as tc
 from beside import NAME
@@ -85,7 +79,7 @@ def forgetful(tmp_path: Path) -> Path:
 
 
 def test_file_of_parts_takes_what_stands_beside_it_before_and_after_the_command(
-    teleop: "Run", forgetful: Path, tmp_path: Path
+    teleop_again: "Run", forgetful: Path, tmp_path: Path
 ) -> None:
     text = "import teleop_core as tc\n\ntc.register_operator('still', lambda t: 0.0 * t)\n"
     (tmp_path / "more.py").write_text(text)
@@ -95,7 +89,7 @@ def test_file_of_parts_takes_what_stands_beside_it_before_and_after_the_command(
         ["--parts", first, "parts", "--parts", second],
         ["parts", "--parts", first, "--parts", second],
     ):
-        listed = teleop(*arguments).stdout.split()
+        listed = teleop_again(*arguments).stdout.split()
         assert {"own", "still"} <= {name.strip(",") for name in listed}
         assert {"tremor_filters", "world_objects", "metrics"} <= set(listed)
 

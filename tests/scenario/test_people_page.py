@@ -7,11 +7,9 @@ from typing import Any
 
 import pytest
 
-from headless import Headless
-
 pytest.importorskip("viser")
 
-from browser import Tab, until
+from browser import until
 from page_client import PageClient, ask
 from teleop_console.answers import Situation
 from teleop_console.server import ConsoleServer
@@ -63,20 +61,6 @@ def served(plan: Plan, tmp_path: Path) -> Iterator[tuple[ConsoleServer, PeoplePa
         server.close()
 
 
-@pytest.fixture(scope="module")
-def tab(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Headless]:
-    with Tab(tmp_path_factory.mktemp("people")) as opened:
-        yield opened
-
-
-def clean(tab: Any, size: tuple[int, int]) -> None:
-    """An empty tab of a size, without memory of errors."""
-    tab.resize(*size)
-    tab.call("Page.navigate", url="about:blank")
-    tab.value("0")
-    tab.errors.clear()
-
-
 @browser
 @pytest.mark.slow
 @pytest.mark.parametrize("size", SIZES)
@@ -84,7 +68,7 @@ def test_participant_gets_to_the_questions_and_answers_by_keys_alone(
     tab: Any, served: tuple[ConsoleServer, PeoplePage, Journal], size: tuple[int, int]
 ) -> None:
     server, _, journal = served
-    clean(tab, size)
+    tab.resize(*size)
     tab.visit(server.url)
     for text in ("I agree and take part", "Trial 1 of 6 · practice", "Trial 2 of 6", "Trial 3 of 6"):
         tab.shows(text)
@@ -119,7 +103,7 @@ def test_conductor_sees_scores_repeats_with_a_reason_pauses_and_chooses_who_is_n
     journal.agree("p01")
     journal.note("p01", 1, DONE, bag="trial_01")
     journal.score("p01", 1, {"task.time_s": 1.25}, "nothing stands out")
-    clean(tab, size)
+    tab.resize(*size)
     tab.call("Page.navigate", url=page.link(server.url))
     tab.until("document.body && document.querySelectorAll('tbody tr').length === 6")
     for text in ("nothing stands out", "1.250", "p01 – 1 of 6", "✓ done"):

@@ -11,12 +11,11 @@ import pytest
 from rich.console import Console
 
 from present import present
+from recipes import Recipe, pose_rows, state
 from teleop_core.bags.reader import Bag
-from teleop_core.bags.reports import report
-from teleop_core.bags.writer import BagWriter
 from teleop_core.evaluation.command import evaluate_bags
 from teleop_core.evaluation.scoring import studies, study
-from teleop_core.graph import STATE_FIELDS, TICK_NS, topics
+from teleop_core.graph import topics
 
 if TYPE_CHECKING:
     from conftest import Run
@@ -32,8 +31,6 @@ BROWSER_ITSELF = "not an origin"
 # What Chromium says about the speed of software rendering; nothing is wrong then.
 ADVICE = ("GL Driver Message", "Canvas2D: Multiple readback")
 LARGEST_PAGE = 4_000_000
-JOINTS = tuple(f"joint_{i}" for i in range(1, 7))
-START_NS = 1_700_000_000 * 1_000_000_000
 # A fixture of 30 mm around the middle of the path.
 FIXTURE = {
     "gain": 1.0,
@@ -45,39 +42,35 @@ FIXTURE = {
 }
 
 
-def record(path: Path, seed: int, fixture: dict[Any, Any] | None = None, count: int = 6000) -> Path:
+def record(path: Path, seed: int, fixture: dict[str, str] | None = None, count: int = 6000) -> Path:
     """A live-looking recording: a tip on a curve through a fixture, with delays and a noisy hand.
 
     ``fixture`` are names and texts that describe it; None for a box, as older recordings have it.
     """
-    rng = np.random.default_rng(seed)
-    stamps = START_NS + np.arange(count) * TICK_NS
+    rng, recipe = np.random.default_rng(seed), Recipe(count)
     t = np.arange(count) * 1e-3
     curve = 0.0155 * np.stack((np.sin(2.1 * t), np.sin(1.3 * t), np.cos(1.7 * t)), axis=1)
-    poses = np.zeros((count, 7))
-    poses[:, 3], poses[:, :3] = 1.0, curve + np.array([0.4, 0.0, 0.0])
+    poses, joints, force = pose_rows(count, (0.4, 0.0, 0.0)), np.zeros((count, 6)), np.zeros((count, 6))
+    poses[:, :3] += curve
     measured = poses.copy()
     measured[:, :3] += rng.normal(scale=5e-5, size=(count, 3))
-    force = np.zeros((count, 6))
     force[:, :3] = -1000.0 * np.sign(curve) * np.maximum(np.abs(curve) - 0.015, 0.0)
     rows = {
         topics.MASTER_MEASURED_CP: poses,
         topics.SLAVE_SERVO_CP: poses,
-        topics.SLAVE_SERVO_JP: np.zeros((count, 6)),
-        topics.SLAVE_SETPOINT_JS: np.zeros((count, 6)),
+        topics.SLAVE_SERVO_JP: joints,
+        topics.SLAVE_SETPOINT_JS: joints,
         topics.SLAVE_SETPOINT_CP: poses,
         topics.SLAVE_MEASURED_CP: measured,
         topics.MASTER_MEASURED_CF: force,
     }
-    texts = {name: repr(FIXTURE.get(name, 0.0)) for name in STATE_FIELDS} | (fixture or {})
-    metadata = {"scenario": '<curve> & "box" \'</script>', "robot": "rcrt1", "seed": str(seed)}
-    with BagWriter(path, topics.ALL, JOINTS, metadata=metadata, start_ns=START_NS) as writer:
-        at = START_NS + 500 * TICK_NS
-        writer.write(topics.TELEOP_STATE, at, report(at, "teleop", 0, "FOLLOWING", texts))
-        late = np.sort(rng.integers(100_000, 900_000, (len(rows), count)), axis=0)
-        for link, (topic, values) in enumerate(rows.items()):
-            logs = np.maximum.accumulate(stamps + late[link])
-            writer.write_block({topic: (stamps, values, logs)})
+    late = np.sort(rng.integers(100_000, 900_000, (len(rows), count)), axis=0)
+    for link, (topic, values) in enumerate(rows.items()):
+        recipe.rows[topic] = (recipe.stamps, values, np.maximum.accumulate(recipe.stamps + late[link]))
+    at = recipe.stamps[500]
+    recipe.singles = [(topics.TELEOP_STATE, at, state(at, fixture, **FIXTURE))]
+    recipe.metadata = {"scenario": '<curve> & "box" \'</script>', "robot": "rcrt1", "seed": str(seed)}
+    recipe.write(path)
     return path
 
 

@@ -14,12 +14,11 @@ if TYPE_CHECKING:
     from peers import AnyPeer as Peer
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_a_node_that_was_shut_down_by_service_still_ends_well(peer: "Peer", tmp_path: Path, number: Any) -> None:
+def test_a_node_that_was_shut_down_by_service_still_ends_well(peer: "Peer", tmp_path: Path) -> None:
     node = peer.start("recorder", out=str(tmp_path / "bag"))
     assert peer.change("recorder", Transition.TRANSITION_ACTIVE_SHUTDOWN)
     assert (tmp_path / "bag" / "metadata.yaml").exists()
-    assert node.end(number) == 0, node.stderr.read_text()
+    assert node.end() == 0, node.stderr.read_text()
 
 
 def test_a_transition_that_there_is_not_is_refused_and_the_node_goes_on(peer: "Peer") -> None:

@@ -38,7 +38,7 @@ def push(peer: "Peer", first: Any, second: Any) -> None:
             peer.send(topic, now, [force, 0.0, 0.0, 0.0, 0.0, 0.0])
 
 
-def test_the_master_feels_the_sum_of_all_sources_of_force(peer: "Peer") -> None:
+def test_the_master_feels_the_sum_of_all_sources_of_force_that_are_not_silent(peer: "Peer") -> None:
     felt = peer.listen(topics.MASTER_MEASURED_CF)
     peer.start("haptic_master", patience=0.0, links=FORCES)
 
@@ -52,27 +52,9 @@ def test_the_master_feels_the_sum_of_all_sources_of_force(peer: "Peer") -> None:
     feels(0.75, 0.5, 0.25)
     feels(0.5, 0.5, 0.0)
     feels(0.25, 0.0, 0.25)
-
-
-@pytest.mark.parametrize("silent", [0, 1])
-def test_a_source_of_force_that_falls_silent_acts_no_more(peer: "Peer", silent: int) -> None:
-    felt = peer.listen(topics.MASTER_MEASURED_CF)
-    peer.start("haptic_master", patience=0.0, links=FORCES)
-    sources: Any = [0.5, 0.25]
-
-    def is_felt() -> int:
-        push(peer, *sources)
-        return felt.take() and felt.values[-1][0] == 0.75
-
-    peer.wait(is_felt, "both")
-    sources[silent] = None
-    left = 0.5 if silent else 0.25
-
-    def is_alone() -> int:
-        push(peer, *sources)
-        return felt.take() and felt.values[-1][0] == left
-
-    peer.wait(is_alone, "the other one alone")
+    for left, *sources in ((0.5, 0.5, None), (0.25, None, 0.25)):
+        feels(0.75, 0.5, 0.25)
+        feels(left, *sources)
 
 
 @pytest.fixture(scope="module")

@@ -3,10 +3,11 @@
 import os
 import subprocess
 import sys
+from contextlib import nullcontext
 from pathlib import Path
 
 import pytest
-from std_msgs.msg import Bool
+from std_msgs.msg import Bool, Empty
 
 from teleop_core.middleware.world import Qos
 from teleop_drill.simulation.bus import Bus, Line
@@ -75,17 +76,49 @@ def test_a_full_queue_loses_its_oldest_and_keep_all_loses_nothing() -> None:
     assert every == list(range(1, 51))
 
 
-def test_qualities_that_do_not_go_together_do_not_meet() -> None:
+def test_qualities_and_types_that_do_not_go_together_do_not_meet() -> None:
     pair = Pair()
     writer = pair.here.node("a").create_publisher(Bool, "/t", Qos(is_reliable=False))
     node = pair.there.node("b")
     strict, lenient = (node.create_taker(Bool, "/t", Qos(is_reliable=reliable)) for reliable in (True, False))
+    other = node.create_taker(Empty, "/t", Qos(is_reliable=False))
     pair.sleep(FOUND)
     writer.publish(b"x")
     pair.sleep(0.01)
     assert writer.get_subscription_count() == 1
-    assert strict.take() is None
+    assert strict.take() is other.take() is None
     assert lenient.take() is not None
+
+
+@pytest.mark.parametrize(
+    ("breaks", "has_lock", "is_whole"), [(0.0, False, True), (0.1, False, False), (0.1, True, True)]
+)
+def test_threads_that_read_and_write_without_a_lock_lose_counts_where_turns_are_broken(
+    breaks: float, has_lock: bool, is_whole: bool
+) -> None:
+    machine, total = Machine(Scheduler(0, breaks)), 0
+
+    def work(process: Process) -> int:
+        world = SimulatedWorld(Bus(machine.scheduler), process)
+        lock = world.lock() if has_lock else nullcontext()
+
+        def count() -> None:
+            nonlocal total
+            for _ in range(100):
+                with lock:
+                    before = total
+                    world.monotonic_ns()
+                    total = before + 1
+                world.sleep(1e-4)
+
+        threads = [world.thread(name, count) for name in ("one", "other")]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+        return total
+
+    assert (machine.run(work) == 200) is is_whole
 
 
 def test_a_reliable_message_is_late_on_a_bad_line_and_another_one_is_lost_and_counted() -> None:

@@ -59,17 +59,9 @@ def test_motion_scaling_is_silent_until_it_knows_where_the_slave_is(peer: "Peer"
     assert answers.take() == 0
 
     where = [0.4, 0.0, -0.2, 1.0, 0.0, 0.0, 0.0]
-    stamp = 2 * MS
-
-    def answered() -> int:
-        nonlocal stamp
-        peer.send(topics.SLAVE_SETPOINT_CP, 0, where)
-        peer.send(topics.MASTER_MEASURED_CP, stamp, REST)
-        stamp += MS
-        return answers.take() and forces.take()
-
-    peer.wait(answered, "slave/servo_cp")
-    assert answers.stamps[0] in range(2 * MS, stamp, MS)
+    fresh, still = {topics.MASTER_MEASURED_CP: REST}, {topics.SLAVE_SETPOINT_CP: where}
+    last = peer.feed(lambda: answers.take() and forces.take(), "slave/servo_cp", fresh, still, after=MS)
+    assert answers.stamps[0] in range(2 * MS, last + 1, MS)
     assert answers.stamps[0] == forces.stamps[0]
     np.testing.assert_array_equal(answers.values[0], where)
 
@@ -114,17 +106,9 @@ def test_inverse_kinematics_answers_under_the_stamp_of_the_pose(peer: "Peer") ->
     goal = robot.fk(HOME)
     goal[0, 3] -= 1e-5  # within one tick's reach
     pose = np.array([*goal[:3, 3], *_quaternion(goal)])
-    stamp = MS
-
-    def answered() -> int:
-        nonlocal stamp
-        stamp += MS
-        peer.send(topics.SLAVE_SETPOINT_JS, 0, HOME)
-        peer.send(topics.SLAVE_SERVO_CP, stamp, pose)
-        return answers.take()
-
-    peer.wait(answered, "slave/servo_jp")
-    assert answers.stamps[0] in range(MS, stamp + 1, MS)
+    fresh, still = {topics.SLAVE_SERVO_CP: pose}, {topics.SLAVE_SETPOINT_JS: HOME}
+    last = peer.feed(answers.take, "slave/servo_jp", fresh, still)
+    assert answers.stamps[0] in range(MS, last + 1, MS)
     np.testing.assert_allclose(answers.values[0], robot.ik(goal, HOME).q, atol=1e-12)
 
 
@@ -133,17 +117,13 @@ def test_inverse_kinematics_warns_with_the_joint_that_holds_the_slave_back(peer:
     peer.start("inverse_kinematics")
     goal = robot.fk(HOME)
     goal[:3, 3] += 0.01 * robot.jacobian(HOME)[:3, 2]  # 10 mm past the end of d3
-    pose, stamp = np.array([*goal[:3, 3], *_quaternion(goal)]), MS
+    pose = np.array([*goal[:3, 3], *_quaternion(goal)])
 
     def warned() -> bool:
-        nonlocal stamp
-        stamp += MS
-        peer.send(topics.SLAVE_SETPOINT_JS, stamp - MS, HOME)
-        peer.send(topics.SLAVE_SERVO_CP, stamp, pose)
         status = peer.status("inverse_kinematics")
         return status and "d3 is at its limit" in status.message and status.level == 1
 
-    peer.wait(warned, "warning")
+    peer.feed(warned, "warning", {topics.SLAVE_SETPOINT_JS: HOME, topics.SLAVE_SERVO_CP: pose})
     assert reach.take()
     said = dict(zip(topics.SLAVE_REACH.columns, reach.values[-1], strict=True))
     assert (said["limit"], said["joint"]) == (topics.Limit.JOINT, 2)
@@ -176,21 +156,13 @@ def test_slave_follows_and_passes_the_stamp_of_the_command_on(peer: "Peer") -> N
     peer.start("slave")
     peer.wait(lambda: measured.take() > 100, "slave/measured_js")
     assert set(setpoints.stamps) <= {topics.NO_COMMAND_NS}
-    wanted, stamp = HOME - 0.001 * np.eye(6)[0], 0
-
-    def passed_on() -> int | bool:
-        nonlocal stamp
-        stamp += MS
-        peer.send(topics.SLAVE_SERVO_JP, stamp, wanted)
-        return setpoints.take() and setpoints.stamps[-1] in range(MS, stamp + 1, MS)
-
-    peer.wait(passed_on, "stamp passed on")
+    wanted = HOME - 0.001 * np.eye(6)[0]
 
     def arrived() -> bool:
-        passed_on()
-        return np.allclose(setpoints.values[-1], wanted, atol=1e-9)
+        return bool(setpoints.take()) and np.allclose(setpoints.values[-1], wanted, atol=1e-9)
 
-    peer.wait(arrived, "slave at the reference")
+    last = peer.feed(arrived, "slave at the reference", {topics.SLAVE_SERVO_JP: wanted})
+    assert setpoints.stamps[-1] in range(MS, last + 1, MS)
     steps = np.diff(measured.stamps)
     assert (steps > 0).all()
     assert (steps % MS == 0).all()
@@ -202,49 +174,29 @@ def heard_by_recorder(peer: "Peer") -> int:
     A best-effort writer may know its reader before the reader knows it: what it sends until then
     is lost, and from then on nothing is.
     """
-    stamp = 0
 
-    def heard() -> Any:
-        nonlocal stamp
-        stamp += MS
-        peer.send(topics.MASTER_MEASURED_CP, stamp, REST)
+    def is_heard() -> Any:
         status = peer.status("recorder")
         return status and status.number("received.master/measured_cp") > 0
 
-    peer.wait(heard, "samples at the recorder")
-    return stamp
+    return peer.feed(is_heard, "samples at the recorder", {topics.MASTER_MEASURED_CP: REST})
 
 
-def test_recorder_keeps_what_was_sent_and_the_configuration(peer: "Peer", tmp_path: Path) -> None:
+def test_recorder_keeps_what_was_sent_until_the_signal_and_the_configuration(peer: "Peer", tmp_path: Path) -> None:
     recorder = peer.start("recorder", out=str(tmp_path / "bag"), scenario="mine")
-    first = heard_by_recorder(peer) + MS
-    sent = first + MS * np.arange(500)
+    sent = heard_by_recorder(peer) + MS * np.arange(1, 501)
     for stamp in sent:
         peer.send(topics.MASTER_MEASURED_CP, int(stamp), REST)
-    peer.wait_value("recorder", "received.master/measured_cp", lambda n: n > 500)
-    assert recorder.end(signal.SIGTERM) == 0
+    assert recorder.end() == 0
     bag = Bag(tmp_path / "bag")
-    series = bag.read(topics.MASTER_MEASURED_CP)
     peer.insist_on_all("recorder")
-    np.testing.assert_array_equal(series.stamp_ns[-500:], sent)
+    np.testing.assert_array_equal(bag.read(topics.MASTER_MEASURED_CP).stamp_ns[-500:], sent)
     assert bag.metadata["scenario"] == "mine"
     assert "haptic_master" in bag.metadata["configuration"]
 
 
-def test_what_arrived_just_before_the_signal_is_recorded(peer: "Peer", tmp_path: Path) -> None:
-    recorder = peer.start("recorder", out=str(tmp_path / "bag"))
-    last = heard_by_recorder(peer) + MS * np.arange(1, 101)
-    for number in last:
-        peer.send(topics.MASTER_MEASURED_CP, int(number), REST)
-    assert recorder.end() == 0
-    stamps = Bag(tmp_path / "bag").read(topics.MASTER_MEASURED_CP).stamp_ns
-    peer.insist_on_all("recorder")
-    assert np.array_equal(stamps[-100:], last)
-
-
 @pytest.mark.slow
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_every_node_ends_with_0(peer: "Peer", tmp_path: Path, number: Any) -> None:
+def test_every_node_ends_with_0(peer: "Peer", tmp_path: Path) -> None:
     for name in STAGES:
         parameters: dict[str, Any] = {"out": str(tmp_path / "bag")} if name == "recorder" else {}
         peer.start(name, wait="", **parameters)
@@ -252,7 +204,7 @@ def test_every_node_ends_with_0(peer: "Peer", tmp_path: Path, number: Any) -> No
         peer.wait_state(node.name, "active")
     peer.wait_value("recorder", "received.slave/measured_js", lambda n: n > 0)  # they have met
     for node in peer.nodes:
-        node.process.send_signal(number)
+        node.process.send_signal(signal.SIGTERM)
     assert {n.name: n.wait(60) for n in peer.nodes} == dict.fromkeys(STAGES, 0)
     assert Bag(tmp_path / "bag").topics["slave/measured_js"].count > 0
 
@@ -284,31 +236,20 @@ def test_relations_between_parameters_hold_and_can_be_changed_at_once(peer: "Pee
 def test_a_new_gain_is_used_from_the_next_sample_on(peer: "Peer") -> None:
     answers = peer.listen(topics.SLAVE_SERVO_CP)
     peer.start("motion_scaling", feedback_timeout=5.0)
-    where, pose, stamp = [0.4, 0.0, -0.2, 1.0, 0.0, 0.0, 0.0], list(REST), 0
+    where, pose = [0.4, 0.0, -0.2, 1.0, 0.0, 0.0, 0.0], list(REST)
 
     def moved() -> float:
         """Slave travel of one millimetre of master travel along x."""
+        nonlocal stamp
         answers.take()
         before, last = answers.values[-1], stamp
         pose[0] += 1e-3
-
-        def answered() -> int | bool:
-            nonlocal stamp
-            stamp += MS
-            peer.send(topics.MASTER_MEASURED_CP, stamp, pose)
-            return answers.take() and answers.stamps[-1] > last
-
-        peer.wait(answered, "answer")
+        new = {topics.MASTER_MEASURED_CP: pose}
+        stamp = peer.feed(lambda: answers.take() and answers.stamps[-1] > last, "answer", new, after=last)
         return float(np.linalg.norm(answers.values[-1][:3] - before[:3]))
 
-    def engaged() -> bool:
-        nonlocal stamp
-        stamp += MS
-        peer.send(topics.SLAVE_SETPOINT_CP, stamp, where)
-        peer.send(topics.MASTER_MEASURED_CP, stamp, pose)
-        return answers.take() >= 3
-
-    peer.wait(engaged, "motion_scaling at work")
+    fresh = {topics.SLAVE_SETPOINT_CP: where, topics.MASTER_MEASURED_CP: pose}
+    stamp = peer.feed(lambda: answers.take() >= 3, "motion_scaling at work", fresh)
     assert moved() == pytest.approx(1e-3, rel=1e-6)
     assert peer.set("motion_scaling", coarse_gain=0.25)[0].successful
     assert moved() == pytest.approx(0.25e-3, rel=1e-6)

@@ -37,11 +37,9 @@ class Session:
         before = self.peer.status("recorder").number(key)
 
         def heard() -> Any:
-            self._stamp += MS
-            self.peer.send(MASTER, self._stamp, REST)
             return self.peer.status("recorder").number(key) >= before + count
 
-        self.peer.wait(heard, "samples at the recorder")
+        self._stamp = self.peer.feed(heard, "samples at the recorder", {MASTER: REST}, after=self._stamp)
 
 
 def count(path: Path, topic: Any = MASTER) -> int:

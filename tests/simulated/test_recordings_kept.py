@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import pytest
 from geometry_msgs.msg import PoseStamped
 
 from teleop_core.bags.messages import layout
@@ -42,23 +43,21 @@ def test_a_killed_recorder_loses_at_most_a_fifth_of_a_second(peer: "Peer", tmp_p
     assert len(series) > 1000
 
 
-def test_a_recorder_whose_directory_moved_keeps_everything_and_does_not_say_success(
-    peer: "Peer", tmp_path: Path
+@pytest.mark.parametrize("is_moved", [True, False])
+def test_a_recorder_whose_directory_moved_or_takes_no_metadata_keeps_everything_and_does_not_say_success(
+    peer: "Peer", tmp_path: Path, is_moved: bool
 ) -> None:
     recorder = start(peer, tmp_path)
-    (tmp_path / "bag").rename(tmp_path / "moved")
-    assert recorder.end(signal.SIGTERM) == 1
-    assert f"messages are in {tmp_path / 'moved'}" in recorder.stderr.read_text()
-    assert Bag(tmp_path / "moved").topics["master/measured_cp"].count > 1500
-
-
-def test_a_recorder_that_cannot_write_metadata_keeps_everything_for_recover(peer: "Peer", tmp_path: Path) -> None:
-    recorder = start(peer, tmp_path)
-    (tmp_path / "bag" / "metadata.yaml").mkdir()
-    assert recorder.end(signal.SIGINT) == 1
-    assert "`teleop recover " in recorder.stderr.read_text()
-    out, _ = recover(tmp_path / "bag")
-    assert Bag(out).topics["master/measured_cp"].count > 1500
+    place = tmp_path / "bag"
+    place = place.rename(tmp_path / "moved") if is_moved else place
+    if not is_moved:
+        (place / "metadata.yaml").mkdir()
+    assert recorder.end() == 1
+    told = f"messages are in {place}" if is_moved else "`teleop recover "
+    assert told in recorder.stderr.read_text()
+    if not is_moved:
+        place, _ = recover(place)
+    assert Bag(place).topics["master/measured_cp"].count > 1500
 
 
 def test_what_the_middleware_brings_after_a_feed_has_begun_does_not_stand_behind_newer_samples(

@@ -7,7 +7,6 @@ import subprocess
 import sys
 from collections.abc import Callable
 from itertools import pairwise
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -128,16 +127,11 @@ def test_a_node_may_leave_a_composed_session_in_any_moment(peer: "Peer", session
     assert session.wait() == 0
 
 
-def test_a_composed_session_records_all_topics_at_times_that_rise_from_stage_to_stage(
-    peer: Any, tmp_path: Path
-) -> None:
-    enough = {topic.name: 1500 for topic in STREAMS}
-    bag = peer.run(configure("coarse_box"), lambda: peer.has_recorded(enough), tmp_path / "bag")
+def test_a_composed_session_records_all_topics_at_times_that_rise_from_stage_to_stage(recorded: Bag) -> None:
     for topic in STREAMS:
-        assert bag.topics[topic.name].count > 1500, topic.name
+        assert recorded.topics[topic.name].count > 1500, topic.name
     chain = (topics.MASTER_MEASURED_CP, topics.SLAVE_SERVO_CP, topics.SLAVE_SERVO_JP, topics.SLAVE_SETPOINT_JS)
-    series = [bag.read(topic) for topic in chain]
-    for before, after in pairwise(series):
+    for before, after in pairwise(map(recorded.read, chain)):
         _, i, j = np.intersect1d(before.stamp_ns, after.stamp_ns, return_indices=True)
         assert len(i) > 500
         assert (after.log_ns[j] >= before.log_ns[i]).all()

@@ -91,17 +91,6 @@ def test_a_second_master_is_refused_and_the_first_one_goes_on(peer: "Peer") -> N
     assert status.number("rate_hz.master/measured_cp") > 0.0
 
 
-def test_a_sender_whose_stamps_stand_still_is_told_what_to_do(peer: "Peer") -> None:
-    peer.start("motion_scaling")
-    pose = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]
-
-    def told() -> bool:
-        peer.send(topics.MASTER_MEASURED_CP, 0, pose)
-        return "its stamps are 0: stamp each" in peer.status("motion_scaling").message
-
-    peer.wait(told, "the advice")
-
-
 def test_a_recorder_does_not_take_a_second_publisher_for_losses(peer: "Peer", tmp_path: Path) -> None:
     peer.start("recorder", out=str(tmp_path / "bag"))
     topic = topics.MASTER_MEASURED_CP

@@ -2,7 +2,6 @@
 
 import runpy
 import sys
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -27,13 +26,6 @@ def test_a_data_frame_of_something_else_is_refused_with_what_is_needed() -> None
     for frame in (FRAME.rename(columns={"x": "depth"}), FRAME.assign(force=1.0)):
         with pytest.raises(tc.ParameterError, match="columns of t, x, y, z"):
             tc.run(operator=frame, duration=1.0)
-
-
-def test_an_unknown_parameter_is_named_with_its_stage(tmp_path: Path) -> None:
-    file = tmp_path / "own.yaml"
-    file.write_text("haptic_master: {ros__parameters: {out: 1.0}}")
-    with pytest.raises(tc.TeleopError, match=r"parameter of \S+ is 'out', must be one of: "):
-        tc.configuration(files=[file])
 
 
 def test_the_crtk_client_says_what_it_lacks(

@@ -87,13 +87,8 @@ def test_velocities_and_efforts_that_are_not_sent_are_nan() -> None:
     np.testing.assert_array_equal(values, [1.0, 2.0, *[np.nan] * 4])
 
 
-def test_a_sound_message_is_accepted() -> None:
-    assert check(Kind.POSE, 5, POSE, 4) is None
-    assert check(Kind.POSE, -5, POSE, None) is None
-
-
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
-@pytest.mark.parametrize("column", range(7))
+@pytest.mark.parametrize("column", [0, 3, 6])
 def test_numbers_that_are_not_finite_are_refused(bad: float, column: int) -> None:
     values = POSE.copy()
     values[column] = bad

@@ -100,8 +100,6 @@ def test_setting_of_another_form_is_refused(setting: str, told: str) -> None:
 @pytest.mark.parametrize(
     ("setting", "name"),
     [
-        ("duration=-1", "teleop.duration"),
-        ("duration=.nan", "teleop.duration"),
         ("duration=soon", "teleop.duration"),
         ("duration=", "teleop.duration"),
         ("seed=1.5", "operator.seed"),
@@ -215,31 +213,16 @@ def test_former_name_sets_what_it_is_called_now(
 
 
 def test_file_with_former_names_gives_the_same_configuration(tmp_path: Path) -> None:
-    old = {
+    old: dict[str, dict[str, Any]] = {
         "haptic_master": {"path": {"kind": "circle", "period": 5.0}, "seed": 3},
-        "motion_scaling": {"fixture.size": [0.1, 0.2, 0.3]},
-        "inverse_kinematics": {"robot": "puma560"},
-        "slave_sim": {
-            "pid": {"kp": [1.0] * 6},
-            "robot": "puma560",
-            "start_speed": 0.2,
-            "reference_filter": {"is_on": False},
-            "operation.tool_speed": 0.1,
-        },
+        "slave_sim": {"pid": {"kp": [1.0] * 6}, "start_speed": 0.2, "operation.tool_speed": 0.1},
         "teleop": {"delays": ["slave/servo_jp@slave_sim=0.02"]},
     }
-    now = {
+    now: dict[str, dict[str, Any]] = {
         "operator": {"kind": "circle", "period": 5.0},
         "haptic_master": {"seed": 3},
-        "motion_scaling": {"fixture": {"box": {"size": [0.1, 0.2, 0.3]}}},
-        "inverse_kinematics": {"robot": "puma560"},
-        "slave": {
-            "robot": "puma560",
-            "start_speed": 0.2,
-            "reference_filter.is_on": False,
-            "operation": {"tool_speed": 0.1},
-        },
-        "slave_sim": {"controller.pid.kp": [1.0] * 6, "robot": "puma560"},
+        "slave": {"start_speed": 0.2, "operation": {"tool_speed": 0.1}},
+        "slave_sim": {"controller.pid.kp": [1.0] * 6},
         "teleop": {"delays": ["slave/servo_jp@slave=0.02"]},
     }
     first, second = (

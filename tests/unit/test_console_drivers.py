@@ -116,12 +116,6 @@ def test_who_takes_control_holds_nothing_yet() -> None:
     assert drivers.driver == 1
 
 
-def test_page_that_is_gone_cannot_take_control() -> None:
-    drivers = pages(1)
-    drivers.take(7)
-    assert drivers.driver == 0
-
-
 def test_every_page_drives_where_nothing_can_be_harmed() -> None:
     drivers = pages(3)
     drivers.is_for_all = True

@@ -2,7 +2,6 @@
 
 import bisect
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -120,12 +119,9 @@ def test_a_loop_begins_again_at_its_end(link: RecordedLink) -> None:
 
 
 @pytest.mark.parametrize("speed", [0.0, -1.0, 101.0, float("nan")])
-def test_impossible_speeds_are_refused(link: RecordedLink, speed: float) -> None:
+def test_impossible_speeds_and_no_time_are_refused(link: RecordedLink, speed: float) -> None:
     with pytest.raises(tc.ParameterError, match="speed"):
         link.speed = speed
-
-
-def test_no_time_is_refused(link: RecordedLink) -> None:
     with pytest.raises(tc.ParameterError, match="time"):
         link.seek(float("nan"))
 
@@ -199,11 +195,6 @@ def test_a_recording_of_another_system_is_refused_with_what_it_lacks(
 ) -> None:
     with pytest.raises(tc.RecordingError, match=reason):
         RecordedLink(foreign(small, lacking, metadata))
-
-
-def test_a_path_that_is_none_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(tc.RecordingError):
-        RecordedLink(tmp_path / "nothing")
 
 
 def test_a_robot_that_is_named_by_the_recording_alone_is_enough(small: MemoryBag) -> None:

@@ -67,6 +67,12 @@ def drawn(server: Server, link: RecordedLink, time: float) -> tuple[Scene, View]
     return scene, view
 
 
+def scene_of(server: Server, name: str) -> Scene:
+    """Empty scene with an arm."""
+    server.scene.reset()
+    return Scene(server, [Arm("", tc.load_robot(name))])
+
+
 def turned(node: FrameHandle | BoxHandle) -> Array:
     return rotations_from_quaternions(node.wxyz[None])[0]
 
@@ -103,6 +109,8 @@ def test_the_fixture_is_drawn_around_the_hand_where_its_button_was_pressed(
     when = state.stamp_ns[np.argmax(state["is_fixture_on"] > 0)]
     master = session[MASTER]
     there = master[["x", "y", "z"]][np.searchsorted(master.stamp_ns, when)]
+    scene, _ = drawn(server, link, 1.0)
+    assert scene.arms[""].outline.line is None
     scene, view = drawn(server, link, 11.0)
     assert view.arms[""].state["is_fixture_on"]
     outline = present(scene.arms[""].master.outline.line)
@@ -114,13 +122,18 @@ def test_a_fixture_is_red_where_its_wall_is_felt_and_green_elsewhere(
     server: Server, link: RecordedLink, session: tc.Recording
 ) -> None:
     force = session[FORCE]
-    size = np.linalg.norm(force[["fx", "fy", "fz"]], axis=1)
+    size = sizes(force)
     colors = []
     for time in (force.time[np.argmax(size)], force.time[size == 0.0][-1]):
         scene, view = drawn(server, link, time)
         assert view.arms[""].state["is_fixture_on"]
         colors.append(tuple(present(scene.arms[""].outline.line).colors.tolist()))
     assert colors == [WRONG, GOOD]
+
+
+def sizes(stream: tc.Stream) -> Array:
+    """Forces (N,) [N] of a stream of wrenches."""
+    return np.linalg.norm(stream[["fx", "fy", "fz"]], axis=1)
 
 
 def path_of(server: Any, name: str) -> NDArray[np.float32]:
@@ -160,11 +173,6 @@ def test_after_a_jump_in_time_the_path_is_that_of_the_recording(
     np.testing.assert_allclose(points[0], session[TIP][["x", "y", "z"]][0], atol=1e-4)
 
 
-def test_no_fixture_is_drawn_before_there_is_one(server: Server, link: RecordedLink) -> None:
-    scene, _ = drawn(server, link, 1.0)
-    assert scene.arms[""].outline.line is None
-
-
 def test_the_same_view_again_sends_nothing(server: Server, link: RecordedLink) -> None:
     scene, view = drawn(server, link, 9.0)
     scene.draw(view)
@@ -185,17 +193,22 @@ def test_another_view_sends_no_mesh_again(server: Server, link: RecordedLink) ->
 
 
 @pytest.mark.parametrize("name", tc.list_robots())
-def test_every_robot_is_drawn(server: Server, name: str) -> None:
-    server.scene.reset()
-    robot = tc.load_robot(name)
-    scene = Scene(server, [Arm("", robot)])
+def test_every_robot_is_drawn_and_the_first_camera_sees_all_of_it_in_a_square_window(server: Server, name: str) -> None:
+    scene, robot = scene_of(server, name), tc.load_robot(name)
     scene.draw(View(arms={"": ArmView()}))
+    camera, room = scene.whole(), scene.arms[""].room()
+    corners = np.stack(np.meshgrid(*np.transpose(room)), axis=-1).reshape(-1, 3)
+    turn = rotations_from_quaternions(camera.quaternion[None])[0]
+    right, down, depth = ((corners - camera.position) @ turn).T
+    half = np.tan(0.5 * server.initial_camera.fov)
+    assert (depth > 0.0).all()
+    assert (np.abs(down) < half * depth).all()
+    assert (np.abs(right) < 1.06 * half * depth).all()
     rng = np.random.default_rng(4)
+    scene.show("ghost", is_shown=True)
     for joints in (robot.home, rng.uniform(robot.lower, robot.upper), np.full(robot.n, np.nan)):
         state = np.concatenate((joints, np.zeros(2 * robot.n)))
-        streams = {"slave/measured_js": state, "slave/setpoint_js": joints}
-        scene.show("ghost", is_shown=True)
-        scene.draw(View(arms={"": ArmView(streams)}))
+        scene.draw(View(arms={"": ArmView({"slave/measured_js": state, "slave/setpoint_js": joints})}))
     scene.show("axes", is_shown=True)
     for camera in (scene.whole(), scene.tool(), scene.microscope()):
         assert np.isfinite(camera.quaternion).all()
@@ -236,7 +249,7 @@ def test_the_force_on_the_stylus_is_an_arrow_at_it_as_long_as_it_is_large(
     server: Server, link: RecordedLink, session: tc.Recording
 ) -> None:
     force = session[FORCE]
-    size = np.linalg.norm(force[["fx", "fy", "fz"]], axis=1)
+    size = sizes(force)
     scene, view = drawn(server, link, force.time[np.argmax(size)])
     arrow, seen = scene.arms[""].master._force, view.arms[""].streams
     assert arrow._frame.visible
@@ -250,9 +263,7 @@ def test_the_force_on_the_stylus_is_an_arrow_at_it_as_long_as_it_is_large(
 
 @pytest.mark.parametrize("name", ["rcrt1", "planar_3r"])
 def test_the_reach_holds_the_places_of_the_tip_and_no_others(server: Any, name: str) -> None:
-    server.scene.reset()
-    robot, rng = tc.load_robot(name), np.random.default_rng(1)
-    scene = Scene(server, [Arm("", robot)])
+    scene, robot, rng = scene_of(server, name), tc.load_robot(name), np.random.default_rng(1)
     scene.show("reach", is_shown=True)
     cloud = present(server.scene.get_handle_by_name("/arm/reach"))
     points = np.asarray(cloud.points, np.float64)
@@ -278,9 +289,7 @@ def test_the_hand_of_a_task_passes_every_target_and_no_other_operator_has_any() 
 
 
 def test_a_joint_at_its_limit_has_a_halo_and_its_body_keeps_its_colour(server: Server) -> None:
-    server.scene.reset()
-    robot = tc.load_robot("rcrt1")
-    scene = Scene(server, [Arm("", robot)])
+    scene, robot = scene_of(server, "rcrt1"), tc.load_robot("rcrt1")
     bodies = scene.arms[""].bodies
     place = f"/arm/robot/{bodies.bodies[bodies.joint_body[1]].name}"
 
@@ -301,14 +310,12 @@ def test_a_joint_at_its_limit_has_a_halo_and_its_body_keeps_its_colour(server: S
 
 
 def test_no_joint_is_marked_at_home_unless_the_session_says_that_it_is_in_the_way(server: Server) -> None:
-    server.scene.reset()
-    robot = tc.load_robot("rcrt1")  # its home is the end of d3
-    scene = Scene(server, [Arm("", robot)])
+    scene, robot = scene_of(server, "rcrt1"), tc.load_robot("rcrt1")  # its home is the end of d3
     drawn, slide = scene.arms[""].drawn, robot.joint_names.index("d3")
     told = {"limit": float(Limit.JOINT), "limited_joint": float(slide)}
     measured = {"slave/measured_js": np.concatenate((robot.home, np.zeros(2 * robot.n)))}
-    said: list[tuple[dict[str, float], int]] = [({}, 0), (told, 1)]
-    for state, marked in said:
+    nothing: dict[str, float] = {}
+    for state, marked in ((nothing, 0), (told, 1)):
         scene.draw(View(arms={"": ArmView(measured, state=state)}))
         assert len(drawn._marked) == marked
 
@@ -333,29 +340,12 @@ def test_two_arms_stand_beside_each_other_and_each_tip_is_where_it_was_measured(
         np.testing.assert_allclose(nodes.tip()[:3], root.position + tip.position, atol=STILL)
 
 
-def test_the_first_camera_sees_all_of_every_robot_in_a_square_window(server: Server) -> None:
-    for name in tc.list_robots():
-        server.scene.reset()
-        scene = Scene(server, [Arm("", tc.load_robot(name))])
-        camera, (low, high) = scene.whole(), scene.arms[""].room()
-        corners = np.array(
-            [[(low, high)[i][0], (low, high)[j][1], (low, high)[k][2]] for i in (0, 1) for j in (0, 1) for k in (0, 1)]
-        )
-        turn = rotations_from_quaternions(camera.quaternion[None])[0]
-        right, down, depth = ((corners - camera.position) @ turn).T
-        half = np.tan(0.5 * server.initial_camera.fov)
-        assert (depth > 0.0).all()
-        assert (np.abs(down) < half * depth).all(), name
-        assert (np.abs(right) < 1.06 * half * depth).all(), name
-
-
 @pytest.mark.parametrize("name", ["rcrt1", "puma560", "planar_3r"])
 @pytest.mark.parametrize("aspect", [0.46, 1.2, 2.4])
 def test_camera_of_the_work_sees_tip_and_stylus_and_no_more_than_it_must(
     server: Server, name: str, aspect: float
 ) -> None:
-    server.scene.reset()
-    scene = Scene(server, [Arm("", tc.load_robot(name))])
+    scene = scene_of(server, name)
     camera, points = scene.work(aspect), scene.arms[""].work()
     turn = rotations_from_quaternions(camera.quaternion[None])[0]
     right, down, depth = ((points - camera.position) @ turn).T
@@ -450,7 +440,7 @@ def test_the_object_is_drawn_where_the_tip_touches_it(server: Server, pressed: t
 
 def test_the_push_on_the_tip_is_drawn_there_as_large_as_it_is(server: Server, pressed: tc.Recording) -> None:
     force = pressed["slave/measured_cf"]
-    size = np.linalg.norm(force[["fx", "fy", "fz"]], axis=1)
+    size = sizes(force)
     scene, view = drawn(server, RecordedLink(pressed.bag), force.time[np.argmax(size)])
     push = scene.arms[""].world.push
     assert push._frame.visible
@@ -558,7 +548,7 @@ def test_the_view_of_the_work_grows_to_hold_what_the_tip_meets_goals_far_away_to
 def test_a_camera_on_the_tool_goes_with_it_until_another_is_chosen_and_one_that_was_turned_stays(
     server: Server,
 ) -> None:
-    scene, client = Scene(server, [Arm("", tc.load_robot("rcrt1"))]), Viewer()
+    scene, client = scene_of(server, "rcrt1"), Viewer()
     visitors: Any = Visitors(server, Drivers(), scene, is_live=True)
     visitors._fit(0, client)
     work = scene.work(client.camera.aspect)

@@ -1,5 +1,6 @@
 """Settings of the page: what a control shows is what the parameter is, there and back."""
 
+from collections.abc import Iterator
 from typing import Any
 
 import pytest
@@ -22,11 +23,31 @@ EVERY: list[tuple[str, str, Any]] = [
 ]
 
 
-@pytest.mark.parametrize(("node", "name", "value"), EVERY, ids=[f"{n}.{p}" for n, p, _ in EVERY])
-def test_a_value_that_is_shown_is_read_as_itself(node: str, name: str, value: Any) -> None:
-    info = ParameterInfo(node, name, value)
-    read = parsed(shown(value), info)
-    assert read == value or read == pytest.approx(value)
+@pytest.fixture(scope="module")
+def _server() -> Iterator[Any]:
+    with ConsoleServer(0) as opened:
+        yield opened.viser
+
+
+@pytest.fixture
+def viser(_server: Any) -> Any:
+    """Server of a page on which nothing stands."""
+    _server.gui.reset()
+    return _server
+
+
+def panel(viser: Any, known: dict[tuple[str, str], ParameterInfo], *, may: bool = True) -> tuple[SettingsPanel, Any]:
+    """Settings of a session with these parameters, and its desk; whoever looks may change them or not."""
+    desk: Any = Desk()
+    desk.known = known
+    settings = SettingsPanel(viser, desk, lambda _: may)
+    settings.refresh()
+    return settings, desk
+
+
+def inputs(viser: Any) -> dict[str, Any]:
+    """Inputs on the page by their labels."""
+    return {handle.label: handle for handle in viser.gui._gui_input_handle_from_uuid.values()}
 
 
 @pytest.mark.parametrize(
@@ -59,25 +80,25 @@ def test_a_setting_text_is_read_by_the_session_as_the_value(value: Any) -> None:
         ("weight [kg m] or length [m]", " [m]"),
     ],
 )
-def test_a_label_has_the_unit_that_ends_the_meaning(doc: str, unit: str) -> None:
-    with ConsoleServer(0) as server:
-        control = Input(server.viser.gui, "x", ParameterInfo("slave", "x", 1.0, doc))
-        assert control.parts[0].label == f"x{unit}"
+def test_a_label_has_the_unit_that_ends_the_meaning(viser: Any, doc: str, unit: str) -> None:
+    control = Input(viser.gui, "x", ParameterInfo("slave", "x", 1.0, doc))
+    assert control.parts[0].label == f"x{unit}"
 
 
-def test_every_parameter_has_an_input_of_its_kind_which_shows_its_value_and_all_seven_kinds_are_used() -> None:
+def test_every_parameter_has_an_input_of_its_kind_which_shows_its_value_and_reads_it_as_itself(viser: Any) -> None:
     bounds = {(n, s.name): s for n, group in declared_groups().items() for s in specs(group)}
     used = set()
-    with ConsoleServer(0) as server:
-        for node, name, value in EVERY:
-            spec = bounds[node, name]
-            info = ParameterInfo(node, name, value, spec.doc, spec.lowest, spec.upper, spec.choices, spec.fixed)
-            control = Input(server.viser.gui, name, info)
-            assert control.value == value or control.value == pytest.approx(value), name
-            assert control.show(value)
-            assert control.kind == "vector" or (LATER in control.parts[0].label) == spec.fixed
-            used.add(control.kind)
-            control.remove()
+    for node, name, value in EVERY:
+        spec = bounds[node, name]
+        info = ParameterInfo(node, name, value, spec.doc, spec.lowest, spec.upper, spec.choices, spec.fixed)
+        read = parsed(shown(value), info)
+        assert read == value or read == pytest.approx(value), name
+        control = Input(viser.gui, name, info)
+        assert control.value == value or control.value == pytest.approx(value), name
+        assert control.show(value)
+        assert control.kind == "vector" or (LATER in control.parts[0].label) == spec.fixed
+        used.add(control.kind)
+        control.remove()
     assert used == set(KINDS)
 
 
@@ -96,94 +117,82 @@ def test_every_parameter_has_an_input_of_its_kind_which_shows_its_value_and_all_
         ("bags/run_1", {}, "text", "GuiTextHandle"),
     ],
 )
-def test_seven_kinds_of_values_have_seven_kinds_of_inputs(value: Any, more: Any, kind: str, element: str) -> None:
+def test_seven_kinds_of_values_have_seven_kinds_of_inputs(
+    viser: Any, value: Any, more: Any, kind: str, element: str
+) -> None:
     info = ParameterInfo("elsewhere", "x", value, **more)
-    with ConsoleServer(0) as server:
-        control = Input(server.viser.gui, "x", info)
-        assert kind_of(info) == control.kind == kind
-        assert {type(part).__name__ for part in control.parts} == {element}
-        assert control.value == value
+    control = Input(viser.gui, "x", info)
+    assert kind_of(info) == control.kind == kind
+    assert {type(part).__name__ for part in control.parts} == {element}
+    assert control.value == value
 
 
-def test_numbers_of_a_vector_have_the_names_of_axes_or_joints_and_are_set_one_by_one() -> None:
-    desk: Any = Desk()
-    joints = desk.arms[0].robot.joint_names
+def test_numbers_of_a_vector_have_the_names_of_axes_or_joints_and_are_set_one_by_one(viser: Any) -> None:
+    joints = Desk().arms[0].robot.joint_names
     place, gains = ("slave_sim", "world.place"), ("slave_sim", "own.gains")
-    desk.known = {
-        place: ParameterInfo(*place, (0.1, 0.2, 0.3), "place [m]"),
-        gains: ParameterInfo(*gains, (1.0,) * len(joints)),
-    }
-    with ConsoleServer(0) as server:
-        settings = SettingsPanel(server.viser, desk, lambda _: True)
-        settings.refresh()
-        search: Any = settings._search
-        search.value = "slave_sim"
-        settings._show()
-        assert [part.label for part in settings._by_key[place].parts] == ["x", "y", "z"]
-        assert [part.label for part in settings._by_key[gains].parts] == list(joints)
-        y: Any = settings._by_key[place].parts[1]
-        y.value = 0.5
-        settings._changed(0, settings._by_key[place], settings._failed, desk.known[place])
-        assert settings.known[place].value == (0.1, 0.5, 0.3)
-        settings.follow({place: (1.0, 2.0, 3.0)})
-        assert [part.value for part in settings._by_key[place].parts] == [1.0, 2.0, 3.0]
-        settings.follow({place: ()})  # which has no fields
-        assert settings._by_key[place].kind == "text"
+    settings, desk = panel(
+        viser,
+        {
+            place: ParameterInfo(*place, (0.1, 0.2, 0.3), "place [m]"),
+            gains: ParameterInfo(*gains, (1.0,) * len(joints)),
+        },
+    )
+    search: Any = settings._search
+    search.value = "slave_sim"
+    settings._show()
+    assert [part.label for part in settings._by_key[place].parts] == ["x", "y", "z"]
+    assert [part.label for part in settings._by_key[gains].parts] == list(joints)
+    y: Any = settings._by_key[place].parts[1]
+    y.value = 0.5
+    settings._changed(0, settings._by_key[place], settings._failed, desk.known[place])
+    assert settings.known[place].value == (0.1, 0.5, 0.3)
+    settings.follow({place: (1.0, 2.0, 3.0)})
+    assert [part.value for part in settings._by_key[place].parts] == [1.0, 2.0, 3.0]
+    settings.follow({place: ()})  # which has no fields
+    assert settings._by_key[place].kind == "text"
 
 
-def test_value_that_a_button_of_the_stylus_changed_is_shown_as_it_is_and_can_be_set_back() -> None:
-    desk: Any = Desk()
-    desk.known = {MODE: ParameterInfo(*MODE, "coarse", choices=("coarse", "fine")), GAIN: ParameterInfo(*GAIN, 0.1)}
-    with ConsoleServer(0) as server:
-        settings = SettingsPanel(server.viser, desk, lambda _: True)
-        settings.refresh()
-        inputs = server.viser.gui._gui_input_handle_from_uuid.values()
-        shown = {handle.label: handle for handle in inputs}
-        heard: list[Any] = []
-        settings.on_change(heard.append)
-        settings.follow({MODE: "fine", ("elsewhere", "mode"): "coarse"})
-        assert shown["mode"].value == settings.known[MODE].value == "fine"
-        assert shown["fine_gain"].value == 0.1
-        assert heard == [settings.known]
+def test_value_that_a_button_of_the_stylus_changed_is_shown_as_it_is_and_can_be_set_back(viser: Any) -> None:
+    settings, _ = panel(
+        viser, {MODE: ParameterInfo(*MODE, "coarse", choices=("coarse", "fine")), GAIN: ParameterInfo(*GAIN, 0.1)}
+    )
+    heard: list[Any] = []
+    settings.on_change(heard.append)
+    settings.follow({MODE: "fine", ("elsewhere", "mode"): "coarse"})
+    assert inputs(viser)["mode"].value == settings.known[MODE].value == "fine"
+    assert inputs(viser)["fine_gain"].value == 0.1
+    assert heard == [settings.known]
 
 
-def test_search_finds_words_of_stage_name_and_meaning_and_changed_only_what_is_no_default() -> None:
-    desk: Any = Desk()
+def test_search_finds_words_of_stage_name_and_meaning_and_changed_only_what_is_no_default(viser: Any) -> None:
     filtered = ("slave", "reference_filter.is_on")
-    desk.known = {
+    known = {
         MODE: ParameterInfo(*MODE, "coarse", "which gain holds", choices=("coarse", "fine")),
         GAIN: ParameterInfo(*GAIN, 0.25, "ratio of the fine mode [m/m]"),
         filtered: ParameterInfo(*filtered, True, "whether setpoints are smoothed"),
     }
-    with ConsoleServer(0) as server:
-        settings = SettingsPanel(server.viser, desk, lambda _: True)
-        settings.refresh()
-        inputs: Any = server.viser.gui._gui_input_handle_from_uuid.values()
-        shown = {one.label: one for one in inputs}
-        for text, found in (
-            ("", [MODE, GAIN, filtered]),
-            ("SCALING gain", [MODE, GAIN]),
-            ("m/m", [GAIN]),
-            ("smoothed", [filtered]),
-            ("nothing like it", []),
-        ):
-            shown["search"].value = text
-            assert settings.keys() == found, text
-        shown["search"].value = ""
-        shown["changed only"].value = True
-        assert settings.keys() == [GAIN]  # 0.1 by default
-        settings._reset(0)
-        assert desk.asked == ["fine_gain"]
-        assert settings.known[GAIN].value == 0.1
-        assert settings.keys() == []
+    settings, desk = panel(viser, known)
+    search, changed = (inputs(viser)[name] for name in ("search", "changed only"))
+    for said, found in (
+        ("", [MODE, GAIN, filtered]),
+        ("SCALING gain", [MODE, GAIN]),
+        ("m/m", [GAIN]),
+        ("smoothed", [filtered]),
+        ("nothing like it", []),
+    ):
+        search.value = said
+        assert settings.keys() == found, said
+    search.value = ""
+    changed.value = True
+    assert settings.keys() == [GAIN]  # 0.1 by default
+    settings._reset(0)
+    assert desk.asked == ["fine_gain"]
+    assert settings.known[GAIN].value == 0.1
+    assert settings.keys() == []
 
 
-def test_who_watches_resets_nothing() -> None:
-    desk: Any = Desk()
-    desk.known = {GAIN: ParameterInfo(*GAIN, 0.25)}
-    with ConsoleServer(0) as server:
-        settings = SettingsPanel(server.viser, desk, lambda _: False)
-        settings.refresh()
-        settings._reset(1)
-        assert desk.asked == []
-        assert settings.known[GAIN].value == 0.25
+def test_who_watches_resets_nothing(viser: Any) -> None:
+    settings, desk = panel(viser, {GAIN: ParameterInfo(*GAIN, 0.25)}, may=False)
+    settings._reset(1)
+    assert desk.asked == []
+    assert settings.known[GAIN].value == 0.25

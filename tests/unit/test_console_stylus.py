@@ -164,13 +164,11 @@ def test_nothing_is_stepped_before_the_stylus_is_known_or_while_it_is_dragged(se
     hand.take()
     hand.stylus.nudge("", "x", 1)
     assert hand.take() == []
-    fresh = Hand.__new__(Hand)
     server.scene.reset()
-    scene = Scene(server, [Arm("", tc.load_robot("rcrt1"))])
-    fresh.said = []
-    stylus = Stylus(server, scene, lambda _: True, lambda *_: fresh.said.append(1), fresh.said.append)
+    scene, said = Scene(server, [Arm("", tc.load_robot("rcrt1"))]), list[Any]()
+    stylus = Stylus(server, scene, lambda _: True, lambda *_: said.append(1), said.append)
     stylus.nudge("", "x", 1)
-    assert fresh.said == []
+    assert said == []
 
 
 def test_unknown_axes_are_refused(hand: Hand) -> None:

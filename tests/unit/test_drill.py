@@ -45,20 +45,20 @@ def trace(values: ArrayLike, numbers: Any = None) -> Any:
     return drill.measure.Trace(times, present(numbers).astype(np.int64), values, times)
 
 
-@pytest.mark.parametrize(("steps", "ratio"), [([1e-3, 2e-3], 2.0), ([5e-4, -5e-4], 0.5)])
-def test_the_ratio_is_that_of_the_largest_step_of_any_joint(steps: list[float], ratio: float) -> None:
-    still = np.zeros((len(steps) + 1, 1))
-    moving = np.concatenate(([0.0], np.cumsum(steps)))[:, np.newaxis]
-    found = drill.measure.step_ratio(trace(np.hstack((still, moving))), np.array([9.0, 1.0]), DT)
-    assert found == pytest.approx(ratio)
-
-
-def test_messages_that_were_lost_count_as_ticks_in_which_a_joint_could_move() -> None:
-    assert drill.measure.step_ratio(trace([[0.0], [3e-3]], [0, 3]), np.array([1.0]), DT) == (pytest.approx(1.0))
-
-
-def test_another_publisher_is_no_step() -> None:
-    assert drill.measure.step_ratio(trace([[0.0], [9.0]], [500, 1]), np.array([1.0]), DT) == 0.0
+@pytest.mark.parametrize(
+    ("places", "numbers", "ratio"),
+    [
+        ([0.0, 1e-3, 3e-3], None, 2.0),
+        ([0.0, 5e-4, 0.0], None, 0.5),
+        ([0.0, 3e-3], [0, 3], 1.0),  # messages that were lost
+        ([0.0, 9.0], [500, 1], 0.0),  # another publisher
+    ],
+)
+def test_the_ratio_is_that_of_the_largest_step_of_any_joint_in_a_tick(
+    places: list[float], numbers: list[int] | None, ratio: float
+) -> None:
+    joints = np.column_stack((np.zeros(len(places)), places))
+    assert drill.measure.step_ratio(trace(joints, numbers), np.array([9.0, 1.0]), DT) == pytest.approx(ratio)
 
 
 @pytest.mark.parametrize("moving_for", [0, 1, 7])
@@ -174,10 +174,6 @@ def outcome(**changed: object) -> drill.Outcome:
     return drill.Outcome(**(good | changed))
 
 
-def test_an_outcome_as_expected_has_no_failures() -> None:
-    assert outcome().failures() == []
-
-
 @pytest.mark.parametrize(
     ("changed", "word"),
     [
@@ -273,13 +269,10 @@ def wrong(name: str, found: judging.Seen) -> list[str]:
     return [m.name for m in judging.judge(by_name(name), found, NUMBERS) if m.failure]
 
 
-def test_an_arm_that_goes_where_the_hand_goes_is_as_expected() -> None:
-    assert wrong("loss", seen(round_and_round())) == []
-
-
 @pytest.mark.parametrize(
     ("joints", "names"),
     [
+        (round_and_round(), []),
         (round_and_round(speed=2.8), ["tip_speed_m_s"]),
         (round_and_round(speed=0.3), ["path_m"]),
         (round_and_round(speed=0.0), ["path_m"]),
@@ -441,10 +434,6 @@ def test_every_code_mutant_fits_the_source_and_names_files_of_tests(mutant: Muta
     assert changed(mutant)
     assert mutant.rows
     assert all((ROOT / file).is_file() for file in mutant.rows)
-
-
-def test_the_short_form_is_there_in_five_processes() -> None:
-    assert {one.name for one in drill.chosen(drill.SHORT, is_composed=False)} == set(drill.SHORT)
 
 
 def test_a_fault_that_there_is_not_is_refused_with_those_that_there_are() -> None:

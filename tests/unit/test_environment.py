@@ -52,12 +52,6 @@ def test_the_same_seed_gives_the_same_episode_beside_another_environment() -> No
     assert led(second, 4)[2] != led(first, 3)[2]
 
 
-def test_a_late_display_makes_it_slower() -> None:
-    late = gymnasium.make(NAME, settings={"display.latency": 0.3})
-    soon = gymnasium.make(NAME, settings={"display.latency": 0.0})
-    assert sum(led(late, s)[1] for s in range(3)) > sum(led(soon, s)[1] for s in range(3))
-
-
 def test_a_hand_that_goes_where_each_step_says_brings_all_blocks_to_their_pegs() -> None:
     env = gymnasium.make(TRANSFER)
     seen, _ = env.reset(seed=1)

@@ -1,15 +1,14 @@
 """Arms: a recording of two arms is scored arm by arm, each as if it had been recorded alone."""
 
-import io
 import json
 from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 import pytest
-from rich.console import Console
 
 from present import present
+from recipes import terminal
 from teleop_core.bags import arms, reports
 from teleop_core.bags.reader import Bag
 from teleop_core.bags.writer import BagWriter
@@ -125,7 +124,7 @@ def test_view_of_an_arm_reads_what_the_recording_holds_of_it(bag: Bag) -> None:
 
 
 def test_json_table_and_page_show_every_arm(path: Path, tmp_path: Path) -> None:
-    shown = Console(width=80, record=True, file=io.StringIO(), color_system=None)
+    shown = terminal()
     target, page = tmp_path / "scores.json", tmp_path / "page.html"
     evaluate_bags([path], target, page, shown)
     assert [s["session"]["arm"] for s in json.loads(target.read_text())] == ["right", "left"]

@@ -1,6 +1,5 @@
 """Fixtures in scores and pictures: any kind, turned and scaled as it stood around the slave."""
 
-import io
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -335,7 +334,7 @@ def test_walls_are_drawn_where_there_are_some_and_nowhere_else(
 def test_page_speaks_of_the_kind_and_of_no_box(recipe: Recipe, path: Path, tmp_path: Path) -> None:
     recipe.singles = [fixture_on(SPHERE)]
     recipe.write(path)
-    evaluate_bags([path], None, tmp_path / "page.html", Console(file=io.StringIO()))
+    evaluate_bags([path], None, tmp_path / "page.html", Console(quiet=True))
     body = (tmp_path / "page.html").read_text().split("page-data")[0].split("<body")[1]
     assert "sphere" in body
     assert "box" not in body

@@ -1,16 +1,14 @@
 """Evaluation follows the graph that a recording was made with: its chain, topics and stamps."""
 
-import io
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 import yaml
-from rich.console import Console
 
 from present import present
-from recipes import Recipe, pose_rows
+from recipes import Recipe, pose_rows, terminal
 from teleop_core.base import NoParameters
 from teleop_core.evaluation.command import evaluate_bags
 from teleop_core.evaluation.origin import read_origin
@@ -85,7 +83,7 @@ def test_stage_of_a_user_has_its_own_latency(recipe: Recipe, path: Path) -> None
 @pytest.mark.usefixtures("_smoother")
 def test_table_and_page_show_the_stage_of_a_user(recipe: Recipe, path: Path, tmp_path: Path) -> None:
     recipe.write(path)
-    shown = Console(width=80, record=True, file=io.StringIO(), color_system=None)
+    shown = terminal()
     evaluate_bags([path], None, tmp_path / "page.html", shown)
     lines = [text.split() for text in shown.export_text().splitlines()]
     assert ["smoother", "ms", "0.10/0.10/0.10"] in lines

@@ -2,7 +2,6 @@
 
 import ast
 import inspect
-import io
 import json
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
@@ -13,6 +12,7 @@ import pytest
 from rich.console import Console
 
 from present import present
+from recipes import terminal
 from teleop_core import evaluation
 from teleop_core.bags.reader import Bag, Series
 from teleop_core.bags.writer import BagWriter
@@ -117,7 +117,7 @@ def test_metric_of_a_user_stands_in_json_table_and_page(
     added: Callable[[str, object], None], path: Path, tmp_path: Path
 ) -> None:
     added("jerk", JerkMetric)
-    shown = Console(width=80, record=True, file=io.StringIO(), color_system=None)
+    shown = terminal()
     scores_file, page = tmp_path / "scores.json", tmp_path / "page.html"
     (score,) = evaluate_bags([path], scores_file, page, shown)
     found = json.loads(scores_file.read_text())[0]
@@ -146,12 +146,12 @@ def test_metric_of_a_user_leaves_the_others_as_they_are(bag: Bag) -> None:
 
 def test_recording_without_a_state_has_a_page(path: Path, tmp_path: Path) -> None:
     page = tmp_path / "page.html"
-    evaluate_bags([path], None, page, Console(file=io.StringIO()))
+    evaluate_bags([path], None, page, Console(quiet=True))
     assert "no fixture was on" in page.read_text()
 
 
 def test_scores_with_and_without_a_metric_stand_side_by_side(bag: Bag) -> None:
-    shown = Console(width=80, record=True, file=io.StringIO(), color_system=None)
+    shown = terminal()
     shown.print(score_tables([evaluate(bag), evaluate(bag, further=[JerkMetric])], 80)[0])
     (row,) = [text for text in shown.export_text().splitlines() if "rms m/s³" in text]
     assert row.split()[2:] == ["–", "6.000"]
@@ -298,7 +298,7 @@ def test_metric_that_raises_is_named_in_one_line(bag: Bag, method: str) -> None:
 def test_metric_that_cannot_draw_is_named(added: Callable[[str, object], None], path: Path, tmp_path: Path) -> None:
     added("jerk", changed(figures=fail))
     with pytest.raises(EvaluationError, match="'jerk' failed with ZeroDivisionError"):
-        evaluate_bags([path], None, tmp_path / "page.html", Console(file=io.StringIO()))
+        evaluate_bags([path], None, tmp_path / "page.html", Console(quiet=True))
     assert not (tmp_path / "page.html").exists()
 
 

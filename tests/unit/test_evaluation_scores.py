@@ -1,6 +1,5 @@
 """Evaluation: scores of recordings made for the purpose, against what was put into them."""
 
-import io
 import json
 import re
 from collections.abc import Iterator
@@ -9,10 +8,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from rich.console import Console
 
 from present import present
-from recipes import JOINTS, START_NS, Recipe, pose_rows, state
+from recipes import JOINTS, START_NS, Recipe, pose_rows, state, terminal
 from teleop_console.report.page import report_page
 from teleop_core.bags import reader, reports
 from teleop_core.bags.writer import BagWriter
@@ -421,16 +419,12 @@ def pattern(key: str) -> str:
 # -- the command -----------------------------------------------------------------------------------
 
 
-def console(width: int = 80) -> Console:
-    return Console(width=width, record=True, file=io.StringIO(), color_system=None)
-
-
 def test_command_writes_table_scores_and_page(recipe: Recipe, path: Path, tmp_path: Path) -> None:
     recipe.values(SLAVE_MEASURED_CP)[:, 0] += 0.5e-3
     followed = np.zeros((len(recipe.stamps), len(SLAVE_REACH.columns)))
     recipe.rows[SLAVE_REACH] = (recipe.stamps, followed, recipe.stamps)
     recipe.write(path)
-    shown = console()
+    shown = terminal()
     target, page = tmp_path / "scores.json", tmp_path / "page.html"
     page.write_text("old")
     (score,) = evaluate_bags([path], target, page, shown)
@@ -447,7 +441,7 @@ def test_command_writes_table_scores_and_page(recipe: Recipe, path: Path, tmp_pa
 def test_three_recordings_fit_side_by_side_on_a_narrow_terminal(recipe: Recipe, path: Path) -> None:
     score = evaluate(recipe.write(path))
     assert [len(table.columns) for table in score_tables([score] * 4, 80)] == [4, 2]
-    shown = console(80)
+    shown = terminal()
     shown.print(score_tables([score] * 3, 80)[0])
     assert "…" not in shown.export_text()
 
@@ -459,7 +453,7 @@ def test_texts_of_a_recording_cannot_become_markup(recipe: Recipe, tmp_path: Pat
     assert "<b>[red]" not in page
     assert "<img" not in page.split("page-data")[0]
     assert "<i>bag" not in page
-    shown = console()
+    shown = terminal()
     shown.print(score_tables([evaluate(bag)], 80)[0])
     assert "[red]x" in shown.export_text()
 
@@ -469,7 +463,7 @@ def test_missing_topic_is_named_with_what_there_is(recipe: Recipe, path: Path, t
     del recipe.rows[topic]
     recipe.write(path)
     with pytest.raises(RecordingError) as caught:
-        evaluate_bags([path], None, None, console())
+        evaluate_bags([path], None, None, terminal())
     missing, present = str(caught.value).split("; it has ")
     assert f"lacks {topic.name}" in missing
     assert set(present.split(", ")) >= {other.name for other in recipe.rows}
@@ -495,12 +489,12 @@ def test_nothing_is_written_when_one_recording_cannot_be_scored(recipe: Recipe, 
     recipe.write(path)
     target = tmp_path / "scores.json"
     with pytest.raises(RecordingError):
-        evaluate_bags([path, tmp_path / "none"], target, None, console())
+        evaluate_bags([path, tmp_path / "none"], target, None, terminal())
     assert not target.exists()
 
 
 def test_output_into_a_missing_directory_is_refused_before_scoring(tmp_path: Path) -> None:
     with pytest.raises(EvaluationError, match="does not exist; make it first"):
-        evaluate_bags([tmp_path / "none"], tmp_path / "a" / "b.json", None, console())
+        evaluate_bags([tmp_path / "none"], tmp_path / "a" / "b.json", None, terminal())
     with pytest.raises(EvaluationError, match="is a directory"):
-        evaluate_bags([tmp_path / "none"], None, tmp_path, console())
+        evaluate_bags([tmp_path / "none"], None, tmp_path, terminal())

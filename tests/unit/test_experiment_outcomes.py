@@ -138,17 +138,6 @@ def test_no_experiment_compares_two_typed_numbers() -> None:
         assert not Typed(file.read_text()).lines, file
 
 
-def test_outcome_counts_what_is_judged_and_what_agrees() -> None:
-    rows = (
-        Comparison(quantity="a", published=1.0, predicted=1.0, within=EXACT),
-        Comparison(quantity="b", published=1.0, predicted=2.0, within=EXACT),
-        Comparison(quantity="c", predicted=2.0),
-    )
-    found = outcome(*rows)
-    assert (found.agreeing, found.judged) == (1, 2)
-    assert summary([found, found]) == "2 of 4 published figures agree; 2 rows are not judged"
-
-
 def test_row_is_found_by_quantity_and_group_and_a_wrong_name_lists_those_there_are() -> None:
     first, second = (Comparison(quantity="rms", group=group, predicted=1.0) for group in ("x", "y"))
     found = outcome(first, second)

@@ -8,7 +8,7 @@ import pytest
 
 import teleop_core as tc
 from teleop_core.commands.cli import main
-from teleop_lab.grading import FIGURES, ODD, REASON, WORST, grade, usual
+from teleop_lab.grading import ODD, REASON, WORST, grade, usual
 
 RATE, ODD_ONE = 50.0, 4
 
@@ -72,13 +72,6 @@ def test_all_alike_nothing_is_odd(table: Path, tmp_path: Path) -> None:
 def test_wrong_figures_are_refused(table: Path, figures: tuple[str, ...], said: str) -> None:
     with pytest.raises(tc.TeleopError, match=said):
         grade(table, figures=figures)
-
-
-def test_the_figures_are_keys_of_the_score() -> None:
-    from teleop_core.evaluation import keys
-
-    known = {name for key in keys() for name in key.names()}
-    assert {f"motion.hand.{name}" for name in FIGURES} <= known
 
 
 def test_the_command_prints_and_writes_what_the_function_finds(

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 import teleop_core as tc
 import teleop_exchange
 from teleop_core.commands import cli
-from teleop_core.kernels.geometry import Array, rotation_from_quaternion
+from teleop_core.kernels.geometry import Array
 from teleop_exchange import ImportOptions
 
 COUNT = 300
@@ -41,10 +41,7 @@ UNITY: dict[str, Any] = {"unit": "m", "handedness": "left", "axes": ("+z", "-x",
 def poses(recording: tc.Recording, topic: str = "master/measured_cp") -> tuple[Array, Array]:
     """Places (N, 3) [m] and rotation matrices (N, 3, 3)."""
     values = recording[topic].values
-    matrices = np.empty((len(values), 3, 3))
-    for quaternion, matrix in zip(values[:, 3:], matrices, strict=True):
-        rotation_from_quaternion(np.ascontiguousarray(quaternion), matrix)
-    return values[:, :3], matrices
+    return values[:, :3], Rotation.from_quat(values[:, 3:], scalar_first=True).as_matrix()
 
 
 def qualisys(path: Path, end: str = "") -> Path:

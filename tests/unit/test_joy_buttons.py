@@ -7,9 +7,7 @@ import numpy as np
 import pytest
 
 from teleop_core.bags.messages import Refusal, read_values
-from teleop_core.base import ParameterError, build
 from teleop_core.graph import topics
-from teleop_core.nodes.tuned import NodeParameters
 
 
 def joy(*pressed: int) -> Any:
@@ -42,9 +40,3 @@ def test_a_message_with_fewer_buttons_is_refused_with_what_to_set(places: tuple[
     refusal = read_values(topics.Kind.BUTTONS, joy(1, 0), buttons=places)
     assert refusal is Refusal.FEW_BUTTONS
     assert "set joy_buttons=[0, -1, 1]" in refusal.value
-
-
-@pytest.mark.parametrize("places", [(0, 1), (0, 1, -2), (0, 1, 256)])
-def test_a_map_of_other_form_is_refused(places: tuple[int, ...]) -> None:
-    with pytest.raises(ParameterError, match="joy_buttons"):
-        build(NodeParameters, {"joy_buttons": places})

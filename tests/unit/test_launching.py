@@ -13,6 +13,7 @@ from teleop_core.base.errors import ParameterError, TeleopError
 from teleop_core.base.plain_yaml import LARGEST_TEXT
 from teleop_core.nodes.files import checked_arguments
 from teleop_core.nodes.launching import COMMON, ONE_ARM, TWO_ARMS, Process, processes
+from teleop_core.nodes.start import taken_names
 
 LAUNCH = Path(__file__).resolve().parents[2] / "src" / "teleop_core" / "launch"
 STAGES = {"operator", "haptic_master", "motion_scaling", "inverse_kinematics", "slave", "slave_sim"}
@@ -138,3 +139,11 @@ def test_a_parameter_file_of_a_node_costs_no_more_than_any_other(tmp_path: Path,
     file.write_text(text)
     with pytest.raises(TeleopError, match=says):
         checked_arguments(["--params-file", str(file)])
+
+
+def test_names_for_all_nodes_of_a_process_are_taken_out_and_others_are_kept() -> None:
+    given = ["node", "-r", "__ns:=/x", "--ros-args", "-r", "__ns:=/lab", "--remap", "__node:=arm",
+             "-r", "slave:__node:=other", "-r", "a:=b", "--", "-r", "__ns:=/y"]  # fmt: skip
+    kept = ["node", "-r", "__ns:=/x", "--ros-args", "-r", "slave:__node:=other", "-r", "a:=b", "--", "-r", "__ns:=/y"]
+    assert taken_names(given) == (kept, {"__ns": "/lab", "__node": "arm"})
+    assert taken_names(kept) == (kept, {})

@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pandas as pd
 import pytest
 from mcap.writer import Writer
 from numpy.typing import NDArray
@@ -114,14 +113,6 @@ def test_every_arm_keeps_its_topic_and_stamps(tmp_path: Path) -> None:
         found = as_master_bag(tmp_path / "bag")
     assert np.array_equal(found.read(left).stamp_ns, STAMPS + 2_000_000)
     assert len(poses_of(found)) == COUNT - 1
-
-
-def test_a_table_is_a_recording_too(tmp_path: Path) -> None:
-    names = ["t", "x", "y", "z", "qw", "qx", "qy", "qz"]
-    table = pd.DataFrame(np.column_stack((T, POSES)), columns=names)
-    table.to_csv(tmp_path / "hand.csv", index=False)
-    found, _ = converted(tmp_path / "hand.csv")
-    assert np.allclose(poses_of(found).values, POSES, rtol=0, atol=1e-15)
 
 
 def test_what_cannot_be_read_is_told(tmp_path: Path) -> None:

@@ -81,17 +81,6 @@ def test_a_force_is_given_along_the_axes_of_the_device_and_never_above_its_bound
         assert np.allclose(given_force, expected, rtol=0, atol=1e-15)
 
 
-def test_what_the_device_does_and_what_it_feels_make_the_same_work_in_both_frames() -> None:
-    rng = np.random.default_rng(2)
-    stage = bridge(device_axes=TURNED, unit=0.01)
-    for k in range(20):
-        place, force = rng.uniform(-5.0, 5.0, 3), rng.uniform(-1.0, 1.0, 3)
-        assert stage.hear(pose(place), NOW_NS + k + 1, NOW_NS)
-        stage.signals["master_servo_cf"][:3] = force
-        ours = said(stage)[0] @ force
-        assert 0.01 * place @ stage.force(0.0, NOW_NS) == pytest.approx(ours, abs=1e-15)
-
-
 @pytest.mark.parametrize("late", ["force", "device", "never", "nan"])
 def test_a_device_is_given_no_force_where_either_side_is_silent(late: str) -> None:
     stage = bridge(force_timeout=0.1)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from teleop_core.graph.topics import HAND_BUTTONS, SELDOM_NS, SLAVE_TRUE_CF
+from teleop_core.graph.topics import SELDOM_NS, SLAVE_TRUE_CF
 from teleop_core.kernels.geometry import Array
 from teleop_core.session.runner import NewSamples
 
@@ -38,7 +38,3 @@ def test_what_changes_is_said_at_once() -> None:
     values = np.where(np.arange(100) == 33, 1.0, 0.0)
     found = recorded(stamps, values, 3)
     assert {stamps[33], stamps[34]} <= set(found.tolist())
-
-
-def test_buttons_are_sent_where_they_change() -> None:
-    assert HAND_BUTTONS.is_seldom

@@ -28,13 +28,6 @@ def schedule(time: FakeTime, **options: int) -> Schedule:
     return Schedule(time.clock, time.sleep, **options)
 
 
-def test_ticks_are_one_period_apart_from_the_start() -> None:
-    time = FakeTime()
-    ticks = schedule(time)
-    assert [list(ticks.due()) for _ in range(3)] == [[6 * MS], [7 * MS], [8 * MS]]
-    assert (ticks.counts.ticks, ticks.counts.late, ticks.counts.missed) == (3, 0, 0)
-
-
 def test_lateness_does_not_add_up() -> None:
     time = FakeTime(*[300_000] * 1000)
     ticks = schedule(time)

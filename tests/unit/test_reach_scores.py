@@ -1,6 +1,5 @@
 """Reach in scores: shares of time and asked errors are those of plain counts, in any windows."""
 
-import io
 from itertools import groupby
 from pathlib import Path
 from typing import Any
@@ -8,11 +7,10 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from rich.console import Console
 from scipy.spatial.transform import Rotation
 
 from present import present
-from recipes import JOINTS, START_NS, Recipe, state
+from recipes import JOINTS, START_NS, Recipe, state, terminal
 from teleop_core.bags import reader, reports
 from teleop_core.bags.writer import BagWriter
 from teleop_core.coupling.mapping.gains import MotionScalingParameters
@@ -84,7 +82,7 @@ def shares(score: Score) -> Any:
 
 def table_of(score: Score) -> str:
     """The table as a terminal shows it."""
-    shown = Console(width=80, file=io.StringIO(), record=True, color_system=None)
+    shown = terminal()
     for table in score_tables([score], 80):
         shown.print(table)
     return shown.export_text()
@@ -276,7 +274,7 @@ def test_asked_error_is_what_was_cut_off_since_the_last_clutch_stroke(path: Path
     assert np.allclose(error, (np.sqrt(np.mean(kept**2)), kept.max()), rtol=0, atol=EXACT_MM)
 
 
-@pytest.mark.parametrize("at", range(0, COUNT - 100, 700))
+@pytest.mark.parametrize("at", range(0, COUNT - 100, 2100))
 def test_no_sample_of_the_slave_is_left_out_of_the_asked_error(path: Path, at: int) -> None:
     session = Session()
     still = np.zeros(COUNT, bool)

@@ -208,17 +208,6 @@ def test_other_tables_are_guessed_with_a_note(tmp_path: Path) -> None:
     assert np.allclose(got[:, :3], PLACES - PLACES[0], rtol=0, atol=1e-12)
 
 
-@pytest.mark.parametrize(
-    ("content", "text"),
-    [("t,x,y\n0,1,2\n1,2,3\n", "--position"), ("t,x,y,z\n0,1,2,lost\n1,1,1,1\n", "lost"), ("", "is empty")],
-)
-def test_tables_that_are_no_motion_are_refused(content: str, text: str, tmp_path: Path) -> None:
-    (tmp_path / "a.csv").write_text(content)
-    with pytest.raises(tc.TeleopError) as error:
-        motion(tmp_path / "a.csv", kind="file")
-    assert text in str(error.value)
-
-
 def test_a_missing_recording_is_told_before_anything_runs(tmp_path: Path) -> None:
     for name in ("nothing.csv", "nothing"):
         with pytest.raises(tc.RecordingError, match="No such file"):

@@ -30,29 +30,22 @@ def feed_in_turn(
     return answers
 
 
-def test_a_sender_of_consecutive_numbers_is_the_owner_and_loses_nothing() -> None:
+@pytest.mark.parametrize(
+    ("numbers", "lost"),
+    [
+        (range(40, 240), 0),
+        ([1, 2, 5, 6, 16], 2 + 9),
+        ([1, 2, 3, 2003], 1999),  # in a stall
+        ([1, 2, 4, 3, 5], 1),  # one was overtaken on the way, and is counted once
+        ([0] * 50, 0),  # of a middleware without numbers
+    ],
+)
+def test_what_is_missing_from_the_owners_numbers_is_counted_and_all_that_came_is_admitted(
+    numbers: list[int] | range, lost: int
+) -> None:
     sender = Sender()
-    assert feed(sender, range(40, 240)) == [None] * 200
-    assert (sender.gaps, sender.owners, sender.conflict) == (0, 1, False)
-
-
-def test_numbers_that_are_missing_are_counted() -> None:
-    sender = Sender()
-    assert feed(sender, [1, 2, 5, 6, 16]) == [None] * 5
-    assert sender.gaps == 2 + 9
-
-
-def test_thousands_that_were_lost_in_a_stall_are_counted() -> None:
-    sender = Sender()
-    feed(sender, [1, 2, 3])
-    assert sender.admit(b"first", 2003, BEGIN + 3 * MS) is None
-    assert sender.gaps == 1999
-
-
-def test_a_message_that_was_overtaken_on_the_way_is_the_owners_and_no_loss() -> None:
-    sender = Sender()
-    assert feed(sender, [1, 2, 4, 3, 5]) == [None] * 5
-    assert (sender.gaps, sender.conflict) == (1, False)
+    assert feed(sender, numbers) == [None] * len(numbers)
+    assert (sender.gaps, sender.owners, sender.conflict) == (lost, 1, False)
 
 
 @pytest.mark.parametrize("begin", [1, 41, 5000, 90_000])
@@ -104,12 +97,6 @@ def test_a_flood_is_refused_beyond_its_rate_second_by_second() -> None:
     assert answers[100:] == [Refusal.FLOOD] * 900
     again = feed(sender, range(1001, 1011), BEGIN + SECOND)
     assert again == [None] * 10
-
-
-def test_a_middleware_without_numbers_loses_nothing_that_could_be_told() -> None:
-    sender = Sender()
-    assert feed(sender, [0] * 50) == [None] * 50
-    assert (sender.gaps, sender.conflict) == (0, False)
 
 
 def test_stamps_of_a_clock_that_is_ahead_are_told_as_such() -> None:

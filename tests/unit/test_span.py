@@ -1,6 +1,5 @@
 """Spans: a part of a recording is scored by its own samples, and by what was in force before."""
 
-import io
 import json
 from itertools import pairwise
 from pathlib import Path
@@ -11,6 +10,7 @@ import pytest
 from rich.console import Console
 
 import teleop_core as tc
+from recipes import terminal
 from teleop_core.base.errors import ParameterError
 from teleop_core.evaluation.command import evaluate_bags
 from teleop_core.evaluation.score_table import score_table
@@ -64,7 +64,7 @@ def test_score_says_what_was_scored(recording: tc.Recording, score: tc.Score) ->
     assert (score.session.from_s, score.session.to_s) == (FROM, TO)
     assert score.session.duration_s == recording.duration
     assert "scored from 9 to 11.5 s" in repr(score)
-    shown = Console(record=True, width=80, file=io.StringIO())
+    shown = terminal()
     shown.print(score_table([score]))
     assert "9–11.5 s" in shown.export_text()
 
