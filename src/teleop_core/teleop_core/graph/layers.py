@@ -19,38 +19,46 @@ class RealTimeParameters:
     priority: int = parameter(
         -1,
         Within(-1, 98),
-        "SCHED_FIFO priority of the loop, and 1 for the threads beside it; 0: fair shares; -1: "
-        "20 in sessions by side or in one process where the system grants it, else fair shares",
+        "SCHED_FIFO priority of the loop; its helper threads get 1. 0: ordinary scheduling; -1: 20 "
+        "for sessions by side or in one process if the system permits it, else ordinary scheduling",
         fixed=True,
     )
     cpus: tuple[int, ...] = parameter((), Within(0), "processors that the loop may use; empty: all", fixed=True)
     patience: float = parameter(
         0.8,
         Within(0.01, 60.0, "s"),
-        "a loop of which nothing came for longer hangs, and ends its process; time for which "
-        "it waited for a processor does not count; 0: never",
+        "if the loop makes no progress for this time, it counts as hung and its process ends; time "
+        "without a processor does not count; 0: never",
         off=0.0,
         fixed=True,
         source="assumed",
     )
-    lock_memory: bool = parameter(False, fixed=True, doc="keep all memory out of swap")
-    freeze_gc: bool = parameter(True, fixed=True, doc="keep what exists at the start out of garbage collections")
+    lock_memory: bool = parameter(
+        False, fixed=True, doc="whether all memory of the process is locked, so that it is never swapped out"
+    )
+    freeze_gc: bool = parameter(
+        True, fixed=True, doc="whether garbage collections skip the objects that exist at the start"
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
 class SessionParameters:
     """Parameters of a session as a whole."""
 
-    description: str = parameter("", doc="what happens in it, in one sentence")
-    duration: float = parameter(10.0, Within(0.001, 86400.0, "s"), "simulated or live time")
+    description: str = parameter("", doc="one sentence that describes the session")
+    duration: float = parameter(10.0, Within(0.001, 86400.0, "s"), "duration of the session, in simulated or live time")
     ends_with_task: bool = parameter(
-        False, fixed=True, doc="end it within a second after no arm's task has a goal left"
+        False, fixed=True, doc="whether the session ends within 1 s after the tasks of all arms are finished"
     )
     arms: tuple[str, ...] = parameter(
-        (), fixed=True, doc="names of the arms, the first of which keeps the plain topics; empty: one without name"
+        (), fixed=True, doc="names of the arms; the first arm's topics have no namespace; empty: one arm without a name"
     )
-    stages: tuple[str, ...] = parameter((), fixed=True, doc="further stages of every arm, beside the built-in ones")
-    delays: tuple[str, ...] = parameter((), fixed=True, doc="delays on links, topic=seconds or topic@reader=seconds")
+    stages: tuple[str, ...] = parameter(
+        (), fixed=True, doc="additional stages of every arm, besides the built-in stages"
+    )
+    delays: tuple[str, ...] = parameter(
+        (), fixed=True, doc="delays of topics, as topic=seconds, or topic@reader=seconds for one reader"
+    )
     real_time: RealTimeParameters = field(default_factory=RealTimeParameters)
 
 

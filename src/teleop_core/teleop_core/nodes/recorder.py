@@ -49,12 +49,14 @@ _RECENT = 1000
 class RecorderParameters(RecordingParameters):
     """Parameters of the recorder as a node."""
 
-    out: str = parameter("", fixed=True, doc="directory to make; empty: bags/ and the time")
-    configuration: str = parameter(
-        "", fixed=True, doc="parameter file of the session, as text, kept with the recording"
+    out: str = parameter(
+        "", fixed=True, doc="directory of the new recording; empty: a directory in bags/ named after the current time"
     )
-    scenario: str = parameter("", fixed=True, doc="name of the session, kept with the recording")
-    mark: str = parameter("", doc="text of the next marks; empty: their number")
+    configuration: str = parameter(
+        "", fixed=True, doc="text of the session's parameter file; it is stored in the recording"
+    )
+    scenario: str = parameter("", fixed=True, doc="name of the session; it is stored in the recording")
+    mark: str = parameter("", doc="text of the next marks; empty: each mark gets its number as text")
 
 
 class _Channel:

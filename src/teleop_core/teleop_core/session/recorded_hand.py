@@ -36,8 +36,8 @@ class FileParameters:
     path: str = parameter(
         "",
         fixed=True,
-        doc="CSV or Parquet file, best with a head of t, x, y, z and, if wanted, rx, ry, rz, "
-        "clutch, fixture, mode [s, m, rad]",
+        doc="CSV or Parquet file with a header of t, x, y, z and optionally rx, ry, rz, clutch, "
+        "fixture, mode [s, m, rad]",
     )
 
 

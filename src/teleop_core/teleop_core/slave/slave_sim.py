@@ -34,7 +34,7 @@ class ControllerParameters:
 class PlantParameters:
     """The plant, which the simulator moves."""
 
-    kind: Choice = choice(PLANTS, "ideal", fixed=True, doc="what the simulator moves")
+    kind: Choice = choice(PLANTS, "ideal", fixed=True, doc="model of the arm that the simulator moves")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,11 +46,11 @@ class SlaveSimParameters(RobotParameters):
     gravity_compensation: str = parameter(
         "published",
         choices=("published", "all", "none"),
-        doc="axes whose gravity is fed forward: those of the source (axis 2), all, none",
+        doc="axes with gravity feed-forward: source: as published (axis 2), all, or none",
     )
-    integration_steps: int = parameter(2, Within(1, 50), "Runge-Kutta steps in each control tick")
+    integration_steps: int = parameter(2, Within(1, 50), "number of Runge-Kutta steps in each control tick")
     viscous: tuple[float, ...] = parameter(
-        (), Within(0.0, None, "N·m·s/rad or N·s/m"), "friction of each joint; empty: the plant's"
+        (), Within(0.0, None, "N·m·s/rad or N·s/m"), "viscous friction of each joint; empty: the plant's"
     )
     coulomb: tuple[float, ...] = parameter(
         (), Within(0.0, None, "N·m or N"), "dry friction of each joint; empty: the plant's"
@@ -62,8 +62,9 @@ class SlaveSimParameters(RobotParameters):
     trials: str = parameter(
         "all",
         choices=("all", "small"),
-        doc="errors that the loop must let die before it is used: small ones and those after a "
-        "dash at full speed, or small ones alone, as for experiments with bad laws",
+        doc="errors that must decay in the stability check before a session: all: small errors and "
+        "those after a move at full speed; small: small errors only, for experiments with bad "
+        "control laws",
     )
 
 

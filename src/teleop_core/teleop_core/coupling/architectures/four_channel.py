@@ -15,8 +15,8 @@ class FourChannelParameters(ThreeChannelParameters):
     hand_gain: float = parameter(
         1.0,
         Within(0.0, 10.0, "N/N"),
-        "force that leads the slave over the hand's; with 1/force_gain a press that lasts "
-        "moves the tip no way from its command",
+        "force that moves the slave, divided by the hand's force; with 1/force_gain a constant press "
+        "does not move the tip away from its command",
     )
 
 

@@ -25,9 +25,9 @@ _FADE = 0.2
 class TremorFilterParameters:
     """Parameters of :class:`RunningTremorFilter`."""
 
-    kind: Choice = choice(TREMOR_FILTERS, "wflc", doc="how tremor is taken out")
+    kind: Choice = choice(TREMOR_FILTERS, "wflc", doc="filter that removes the hand's tremor")
     longest_pause: float = parameter(
-        0.3, Within(0.002, 5.0, "s"), "after a longer pause of the master the filter begins anew at the reading"
+        0.3, Within(0.002, 5.0, "s"), "after a longer pause of the master the filter restarts at the next reading"
     )
     plausible: plausibility.HandLimits = field(default_factory=plausibility.HandLimits)
 

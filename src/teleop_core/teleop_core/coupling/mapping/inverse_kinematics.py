@@ -19,22 +19,30 @@ from teleop_core.robots.selection import RobotParameters
 class InverseKinematicsParameters(RobotParameters):
     """Parameters of :class:`InverseKinematics`."""
 
-    speed_share: float = parameter(1.0, Within(0.01, 1.0), "share of the drives' speed limits that references may use")
-    position_tolerance: float = parameter(
-        1e-3, Within(0.0, 1.0, "m"), "an arm that lags behind by less than this, for want of speed, still follows"
+    speed_share: float = parameter(
+        1.0, Within(0.01, 1.0), "share of the drives' speed limits that joint references may use"
     )
-    rotation_tolerance: float = parameter(math.radians(1.0), Within(0.0, 1.0, "rad"), "the same for its orientation")
+    position_tolerance: float = parameter(
+        1e-3,
+        Within(0.0, 1.0, "m"),
+        "an arm at its speed limit counts as following while its position error is less than this",
+    )
+    rotation_tolerance: float = parameter(
+        math.radians(1.0),
+        Within(0.0, 1.0, "rad"),
+        "an arm at its speed limit counts as following while its orientation error is less than this",
+    )
     longest_pause: float = parameter(
         0.3,
         Within(0.002, 5.0, "s"),
-        "time between commands of one stream, at most; for one that comes alone, after a "
-        "longer pause, joints go as far as 0.45 s of full speed",
+        "largest time between two commands of one stream; for a command after a longer pause, joints "
+        "may move as far as full speed allows in 0.45 s",
     )
     feedback_timeout: float = parameter(
         0.1,
         Within(0.002, 5.0, "s"),
-        "with an older slave setpoint, solutions start from the slave's joints again; of slow "
-        "commands twice their period counts",
+        "largest age of the slave's setpoint; if it is older, the solver starts from the slave's "
+        "joints again. If commands are slow, the limit is twice their period",
     )
 
 

@@ -20,20 +20,26 @@ class HandLimits:
     speed: float = parameter(
         3.0,
         Within(0.01, 1000.0, "m/s"),
-        "largest speed of the stylus",
-        source="assumed: across the Phantom's workspace in a twentieth of a second",
+        "largest plausible speed of the stylus; faster samples are refused",
+        source="assumed: crosses the Phantom's workspace in a twentieth of a second",
     )
     acceleration: float = parameter(
         1000.0,
         Within(1.0, 1e6, "m/s²"),
-        "largest acceleration of the stylus",
-        source="assumed: ten times that of a fast arm, for one reading step in 1 ms is 55 m/s²",
+        "largest plausible acceleration of the stylus",
+        source="assumed: ten times the acceleration of a fast arm, because one step of the reading in 1 ms is 55 m/s²",
     )
     turn: float = parameter(
-        60.0, Within(0.1, 1e4, "rad/s"), "largest speed of its turn", source="assumed: three times that of a fast wrist"
+        60.0,
+        Within(0.1, 1e4, "rad/s"),
+        "largest plausible angular speed of the stylus",
+        source="assumed: three times the angular speed of a fast wrist",
     )
     reach: float = parameter(
-        2.0, Within(0.01, 100.0, "m"), "farthest stylus from the master's base", source="assumed: longer than an arm"
+        2.0,
+        Within(0.01, 100.0, "m"),
+        "largest plausible distance of the stylus from the master's base",
+        source="assumed: longer than an arm",
     )
 
 
@@ -44,7 +50,7 @@ class PlausibilityParameters(HandLimits):
     button_silence: float = parameter(
         0.5,
         Within(0.01, 60.0, "s"),
-        "a stream of buttons that fell silent for longer counts as a pressed clutch; 0: never",
+        "if a stream of buttons has no message for this time, the clutch counts as pressed; 0: never",
         off=0.0,
     )
 

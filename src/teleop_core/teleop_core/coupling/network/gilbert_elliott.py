@@ -13,17 +13,25 @@ _LEVEL = "published: UVA-DSA telesurgery QoS analysis 2026, loss of 10 %"
 class GilbertElliottParameters:
     """Good times and bad ones, each with bursts of lost packets of its own length."""
 
-    to_bad: float = parameter(0.05, Within(0.0, 1.0), "chance at every packet that a bad time begins", source=_LEVEL)
-    stay_bad: float = parameter(0.9, Within(0.0, 1.0), "chance at every packet that a bad time goes on", source=_LEVEL)
+    to_bad: float = parameter(
+        0.05, Within(0.0, 1.0), "probability, at each packet, that a bad period begins", source=_LEVEL
+    )
+    stay_bad: float = parameter(
+        0.9, Within(0.0, 1.0), "probability, at each packet, that a bad period continues", source=_LEVEL
+    )
     good: tuple[float, ...] = parameter(
         (4.428, 1.638),
         Within(1e-3, 100.0),
-        "shape and scale of the length of bursts in good times, a Pareto II distribution rounded down [packets]",
+        "shape and scale of the burst length in good periods, a Pareto II distribution, rounded down [packets]",
         length=2,
         source=_LEVEL,
     )
     bad: tuple[float, ...] = parameter(
-        (4.966, 0.271), Within(1e-3, 100.0), "the same in bad times", length=2, source=_LEVEL
+        (4.966, 0.271),
+        Within(1e-3, 100.0),
+        "shape and scale of the burst length in bad periods, a Pareto II distribution, rounded down [packets]",
+        length=2,
+        source=_LEVEL,
     )
 
 

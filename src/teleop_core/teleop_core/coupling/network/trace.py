@@ -22,8 +22,8 @@ class TraceParameters:
 
     file: str = parameter(
         "",
-        doc="CSV file with columns time and delay [s], ping by ping; an empty delay is a loss. It "
-        "begins anew at its end",
+        doc="CSV file with the columns time and delay [s], one row per ping; an empty delay is a "
+        "lost packet. At its end the file starts again",
     )
 
 

@@ -31,22 +31,23 @@ class StoreParameters:
     kept_way: float = parameter(
         3e-4,
         Within(0.0, 0.01, "m"),
-        "what the hand gave is told to the slave but for the present push over this way, which "
-        "is kept so that the push outlasts a step of the reading outwards",
+        "distance; the hand's side keeps the energy of the present push over this distance and "
+        "credits the rest to the slave, so that the push outlasts an outward step of the position "
+        "reading",
         source="assumed: five steps of the device's reading, 0.055 mm",
     )
     store: float = parameter(
         6e-3,
         Within(0.0, 1.0, "J"),
-        "energy that the slave shall have before it touches anything; while it has less the hand feels a drag",
+        "energy that the slave should have before a contact; while it has less, the hand feels a drag",
         source="derived: half of approach_stiffness times the square of the 3 mm by which the arm "
         "lags behind a command of 60 mm/s",
     )
     drag: float = parameter(
         10.0,
         Within(0.0, 100.0, "N·s/m"),
-        "that drag, where the slave has nothing or less",
-        source="assumed: that of a wave",
+        "damping of the drag on the hand while the slave has no energy",
+        source="assumed: the same as the impedance of a wave",
     )
 
 

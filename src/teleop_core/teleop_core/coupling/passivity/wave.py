@@ -24,9 +24,9 @@ class WaveParameters:
     impedance: float = parameter(
         10.0,
         Within(0.1, 100.0, "N·s/m"),
-        "force over speed of a wave, at the hand; the hand feels 1.5 times as much as a drag",
-        source="assumed: tissue of 200 N/m times the arm's lag of 50 ms, below which an arm that "
-        "yields to a force that it reads late swings",
+        "wave impedance: force divided by speed of a wave at the hand; the hand feels a drag of 1.5 times this damping",
+        source="assumed: stiffness of tissue, 200 N/m, times the arm's lag of 50 ms; with less, an arm "
+        "that yields to a delayed force oscillates",
     )
 
 

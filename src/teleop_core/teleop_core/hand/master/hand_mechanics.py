@@ -25,21 +25,21 @@ class HandParameters:
     mass: float = parameter(
         0.15,
         Within(0.01, 5.0, "kg"),
-        "mass moved with the tip",
+        "mass of the hand that moves with the tip",
         source="assumed: fingers and a part of the hand of some 0.4 kg; a fingertip alone "
         "has some grams (Hajian and Howe 1997)",
     )
     stiffness: float = parameter(
         300.0,
         Within(1.0, 5000.0, "N/m"),
-        "how firmly the hand holds its path",
+        "stiffness with which the hand holds the tip on its path",
         source="assumed: some 100 to 1000 N/m by grip, as of fingertips (Hajian and Howe 1997) and "
         "wrists that hold a stylus (Kuchenbecker, Park and Niemeyer 2003)",
     )
     damping: float = parameter(
         12.0,
         Within(0.1, 200.0, "N·s/m"),
-        "damping of the arm",
+        "damping with which the hand holds the tip on its path",
         source="assumed: 0.8 of critical with the masses and the stiffness here; fingertips have "
         "some 5 N·s/m (Hajian and Howe 1997), a firm grip more",
     )

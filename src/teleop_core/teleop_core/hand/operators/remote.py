@@ -32,23 +32,24 @@ class RemoteParameters:
     delay: float = parameter(
         0.045,
         Within(0.005, 0.5, "s"),
-        "how far the stylus is behind a steady motion that is wanted",
+        "delay of the stylus behind a commanded motion of constant speed",
         fixed=True,
-        source="assumed: smooths 30 to 60 poses a second; less than a third of what people feel",
+        source="assumed: smooths 30 to 60 poses per second; less than a third of the delay that people feel",
     )
     timeout: float = parameter(
         0.2,
         Within(0.02, 5.0, "s"),
-        "silence that lets go of the stylus: the clutch is pressed until the next pose",
+        "if no pose arrives for this time, the operator lets go of the stylus: the clutch is pressed "
+        "until the next pose",
         fixed=True,
-        source="assumed: some six frames of a slow page",
+        source="assumed: the time of some six frames of a slow page",
     )
     speed: float = parameter(
         0.5,
         Within(0.01, 2.5, "m/s"),
         "largest speed of the stylus",
         fixed=True,
-        source="assumed: through the Phantom's workspace in a third of a second",
+        source="assumed: crosses the Phantom's workspace in a third of a second",
     )
     acceleration: float = parameter(
         30.0,
@@ -60,14 +61,14 @@ class RemoteParameters:
     turn_speed: float = parameter(
         6.0,
         Within(0.05, 50.0, "rad/s"),
-        "largest speed of its turn",
+        "largest angular speed of the stylus",
         fixed=True,
         source="assumed: about one turn a second",
     )
     turn_acceleration: float = parameter(
         300.0,
         Within(1.0, 5000.0, "rad/s²"),
-        "largest acceleration of its turn",
+        "largest angular acceleration of the stylus",
         fixed=True,
         source="assumed: reaches turn_speed in half of the delay",
     )

@@ -18,12 +18,20 @@ _STEPS = (0.8191725133961645, 0.6710436067037893, 0.5497004779019703)
 class ReachTaskParameters:
     """A box around the position of the tip when the task begins."""
 
-    size: tuple[float, ...] = parameter((0.01, 0.04, 0.04), Within(0.0, 0.5, "m"), "of the box", length=3)
-    width: float = parameter(0.004, Within(1e-4, 0.1, "m"), "diameter of a goal, a ball")
-    longest: float = parameter(10.0, Within(0.1, 600.0, "s"), "after which a goal counts as an error")
-    first: int = parameter(0, Within(0, 10**6), "which place comes first")
-    turn: float = parameter(0.0, Within(0.0, 1.5, "rad"), "largest turn of a goal; 0: any does")
-    turn_width: float = parameter(0.2, Within(0.01, 3.0, "rad"), "twice how far the tool may be off it")
+    size: tuple[float, ...] = parameter(
+        (0.01, 0.04, 0.04), Within(0.0, 0.5, "m"), "edge lengths of the box that contains the goals", length=3
+    )
+    width: float = parameter(0.004, Within(1e-4, 0.1, "m"), "diameter of a goal, which is a ball")
+    longest: float = parameter(
+        10.0, Within(0.1, 600.0, "s"), "longest time for a goal; if it takes longer, the goal counts as an error"
+    )
+    first: int = parameter(0, Within(0, 10**6), "index of the first goal in the sequence of goals")
+    turn: float = parameter(
+        0.0, Within(0.0, 1.5, "rad"), "largest turn of a goal's attitude; 0: any attitude of the tool is accepted"
+    )
+    turn_width: float = parameter(
+        0.2, Within(0.01, 3.0, "rad"), "twice the largest angle between the tool's attitude and the goal's"
+    )
 
 
 @kernel

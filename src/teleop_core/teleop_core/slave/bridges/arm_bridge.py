@@ -28,17 +28,17 @@ _STATE, _BRAKED = topics.OPERATION.index("state"), topics.OPERATION.index("is_br
 class BridgeParameters:
     """Parameters of every bridge to a controller."""
 
-    kind: Choice = choice(BRIDGES, "joint_state", doc="what the arm's controller understands", fixed=True)
+    kind: Choice = choice(BRIDGES, "joint_state", doc="kind of command that the arm's controller accepts", fixed=True)
     command_topic: str = parameter(
-        "", fixed=True, doc="where the controller takes commands; empty: where its kind does"
+        "", fixed=True, doc="topic on which the controller receives commands; empty: the usual topic of its kind"
     )
     state_topic: str = parameter(
-        "", fixed=True, doc="where the arm's JointState comes from; empty: from where that of its kind does"
+        "", fixed=True, doc="topic on which the arm publishes its JointState; empty: the usual topic of its kind"
     )
     rate: int = parameter(
         500,
         Within(100, 1000, "1/s"),
-        "commands a second, one of " + ", ".join(map(str, RATES)),
+        "number of commands per second, one of " + ", ".join(map(str, RATES)),
         fixed=True,
         source="assumed",
     )
@@ -46,35 +46,36 @@ class BridgeParameters:
         "header",
         choices=("header", "sent"),
         fixed=True,
-        doc="when a sample of the arm was taken: as its header says, or when it was sent, for "
-        "arms on a clock of their own",
+        doc="timestamp of a sample of the arm: header: the stamp of its header; sent: the time when "
+        "it was sent, for arms with another clock",
     )
     oldest_stamp: float = parameter(
         0.1,
         Within(0.001, 1.0, "s"),
-        "samples whose stamps differ by more from our clock are refused",
+        "largest difference between the stamp of a sample and our clock; samples beyond it are refused",
         fixed=True,
         source="assumed",
     )
     jump_tolerance: float = parameter(
         0.02,
         Within(1e-4, 0.1, "rad or m"),
-        "what a joint may move between two samples beyond twice its rated speed",
+        "largest joint motion between two samples, added to the motion at twice the rated speed; "
+        "samples beyond it are refused",
         fixed=True,
         source="assumed",
     )
     arm_timeout: float = parameter(
         0.3,
         Within(0.02, 5.0, "s"),
-        "without a sound sample for longer the arm is commanded no more; the server holds "
-        "before, at its command_timeout",
+        "if no valid sample of the arm arrives for this time, the bridge sends no more commands; the "
+        "slave holds earlier, after its command_timeout",
         fixed=True,
         source="assumed",
     )
     setpoint_timeout: float = parameter(
         0.1,
         Within(0.005, 5.0, "s"),
-        "without slave/setpoint_js for longer the arm is commanded no more",
+        "if no slave/setpoint_js arrives for this time, the bridge sends no more commands",
         fixed=True,
         source="assumed",
     )
@@ -89,24 +90,31 @@ class BridgeParameters:
 class ArmBridgeParameters(RobotParameters, BridgeParameters):
     """Parameters of :class:`ArmBridge`."""
 
-    joints: tuple[str, ...] = parameter((), fixed=True, doc="ours=theirs for each joint that the arm calls otherwise")
+    joints: tuple[str, ...] = parameter(
+        (), fixed=True, doc="ours=theirs for each joint that has another name in the arm's messages"
+    )
     signs: tuple[float, ...] = parameter(
         (),
         Within(-1.0, 1.0),
-        "1.0 or -1.0 for each of our joints: ours = sign * theirs + offset; empty: 1.0",
+        "sign of each of our joints, 1.0 or -1.0: our position = sign * arm position + offset; empty: 1.0",
         fixed=True,
     )
-    offsets: tuple[float, ...] = parameter((), Within(unit="rad or m"), "of each of our joints; empty: 0.0", fixed=True)
+    offsets: tuple[float, ...] = parameter(
+        (),
+        Within(unit="rad or m"),
+        "offset of each of our joints: our position = sign * arm position + offset; empty: 0.0",
+        fixed=True,
+    )
     order: tuple[str, ...] = parameter(
         (),
         fixed=True,
-        doc="the arm's joints in the order of its commands, which a forward command does not name; "
-        "empty: the robot's order",
+        doc="names of the arm's joints in the order of its commands, because a forward command "
+        "contains no names; empty: the robot's order",
     )
     start_tolerance: float = parameter(
         0.02,
         Within(1e-4, 0.1, "rad or m"),
-        "the arm is commanded once each joint is as near to its setpoint",
+        "the bridge starts to send commands when each joint is nearer to its setpoint than this",
         fixed=True,
         source="assumed",
     )

@@ -24,16 +24,14 @@ class JawParameters:
     command_timeout: float = parameter(
         0.1,
         Within(0.002, 5.0, "s"),
-        "the jaw stays where it is led when for longer than this no command came, or the jaw did not say where it is",
+        "if no command or no measured angle of the jaw arrives for this time, the jaw holds its setpoint",
     )
     upper: float = parameter(
-        0.8,
-        Within(0.05, 3.0, "rad"),
-        "largest angle between the fingers that the jaw is led to",
-        fixed=True,
-        source="assumed",
+        0.8, Within(0.05, 3.0, "rad"), "largest commanded angle between the fingers", fixed=True, source="assumed"
     )
-    speed_limit: float = parameter(4.0, Within(0.01, 100.0, "rad/s"), "of the setpoint", source="assumed")
+    speed_limit: float = parameter(
+        4.0, Within(0.01, 100.0, "rad/s"), "largest speed of the jaw's setpoint", source="assumed"
+    )
 
 
 class JawNumbers(Fields):

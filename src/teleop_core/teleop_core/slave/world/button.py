@@ -42,17 +42,24 @@ class ButtonState(Fields):
 class ButtonParameters(CylinderParameters):
     """A post that is pressed from above, or from any other side."""
 
-    radius: float = parameter(0.02, Within(1e-3, 1.0, "m"), "of the post")
-    length: float = parameter(0.03, Within(1e-3, 2.0, "m"), "from end to end")
-    direction: tuple[float, ...] = parameter((0.0, 0.0, 1.0), Within(-1.0, 1.0), "upwards, of any length", length=3)
-    click_force: float = parameter(1.0, Within(0.01, _LARGEST, "N"), "on the way in, where it snaps", source="assumed")
-    click_travel: float = parameter(2e-3, Within(1e-4, 0.1, "m"), "way to the click", source="assumed")
-    contact_force: float = parameter(
-        0.4, Within(0.0, _LARGEST, "N"), "on the way in, just before the stop", source="assumed"
+    radius: float = parameter(0.02, Within(1e-3, 1.0, "m"), "radius of the button's post")
+    length: float = parameter(0.03, Within(1e-3, 2.0, "m"), "length of the button's post")
+    direction: tuple[float, ...] = parameter(
+        (0.0, 0.0, 1.0),
+        Within(-1.0, 1.0),
+        "axis of the button, pointing out of it; its length does not matter",
+        length=3,
     )
-    stroke: float = parameter(3e-3, Within(2e-4, 0.1, "m"), "way to the stop", source="assumed")
+    click_force: float = parameter(
+        1.0, Within(0.01, _LARGEST, "N"), "force at which the button clicks, on the way in", source="assumed"
+    )
+    click_travel: float = parameter(2e-3, Within(1e-4, 0.1, "m"), "travel from rest to the click", source="assumed")
+    contact_force: float = parameter(
+        0.4, Within(0.0, _LARGEST, "N"), "force on the way in, just before the stop", source="assumed"
+    )
+    stroke: float = parameter(3e-3, Within(2e-4, 0.1, "m"), "travel from rest to the stop", source="assumed")
     hysteresis: float = parameter(
-        0.3, Within(0.0, 1.0), "share of the spring's force that is missing on the way out", source="assumed"
+        0.3, Within(0.0, 1.0), "hysteresis: share of the spring's force that is lost on the way out", source="assumed"
     )
 
     def __post_init__(self) -> None:
