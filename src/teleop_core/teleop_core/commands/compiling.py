@@ -27,7 +27,7 @@ def add(commands: argparse._SubParsersAction) -> None:  # type: ignore[type-arg]
     """Add the command's parser."""
     text = "compile the kernels of built-in parts now, on all processors"
     parser = command(commands, "compile", _run, text, _EPILOG)
-    parser.add_argument("--all", action="store_true", help="also those that no scenario needs")
+    parser.add_argument("--all", action="store_true", help="also compile kernels that no scenario needs")
 
 
 def _run(arguments: argparse.Namespace) -> int:
