@@ -23,19 +23,19 @@ VERDICT = "verdict"
 
 SESSION_KEYS = (
     Key("session.name", "1", "name of the recording"),
-    Key("session.scenario", "1", "scenario it was made with; null if unknown"),
-    Key("session.robot", "1", "robot; null if unknown"),
+    Key("session.scenario", "1", "scenario of the recording; null if unknown"),
+    Key("session.robot", "1", "name of the robot; null if unknown"),
     Key("session.seed", "1", "random seed; null if unknown"),
-    Key("session.duration_s", "s", "first to last message"),
-    Key("session.gain", "m/m", "gain that was in force most of the time; null if unknown"),
+    Key("session.duration_s", "s", "duration from the first to the last message"),
+    Key("session.gain", "m/m", "gain that was used most of the time; null if unknown"),
     Key("session.arm", "1", "arm that was scored; empty if the recording names no arms"),
-    Key("session.plant", "1", "what the simulated slave was; null if no simulator is told of"),
-    Key("session.controller", "1", "its control law; null if unknown"),
-    Key("session.from_s|to_s", "s", "what was scored, since the first message"),
-    Key("session.missing", "1", "parts it names that are not known here; null if all are known"),
-    Key("verdict.text", "1", "one line that names the worst first"),
-    Key("verdict.worst", "1", "key of the worst; null if nothing is beyond what is fine"),
-    Key("verdict.advice", "1", "what the worst means and what to do; null if nothing is wrong"),
+    Key("session.plant", "1", "plant of the simulated slave; null if no simulator was recorded"),
+    Key("session.controller", "1", "control law of the simulated slave; null if unknown"),
+    Key("session.from_s|to_s", "s", "begin and end of the scored span, since the first message"),
+    Key("session.missing", "1", "parts named in the recording that are not installed here; null if all are"),
+    Key("verdict.text", "1", "one line that summarizes the score, the worst finding first"),
+    Key("verdict.worst", "1", "key of the worst finding; null if all values are within their bounds"),
+    Key("verdict.advice", "1", "meaning of the worst finding and what to do; null if nothing is wrong"),
 )
 """Keys of the data about a recording, in addition to the keys of its metrics."""
 Record = TypeVar("Record")

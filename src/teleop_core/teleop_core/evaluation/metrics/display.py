@@ -11,8 +11,8 @@ class DisplayMetric(Metric):
     """Age of the displayed slave pose, from its measurement to the end of each frame; None without a display."""
 
     name, topics = "display", (DISPLAY_MEASURED_CP,)
-    age_mean_ms = figure("ms", "mean age of the newest frame that was on the screen", "age of what is seen, mean")
-    rate_hz = figure("Hz", "frames with another pose that were shown in a second", "frames")
+    age_mean_ms = figure("ms", "mean age of the frame on the screen", "age of what is seen, mean")
+    rate_hz = figure("Hz", "shown frames per second whose pose differs from the frame before", "frames")
 
     def __init__(self, _: Context) -> None:
         self._log_ns = self._stamp_ns = NO_COMMAND_NS  # of the newest frame

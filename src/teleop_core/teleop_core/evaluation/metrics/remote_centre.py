@@ -30,11 +30,13 @@ class RemoteCentreMetric(Metric):
     topics = (REMOTE_CENTRE, SLAVE_MEASURED_CP)
     off_rms_mm = figure(
         "mm",
-        "RMS distance from the centre to the line of the shaft, of slave/measured_cp",
+        "RMS distance from the remote centre to the shaft's axis, by slave/measured_cp",
         "shaft beside the centre, RMS",
     )
-    off_max_mm = figure("mm", "largest such distance", "shaft beside the centre, max")
-    least_depth_mm = figure("mm", "least distance from the centre to the tip", "least depth of the tip")
+    off_max_mm = figure(
+        "mm", "largest distance from the remote centre to the shaft's axis", "shaft beside the centre, max"
+    )
+    least_depth_mm = figure("mm", "smallest distance from the remote centre to the tip", "least depth of the tip")
 
     def __init__(self, context: Context) -> None:
         self._begin_ns = approach_end_ns(context) if context.span is None else context.span.first_ns
