@@ -103,8 +103,10 @@ def _last(begins: NDArray[np.bool_]) -> Integers:
 
 
 _GROUP = "against what was asked for"
-_MEANING = "slave/measured_cp to the pose that follows from the hand's motion since the slave last "
-"began to follow or the clutch was released"
+_MEANING = (
+    "slave/measured_cp to the pose that follows from the hand's motion since the slave last "
+    "began to follow or the clutch was released"
+)
 
 
 class _AskedMetric(SpreadMetric):

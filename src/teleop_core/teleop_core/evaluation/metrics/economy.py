@@ -14,11 +14,7 @@ class EconomyMetric(Metric):
 
     name, topics = "economy", (SLAVE_TRUE_CP, TASK_STATE)
     path_mm = figure("mm", "length of the tip's path, from positions every 0.1 s")
-    share = figure(
-        "1",
-        "sum of the straight distances of all attempts, divided by the length of the tip's path; "
-        "1: all paths were straight",
-    )
+    share = figure("1", "straight distances of all attempts, divided by path_mm; 1: all paths are straight")
     _path, _slot, _straight, _tried = np.empty((0, 3)), -1, 0.0, 0.0
 
     def add(self, window: Window) -> None:

@@ -64,7 +64,7 @@ class OrientationErrorMetric(Metric):
             f"same tick, wrapped to ±180: {SPREAD_MEANING}"),
         Key("orientation_error_deg.angle.rms|sd|max", "deg",
             "angle of the single rotation from slave/setpoint_cp to slave/measured_cp of the same tick: "
- f"{SPREAD_MEANING}"),
+            f"{SPREAD_MEANING}"),
         Key("orientation_error_deg.degenerate_share", "1",
             "share of samples whose pitch is within 1° of ±90°; they do not count for roll and yaw"),
     )  # fmt: skip

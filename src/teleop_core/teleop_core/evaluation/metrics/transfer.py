@@ -13,10 +13,8 @@ class TransferMetric(Metric):
     name, group, topics = "transfer", "peg transfer", (SLAVE_JAW_BOARD, SLAVE_JAW_GRIP)
     transferred = figure("1", "number of objects that were released onto another peg", "transferred")
     dropped = figure("1", "number of objects that came to rest on no peg", "dropped")
-    time_s = figure("s", "mean time of the transferred objects, from the last grip to rest", "time of a transfer, mean")
-    peak_pull_n = figure(
-        "N", "largest force of a peg on the gripped object, across the peg's axis", "pull of a peg, max"
-    )
+    time_s = figure("s", "mean time from the last grip of a transferred object to its rest", "time of a transfer, mean")
+    peak_pull_n = figure("N", "largest force of a peg on the gripped object, across the peg", "pull of a peg, max")
 
     def __init__(self, context: Context) -> None:
         super().__init__(context)
