@@ -54,7 +54,7 @@ def copies(p: Any, s: Any, row: Any, dt: float) -> None:
 
 
 def test_answer_that_nobody_reads_is_a_warning_with_the_way_out(own_parts: None) -> None:
-    told = "'own' writes test/answer, which no stage reads; replaces= would lead it to the"
+    told = "'own' writes test/answer, which no stage reads; with replaces= it would reach the"
     with pytest.warns(UserWarning, match=told):
         tc.run(duration=0.01, stages=stage(copies))
 

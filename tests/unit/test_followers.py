@@ -255,7 +255,7 @@ MISTAKES = {
         '<dynamics damping="0.5" friction="0.2"/>',
         '<mimic joint="follow"/>',
         {},
-        "does not follow it in turn",
+        "does not itself follow this joint",
     ),
     "factor of zero": ('multiplier="-2"', 'multiplier="0"', {}, "multiplier of mimic of joint"),
     "a word": ('multiplier="-2"', 'multiplier="two"', {}, "multiplier of mimic of joint follow"),

@@ -108,7 +108,7 @@ def test_answer_like_its_input_that_nobody_reads_is_noted_unless_it_replaces_or_
     watch = stage("watch", writes=(Topic("test/x", Kind.WRENCH, passed_on("slave/measured_cp")),))
     assert Graph((*BASE, limit(), push, watch)).notes == ()
     (note,) = Graph((*BASE, stage())).notes
-    assert "'echo' writes test/echo, which no stage reads; replaces= would lead it to the" in note
+    assert "'echo' writes test/echo, which no stage reads; with replaces= it would reach the" in note
     assert note.endswith("readers of slave/measured_cp")
     reader = stage("reader", (ECHO,), ())
     assert Graph((*BASE, stage(), reader)).notes == ()
@@ -165,7 +165,7 @@ UNFED = stage(reads=(SLAVE_MEASURED_CP, UNWRITTEN))
 NOTED = stage(writes=(), notes=(("command_status", "i8"),))
 BAD_GRAPHS = {
     "reader nobody writes for": ((*BASE, UNFED), "echo", "test/unwritten, which no stage writes"),
-    "two stages of one name": ((*BASE, BASE[4]), "slave", "two have this name"),
+    "two stages of one name": ((*BASE, BASE[4]), "slave", "two of them have this name"),
     "two writers of a topic": ((*BASE, stage("a"), stage("b")), "b", "the only one that writes test/echo; a does"),
     "two stages for one column": ((*BASE, NOTED), "echo", "slave uses"),
     "stages that wait for each other": ((*BASE, *CIRCLE), "forth", "forth, back wait"),
@@ -175,7 +175,7 @@ BAD_GRAPHS = {
 @pytest.mark.parametrize(
     ("arms", "name", "expected"),
     [
-        (("left", "left"), "left", "two have this name"),
+        (("left", "left"), "left", "two of them have this name"),
         (("", "left arm"), "left arm", "letters"),
         (("right", ""), "", "letters"),
         (("right", "2nd"), "2nd", "letters"),
@@ -213,7 +213,7 @@ BAD_STAGES = {
             "writes": (Topic("test/x", Kind.POSE),),
             "replaces": topics.MASTER_SERVO_CF,
         },
-        "writes its like first",
+        "writes a topic of the same type",
     ),
     "is late in what it does not read": ({"late": (SLAVE_SERVO_CP,)}, "slave/servo_cp (late)"),
     "needs what it does not read": ({"needs": (SLAVE_SERVO_CP,)}, "slave/servo_cp (needs)"),

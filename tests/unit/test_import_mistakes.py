@@ -102,8 +102,8 @@ def test_a_number_beyond_the_columns_is_told(tmp_path: Path) -> None:
     [
         ("y", np.nan, "column y holds no numbers"),
         ("t", 5.0, "the time is 5 in every row"),
-        ("t", np.nan, "the column of the time holds no numbers"),
-        ("t", np.arange(COUNT) // 3 * 0.01, "stands still in 66.5 % of the rows"),
+        ("t", np.nan, "the column of the time contains no numbers"),
+        ("t", np.arange(COUNT) // 3 * 0.01, "does not change in 66.5 % of the rows"),
         ("t", np.where(np.arange(COUNT) < 100, T, T - 0.5), "goes back in 49 rows (24.5 %)"),
     ],
 )

@@ -69,7 +69,7 @@ def test_a_recording_is_read_without_its_malformed_messages(tmp_path: Path, bad:
 
 
 def test_a_recording_of_malformed_messages_alone_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(RecordingError, match=r"nothing to read.*3 of 3 messages"):
+    with pytest.raises(RecordingError, match=r"no readable messages.*3 of 3 messages"):
         recorded(tmp_path / "bag", bad=(0, 1, 2), good=0).read("slave/measured_cp")
 
 

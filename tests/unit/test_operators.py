@@ -302,7 +302,7 @@ def tried(operator: Operator) -> None:
 @pytest.mark.parametrize(
     ("values", "expected"),
     [
-        ({"make": 5}, "make can be called"),
+        ({"make": 5}, "callable make"),
         ({"make": lambda parameters: None}, "make(parameters, setting)"),
         ({"ahead": 0}, ">= 1 tick"),
         ({"parameters": dict}, "dataclass"),

@@ -102,7 +102,7 @@ def test_group_that_is_no_dataclass_but_an_object_is_refused(
 
 @pytest.mark.parametrize("name", ["", "my fixture", "a.b", "a/b", "-a", "a=b", None, 5])
 def test_name_that_keys_and_files_cannot_hold_is_refused(own_parts: None, name: str | int | None) -> None:
-    with pytest.raises(PartError, match="named by letters, digits, _ and -") as error:
+    with pytest.raises(PartError, match="named with letters, digits, _ and -") as error:
         register_shape(replace(sphere.SPHERE, name=cast(str, name)))
     assert (error.value.kind, error.value.name) == ("shape", name)
 

@@ -58,7 +58,7 @@ def test_a_moved_directory_is_finished_where_it_is_and_its_new_place_told(tmp_pa
 
 def test_a_removed_directory_is_made_again_with_every_message(tmp_path: Path) -> None:
     told = record(tmp_path / "bag", shutil.rmtree)
-    assert "was removed meanwhile, and is there again with all 4000 messages" in told
+    assert "was removed during the recording and is created again with all 4000 messages" in told
     assert_holds(tmp_path / "bag")
 
 

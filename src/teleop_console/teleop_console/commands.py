@@ -52,7 +52,7 @@ def add(commands: Any) -> None:
 
 def _run(arguments: argparse.Namespace) -> int:
     if arguments.bag is not None and arguments.attach:
-        raise ParameterError("BAG", str(arguments.bag), "a recording, or --attach, not both")
+        raise ParameterError("BAG", str(arguments.bag), "left out with --attach, which shows a running session")
     from teleop_console.answers import Situation
     from teleop_console.server import ConsoleServer
 

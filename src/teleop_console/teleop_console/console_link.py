@@ -109,8 +109,8 @@ class LiveLink(Observer):
             names = {name.removesuffix(suffix).strip("/") for name, _ in topics if name.endswith(suffix)}
             if not names and now_of(self) > end:
                 raise SessionError(
-                    f"no arm answers on ROS domain {self.domain}; `teleop live` says which is its "
-                    "own, --domain N names another"
+                    f"no arm answers on ROS domain {self.domain}; `teleop live` prints the domain of its "
+                    "session; give it with --domain N"
                 )
             self.world.sleep(0.02)
         self.arms = tuple(Arm(name, self._robot(name)) for name in sorted(names))
@@ -284,7 +284,7 @@ class LiveLink(Observer):
             raise ParameterError("name", name, "letters, digits, '.', '_' and '-', no more than 100")
         wanted = recording.with_name(name)
         if wanted.exists():
-            raise ParameterError("name", name, f"a new one; {wanted} exists already")
+            raise ParameterError("name", name, f"a new name; {wanted} exists already")
         is_done, text = self._trigger(f"/{self._recorder()}{_SPLIT}")
         if not is_done:
             raise SessionError(text)
@@ -292,7 +292,7 @@ class LiveLink(Observer):
         try:
             closed.rename(wanted)
         except OSError as error:
-            raise SessionError(f"{closed} is closed, but not called {name}: {error}") from error
+            raise SessionError(f"{closed} is closed, but could not be renamed to {name}: {error}") from error
         self._runs += 1
         with self._lock:
             self._view.run = self._runs

@@ -108,7 +108,7 @@ def _checked(name: str, part: object) -> Control:
         raise PartError("control", name, f"a Control, not a {type(part).__name__}")
     for field in ("act", "text", "is_alive"):
         if not (callable(found := getattr(part, field)) or (found is None and field != "act")):
-            raise PartError("control", name, f"one whose {field} can be called")
+            raise PartError("control", name, f"one with a callable {field}")
     return part
 
 

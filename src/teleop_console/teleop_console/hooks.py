@@ -106,7 +106,9 @@ class Server(viser.ViserServer):
 
     def request_share_url(self, verbose: bool = True) -> str | None:
         """Refuse: a public address would bypass the guard."""
-        raise SessionError("the console takes no public address; `ssh -L` reaches it from another machine")
+        raise SessionError(
+            "the console does not listen on public addresses; use `ssh -L` to reach it from another machine"
+        )
 
     def _tell(self, answers: Answers) -> None:
         """Report pages to the drivers, in the order of events, and therefore on the server's loop."""

@@ -103,14 +103,14 @@ def call(world: World, client: Client, request: object, patience: float) -> Any:
         SessionError: There is no such service, or it did not answer in time.
     """
     if not client.wait_for_service(timeout_sec=patience):
-        raise SessionError(f"{client.srv_name} is not there")
+        raise SessionError(f"the service {client.srv_name} does not exist")
     waits = world.lock()
     waits.acquire()
     asked = client.call_async(request)
     asked.add_done_callback(lambda _: waits.release())
     if not waits.acquire(True, patience):
         client.remove_pending_request(asked)
-        raise SessionError(f"{client.srv_name} does not answer")
+        raise SessionError(f"the service the service {client.srv_name} does not answer")
     return asked.result()
 
 

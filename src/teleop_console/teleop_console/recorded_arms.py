@@ -114,7 +114,7 @@ def _robot(bag: Bag, configuration: Configuration | None, arm: str) -> Robot:
     try:
         robot = load_robot_set(name, geometry)
     except (TeleopError, OSError) as error:
-        raise RecordingError(bag.path, f"its robot cannot be made: {error}") from error
+        raise RecordingError(bag.path, f"its robot cannot be loaded: {error}") from error
     bag.require([topics.SLAVE_MEASURED_JS])
     return robot
 

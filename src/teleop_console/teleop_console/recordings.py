@@ -66,7 +66,7 @@ class Recordings:
             ParameterError: There is no such recording in the folder.
         """
         if name not in {entry.name for entry in self.entries()}:
-            raise ParameterError("recording", name, f"one of those in {self._folder}")
+            raise ParameterError("recording", name, f"the name of a recording in {self._folder}")
         return self._folder / name
 
     def words(self, kind: str, names: Sequence[str]) -> list[str]:

@@ -199,7 +199,7 @@ class StartPage:
         kind, names = _words(query).get("kind", ""), tuple(query.get("name", ()))
         words = self.recordings.words(kind, names)
         if not self._runs.acquire(blocking=False):
-            raise ParameterError("action", kind, "asked for after the action before it has ended")
+            raise ParameterError("action", kind, "sent after the previous action has ended")
         self.told = "$ teleop " + " ".join(words) + "\n…"
         threading.Thread(target=self._do, args=(kind, names), daemon=True).start()
         return ""
@@ -218,7 +218,7 @@ class StartPage:
             raise ParameterError("name", name, "letters, digits, '.', '_' and '-', then .urdf")
         data, file = body(_LARGEST), ROBOTS / name
         if file.exists() and file.read_bytes() != data:
-            raise ParameterError("name", name, f"a new one: {file} is another robot")
+            raise ParameterError("name", name, f"a new name: {file} is another robot")
         ROBOTS.mkdir(exist_ok=True)
         file.write_bytes(data)
         return str(file)
@@ -230,7 +230,7 @@ class StartPage:
 
     def _insist_open(self) -> None:
         if not self.is_open:
-            raise ParameterError("session", "one that runs", "ended before another is begun")
+            raise ParameterError("session", "one that runs", "ended before another session begins")
 
 
 def _words(query: Query) -> dict[str, str]:

@@ -118,7 +118,7 @@ class Timeline:
 
     def _curve(self, name: str, begin: float, end: float, pixels: int, shift: float | None) -> object:
         if name not in self._past.columns:
-            raise ParameterError("name", name, "a column of this session: /timeline?find= has them")
+            raise ParameterError("name", name, "a column of this session; /timeline?find= lists all columns")
         column, samples = self._past.columns[name], self._past.samples(name)
         told: dict[str, object] = {"name": name, "unit": column.unit, "is_held": column.is_held}
         told["waits"] = samples is None

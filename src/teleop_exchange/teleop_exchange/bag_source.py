@@ -201,7 +201,7 @@ class BagSource:
         parent, child = poses.taken or ("", "")
         if poses.taken is None:
             chosen = f"--frame {self._frame or '(any)'} in --parent {self._options.parent or '(any)'}"
-            raise RecordingError(self.path, f"{self._topic} holds no pose of {chosen}")
+            raise RecordingError(self.path, f"{self._topic} contains no pose of {chosen}")
         if child:
             self.told.append(f"poses of {child} in {parent or 'a frame without a name'}")
 

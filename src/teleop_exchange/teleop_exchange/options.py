@@ -171,7 +171,7 @@ class ImportOptions:
                 what = "an order and three columns" if name == "euler" else f"{needed} columns"
                 raise ParameterError(option(name), given, what)
         if several := [option(name) for name in ORIENTATIONS if getattr(self, name)][1:]:
-            raise ParameterError(several[0], "given", "the only one that says an orientation")
+            raise ParameterError(several[0], "given", "the only option that defines the orientation")
         order = self.euler[0] if self.euler else "xyz"
         if not is_euler_order(order):
             needed = "three of xyz or of XYZ, no axis twice in a row, such as xyz or ZYX"

@@ -252,7 +252,11 @@ class TableSource:
         if wanted == "auto":
             return named
         listed = ", ".join(repr(self._table.names[column]) for column in columns)
-        raise ParameterError(option(name), wanted, f"{named}, as {listed} say; else change these")
+        raise ParameterError(
+            option(name),
+            wanted,
+            f"{named}, because the columns {listed} name this unit; if it is wrong, rename the columns",
+        )
 
     # -- rows ------------------------------------------------------------------------------------
 

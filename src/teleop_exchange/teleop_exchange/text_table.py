@@ -197,7 +197,7 @@ def recognised(path: Path, text: str, skip: int = 0) -> Form:
         first += 1
     body = [line for line in lines[first:] if line.strip()][: SAMPLE + 2]
     if not body:
-        raise RecordingError(path, "holds no rows of numbers")
+        raise RecordingError(path, "contains no rows of numbers")
     separator = _separator(body)
     rows = [cells(line, separator) for line in body]
     with_numbers = [row for row in rows if _has_numbers(row)]
@@ -205,7 +205,7 @@ def recognised(path: Path, text: str, skip: int = 0) -> Form:
     # Lines before the table may contain numbers too, like `NO_OF_FRAMES 720`, but fewer numbers than a row.
     begin = next((i for i, row in enumerate(rows) if len(row) == width and _has_numbers(row)), None)
     if begin is None:
-        reason = "holds no rows of numbers" if len(rows) < 3 else "holds text, not numbers"
+        reason = "contains no rows of numbers" if len(rows) < 3 else "contains text, not numbers"
         raise RecordingError(path, reason)
     head = [comment_cells for comment_cells in [cells(comment, separator)] if not begin]
     head = rows[:begin] or head

@@ -51,7 +51,7 @@ def _unzstd(data: bytes, size: int) -> bytes:
     """Unpack at most ``size`` bytes. The size that a frame states is checked first, since the library trusts it."""
     told = zstandard.frame_content_size(data)
     if told not in {-1, size}:  # -1: not told
-        raise ValueError(f"a frame of {told} bytes, must be {size}")
+        raise ValueError(f"a frame states {told} bytes, must state {size}")
     return zstandard.ZstdDecompressor().decompress(data, max_output_size=size)
 
 

@@ -88,7 +88,7 @@ class KeptFiles:
         if self._left_out:
             names = ", ".join(path.name for path in self._left_out.values())
             limit = f"keeps {_MOST / 2**20:g} MiB of files"
-            warnings.warn(f"the recording {limit}, and only digests of {names}", TeleopWarning, stacklevel=3)
+            warnings.warn(f"the recording {limit}; of {names} it keeps only digests", TeleopWarning, stacklevel=3)
         return dict(self._texts)
 
     def _name(self, key: str, name: str) -> None:

@@ -35,13 +35,13 @@ class Refusal(Enum):
     NOT_FINITE = "holds NaN or infinite numbers"
     NOT_UNIT = "its quaternion is not of unit length"
     NOT_NEWER = "its stamp is not newer than the last one"
-    WRONG_NAMES = "lacks a name that it must have, as of a joint of the robot"
+    WRONG_NAMES = "lacks a required name, such as that of a joint of the robot"
     WRONG_LENGTH = "has too few or too many numbers"
     FEW_BUTTONS = (
-        "has fewer buttons than joy_buttons names; where it has a clutch and a mode button only, "
-        "set joy_buttons=[0, -1, 1]"
+        "has fewer buttons than joy_buttons names; if it has only a clutch and a mode button, set "
+        "joy_buttons=[0, -1, 1]"
     )
-    MALFORMED = "has bytes that are no message of its type"
+    MALFORMED = "has bytes that are no valid message of its type"
     SECOND_PUBLISHER = "is from a second publisher, while the first one sends"
     FLOOD = "came faster than flood_rate allows"
 

@@ -106,7 +106,7 @@ class Column:
             f"{self.name}: {count} of {self.total} messages are left out: each {reason.value}"
             for reason, count in self.left_out.items()
         ] + [
-            f"{self.name}: {count} messages stand in the frame {frame!r}, the first in {self.frame_id!r}"
+            f"{self.name}: {count} messages are in the frame {frame!r}, but the first is in {self.frame_id!r}"
             for frame, count in self._frames.items()
             if frame != self.frame_id and not self.kind.has_names
         ]

@@ -197,7 +197,7 @@ class Score:
 
     def __getattr__(self, name: str) -> NoReturn:
         """Raise an error that explains how to read the values of a user's metrics."""
-        hint = f"{name!r} is none; values of any metric: score.value({name + '.rms'!r})"
+        hint = f"{name!r} does not exist; read a metric's value with score.value({name + '.rms'!r})"
         raise AttributeError(f"attribute of a Score: {hint}")
 
     @property

@@ -164,14 +164,14 @@ def parse_layer(content: object, where: str) -> Layer:
     """
     layer: Layer = {}
     if not isinstance(content, Mapping):
-        raise TeleopError(f"{where}: must hold stages, each with ros__parameters")
+        raise TeleopError(f"{where}: must contain stages, each with ros__parameters")
     for key, inner in sorted(content.items(), key=lambda item: item[0] != _EVERY):
         name = str(key).removeprefix("/").removeprefix("**/")
         stage = name.rpartition("/")[2]
         if key != _EVERY and stage != SESSION and stage not in STAGES.names():
             raise UnknownNameError(f"{where}: stage", key, (SESSION, *STAGES))
         if not isinstance(inner, Mapping) or not isinstance(inner.get("ros__parameters"), Mapping):
-            raise TeleopError(f"{where}: {key} must hold ros__parameters with names and values")
+            raise TeleopError(f"{where}: {key} must contain ros__parameters with names and values")
         if key == _EVERY:
             for own, value in _flat(inner["ros__parameters"]):
                 for stage in _owners(own, where):

@@ -377,7 +377,7 @@ class CoreNode(TunedNode):
         values |= input_values(inputs) | self._reporter.rates(inputs)
         values |= {f"sent.{t.name}": str(o.sent) for t, o in self.ports.outputs.items()}
         if step := self._reporter.clock_step():
-            concerns.append(f"the clock was stepped by {step:+.3f} s: ages begin anew")
+            concerns.append(f"the system clock was stepped by {step:+.3f} s: all ages of messages are reset")
             for entry in inputs:
                 entry.sender.clear_ages()
             self.delay.clear()

@@ -147,7 +147,7 @@ class Child:
             self.is_told = True
             raise SessionError(f"{self.name} ended with {_in_words(code)}{self.last_words()}")
         if silence := self._silence():
-            text = f"{self.name} stands still: nothing heard of its process for {silence:.0f} s"
+            text = f"{self.name} does not run: no sign of life from its process for {silence:.0f} s"
             raise SessionError(text + self.last_words())
 
     def _silence(self) -> float:

@@ -60,7 +60,7 @@ class DeviceHand:
         """Texts about a lost device, and about a stylus that nobody holds."""
         if self._lost:
             return [f"{self._lost}; waits for it"]
-        return [] if self._hand.is_held else ["waits for a hand: nobody holds the stylus"]
+        return [] if self._hand.is_held else ["waits for a hand: no person holds the stylus"]
 
     def values(self) -> dict[str, str]:
         """The device, and whether the stylus is held."""

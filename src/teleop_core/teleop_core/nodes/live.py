@@ -113,8 +113,8 @@ def live(
 
 
 _UNGRANTED = (
-    "the system grants no SCHED_FIFO, so loops share processors fairly and are late more often; "
-    "grant it with an rtprio line in /etc/security/limits.conf"
+    "the system grants no SCHED_FIFO, so loops are scheduled as ordinary threads and are late more "
+    "often; grant it with an rtprio line in /etc/security/limits.conf"
 )
 
 
@@ -178,7 +178,7 @@ class _Session:
             for crew in self.crews:
                 self._start(crew)
             if self._keys.is_there:
-                self.say("space stops all arms; e lets them go on")
+                self.say("press space to stop all arms, and e to let them continue")
             self._await_operator()
             is_begun = True
             self._watch()
@@ -215,7 +215,7 @@ class _Session:
                 self.say(line)
             if waiting and progress.age() > START_TIMEOUT:
                 child = self._children[home[waiting[0]]]
-                reason = f"{waiting[0]} is not ready and got no further for {START_TIMEOUT:g} s"
+                reason = f"{waiting[0]} is not ready and made no progress for {START_TIMEOUT:g} s"
                 raise SessionError(reason + child.last_words())
         self._ready = time.monotonic()
 
@@ -251,7 +251,7 @@ class _Session:
             self._observer.listen(min(0.1, self._duration - elapsed))
             self._check()
             if self._task_end is not None and self._task_end.is_there():
-                self.say("the task has no goal left")
+                self.say("the task is finished")
                 return
             if int(elapsed) > shown:
                 shown = int(elapsed)

@@ -50,7 +50,7 @@ class Commanders:
             senders = sorted(end.node for end in self._owner.ros.publishers(name))
             before, self._known[name] = self._known.get(name, []), senders
             if senders != before:
-                found.append(f"{name} comes from {' and '.join(senders) or 'nobody any more'}")
+                found.append(f"{name} now comes from {' and '.join(senders) or 'no node'}")
         return found
 
     def _is_command(self, name: str) -> bool:

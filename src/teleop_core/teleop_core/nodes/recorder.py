@@ -310,7 +310,7 @@ class RecorderNode(CoreNode):
         if self.stage is None:
             for transition in ("configure", "activate"):
                 if self.ros.trigger(transition) is not Outcome.SUCCESS:
-                    raise SessionError("did not start; its log says why")
+                    raise SessionError("did not start; see its log")
             return f"records to {self._writer.path}"
         self._insist(is_recording=False)
         with self._writing:
@@ -331,7 +331,7 @@ class RecorderNode(CoreNode):
             closed = self._writer.path
             self._end_recording()
             self._begin_recording(self._next_path())
-        return f"{closed} is closed; goes on in {self._writer.path}"
+        return f"{closed} is closed; the recording continues in {self._writer.path}"
 
     def mark_recording(self) -> str:
         """Record a mark with the current time. Raises the errors of :class:`Recorder`."""
@@ -347,7 +347,7 @@ class RecorderNode(CoreNode):
 
     def _insist(self, *, is_recording: bool) -> None:
         if self.stage is None or not self.is_at_work:
-            raise SessionError("is not active, so that it does not record")
+            raise SessionError("is not active, and therefore does not record")
         if self._is_recording is not is_recording:
             text = "records already to" if self._is_recording else "is stopped; the last one is"
             raise SessionError(f"{text} {self._writer.path}")
@@ -377,7 +377,7 @@ class RecorderNode(CoreNode):
         lost, cut = sum(channel.lost for channel in self.channels.values()), self._cut
         found = [f"the middleware lost {lost} messages on the way here"] if lost else []
         if cut:
-            found.append(f"{cut} processes ended without a word: what they had not sent on is lost")
+            found.append(f"{cut} processes ended abnormally; messages that they had not sent yet are lost")
         return found
 
     @property

@@ -341,7 +341,7 @@ class Robot:
             ClosureError: No assembly has these joints.
         """
         if self.dynamics is None:
-            raise ParameterError("dynamics", None, f"that of a slave: {self.name} has no drives")
+            raise ParameterError("dynamics", None, f"that of a robot with drives; {self.name} has none")
         given = {"q": q, "dq": dq, "effort": effort}
         place, speed, net = (read_only(n, row, (self.n,)).copy() for n, row in given.items())
         if wrench is not None:  # the transposed Jacobian maps it to efforts (Craig 2005, 5.10)

@@ -35,9 +35,9 @@ def rank_note(robot: Robot, file: str, has_task: bool) -> str:
     if len(held) > rank:
         does = f'it is asked for {" ".join(held)}; "task={" ".join(best)}" it can follow'
     return (
-        f"{file}: its tip moves in {rank} of 6 directions at once, so it cannot reach every pose: "
-        f'{does}. geometry=[..., "task=x y z"] chooses what it controls, and teleop reach says '
-        "how far a hand can go with that"
+        f"{file}: the tip moves in only {rank} of 6 directions at once, so it cannot reach every "
+        f'pose: {does}. geometry=[..., "task=x y z"] chooses the controlled directions, and teleop '
+        "reach prints how far a hand can go with them"
     )
 
 

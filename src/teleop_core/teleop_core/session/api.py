@@ -177,7 +177,9 @@ def run(
     if isinstance(scenario, Configuration):
         made = scenario
         if given:
-            raise ParameterError("settings", sorted(given), "left out where a configuration is given: put them into it")
+            raise ParameterError(
+                "settings", sorted(given), "left out if a configuration is given; put them into the configuration"
+            )
     else:
         made = configuration(
             scenario, files=files, settings=given, texts=(), operator=operator, fixture=fixture,

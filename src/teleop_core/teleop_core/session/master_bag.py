@@ -43,7 +43,7 @@ def as_master_bag(recording: Path | str | reader.Bag) -> reader.Bag:
     for entry in entry_points(group=READERS):
         found: reader.Bag = entry.load()(path, ours, prefixes)
         return found
-    reason = "holds no sound motion of a master; install teleop_exchange, which reads others"
+    reason = "contains no valid motion of a master; install teleop_exchange, which reads other recordings"
     raise RecordingError(path, reason)
 
 

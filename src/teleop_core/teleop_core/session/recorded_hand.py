@@ -85,7 +85,9 @@ def _file(parameters: FileParameters, setting: Setting) -> Motion:
 
 def _named(parameters: FileParameters) -> Path:
     if not parameters.path:
-        raise ParameterError("operator.file.path", "", "a CSV file, for operator.kind file")
+        raise ParameterError(
+            "operator.file.path", "", "the path of a CSV or Parquet file, because operator.kind is file"
+        )
     return Path(parameters.path)
 
 

@@ -169,7 +169,7 @@ class Recording:
         plain = next((t for n, t in BY_NAME.items() if name == n or name.endswith(f"/{n}")), None)
         columns = plain.columns if plain is not None else ()
         if not columns:
-            raise RecordingError(self._bag.path, f"{name} holds texts, which are not columns")
+            raise RecordingError(self._bag.path, f"{name} contains texts, which cannot be read as columns")
         reports = self._bag.reports(name)
         rows = [[float(report.values.get(c, "nan")) for c in columns] for report in reports]
         stamps = np.array([report.stamp_ns for report in reports], np.int64)
@@ -254,7 +254,7 @@ class Recording:
         try:
             shutil.copytree(self._bag.path, path)
         except FileExistsError as error:
-            raise RecordingError(path, "exists already; choose another place") from error
+            raise RecordingError(path, "exists already; choose another path") from error
         except OSError as error:
             raise RecordingError(path, f"cannot be written: {error.strerror}") from error
         return open_recording(path)

@@ -173,7 +173,7 @@ class Session:
         self.step(-(-self.runner.lead // self._ticks))
         while not (found := self.step()).is_following:
             if found.time > _PATIENCE:
-                raise SessionError(f"the arm does not follow: it says {found.state.name}")
+                raise SessionError(f"the arm does not follow: its state is {found.state.name}")
         return found
 
     def observe(self) -> Observation:

@@ -111,7 +111,7 @@ def _fault_at(part: Shape, numbers: Array, offset: Array) -> str:
     farther = float(part.distance(offset + _STEP / size * out, given, np.zeros(3)))
     if not abs(farther - distance - _STEP) <= 1e-2 * _STEP:
         growth = (farther - distance) / _STEP
-        return f"a distance that grows as one goes along out; {place} by {growth:.3g} times that"
+        return f"a distance that grows along out at the same rate; {place} it grows by {growth:.3g} times that"
     return ""
 
 

@@ -18,7 +18,8 @@ class IntersectionParameters:
     """Shapes whose common part it is."""
 
     parts: tuple[str, ...] = combined.parts_parameter(
-        ("box size=[0.03, 0.03, 0.03]", "not sphere radius=0.01 at=[0.0, 0.02, 0.0]"), "shapes whose common part it is"
+        ("box size=[0.03, 0.03, 0.03]", "not sphere radius=0.01 at=[0.0, 0.02, 0.0]"),
+        "parts whose common volume is the shape",
     )
 
     def __post_init__(self) -> None:

@@ -255,7 +255,7 @@ class SlaveSim(RunningStage):
         try:
             return self.robot.fk(self.robot.start)
         except ClosureError as error:
-            text = f"given for {self.robot.name}, whose tip is not known where it starts"
+            text = f"given for {self.robot.name}, because the position of its tip at the start is unknown"
             raise ParameterError("world.place", (), text) from error
 
     def _check_world(self, world: WorldParameters) -> None:
@@ -267,7 +267,9 @@ class SlaveSim(RunningStage):
         center, tool = self.parameters["world_center"], world.tool(self.robot.fk(self.robot.home))
         inside = -world.distance(tool, center) if self.parameters["has_world"] else 0.0
         if inside > 0.0:
-            text = f"outside of the tip at home, which is {1e3 * inside:.1f} mm inside the object"
+            text = (
+                f"chosen so that the object does not contain the tip at home, which is {1000.0 * inside:.1f} mm inside"
+            )
             raise ParameterError("world.place", tuple(center.tolist()), text)
 
     def _check_loop(self, parameters: SlaveSimParameters) -> None:

@@ -97,13 +97,13 @@ def _run(arguments: argparse.Namespace) -> int:
             print(f"{one.name:24} {one.text}")
         return 0
     if arguments.drives and arguments.composed:
-        raise ParameterError("--drives", shlex.join(arguments.drives), "without --composed")
+        raise ParameterError("--drives", shlex.join(arguments.drives), "given without --composed")
     if arguments.simulated and arguments.drives:
-        raise ParameterError("--drives", shlex.join(arguments.drives), "without --simulated")
+        raise ParameterError("--drives", shlex.join(arguments.drives), "given without --simulated")
     if arguments.seed and not arguments.simulated:
-        raise ParameterError("--seed", arguments.seed, "with --simulated")
+        raise ParameterError("--seed", arguments.seed, "given with --simulated only")
     if arguments.arm and not arguments.drives:
-        raise ParameterError("--arm", shlex.join(arguments.arm), "with --drives, which lead it")
+        raise ParameterError("--arm", shlex.join(arguments.arm), "given with --drives only, whose drives move the arm")
     check_places(arguments.json, arguments.markdown)
     if arguments.out is not None and arguments.out.exists():
         raise RecordingError(arguments.out, "exists already; choose another --out")

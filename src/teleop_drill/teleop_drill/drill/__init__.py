@@ -23,7 +23,7 @@ def _checked(name: str, part: object) -> Exercise:
     if not isinstance(part, Exercise):
         raise PartError("exercise", name, f"an Exercise, not a {type(part).__name__}")
     if part.name != name or any(one.name == name for one in EXERCISES):
-        raise PartError("exercise", name, "registered under its own name, which must be free")
+        raise PartError("exercise", name, "registered under its own name, which no other exercise has")
     return part
 
 

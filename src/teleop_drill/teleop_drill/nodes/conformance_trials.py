@@ -72,7 +72,7 @@ class Trials:
         tap = self.arm.tap(name)
         self.arm.wait(lambda: tap.read() > 0, 0.5)
         if tap.newest is None and self.arm.newest(name) is None:
-            raise SessionError(f"{self.arm.path(name)} fell silent in the middle: is the arm gone?")
+            raise SessionError(f"{self.arm.path(name)} stopped during the test: has the arm been switched off?")
         return numbers_of(tap.newest)
 
     def go_back(self) -> None:

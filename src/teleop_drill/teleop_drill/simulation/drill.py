@@ -105,7 +105,7 @@ def simulated_drill(
     if drives is not None and processes is not Processes.NODES:
         raise ParameterError("processes", processes, f"{Processes.NODES} with drives")
     if arm is not None and drives is None:
-        raise ParameterError("arm", arm, "with drives, which lead it")
+        raise ParameterError("arm", arm, "given with drives only, which move the arm")
     both = {"slave_sim": drives, ARM: arm}
     foreign = {name: work for name, work in both.items() if work is not None}
     own = [one for one in exercises if not (drives and one.breaks_simulator)]

@@ -269,7 +269,7 @@ class Scheduler:
                 return value
             what.greenlet.switch(value)
             process.busy_ns = self.now_ns + self.costs.turn()
-        raise Deadlock("everything waits for something else")
+        raise Deadlock("deadlock: every process waits for another one")
 
     def _push(self, time_ns: int, what: Any, token: int, value: bool) -> None:
         heapq.heappush(self._queue, (time_ns, next(self._orders), what, token, value))

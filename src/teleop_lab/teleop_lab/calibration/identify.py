@@ -146,7 +146,7 @@ def identify(
         told = "; ".join(f"{entry.name} {entry.reason}" for entry in left)
         raise CalibrationError(f"not identifiable from these {len(measured)} poses: {told}")
     if not kept:
-        raise CalibrationError(f"not identifiable from these {len(measured)} poses: none of {', '.join(names)}")
+        raise CalibrationError(f"none of {', '.join(names)} is identifiable from these {len(measured)} poses")
     _check_count(measured, len(kept))
     found = _solved(model, measured, kept, left)
     return found if is_named or keeps_all else _pruned(found, measured)

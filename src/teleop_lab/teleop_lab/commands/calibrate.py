@@ -131,7 +131,7 @@ def _real(robot: "Robot", arguments: argparse.Namespace) -> "Calibration":
 
     given = [f"--{name}" for name in _OF_SIMULATION if getattr(arguments, name) is not None]
     if given:
-        raise TeleopError(f"--data has measured poses; {', '.join(given)} are of simulated ones")
+        raise TeleopError(f"--data gives measured poses; leave out {', '.join(given)}, which are for simulated poses")
     is_published = arguments.data == PUBLISHED
     measured = appendix_e.published(robot) if is_published else read_measured(Path(arguments.data), robot)
     fit = _fit(arguments) or ("offsets" if is_published else "all")

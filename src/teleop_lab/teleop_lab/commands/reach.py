@@ -55,7 +55,7 @@ def _run(arguments: argparse.Namespace) -> int:
     from teleop_core.evaluation.command import check_places
 
     if arguments.out is not None and len(arguments.sources) > 1:
-        raise TeleopError("--out takes the proposal of one recording; give one, or leave it out")
+        raise TeleopError("--out writes the proposal for one recording; give a single recording, or leave out --out")
     check_places(arguments.html, arguments.out)
     if not 0.0 < arguments.share <= 100.0:
         raise TeleopError(f"--share {arguments.share:g} must be above 0 and at most 100 percent")

@@ -35,7 +35,7 @@ class Tolerance:
             raise ParameterError("kind", self.kind, f"one of {', '.join(_KINDS)}")
         if self.kind == "exact":
             if self.amount != 0.0:
-                raise ParameterError("amount", self.amount, "0 for what must be exact")
+                raise ParameterError("amount", self.amount, "0 for a quantity that must be exact")
             return
         least = 1.0 if self.kind == "factor" else 0.0
         if not (math.isfinite(self.amount) and self.amount > least):

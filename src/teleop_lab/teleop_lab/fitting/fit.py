@@ -298,15 +298,17 @@ def _insist_on_identifiable(names: Sequence[str], slopes: Array) -> None:
     unseen = [name for name, size in zip(names, sizes, strict=True) if size < _WEAK * sizes.max()]
     if unseen or not sizes.any():
         text = ", ".join(unseen or names)
-        raise FitError(f"not identifiable from this table, on which they do not act: {text}")
+        raise FitError(f"not identifiable from this table, because they have no effect on it: {text}")
     if len(slopes) < len(names):
-        raise FitError(f"{len(names)} parameters need as many rests; the table has {len(slopes)}")
+        raise FitError(
+            f"{len(names)} parameters need at least {len(names)} rest positions; the table has {len(slopes)}"
+        )
     _, values, directions = np.linalg.svd(slopes / sizes)
     for value, direction in zip(values, directions, strict=False):
         if value < _WEAK * values[0]:
             mixed = [n for n, part in zip(names, direction, strict=True) if abs(part) > 0.1]
             text = ", ".join(mixed)
-            raise FitError(f"not identifiable from this table, for they act alike: {text}")
+            raise FitError(f"not identifiable from this table, because their effects are alike: {text}")
 
 
 def _result(

@@ -55,7 +55,7 @@ class Journal:
         except (OSError, ValueError, TypeError) as error:
             raise SessionError(f"{self.folder} cannot be used for a study with people: {error}") from error
         if self._about["format"] != FORMAT or self._about["plan"] != digest:
-            raise SessionError(f"{self.folder} is of another study, or of a newer version: its plan is another")
+            raise SessionError(f"{self.folder} belongs to another study or a newer version: its plan differs")
         self.now = str(self._about["now"])
         if self.now not in plan.codes:
             self.now = plan.codes[0]
@@ -75,9 +75,7 @@ class Journal:
                 file.parent.mkdir(exist_ok=True)
                 write_whole(file, json.dumps(content, indent=1))
         except OSError as error:
-            raise SessionError(
-                f"{file} cannot be written: {error.strerror}; what was written before is kept"
-            ) from error
+            raise SessionError(f"{file} cannot be written: {error.strerror}; earlier answers are kept") from error
 
     def choose(self, code: str) -> None:
         """Let a participant take part now."""

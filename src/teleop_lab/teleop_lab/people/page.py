@@ -184,7 +184,7 @@ class PeoplePage:
         if code not in self._plan.codes:
             raise UnknownNameError("participant", code, self._plan.codes)
         if self._running is not None:
-            raise ParameterError("participant", code, "chosen when the trial that runs is over")
+            raise ParameterError("participant", code, "chosen after the running trial has ended")
         self._journal.choose(code)
 
     def _pause(self, *, is_paused: bool) -> None:
@@ -195,7 +195,7 @@ class PeoplePage:
         code, word, reason = self._journal.now, _word(query, "trial"), _word(query, "reason").strip()
         numbers = [str(trial.number) for trial in self._plan.trials(code)]
         if word not in numbers or (self._running and self._running[1].number == int(word)):
-            raise ParameterError("trial", word, f"one of 1 to {len(numbers)} that does not run now")
+            raise ParameterError("trial", word, f"a trial from 1 to {len(numbers)} that is not running")
         if not 0 < len(reason) <= _LONGEST or not reason.isprintable():
             raise ParameterError("reason", reason, f"a line of 1 to {_LONGEST} characters")
         self._journal.note(code, int(word), state, reason=reason)

@@ -195,14 +195,16 @@ def read_plan(path: Path | str) -> Plan:
     plan = Plan(study, build(PeopleParameters, texts, f"{PEOPLE}."), questions)
     trials = plan.trials(plan.codes[0])
     if len(trials) > MOST:
-        raise ParameterError(
-            "people.repetitions", plan.people.repetitions, f"so few that there are {MOST} trials at most"
-        )
+        raise ParameterError("people.repetitions", plan.people.repetitions, f"small enough for at most {MOST} trials")
     study.points()  # a trial that cannot run is reported here
     for trial in {trial.condition: trial for trial in trials}.values():
         stages = plan.configuration(plan.codes[0], trial).groups
         if plan.people.attempts and "task" not in stages:
-            raise ParameterError("people.attempts", plan.people.attempts, "0 where no stage `task` counts them")
+            raise ParameterError(
+                "people.attempts",
+                plan.people.attempts,
+                "0 in a session without the stage `task`, which counts attempts",
+            )
     return plan
 
 

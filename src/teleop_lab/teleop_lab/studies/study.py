@@ -294,7 +294,7 @@ def common(content: Mapping[str, Any], path: Path) -> dict[str, Any]:
     seeds, fixed = content.get("seeds", 1), named(content, "set")
     is_count = isinstance(seeds, int) and seeds > 0
     if not is_count and not (isinstance(seeds, list) and all(isinstance(s, int) for s in seeds)):
-        raise ParameterError("seeds", seeds, "how many there are, or a list of whole numbers")
+        raise ParameterError("seeds", seeds, "a number of seeds, or a list of whole numbers")
     if "duration" in content:
         fixed = {f"{SESSION}.duration": content["duration"], **fixed}
     return {

@@ -179,7 +179,7 @@ class RunningTremorFilter(RunningStage):
         self._told = count
         if count <= told:
             return []
-        return [f"began anew at {count - told} samples of the master that no hand can make"]
+        return [f"restarted at {count - told} samples of the master that are implausible for a hand"]
 
 
 TREMOR_FILTER = Stage(

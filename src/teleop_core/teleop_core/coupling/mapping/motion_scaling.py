@@ -411,15 +411,17 @@ class MotionScaling(RunningStage):
         found, told = [], self._told
         count, aligned = self._told = int(self.state["implausible"]), int(self.state["aligned"])
         if count > told[0]:
-            found.append(f"held {count - told[0]} samples of the master that no hand can make")
+            found.append(
+                f"refused {count - told[0]} samples of the master that are implausible for a hand, and held the slave"
+            )
         elif aligned > told[1]:
             often = f", {aligned - told[1]} times" if aligned - told[1] > 1 else ""
             found.append(
-                f"aligned hand and slave anew, which shifts the one against the other{often}: the "
-                "master paused, or the slave did not follow"
+                f"aligned hand and slave again{often}, which changes the offset between them: the master "
+                "paused, or the slave did not follow"
             )
         if self.state["is_lost"]:
-            found.append("the buttons fell silent: holds as if clutched")
+            found.append("no messages of the buttons: holds as if the clutch were pressed")
         return found
 
     def described(self) -> dict[str, str]:

@@ -53,7 +53,7 @@ class JoyRates:
         """
         p = self._parameters
         if max(p.axes) >= len(axes) or p.held_button >= len(buttons):
-            return f"its Joy has {len(axes)} axes and {len(buttons)} buttons, fewer than are named"
+            return f"its Joy has {len(axes)} axes and {len(buttons)} buttons, fewer than the parameters name"
         said = np.array([axes[place] if place >= 0 else 0.0 for place in p.axes], np.float64)
         if not np.isfinite(said).all():
             return "an axis of its Joy is not a finite number"

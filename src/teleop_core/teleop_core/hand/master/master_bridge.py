@@ -255,7 +255,7 @@ class MasterBridge(RunningStage):
     def concerns(self) -> list[str]:
         """Why the pose of the stylus is not published."""
         if self.wrong:
-            return [f"the device is not believed: {self.wrong}"]
+            return [f"the device's messages are refused: {self.wrong}"]
         if not self.heard_ns:
             return [f"waits for the device on {self.parameters.pose_topic}"]
         return []

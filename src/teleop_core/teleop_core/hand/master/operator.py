@@ -210,7 +210,7 @@ class RunningOperator(RunningStage):
             raise PartError("operator", name, f"one whose motion is numbers, not {moves.dtype}")
         moves = moves.astype(np.float64, copy=False)
         if moves.shape not in {(len(times), columns) for columns in (3, 6, 9, 12, 13)}:
-            text = f"one who answers (N, 3), (N, 6) or (N, 9) for N times, not {moves.shape}"
+            text = f"one whose motion has the shape (N, 3), (N, 6) or (N, 9) for N times, not {moves.shape}"
             raise PartError("operator", name, text)
         if not np.isfinite(moves).all():
             bad = times[int(np.flatnonzero(~np.isfinite(moves).all(axis=1))[0])]

@@ -138,7 +138,7 @@ def sampled_motion(name: str, times: object, rows: object) -> Motion:
 def _checked(name: str, part: object) -> Operator:
     if isinstance(part, Operator):
         if not callable(part.make) or part.ahead < 1:
-            raise PartError("operator", name, "one whose make can be called, asked >= 1 tick ahead")
+            raise PartError("operator", name, "one with a callable make and with ahead >= 1 tick")
         if part.length is not None and not callable(part.length):
             raise PartError("operator", name, "one whose length is length(parameters, setting)")
         if part.opens is not None and not callable(part.opens):

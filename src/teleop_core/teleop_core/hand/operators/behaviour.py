@@ -168,7 +168,7 @@ def insist_on_virtual(stage: str, group: object) -> None:
     if not isinstance(group, OperatorParameters) or _is_virtual(group.kind.kind):
         return
     others = ", ".join(filter(_is_virtual, OPERATORS.names()))
-    text = f"one of {others} in virtual time; {group.kind.kind} is for teleop live"
+    text = f"one of {others} in virtual time; {group.kind.kind} works only with teleop live"
     raise ParameterError(f"{stage}.kind", group.kind.kind, text)
 
 

@@ -180,10 +180,10 @@ def _check_size(request: GridRequest, size: Array) -> None:
     while math.prod(_nodes(size, fits)) > _MOST:
         fits *= 1.05
     if fits > request.step:
-        text = f"at least {fits:.2g} m for what is of this size: its grid would be too large"
+        text = f"at least {fits:.2g} m for an object of this size: the grid would be too large"
         raise request.error("step", request.step, text)
     if (shortest := float(size.min())) < _THINNEST * request.step:
-        text = f"at most {shortest / _THINNEST:.2g} m for what is so thin"
+        text = f"at most {shortest / _THINNEST:.2g} m for an object as thin as this one"
         raise request.error("step", request.step, text)
 
 

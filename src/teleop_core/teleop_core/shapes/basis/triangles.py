@@ -89,7 +89,7 @@ def _check_closed(name: str, path: Path, points: Array, faces: NDArray[np.int64]
         lone = edges[is_lone][0]
     place = points[lone].mean(axis=0)
     sides = int((np.sort(edges, axis=1) == np.sort(lone)).all(axis=1).sum())
-    wrong = {1: "it has a hole", 2: "two triangles look to opposite sides"}
+    wrong = {1: "it has a hole", 2: "two triangles face opposite sides"}
     text = (
         f"a closed mesh; {wrong.get(sides, f'{sides} triangles meet')} at the edge whose middle is "
         f"{[float(f'{x:.6g}') for x in place]} in the file"

@@ -187,7 +187,7 @@ class ControllerBridge(RunningStage):
         elapsed, self._sent_ns = 1e-9 * (now_ns - self._sent_ns), now_ns
         is_late = elapsed > self.parameters.setpoint_timeout
         if is_late and self.lead_arm.has_lost(self.hearing.position):
-            self.lead_arm.let_go("the arm has moved while nobody commanded it")
+            self.lead_arm.let_go("the arm moved although the bridge sent no command")
         if not self._moves(now_ns, setpoint_age, is_led, elapsed):
             return None
         joints, lead = self.joints, self.lead_arm
@@ -198,14 +198,14 @@ class ControllerBridge(RunningStage):
     def _moves(self, now_ns: int, setpoint_age: float, is_led: bool, elapsed: float) -> bool:
         row, lead, hearing, p = self.signals, self.lead_arm, self.hearing, self.parameters
         silence = 1e-9 * (now_ns - hearing.heard_ns)
-        strange = f"; heard are {hearing.strange} alone" if hearing.strange else ""
+        strange = f"; its messages contain only {hearing.strange}" if hearing.strange else ""
         if not hearing.heard_ns:
-            return lead.let_go(f"the arm has not said yet where it is{strange}")
+            return lead.let_go(f"the arm has not sent its joint positions yet{strange}")
         if hearing.has_jumped or silence > p.arm_timeout:
-            silent = f"no sound sample of the arm for {silence:.1f} s{strange}"
+            silent = f"no valid sample of the arm for {silence:.1f} s{strange}"
             return lead.let_go(hearing.wrong if hearing.has_jumped else silent)
         if not is_led:
-            return lead.let_go("waits for slave/operation: no server leads it")
+            return lead.let_go("waits for slave/operation: no slave node commands the arm")
         if self._is_braked():
             return lead.brake(hearing.position, elapsed)
         if setpoint_age > p.setpoint_timeout:
@@ -227,7 +227,7 @@ class ControllerBridge(RunningStage):
     def trouble(self) -> str:
         """Why the arm holds, or why its samples are rejected, in one line; empty without a problem."""
         if self.hearing.wrong:
-            return f"the arm's state is not believed: {self.hearing.wrong}: holds"
+            return f"the arm's messages are refused: {self.hearing.wrong}: holds"
         return self.lead_arm.waits
 
     def concerns(self) -> list[str]:

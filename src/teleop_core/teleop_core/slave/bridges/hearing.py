@@ -161,11 +161,11 @@ def wrong_stamp(stamp_ns: int, newest_ns: int, now_ns: int, oldest: float, optio
         option: Name of the parameter that makes the bridge use sending times in place of stamps.
     """
     if stamp_ns == 0:
-        return f"its messages have no stamp; {option}: sent takes the time when each was sent"
+        return f"its messages have no stamp; {option}: sent uses the time when each was sent"
     if stamp_ns <= newest_ns:
         behind = 1e-9 * (newest_ns - stamp_ns)
-        return f"its stamp does not rise: {behind:.4g} s behind the newest one"
+        return f"its stamp is {behind:.4g} s older than the newest one; stamps must rise"
     age = 1e-9 * (now_ns - stamp_ns)
     if 0.0 < oldest < abs(age):
-        return f"its stamp is {age:.4g} s old, at most {oldest:g} s to either side"
+        return f"its stamp is {age:.4g} s old; it may differ from our clock by at most {oldest:g} s"
     return ""

@@ -39,12 +39,12 @@ class Lead:
         self.position, self.velocity, self._braked = np.zeros(n), np.zeros(n), np.zeros(n)
         self._setpoint = np.full(n, np.nan)
         self._is_braked = self.is_leading = False
-        self.waits = "commands nothing: nothing has come yet"
+        self.waits = "sends no commands: no message has arrived yet"
 
     def let_go(self, reason: str) -> bool:
         """Stop commanding; the controller holds the arm at the last command. Returns False for `step`."""
         self.is_leading = self._is_braked = False
-        self.waits = f"commands nothing: {reason}"
+        self.waits = f"sends no commands: {reason}"
         return False
 
     def has_lost(self, measured: Array) -> bool:
@@ -88,7 +88,7 @@ class Lead:
         self.is_leading = bool((np.abs(setpoint - measured) <= self.tolerance).all())
         if self.is_leading:
             return self.step(setpoint, measured, names, elapsed)
-        self.waits = "goes slowly to the setpoint, which went on without the arm"
+        self.waits = "moves slowly to the setpoint, which has moved away from the arm"
         self._approach(np.clip(setpoint, self._lower, self._upper), elapsed, _SLOWLY)
         return True
 
@@ -99,7 +99,7 @@ class Lead:
         if self.is_leading:
             self._braked[:] = measured
             self.is_leading, self._is_braked = False, True
-            self.waits = "commands nothing: its brakes hold it"
+            self.waits = "sends no commands: brakes hold the arm"
         self._approach(self._braked, elapsed)
         return True
 

@@ -157,7 +157,7 @@ class Jaw(RunningStage):
             return []
         asked, held = float(self.signals["slave_jaw_servo_jp"][0]), float(s["setpoint"])
         way = "close the hand first" if asked > held else "open the hand first, or close it"
-        return [f"the jaw holds at {held:.3f} rad, commanded are {asked:.3f} rad: {way}"]
+        return [f"the jaw holds at {held:.3f} rad, the command is {asked:.3f} rad: {way}"]
 
 
 JAW_STAGE = Stage(
