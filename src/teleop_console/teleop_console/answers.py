@@ -40,12 +40,13 @@ class Situation:
     Attributes:
         can_stop: Whether a stop has any effect; false while a recording is shown.
         is_stopped: Whether an emergency stop is in force.
-        text: What has happened, and what to do next; empty if nothing has.
-        doing: What is going on before a session can be shown; empty while a session is shown.
+        text: Text about the last event and the next action; empty if there was no event.
+        doing: Text about the progress before a session can be shown; empty while a session is shown.
         chooses: Whether a session is being chosen: the form is shown.
         can_end: Whether the page can end the session or replay, which returns to the form.
         state: State of all arms in words, for screen readers.
-        can_press: Whether a person at the page leads a hand that closes: at a task, or a jaw.
+        can_press: Whether a person at the page moves a hand that can press or close: in a task with pressing, or with
+            a jaw.
     """
 
     can_stop: bool = True

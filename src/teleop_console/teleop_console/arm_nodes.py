@@ -41,11 +41,11 @@ Path = Callable[[Topic, str, float], tuple[Array, Array]]
 """From a topic, an arm and a length [s]: times (N,) [s] and rows (N, width) up to now."""
 _AT = 1e-3
 """Share of a joint's range next to its end that counts as at its limit."""
-_WORK, _GRIP = 0.05, 0.1  # room on all sides of a tip and of a stylus with its handles [m]
+_WORK, _GRIP = 0.05, 0.1  # free space on all sides of a tip and of a stylus with its handles [m]
 _GOAL = TASK_STATE.columns.index("goal_x")
 _LEAST_GOAL = 1e-3  # width of a goal as it is drawn [m]
 _NEAR = 0.4  # part of the robot's length about the start of the tip in which an object is framed
-_TOUCH = 0.05  # force of a wall that somebody touches [N]
+_TOUCH = 0.05  # smallest wall force that counts as a contact [N]
 SHOWN = ("axes", "ghost", "reach", "paths")
 """What may be shown or hidden: axes of bodies, the commanded posture, the positions that the tip can reach, the paths
 of the last seconds."""
@@ -294,7 +294,7 @@ class ArmNodes:
 
 
 def posture(robot: Robot) -> Array:
-    """Where a session with it starts (n,) [rad, m]; its home if that cannot be found."""
+    """Start (n,) [rad, m] of the robot in a session; the robot's home if the start cannot be computed."""
     with suppress(TeleopError):
         return robot.start
     return robot.home

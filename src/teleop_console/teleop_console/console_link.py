@@ -153,7 +153,8 @@ class LiveLink(Observer):
                 taken = [seen.take() for seen in self._seen[arm.name]]
                 if any(taken):
                     self._heard = now
-                for seen in reversed(self._seen[arm.name]):  # the display, which is last of them, first
+                for seen in reversed(self._seen[arm.name]):  # search the display's topic first, which is the last in
+                    # this order
                     seen.show(view.arms[arm.name])
                 self._hear(arm, view.arms[arm.name])
             self._insist(view)
@@ -243,7 +244,7 @@ class LiveLink(Observer):
         return MappingProxyType(found)
 
     def changes(self) -> dict[tuple[str, str], Setting]:
-        """Parameters that have changed since the last call, by node and name, whoever changed them."""
+        """Parameters that have changed since the last call, by node and name, from any source."""
         return self._events.take()
 
     def change(self, node: str, name: str, value: Setting) -> str:

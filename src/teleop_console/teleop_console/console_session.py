@@ -1,4 +1,4 @@
-"""Console session: the live session behind a page, started and ended by it."""
+"""Console session: the live session behind a page, which the page starts and ends."""
 
 import threading
 from collections.abc import Callable, Collection
@@ -48,7 +48,7 @@ class _Lines:
 
 
 class ConsoleSession:
-    """A session in its own domain, to be used with ``with``; composed if all nodes are ours.
+    """A session in its own ROS domain, used as a context manager. All nodes run in one process if none is replaced.
 
     If ``ROS_DOMAIN_ID`` is set, the session uses that domain, and the process cannot run a second session.
 

@@ -16,7 +16,8 @@ from teleop_core.nodes.display import displayed
 from teleop_core.nodes.streams import Subscription, message_type
 
 SILENCE = 1.0
-"""Time of silence after which a stream is no longer fresh, and another source of it is searched [s]."""
+"""Time without a message after which a stream is not fresh any more, and another source of the stream is searched [s].
+"""
 _PRESS = 0.12  # of a button [s]
 _FRAMES = 512  # samples of a stream that may wait to be shown
 _SCREEN_NS = 33_000_000  # delay of the page itself, the default latency of a display [ns]

@@ -64,7 +64,8 @@ def _insist(link: SessionLink, word: str, arm: str) -> tuple[bool, str]:
     until = time.monotonic() + _PATIENCE
     while True:
         is_taken, text = link.command(word, arm)
-        is_passing = AT_REST_ONLY in text or STILL_PRESSED in text  # a release may be on its way
+        is_passing = AT_REST_ONLY in text or STILL_PRESSED in text  # a release may have been sent, but has not arrived
+        # yet
         if is_taken or not is_passing or time.monotonic() > until:
             return is_taken, text
         time.sleep(_PAUSE)

@@ -50,7 +50,7 @@ class Drivers:
         return self.is_for_all or page == self._driver
 
     def role(self, page: int) -> str:
-        """Text that tells the people at a page whether the page drives."""
+        """Text for the people at a page: whether the page drives."""
         if self.may_drive(page):
             return "you have control"
         return "you watch" if self._driver is not None else "you watch, nobody has control"

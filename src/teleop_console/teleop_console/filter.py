@@ -22,7 +22,7 @@ RATE, BURST = 200.0, 400.0
 BYTES_RATE, BYTES_BURST = 1e6, 2e6
 """Bytes that a page may send in a second, and in one burst; visible insets need 520,000 a second."""
 PICTURE = (180, 240)
-"""Height and width of a picture that a browser may be asked for [px]."""
+"""Height and width of the picture that the console may request from a browser [px]."""
 
 UNKNOWN = "no message that this page sends"
 WATCHES = "a page that watches cannot do this; take control first"
@@ -99,7 +99,7 @@ class Sets(_Message, tag="GuiUpdateMessage"):
 
 
 class Triggers(_Message, tag="CommandTriggerMessage"):
-    """The page uses a key that stands for a command."""
+    """The page uses a keyboard shortcut of a command."""
 
     uuid: _Name
 
@@ -139,19 +139,19 @@ class Elements(Protocol):
         """Whether pages that watch may use an element."""
 
     def is_asked(self, page: int) -> bool:
-        """Whether a page has been asked for a picture."""
+        """Whether the console has requested a picture from a page."""
 
 
 class Filter:
-    """Judges the messages of all pages, and counts what it refuses.
+    """Checks the messages of all pages, and counts the refused messages.
 
     Args:
-        elements: What is on the page.
+        elements: Elements of the page.
         may_drive: Whether a page may command the session.
         say: Called with a line at the first refusal of each kind.
 
     Attributes:
-        refused: How often a message was refused, by the reason.
+        refused: Number of refused messages, by reason.
     """
 
     def __init__(self, elements: Elements, may_drive: Callable[[int], bool], say: Callable[[str], None]) -> None:
@@ -222,7 +222,7 @@ def takes(control: Any, value: object) -> bool:
 
 
 def is_picture(data: bytes) -> bool:
-    """Whether data begin as a PNG of the size that was asked for, so that it cannot decompress to more."""
+    """Whether data begin with the header of a PNG of the requested size, so that it cannot decompress to more."""
     return data[:8] == b"\x89PNG\r\n\x1a\n" and data[16:24] == struct.pack(">II", *PICTURE[::-1])
 
 
@@ -231,10 +231,10 @@ def _is_unit(wxyz: tuple[float, ...]) -> bool:
 
 
 class Budget:
-    """Frames and bytes that one page, or all of them, may still send.
+    """Number of frames and bytes that one page, or all pages together, may still send.
 
     Args:
-        share: Budget as a multiple of what one page may send.
+        share: Budget as a multiple of the budget of one page.
         clock: Monotonic time [s].
     """
 

@@ -63,7 +63,7 @@ class Front:
         self._line: queue.Queue[tuple[socket.socket, bytes] | None] = queue.Queue(_LINE)
         threading.Thread(target=self._work, name="console start", daemon=True).start()
         self._waiting: dict[socket.socket, float] = {}  # until when
-        self._partial: set[socket.socket] = set()  # of these, those that have begun to say it
+        self._partial: set[socket.socket] = set()  # number of these connections that have begun to send a request
         inner, self._told = socket.socketpair()
         self.passed_on = PassedOn(inner, opened.getsockname())
         self._told.setblocking(False)
@@ -74,7 +74,7 @@ class Front:
         self._thread.start()
 
     def close(self) -> None:
-        """Accept nobody any more."""
+        """Stop accepting connections."""
         self._is_closed = True
         self._thread.join()
         with suppress(queue.Full):  # no harm if the thread is not woken to end

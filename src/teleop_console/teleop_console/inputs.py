@@ -1,4 +1,4 @@
-"""Inputs: how a parameter is shown and changed on the page, one way for each of the seven kinds of values."""
+"""Inputs: the elements that show and change a parameter on the page, one type for each of seven kinds of values."""
 
 import ast
 import math
@@ -38,7 +38,7 @@ def kind_of(info: ParameterInfo) -> str:
 
 
 def _is_slider(info: ParameterInfo) -> bool:
-    """Whether it has bounds that span a range fit for a slider, and lies within them."""
+    """Whether a parameter lies within bounds whose range suits a slider."""
     low, high, value = info.lower, info.upper, info.value
     if low is None or high is None or not low <= float(value) <= high:  # type: ignore[arg-type]
         return False
@@ -141,7 +141,7 @@ def _number(gui: viser.GuiApi, label: str, value: Any, info: ParameterInfo) -> A
     step = 1 if isinstance(value, int) else _step(value)
     low, high = info.lower, info.upper
     if not (-math.inf if low is None else low) <= value <= (math.inf if high is None else high):
-        low = high = None  # one that is allowed whatever the bounds: off
+        low = high = None  # the value `off` is allowed outside of the bounds
     return gui.add_number(label, value, min=low, max=high, step=step, hint=hint_of(info))
 
 
@@ -182,7 +182,7 @@ def text(value: Setting) -> str:
 
 
 def _words(values: tuple[float | str, ...]) -> list[float | str]:
-    """Numbers as they are; texts in quotes if one of them would fall apart in a list without."""
+    """Numbers unchanged; all texts in quotes if one of them could not be read from a list without quotes."""
     is_quoted = any(isinstance(one, str) and set(one) & set(",[]()'\"") for one in values)
     return [repr(one) if is_quoted and isinstance(one, str) else one for one in values]
 

@@ -25,8 +25,8 @@ def finger_poses(tip: Array, angle: float, length: float) -> Array:
 
     Args:
         tip: Pose (7,) of the tip.
-        angle: Between the fingers [rad].
-        length: Of a finger [m].
+        angle: Angle between the fingers [rad].
+        length: Length of a finger [m].
     """
     half, turn = 0.5 * angle, rotations_from_quaternions(tip[None, 3:])[0]
     pivot = tip[:3] - length * np.cos(half) * turn[:, 2]
@@ -105,8 +105,8 @@ def _block_poses(place: Array, board: Array | None) -> Array:
     """Poses (N, 7) of all blocks, those at rest upright.
 
     Args:
-        place: Pose (7,) of the one that moved last.
-        board: Columns of ``slave/jaw/board``, if it is told.
+        place: Pose (7,) of the block that moved last.
+        board: Columns of ``slave/jaw/board``, if this topic exists.
     """
     middles = np.empty((0, 3)) if board is None else board[_FIRST:].reshape(-1, 3)
     middles = middles[middles.any(axis=1)]  # zero: there is no such block

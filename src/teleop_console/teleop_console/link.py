@@ -143,7 +143,7 @@ class SessionLink(Protocol):
         """All parameters of all nodes by node and name, as of the last read."""
 
     def changes(self) -> Mapping[tuple[str, str], Setting]:
-        """Parameters that have changed since the last call, by node and name, whoever changed them."""
+        """Parameters that have changed since the last call, by node and name, from any source."""
         return {}
 
     def change(self, node: str, name: str, value: Setting) -> str:

@@ -1,4 +1,4 @@
-"""Look: the colours and the type of the page, each colour named once by the one thing it means.
+"""Look: the colours and fonts of the page; each colour is defined once, with one meaning.
 
 Colours have a meaning; everything without a meaning is grey. Red is only for errors and the stop. Measured values are
 orange, wanted values and the next button blue, actions of the person violet, and forces magenta, both in the scene and

@@ -185,7 +185,7 @@ class Panel:
             self._live.content = text
 
     def _draw_buttons(self, view: View) -> None:
-        """Show on the buttons their state, which of them can act, and which comes next."""
+        """Show the state of each button, whether it can be used, and which button is the next step."""
         arm, soon, now = next(iter(view.arms.values())), next_button(view), alive(view)
         labels = {c.name: f"{c.name.capitalize()}: {c.text(arm)}" for c in self._controls if c.text}
         own = {c.name: c.is_alive(view) for c in self._controls if c.is_alive is not None}

@@ -22,7 +22,7 @@ class ParameterEvents:
     """Changes of parameters that nodes publish; the caller must spin an executor.
 
     Args:
-        owner: Node that hears them.
+        owner: Node that subscribes to the changes.
     """
 
     def __init__(self, owner: Owner) -> None:
@@ -97,7 +97,7 @@ class ParameterClient:
 
 
 def call(world: World, client: Client, request: object, patience: float) -> Any:
-    """Answer of a service, asked from another thread than the executor's.
+    """Call a service from a thread other than the executor's, and return the answer.
 
     Raises:
         SessionError: There is no such service, or it did not answer in time.

@@ -52,7 +52,7 @@ class Recordings:
         self._judging: tuple[Entry, subprocess.Popen[bytes], Path] | None = None
 
     def entries(self) -> list[Entry]:
-        """The newest recordings, the newest first; each with what is known of it by now."""
+        """The newest recordings, the newest first; each with the data that are known so far."""
         found = []
         for file in self._folder.glob(f"*/{_FILE}"):
             name, made = file.parent.name, file.stat().st_mtime
@@ -87,7 +87,7 @@ class Recordings:
 
     def run(self, kind: str, names: Sequence[str]) -> str:
         """Run such a command at low priority; returns what it printed."""
-        wide = os.environ | {"COLUMNS": str(_COLUMNS)}  # names of several recordings stand side by side
+        wide = os.environ | {"COLUMNS": str(_COLUMNS)}  # the request names several recordings
         words = [*_program(), *self.words(kind, names)]
         done = subprocess.run(words, capture_output=True, text=True, check=False, env=wide)
         return done.stdout or done.stderr
@@ -129,7 +129,7 @@ def _program() -> list[str]:
 
 
 def _operator(path: Path) -> list[str]:
-    """Kind of the first arm's operator; none where that is not told."""
+    """Kind of the first arm's operator; empty if the recording does not contain it."""
     from teleop_console.recorded_arms import configuration_of  # costly for a command that only lists itself
     from teleop_core.bags.reader import Bag
 
@@ -140,7 +140,7 @@ def _operator(path: Path) -> list[str]:
 
 
 def _judged(folder: Path, entry: Entry, out: Path) -> Entry:
-    """Entry with what a score says; one that could not be scored says so."""
+    """Entry with the verdict of its score, or with a note that it could not be scored."""
     if not out.is_file():
         return Entry(entry.name, entry.made, "", "could not be scored: teleop evaluate", False)
     score = json.loads(out.read_text(encoding="utf-8"))[0]

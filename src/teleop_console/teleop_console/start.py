@@ -26,11 +26,11 @@ ROBOTS = Path("robots")
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}\.urdf")
 _LARGEST = 4 * 1024 * 1024  # bytes of a robot's file
 _TRY = 0.25  # for which options are tried before the page is answered [s]
-_LOOK = 0.2  # between looks at verdicts [s]
+_LOOK = 0.2  # time between two checks for new verdicts [s]
 Query = Mapping[str, Sequence[str]]
 Body = Callable[[int], bytes]
 Told = tuple[http.HTTPStatus, object]
-"""Status of an answer, and what it says as JSON."""
+"""Status of an answer, and its content for JSON."""
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,7 @@ class Form(Protocol):
 
     @property
     def style(self) -> Path | None:
-        """Its style sheet, beside the one that forms share; None for none."""
+        """Style sheet of this form, in addition to the common one; None for none."""
 
     @property
     def documents(self) -> Mapping[str, bytes]:
@@ -66,18 +66,18 @@ class Form(Protocol):
         """Paths of its requests."""
 
     def answer(self, path: str, query: Query, page: int, body: Body = bytes) -> Told:
-        """Answer to a request of a page; -1 for one that is not open."""
+        """Answer to a request; ``page`` is the number of the page, -1 if the page is not open."""
 
 
 class StartPage:
-    """What the form shows, and what was asked of it; methods may be called from any thread.
+    """Content of the form, and the actions that people requested; methods may be called from any thread.
 
     Args:
-        drivers: Who may begin and end.
-        folder: Where recordings are.
+        drivers: Knows which page may begin and end a session.
+        folder: Folder of the recordings.
 
     Attributes:
-        is_open: Whether the form is shown: nothing runs.
+        is_open: Whether the form is shown because no session runs.
         told: Text for the person at the page: why the last session ended, or the output of a command.
     """
 
@@ -109,7 +109,7 @@ class StartPage:
         self._ends.clear()
         self.is_open = True
         try:
-            self._shown({})  # the first answer is the slowest: before anybody asks
+            self._shown({})  # compute the first answer, which is the slowest, before any page requests it
             while True:
                 try:
                     return self._wishes.get(timeout=_LOOK)
@@ -129,9 +129,10 @@ class StartPage:
 
         Args:
             path: One of :attr:`paths`.
-            query: Its words.
-            page: Page that asks.
-            body: Its body of at most so many bytes; only who may send one is listened to.
+            query: Query parameters of the request.
+            page: Number of the page that sent the request.
+            body: Returns the request's body of at most the given number of bytes; read only if the page may send a
+                body.
         """
         try:
             if path == "/start":
@@ -194,7 +195,7 @@ class StartPage:
         return ""
 
     def _run(self, query: Query) -> str:
-        """Score, compare or export, in a thread; the form shows what came of it."""
+        """Score, compare or export recordings in a thread; the form then shows the result."""
         self._insist_open()
         kind, names = _words(query).get("kind", ""), tuple(query.get("name", ()))
         words = self.recordings.words(kind, names)

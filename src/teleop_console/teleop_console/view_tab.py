@@ -195,7 +195,7 @@ class Visitors:
         self._grips: dict[int, tuple[bool, float]] = {}
 
     def look(self) -> None:
-        """Welcome new pages, and tell every page whether it drives or watches."""
+        """Greet new pages, and show on every page whether it drives or watches."""
         clients = self._server.get_clients()
         for number, client in clients.items():
             text = f'<p class="t-role">{self._role(number)}</p>'
@@ -214,7 +214,7 @@ class Visitors:
 
         Args:
             client: The browser.
-            find: The camera; None for one that sees the work.
+            find: The camera; None for a camera that shows the whole work.
             is_riding: Whether the camera follows the body that it is attached to.
         """
         number, now = client.client_id, time.monotonic()
@@ -234,7 +234,7 @@ class Visitors:
     def _show_grips(self, number: int) -> None:
         """Show the handles of the styli on a page if it may drive; on other pages they are hidden each time.
 
-        All pages are told when the handles are shown again, those that watch too.
+        When the handles are shown again, viser informs all pages, including those that only watch.
         """
         may_drive, now = self._drivers.may_drive(number), time.monotonic()
         before, told = self._grips.setdefault(number, (True, -_LOOK))

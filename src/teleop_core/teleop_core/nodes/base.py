@@ -111,7 +111,7 @@ class CoreNode(TunedNode):
         return []
 
     def values(self) -> dict[str, str]:
-        """Names and texts to report in addition to the common ones."""
+        """Names and texts of the node's own values in its report, in addition to those of all nodes."""
         return {}
 
     def news(self, word: str) -> str:
@@ -216,7 +216,7 @@ class CoreNode(TunedNode):
         return self._guard("deactivate", self._halt, "inactive")
 
     def on_cleanup(self) -> Outcome:
-        """Close everything: the node can be configured anew."""
+        """Close everything; afterwards the node can be configured again."""
         return self._guard("cleanup", self._clear, "unconfigured")
 
     def on_shutdown(self) -> Outcome:
@@ -228,7 +228,7 @@ class CoreNode(TunedNode):
         return result
 
     def on_error(self) -> Outcome:
-        """After a crash: close everything, so that a supervisor can configure the node anew."""
+        """After a crash: close everything, so that a supervisor can configure the node again."""
         return self._guard("recovery", self._clear, "unconfigured")
 
     def _begin(self) -> None:

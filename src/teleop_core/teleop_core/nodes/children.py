@@ -1,4 +1,4 @@
-"""Children: the processes of a live session, each one node, from start to end."""
+"""Children: starts, watches and ends the processes of a live session."""
 
 import atexit
 import os
@@ -34,7 +34,7 @@ def environment(domain: int | None = None) -> dict[str, str]:
     Variables that this process also needs are set in it too, except the domain: one process may run several sessions.
 
     Args:
-        domain: ROS domain; None for that of ``ROS_DOMAIN_ID``, or else a free one.
+        domain: ROS domain; None for the domain in ``ROS_DOMAIN_ID``, or for a free domain if this is not set.
     """
     os.environ.setdefault("AMENT_PREFIX_PATH", sys.prefix)
     choose_transport()
@@ -85,7 +85,7 @@ class Child:
     Args:
         name: Stage with its namespace, or a whole session.
         parameters: Open parameter file.
-        env: Its environment.
+        env: Environment variables of the process.
         starter: Starter that starts it.
         command: Command that it runs instead of the node with that name.
         nodes: Nodes in the process. If there are several, or one with another name, the process is one side of a
@@ -93,8 +93,8 @@ class Child:
 
     Attributes:
         name: As given.
-        doing: Activity that it reports: starting, compiling kernels, at work, ending.
-        is_told: Whether its end has already been reported.
+        doing: Activity that the process reports: starting, compiling kernels, at work, ending.
+        is_told: Whether the end of the process has already been reported.
     """
 
     def __init__(

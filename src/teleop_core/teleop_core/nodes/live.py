@@ -37,7 +37,8 @@ Whether its process or its loop hangs is detected within seconds by :mod:`teleop
 :mod:`teleop_core.nodes.watch`.
 """
 _LOOK = 0.5
-"""A sender of setpoints that is found this soon after the processes were started is not one of them [s]."""
+"""A sender of setpoints that is discovered sooner than this after the start of the processes belongs to another
+session [s]."""
 _ALONE = 1.0
 """A session that has been alone in its domain for this time, with all nodes at work, owns the domain; later sessions
 end [s]."""

@@ -60,7 +60,7 @@ class Commanders:
 class Trouble:
     """Log of the reasons why a bridge holds.
 
-    Each reason is logged once, even if numbers in it change, and again when it is over.
+    Each reason is logged once, even if numbers in it change. When all reasons are gone, this is logged too.
 
     Args:
         owner: The node.

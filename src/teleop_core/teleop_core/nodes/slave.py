@@ -71,7 +71,7 @@ class SlaveNode(TickingNode):
         """Update the signals, and answer every sample of the arm.
 
         The next step answers the newest sample. If several samples came meanwhile, the older ones are answered here.
-        After a standstill the stop comes first: only the last of the samples that came then are answered.
+        After a standstill of the loop, the stop has priority: only the last of the queued samples are answered.
         """
         measured, *others = self.ports.inputs[SLAVE_MEASURED_JS.name]
         if others or not self._is_told:

@@ -131,7 +131,8 @@ class TeleopSession:
             for node in self._stages:
                 if node.is_at_work:
                     node.tick(tick_ns)
-                    # Messages with the longest way are sent first: the slave's setpoint, the master's sample
+                    # Messages with the longest path to their reader are sent first: the slave's setpoint, the master's
+                    # sample
                     # last.
                     waiting[:0] = self._pending
                     self._pending.clear()
@@ -145,7 +146,7 @@ class TeleopSession:
     def _link(self) -> None:
         """Connect every stage's output to its readers in this process, if both are at work."""
         active = [node for node in self._stages if node.is_at_work]
-        for node in self._stages:  # if a tick is late for one of them, it is late for all that tick
+        for node in self._stages:  # if one ticking node is late in a tick, all ticking nodes are late in it
             if node.description.trigger is None:
                 node.schedule = self._schedule
         outputs = {topic.name: out for node in active for topic, out in node.ports.outputs.items()}

@@ -129,7 +129,7 @@ def identify(
         worst_condition: Ratio of singular values above which entries are left out, > 1.
 
     Raises:
-        UnknownNameError: ``fit`` names what is no link error.
+        UnknownNameError: ``fit`` contains a name that is no link error.
         CalibrationError: Too few readings, named entries that cannot be distinguished, or a search that does not end
             near the nominal arm.
     """

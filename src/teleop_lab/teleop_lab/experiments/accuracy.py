@@ -187,7 +187,7 @@ _NOTES = (
 
 
 def _errors(which: Axis, read_mm: Array) -> Array:
-    """Desired less measured way (10,) [mm]."""
+    """Desired minus measured displacement (10,) [mm]."""
     return DESIRED_MM - moved(read_mm, which.escape_mm)
 
 

@@ -40,7 +40,7 @@ def _study(bench: Bench, kind: str, delays: tuple[float, ...], gains: tuple[floa
 
 
 def _rises(quantity: str, low: float, high: float, group: str) -> Comparison:
-    """Whether a figure is larger in the second case, as the source says; 1 for yes."""
+    """Whether a figure is larger in the second case, as the source reports; 1 for yes."""
     is_so = float(high > low)
     note = f"{low:.3g} and {high:.3g}"
     return Comparison(quantity=quantity, published=1.0, predicted=is_so, within=EXACT, group=group, note=note)

@@ -37,7 +37,7 @@ def numbers(row: "Comparison") -> tuple[str, str, str, str]:
 
 
 def _printed(published: float) -> str:
-    """A published number as it was printed, or four digits of a number that was computed from printed ones."""
+    """A published number as printed, or with four digits if it was computed from printed numbers."""
     text = f"{published:.9g}"
     return text if len(text.partition(".")[2]) <= _DIGITS else f"{published:.4g}"
 

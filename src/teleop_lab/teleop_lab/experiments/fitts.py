@@ -33,7 +33,7 @@ def _laws() -> list[Comparison]:
 
 
 def _sessions(bench: Bench) -> list[Comparison]:
-    """Times of whole sessions, beside the slowing that the look-move cycle predicts."""
+    """Movement times of whole sessions, compared with the slowing that the look-move cycle predicts."""
     times = []
     for latency in LATENCIES:
         session = bench.session("point", settings={"display.latency": latency})

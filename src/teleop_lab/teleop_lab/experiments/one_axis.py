@@ -45,7 +45,7 @@ def exact_boundary(grip: Grip, delay: float, period: float = DT) -> float:
 
     Args:
         grip: The hand.
-        delay: Of the force [s].
+        delay: Delay of the force [s].
         period: Time for which a force is held [s]; half of it adds to the delay.
 
     Source:

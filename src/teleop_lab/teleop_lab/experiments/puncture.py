@@ -29,7 +29,7 @@ WAYS: tuple[Way, ...] = (
 )
 """Architectures and passivities, as of the experiment ``transparency``."""
 ROUND_TRIPS = (0.0, 0.1, 0.2, 0.4)
-"""Half of it each way [s]."""
+"""Round-trip delays [s], half in each direction."""
 SPEED = 0.01
 """Speed with which the hand pushes [m/s]; assumed."""
 NOTICED = 0.1
@@ -62,7 +62,7 @@ class Puncture:
 
 
 def _motion(times: Array, stop: float = math.inf) -> Array:
-    """Place (N, 3) [m] of a hand that goes to the block, then pushes on until ``stop`` [s]."""
+    """Positions (N, 3) [m] of a hand that moves to the block, then pushes on until ``stop`` [s]."""
     place = np.zeros((len(times), 3))
     place[:, 2] = 0.04 * minimum_jerk(times / _APPROACH)
     place[:, 1] = -SPEED * np.clip(times - _APPROACH, 0.0, min(stop - _APPROACH, _PUSH))

@@ -87,7 +87,7 @@ def _rest_mm(found: Response) -> float:
 
 
 def _transient(found: Response) -> tuple[float, float, float]:
-    """Largest error on the way [mm], when it is, and when the error has settled at rest [s]."""
+    """Largest error during the move [mm], its time, and the time at which the error has settled [s]."""
     error = np.linalg.norm(found.error_mm, axis=1)
     peak, room = int(error.argmax()), _REST * (error.max() - error[-1])
     off = np.flatnonzero(np.abs(error - error[-1]) > room)

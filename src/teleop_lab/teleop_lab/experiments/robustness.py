@@ -1,4 +1,4 @@
-"""Robustness: every control law on plants that differ from the one it was made for."""
+"""Robustness: every control law on plants that differ from the plant of its design."""
 
 from collections.abc import Callable, Mapping
 

@@ -159,7 +159,7 @@ def press_energy(damping: float, wall: Wall, length: int, speed: float) -> float
 
 
 def passive_boundary(damping: float, wall_damping: float, length: int, speed: float) -> float:
-    """Stiffness [N/m] above which a press gives energy; the wall's work is linear in it."""
+    """Stiffness [N/m] above which a press gains energy from the wall; the wall's work is linear in the stiffness."""
     tried = 1000.0
     soft, stiff = (press_energy(damping, Wall(stiffness, wall_damping), length, speed) for stiffness in (0.0, tried))
     return tried * soft / (soft - stiff)

@@ -71,8 +71,8 @@ def fastest(bench: Bench, grip: one_axis.Grip, delay: float, stiffness: float, w
     Args:
         bench: Where it runs.
         grip: The hand.
-        delay: By which the force comes later [s].
-        stiffness: Of the object [N/m].
+        delay: Delay of the force [s].
+        stiffness: Stiffness of the object [N/m].
         way: Architecture and passivity.
     """
     rows = bench.signals("palpation", _SECONDS, _settings(grip, delay, stiffness, way))
@@ -94,7 +94,7 @@ def chain_boundary(bench: Bench, grip: one_axis.Grip, delay: float, way: transmi
     Args:
         bench: Where it runs.
         grip: The hand.
-        delay: By which the force comes later [s].
+        delay: Delay of the force [s].
         way: Architecture and passivity.
         calm: Speed of the hand up to which it counts as stable [m/s], from :func:`calm_speed`.
     """

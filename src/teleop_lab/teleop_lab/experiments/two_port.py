@@ -26,7 +26,7 @@ LINES: Array = BINS / PERIOD
 S: Complex = np.multiply(2j * np.pi, LINES, dtype=np.complex128)
 """Laplace's variable at the lines (L,) [rad/s]."""
 AMPLITUDE = 0.15e-3
-"""Of each line of the hand's way [m]."""
+"""Amplitude of each line of the hand's displacement [m]."""
 _APPROACH, _GROWTH = 3.0, 1.0  # duration of the hand's approach to its centre, then of the rise of the multisine [s]
 _FIRM = Grip(0.02, 5000.0, 40.0)
 """A hand that hardly yields, so that its motion does not depend on the force."""
@@ -55,10 +55,10 @@ class Ports:
     """Both ports at the excited lines, in one experiment; each complex, shape (L,).
 
     Attributes:
-        hand_speed: Of the hand at the master [m/s].
-        hand_force: Of the hand on the master [N].
-        tip_speed: Of the slave's tip [m/s].
-        tip_force: Of the tip on the world [N].
+        hand_speed: Speed of the hand at the master [m/s].
+        hand_force: Force of the hand on the master [N].
+        tip_speed: Speed of the slave's tip [m/s].
+        tip_force: Force of the tip on the world [N].
         stray: Share of a force, or of the tip's displacement if that is larger, outside of the lines up to the last
             line; 0 for a linear system in steady state.
     """
@@ -209,8 +209,8 @@ class Lag:
         """Hybrid matrix (L, 2, 2) of position-force with this arm, exactly.
 
         Source:
-            Lawrence 1993, position-force: force comes back, position goes there. The sampled lag is
-            share / (1 - (1 - share) / z).
+            Lawrence 1993, position-force: the position is sent to the slave, and the force is sent back. The sampled
+            lag is share / (1 - (1 - share) / z).
         """
         later = np.exp(-S * DT)
         lag = self.share / (1.0 - (1.0 - self.share) * later)

@@ -1,6 +1,7 @@
 """UVA: times of a user study of fifteen people, predicted before its table was read.
 
-The prediction stands in ``uva_prediction.csv`` as it was written down; ``docs/predicted_study.md`` says when and how.
+``uva_prediction.csv`` contains the prediction as it was first stored; ``docs/predicted_study.md`` describes when and
+how it was made.
 """
 
 import csv
@@ -40,8 +41,8 @@ PRIMITIVES = (
     Primitive("left reaches the goal", 0.055, 0.004),
     Primitive("left releases", 0.015, 0.002),
 )
-"""Distances are from the geometry of the board. Widths are assumed: fingers on a block 2 mm, a peg through its hole 2
-to 4 mm, clear of a peg 6 mm, out of the way 10 mm."""
+"""Distances follow from the geometry of the board. Widths are assumed: 2 mm for fingers on a block, 2 to 4 mm for a
+peg in its hole, 6 mm to be clear of a peg, 10 mm to be out of the other arm's path."""
 
 
 class Level(NamedTuple):
@@ -69,7 +70,7 @@ LEVELS = (
 
 
 def _plain(primitive: Primitive, level: Level) -> float:
-    """Time of a primitive at a level [s], before the one scale for all of them.
+    """Time of a primitive at a level [s], before the common scale factor is applied.
 
     Each look takes a cycle, the station's latency and the delay. Lost motion must be repeated. An outage costs its
     length and the cycle that it interrupts.

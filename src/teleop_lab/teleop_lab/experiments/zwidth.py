@@ -33,7 +33,7 @@ DEVICES = (
     (0.5 * _OWN.friction, _OWN.position_resolution),
     (_OWN.friction, 0.5 * _OWN.position_resolution),
 )
-"""Dry frictions [N] and steps of the reading [m]: those of our device, and halves of them."""
+"""Dry frictions [N] and reading steps [m]: the values of our device, and half of them."""
 _WITHIN, _EXACT = percent(10.0), percent(2.0)
 _NONE = absolute(10.0)  # N/m; if a law allows no stiffness, a relative difference is undefined
 _CASES = tuple((b, late) for b in WALL_DAMPINGS for late in LATE)

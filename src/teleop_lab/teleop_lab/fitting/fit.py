@@ -87,7 +87,7 @@ class FitResult:
     one_sided: NDArray[np.bool_]
 
     def value(self, name: str) -> float:
-        """A fitted number.
+        """Return a fitted number by its name.
 
         Raises:
             UnknownNameError: The number was not fitted; the text lists the fitted ones.
@@ -103,7 +103,7 @@ class FitResult:
         return text(self)
 
     def to_json(self) -> dict[str, object]:
-        """All of it as plain values; numbers are exact, [SI]."""
+        """The whole result as plain values; numbers are exact, in SI units."""
         return {
             "robot": self.robot,
             "table": self.table,

@@ -19,10 +19,10 @@ _ABOUT, _FILE = "people.json", "journal.json"
 
 
 class Journal:
-    """What was done, by participant; each change is on disk when its method returns.
+    """Finished trials by participant; each change is on disk when its method returns.
 
     Args:
-        folder: Where it is kept, made if it is missing; recordings stand in a folder for each participant.
+        folder: Folder of the journal, created if missing; it contains a folder of recordings for each participant.
         plan: Plan of the study.
 
     Attributes:

@@ -97,7 +97,7 @@ class PeoplePage:
     # -- what runs -------------------------------------------------------------------------------
 
     def wait(self) -> tuple[str, Trial]:
-        """Code of a participant and the trial that begins, as soon as one does."""
+        """Wait until a trial begins; return the participant's code and the trial."""
         code, trial = self._wishes.get()
         self._ends.clear()
         self._tried, self.is_stopped = 0, False

@@ -28,7 +28,7 @@ class Question:
 
     Attributes:
         name: Its column in tables.
-        text: What is asked.
+        text: Text of the question.
         low: Word at 0.
         high: Word at 100.
     """
@@ -70,11 +70,11 @@ class Trial:
     """One trial of a participant.
 
     Attributes:
-        number: Place in the participant's order, from 1 on.
+        number: Position in the participant's order, from 1 on.
         condition: Index among the study's combinations of swept values.
         values: Its swept values.
         repetition: Number among the trials of its condition, from 1 on; 0 for practice.
-        asks: Whether questions follow it, if it was done.
+        asks: Whether questions follow the trial, unless it was skipped.
     """
 
     number: int
@@ -180,10 +180,10 @@ def conditions_of(participant: int, count: int, order: str) -> list[int]:
 
 
 def read_plan(path: Path | str) -> Plan:
-    """Plan of a YAML file: a study's, with an entry ``people``.
+    """Plan in a YAML file, which is the file of a study with an entry ``people``.
 
     Raises:
-        TeleopError: The file cannot be read, or something in it is wrong; nothing was started.
+        TeleopError: The file cannot be read or contains a wrong entry; no session was started.
     """
     study = read_study(path)
     content = named(read_entries(path), PEOPLE)

@@ -51,8 +51,8 @@ class AskedPath:
     def excerpt(self, rate: float, count: int) -> "AskedPath":
         """Fewer samples of the same motion.
 
-        At most ``rate`` samples a second are kept, and all samples at which a button changes. If there are more than
-        ``count`` of these, only ten stretches of the path are kept, with the times between them.
+        At most ``rate`` samples a second are kept, and all samples at which a button changes. If more than ``count``
+        samples remain, only ten stretches of the path are kept, with their original times.
 
         Args:
             rate: Samples per second.

@@ -14,15 +14,15 @@ class Placement:
     """How a slave is arranged for a hand's motion.
 
     Attributes:
-        robot: Which slave: ``robot`` of the stages that have one.
-        geometry: Lengths and options in place of its published ones, ``symbol=value`` each.
+        robot: Name of the slave: ``robot`` of all stages with this parameter.
+        geometry: Lengths and options of the slave that replace the published ones, as ``symbol=value``.
         start: Joints (n,) [rad, m] from which the slave follows: ``slave.start``.
         axes: The slave's x, y, z as axes of the master: ``motion_scaling.axes``.
         coarse_gain: Slave motion per hand motion in coarse mode.
-        fine_gain: The same in fine mode.
+        fine_gain: Slave motion per hand motion in fine mode.
         rotation_gain: Rotation of the tool divided by that of the stylus.
         tool_axes: The tool's x, y, z as axes of the stylus: ``motion_scaling.tool_axes``.
-        tool_roll: Turn [rad] of the tool about its axis, after that.
+        tool_roll: Turn [rad] of the tool about its axis, applied after ``tool_axes``.
     """
 
     robot: str

@@ -40,10 +40,10 @@ def insist_on_scores(made: Configuration, metrics: Sequence[str]) -> None:
 
 
 def insist_on_reach(made: Configuration) -> None:
-    """Insist on an object, if a place is given for it, that the slave can touch.
+    """Check that the slave can touch the object, if the session gives a position for it.
 
     Raises:
-        ParameterError: The tip comes nowhere near it.
+        ParameterError: The tip cannot come near the object.
     """
     for arm in made.graph.namespaces:
         world = made.value("world", arm)

@@ -98,7 +98,7 @@ def recipe_of(made: configuration.Configuration) -> str:
 
 
 def point_key(recipe: str, seed: int, metrics: Sequence[str], code: str) -> Key:
-    """Key of a point: any change of parameters, seed, scores or code makes another one."""
+    """Key of a point; any change of parameters, seed, scores or code changes the key."""
     text = json.dumps([recipe, seed, sorted(metrics)])
     return Key(hashlib.sha256(text.encode()).hexdigest()[:20], code)
 
@@ -155,7 +155,7 @@ _READ_MORE: set[tuple[str, ...]] = set()
 
 
 def _kept(metrics: tuple[str, ...]) -> frozenset[str] | None:
-    """Streams to be kept for some scores; None: all."""
+    """Streams that some scores need; None: all streams."""
     return None if metrics in _READ_MORE else streams_of(metrics)
 
 

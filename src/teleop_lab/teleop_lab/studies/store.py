@@ -19,7 +19,7 @@ class Store:
     """Results by the names of their points.
 
     Args:
-        folder: Where they are kept; None: in memory.
+        folder: Folder of the results; None: they stay in memory.
     """
 
     def __init__(self, folder: Path | None) -> None:
