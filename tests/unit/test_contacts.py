@@ -190,9 +190,9 @@ def test_recording_that_does_not_tell_of_contacts_says_so(tmp_path: Path) -> Non
     [
         ({}, ""),
         ({"stiffness": 1020.0}, ""),
-        ({"stiffness": 1100.0}, "on z (1020 N/m): the hand feels 529 N/m"),
+        ({"stiffness": 1100.0}, "along z (1020 N/m): the hand feels 529 N/m"),
         ({"wall": "source"}, "3300 N/m, more than the device's own stiffness along x, y, z"),
-        ({"wall": "step"}, "on x, y, z (1260, 2310, 1020 N/m): the hand feels 1260, 2310, 1020"),
+        ({"wall": "step"}, "along x, y, z (1260, 2310, 1020 N/m): the hand feels 1260, 2310, 1020"),
         ({"wall": "step", "max_force": 0.0}, ""),
     ],
 )

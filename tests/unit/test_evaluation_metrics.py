@@ -216,7 +216,7 @@ def test_unknown_key_is_told_with_the_alternatives_nearby(bag: Bag) -> None:
 
 def test_attribute_that_a_score_has_not_leads_to_its_values(bag: Bag) -> None:
     score = evaluate(bag)
-    with pytest.raises(AttributeError, match=r"'jerk' .*: score\.value\('jerk\.rms'\)"):
+    with pytest.raises(AttributeError, match=r"'jerk' .*score\.value\('jerk\.rms'\)"):
         score.jerk  # noqa: B018
     assert not hasattr(score, "jerk")
 

@@ -264,13 +264,13 @@ MISTAKES = {
         '<limit lower="-0.5"',
         '<mimic joint="lead"/><limit lower="-0.5"',
         {"dynamics": "links"},
-        "joint side is not on the way to the tip",
+        "joint side moves too, but is not on the path to the tip",
     ),
     "a leader beside the way": (
         'mimic joint="lead"',
         'mimic joint="side"',
         {"dynamics": "links"},
-        "joint side is not on the way to the tip",
+        "joint side moves too, but is not on the path to the tip",
     ),
 }
 

@@ -164,9 +164,13 @@ CIRCLE = (stage("forth", (BACK,), (FORTH,)), stage("back", (FORTH,), (BACK,)))
 UNFED = stage(reads=(SLAVE_MEASURED_CP, UNWRITTEN))
 NOTED = stage(writes=(), notes=(("command_status", "i8"),))
 BAD_GRAPHS = {
-    "reader nobody writes for": ((*BASE, UNFED), "echo", "test/unwritten, which no stage writes"),
+    "reader nobody writes for": ((*BASE, UNFED), "echo", "test/unwritten, but no stage writes it"),
     "two stages of one name": ((*BASE, BASE[4]), "slave", "two of them have this name"),
-    "two writers of a topic": ((*BASE, stage("a"), stage("b")), "b", "the only one that writes test/echo; a does"),
+    "two writers of a topic": (
+        (*BASE, stage("a"), stage("b")),
+        "b",
+        "the only one that writes test/echo; a writes it too",
+    ),
     "two stages for one column": ((*BASE, NOTED), "echo", "slave uses"),
     "stages that wait for each other": ((*BASE, *CIRCLE), "forth", "forth, back wait"),
 }

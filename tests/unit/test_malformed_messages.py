@@ -43,7 +43,7 @@ def test_a_message_that_is_padded_as_rclpy_does_is_one() -> None:
     for padding in (0, 4, 8, 11):
         found = ros_types.deserialise(data + bytes(padding), "sensor_msgs/msg/JointState")
         assert (found.header.stamp.nanosec, len(found.effort)) == (2, 0)
-    with pytest.raises(ValueError, match="are no sensor_msgs"):
+    with pytest.raises(ValueError, match="is no valid sensor_msgs"):
         ros_types.deserialise(data + bytes(12), "sensor_msgs/msg/JointState")
 
 

@@ -127,7 +127,7 @@ def test_topics_of_a_stage_that_are_no_tuple_of_topics_are_refused_with_an_examp
     word: str, value: str | Sequence[str | Topic] | Topic | None
 ) -> None:
     given: dict[str, Any] = {"reads": (SLAVE_MEASURED_CP,), "writes": (ECHO,), word: value}
-    with pytest.raises(PartError, match=rf"with {word} as a tuple of Topic, such as \(topics\."):
+    with pytest.raises(PartError, match=rf"whose {word} is a tuple of Topic, such as \(topics\."):
         Stage("echo", NoParameters, step=rest, **given)
 
 

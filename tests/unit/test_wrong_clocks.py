@@ -52,7 +52,7 @@ def memory() -> Iterator[None]:
 
 @pytest.mark.parametrize("late", LATER)
 def test_a_late_last_stamp_is_left_out_of_the_replay_and_told(session: tc.Recording, late: str) -> None:
-    with pytest.warns(UserWarning, match="it leaves out 1 samples beyond gaps of more than 60 s"):
+    with pytest.warns(UserWarning, match="leaves out 1 samples beyond gaps of more than 60 s"):
         again = tc.replay(moved(session, LATER[late]))
     assert again.duration == pytest.approx(session.duration, abs=2.5)
 

@@ -77,7 +77,7 @@ class BagSource:
 
     def _pose_topic(self) -> str:
         found = [n for n, kind in self._types.items() if kind in POSES or kind in TRANSFORMS]
-        if not self._options.topic:  # static transforms belong to the other ones
+        if not self._options.topic:  # static transforms only complete other transforms
             found = [name for name in found if name not in self._static] or found
         if self._options.topic:
             wanted = _named(self._options.topic, self._types)

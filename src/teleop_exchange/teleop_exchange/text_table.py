@@ -216,7 +216,7 @@ def recognised(path: Path, text: str, skip: int = 0) -> Form:
 
 
 def _lines_before(lines: list[str], first: int, count: int) -> int:
-    """Lines before the line that follows ``count`` further ones that are not empty."""
+    """Number of lines before the next line that is not empty, after ``count`` such lines are skipped."""
     for number in range(first, len(lines)):
         if lines[number].strip():
             if not count:

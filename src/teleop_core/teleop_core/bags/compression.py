@@ -1,4 +1,4 @@
-"""Compression of MCAP chunks: the three kinds the format knows, by their names in it."""
+"""Compression of MCAP chunks: the three kinds of the format, by their names in files."""
 
 from collections.abc import Callable
 

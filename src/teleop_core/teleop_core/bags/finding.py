@@ -52,7 +52,7 @@ def _listed(path: Path, index: Path) -> list[Path]:
 
 
 def compression_mode(index: Path) -> str:
-    """What a recording's metadata says is compressed: ``none``, ``file`` or ``message``.
+    """Compressed part of a recording according to its metadata: ``none``, ``file`` or ``message``.
 
     Raises:
         RecordingError: The metadata is malformed.

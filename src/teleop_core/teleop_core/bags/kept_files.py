@@ -50,8 +50,8 @@ class KeptFiles:
         """Add a mesh or a height field; a file that cannot be read is ignored.
 
         Args:
-            name: Its path.
-            prefix: What stands before the names of its arm.
+            name: Path of the file.
+            prefix: Prefix of the names of its arm.
             kind: :data:`TOUCHED` or :data:`FIXTURE`; from the second mesh of a kind on with its number appended.
         """
         self._name(f"{prefix}{kind}", name)
@@ -63,7 +63,7 @@ class KeptFiles:
             name: The robot's name or path.
             settings: Its geometry. If the file is a xacro, it is expanded with the arguments in it, and the URDF is
                 stored.
-            prefix: What stands before the names of its arm.
+            prefix: Prefix of the names of its arm.
         """
         found = file_of(name)
         if found is None:

@@ -1,4 +1,4 @@
-"""Layouts: where each number of a fixed-size message stands in its CDR bytes.
+"""Layouts: the position of each number of a fixed-size message in its CDR bytes.
 
 All messages of a stream have the same frame and the same joint names, hence the same size: their
 bytes are one constant template with a stamp and some numbers in it. Batches are therefore built
@@ -77,7 +77,7 @@ class Layout:
         self._pack, self._unpack = single.pack, single.unpack_from
         self._head, self._frame = fixed[0][1], fixed[1][1]
         self._fixed = fixed
-        # Strings between or after the numbers: each one's index among the arguments that follow the frame.
+        # Strings between or after the numbers: the index of each among the arguments after the frame.
         self._inner = [(at - 4, data) for at, data, _ in fixed[2:]]
 
     # -- batches ---------------------------------------------------------------------------------

@@ -1,4 +1,4 @@
-"""Messages: the one place that knows what a message's fields and bytes mean.
+"""Messages: the only module that defines the meaning of a message's fields and bytes.
 
 Inside the package a message is a stamp and a row of numbers
 (:class:`~teleop_core.graph.topics.Kind` defines the numbers). Three groups of functions convert between both:

@@ -101,7 +101,7 @@ class Column:
         return Series(stamps, log_ns[kept], values, self.names, self.frame_id)
 
     def notes(self) -> list[str]:
-        """Notes for the user: how many messages were left out and why, and which stand in another frame."""
+        """Notes for the user on messages that were left out, with the reason, and on messages in another frame."""
         return [
             f"{self.name}: {count} of {self.total} messages are left out: each {reason.value}"
             for reason, count in self.left_out.items()

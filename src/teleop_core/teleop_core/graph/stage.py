@@ -131,12 +131,12 @@ class Stage:
         for word in ("reads", "writes", "late", "optional", "needs"):
             found = getattr(self, word)
             is_right = isinstance(found, tuple) and all(isinstance(t, Topic) for t in found)
-            text = f"given {word} as a tuple of Topic, such as (topics.SLAVE_SERVO_CP,), not {found!r}"
+            text = f"one whose {word} is a tuple of Topic, such as (topics.SLAVE_SERVO_CP,), not {found!r}"
             self._insist(is_right, text)
         for word in ("spares", "serves"):
             found = getattr(self, word)
             is_right = isinstance(found, tuple) and all(isinstance(name, str) for name in found)
-            self._insist(is_right, f"given {word} as a tuple of names, not {found!r}")
+            self._insist(is_right, f"one whose {word} is a tuple of names, not {found!r}")
         known = {topic.name for topic in self.reads}
         for word in ("late", "optional", "needs"):
             for topic in getattr(self, word):

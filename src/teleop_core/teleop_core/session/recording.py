@@ -285,7 +285,7 @@ def _model_of(bag: reader.Bag) -> "Model":
     try:
         layer, scenario = recorded_configuration(bag)
         return Model(Configuration.from_layers([layer], scenario), None if is_ours else 0.0)
-    except TeleopError:  # made with parts that are not installed: numbers are kept, nothing is drawn
+    except TeleopError:  # made with parts that are not installed: the numbers can be read, but nothing can be drawn
         return Model(Configuration.from_layers([]), 0.0)
 
 

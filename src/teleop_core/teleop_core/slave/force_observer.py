@@ -130,7 +130,7 @@ def force_of_efforts(J: Array, efforts: Array, scale: Array, force: Array) -> No
 
 @inner
 def forget(s: ObserverState, wrench: Array) -> None:
-    """Begin anew with the next estimate; until then there is no estimate, and the wrench (6,) is zero."""
+    """Restart at the next estimate; until then there is no estimate, and the wrench (6,) is zero."""
     s.is_observed = 0
     for i in range(s.residual.shape[0]):
         s.residual[i] = s.lagged[i] = 0.0

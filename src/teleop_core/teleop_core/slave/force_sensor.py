@@ -1,7 +1,7 @@
-"""Force sensor: simulates what a real sensor measures of the force on the tip.
+"""Force sensor: simulates the measurement of the force on the tip by a real sensor.
 
 The contact force passes a low-pass with the bandwidth of the sensor's electronics. Then the weight of the tool behind
-the sensor, the sensor's bias, and noise are added. The noise is drawn anew for each sample.
+the sensor, the sensor's bias, and noise are added. Each sample has new random noise.
 """
 
 import math

@@ -6,7 +6,7 @@ _LINEAR, _MINIMUM_JERK = 1, 2
 
 
 class WayParameters(Fields):
-    """Fields of a parameter record that say how commands are joined."""
+    """Fields of a parameter record that define the interpolation between commands."""
 
     lower: PerJoint
     upper: PerJoint

@@ -56,7 +56,7 @@ def _begin_where_it_is(p: commands.SlaveNumbers, s: commands.SlaveState, arm: Ar
 def _take_measured(p: commands.SlaveNumbers, s: commands.SlaveState, arm: ArmModel, row: commands.SlaveRow) -> None:
     """Take a new sample of the arm, and look for faults in it.
 
-    The sample was taken together with the setpoint that is still in force.
+    The sample was measured at the time of the present setpoint.
     """
     stamp_ns, n = row.slave_measured_js_ns, s.setpoint.shape[0]
     if stamp_ns == s.sampled_ns:

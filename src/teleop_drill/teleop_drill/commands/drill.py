@@ -1,4 +1,4 @@
-"""``teleop drill``: break a running session in every known way, and measure what it does."""
+"""``teleop drill``: injects every known fault into a running session, and measures the reaction of the arm."""
 
 import argparse
 import json

@@ -1,6 +1,6 @@
-"""Hand of a drill: a circle at constant speed, and distortions of its samples on the way.
+"""Hand of a drill: moves in a circle at constant speed; its samples can be distorted before they are sent.
 
-The speed is constant, so that what may move legally in a time is known exactly.
+The speed is constant, so that the allowed motion in a given time is known exactly.
 """
 
 import itertools
@@ -97,7 +97,7 @@ def reordered(count: int) -> Distortion:
 
 
 def replayed(samples: int) -> Distortion:
-    """Send each sample, and after it the one that came a number of samples before, as it was."""
+    """Send each sample, and after it an unchanged copy of the sample that came a fixed number of samples earlier."""
     past: list[Sample] = []
 
     def send(sample: Sample) -> list[Sample]:
@@ -156,7 +156,7 @@ def stamped(change: Callable[[int], int]) -> Distortion:
 
 
 def frozen_stamps() -> Distortion:
-    """Send all samples under the stamp of the first, as a driver whose clock stands still."""
+    """Send all samples with the stamp of the first, like a driver whose clock stands still."""
     first: list[int] = []
 
     def change(stamp_ns: int) -> int:

@@ -45,7 +45,7 @@ class Trace:
         return self.only(chosen)
 
     def only(self, chosen: NDArray[np.bool_]) -> "Trace":
-        """Some of them; ``chosen`` has the shape (N,)."""
+        """The samples of the trace that ``chosen`` (N,) selects."""
         return Trace(self.sent_ns[chosen], self.number[chosen], self.values[chosen], self.stamp_ns[chosen])
 
     def __len__(self) -> int:
@@ -72,11 +72,11 @@ def step_ratio(setpoints: Trace, speed_limit: Array, dt: float) -> float:
 
 
 def stop_delay(setpoints: Trace, since_ns: int) -> float:
-    """Time from a moment until the setpoint stands still for good [s]; NaN if it never does.
+    """Time from ``since_ns`` until the setpoint has stopped and does not move again [s]; NaN if it never stops.
 
     Args:
         setpoints: Joint setpoints, values (N, n).
-        since_ns: The moment [ns].
+        since_ns: Begin of the measured time [ns].
     """
     after = setpoints.within(since_ns - 20_000_000, np.iinfo(np.int64).max)
     moves = np.any(np.diff(after.values, axis=0) != 0.0, axis=1)
@@ -92,7 +92,7 @@ def travel(places: Trace, since_ns: int, until_ns: int) -> float:
 
     Args:
         places: Of the tip, values (N, 3 or more) [m].
-        since_ns: The moment [ns].
+        since_ns: Begin of the measured time [ns].
         until_ns: The other [ns].
     """
     before = places.within(since_ns - _BEFORE_NS, since_ns)
@@ -146,7 +146,7 @@ def rest_delay(places: Trace, since_ns: int, slow: float, until_ns: int) -> floa
 
     Args:
         places: Of the tip.
-        since_ns: The moment [ns].
+        since_ns: Begin of the measured time [ns].
         slow: The speed [m/s].
         until_ns: End of the observation [ns].
     """

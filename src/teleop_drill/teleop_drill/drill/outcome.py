@@ -12,7 +12,7 @@ _SHORT = 20  # notes that fit beside the state
 
 @dataclass(kw_only=True)
 class Outcome:
-    """One fault and what followed.
+    """One fault and the reaction of the session.
 
     Attributes:
         exercise: The exercise that was run.
@@ -84,7 +84,7 @@ class Outcome:
         return f"{text} ({self.note})" if 0 < len(self.note) < _SHORT else text
 
     def to_json(self) -> dict[str, object]:
-        """All of it, in SI units, for a file."""
+        """The whole outcome in SI units, for a file."""
         asked = self.exercise
         return {
             "fault": asked.name, "text": asked.text, "is_passed": not self.failures(),

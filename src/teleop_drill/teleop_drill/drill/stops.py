@@ -26,7 +26,7 @@ def _press(rig: Rig) -> None:
 
 
 def _press_briefly(rig: Rig) -> None:
-    """A press that a short queue would lose: one message, then many that say released.
+    """A press that a short queue would lose: one message with a press, then many with a release.
 
     The process of the slave stands still during this time, so that all these messages wait for it.
     """
@@ -56,7 +56,7 @@ def _disable(rig: Rig) -> None:
 
 
 def _miss_heartbeat(rig: Rig) -> None:
-    """Two buttons beat; then one of them alone."""
+    """Two buttons send heartbeats; then only one of them does."""
     for count in range(20):
         for button in (1, 0):
             rig.press(is_pressed=False, button=button)
@@ -90,7 +90,7 @@ def _press_while_masked(rig: Rig) -> None:
 
 
 def _press_two(rig: Rig) -> None:
-    """Press one button, and say with another one that it is released."""
+    """Press one button, and publish with a second button that this one is released."""
     rig.press(is_pressed=False, button=1)  # it is known before
     rig.press(is_pressed=True)
     rig.wait(0.5)

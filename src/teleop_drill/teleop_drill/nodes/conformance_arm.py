@@ -1,4 +1,4 @@
-"""An arm as a stock CRTK client sees it: taps on its topics, and commands to it."""
+"""An arm from the view of an ordinary CRTK client: subscriptions to its topics, and commands to it."""
 
 from collections.abc import Callable
 from typing import Any
@@ -55,7 +55,7 @@ class Tap:
         return count
 
     def drain(self) -> bool:
-        """Keep all waiting messages undecoded; returns whether any message is kept."""
+        """Store all waiting messages undecoded; return whether any message is stored."""
         while (taken := self._taker.take()) is not None:
             self._kept.append((taken.sent_ns, taken.data))
         return bool(self._kept)

@@ -22,7 +22,7 @@ _MOVED = 0.3  # least share of the displacement that counts as a motion
 _PATIENCE = 10.0  # of a move [s]
 _NOTHING = 1.5  # after this time without any motion, none is expected [s]
 _STATE = 3.0  # of a change of state [s]
-_STILL = 1e-4  # joints that moved by less stand still [rad or m]
+_STILL = 1e-4  # a joint that moved by less counts as at rest [rad or m]
 Outcome = tuple[Verdict, str]
 _OK: Outcome = (Verdict.OK, "")
 
@@ -175,7 +175,7 @@ class Trials:
         return (Verdict.FAILED, "still busy at its goal") if tap.newest.is_busy else _OK
 
     def _candidates(self, known: tuple[int, float], count: int) -> list[tuple[int, float]]:
-        """Directions to try: only the one that is known to be free, or all."""
+        """Directions to try: the direction that is known to be free, or all if none is known."""
         return [known] if known[0] >= 0 else list(product(range(count), (1.0, -1.0)))
 
     def stream_joints(self, name: str, rate: float, *, is_relative: bool = False) -> Outcome:

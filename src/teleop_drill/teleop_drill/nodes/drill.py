@@ -1,4 +1,4 @@
-"""Drill: breaks a running session in one way after the other, and measures what the arm does."""
+"""Drill: injects one fault after the other into running sessions, and measures the reaction of the arm."""
 
 import math
 import sys
@@ -59,9 +59,9 @@ def drill(
     processes on two cores are late even without a fault.
 
     Args:
-        exercises: What is done, as of :func:`teleop_drill.drill.chosen`.
-        folder: Where recordings go.
-        say: Told a line about each.
+        exercises: Exercises to run, from :func:`teleop_drill.drill.chosen`.
+        folder: Folder of the recordings.
+        say: Called with one line about each exercise.
         is_composed: Whether all nodes share one process.
         files: Parameter files over the scenario ``free_motion``.
         texts: Parameters ``key=value`` over all files.
@@ -98,13 +98,13 @@ def drill_at(
     files: Sequence[Path] = (),
     texts: Sequence[str] = (),
 ) -> list[Outcome]:
-    """As :func:`drill`, at any site.
+    """Run exercises like :func:`drill`, but in sessions of any site.
 
     Args:
         site: Makes the site of each session.
-        exercises: What is done.
-        folder: Where recordings go.
-        say: Told a line about each.
+        exercises: Exercises to run.
+        folder: Folder of the recordings.
+        say: Called with one line about each exercise.
         files: Parameter files over the scenario ``free_motion``.
         texts: Parameters ``key=value`` over all files.
     """

@@ -8,7 +8,7 @@ from teleop_drill.drill.numbers import Scheduling
 from teleop_drill.drill.outcome import Outcome
 from teleop_drill.nodes.drill_rig import LiveRig
 
-_PATIENCE = 1.0  # for an arm that goes on by itself [s]
+_PATIENCE = 1.0  # waiting time for an arm that resumes by itself [s]
 _LONGEST = 60.0  # until an arm follows again, whatever it takes [s]
 _STRENGTH = (Cure.NOTHING, Cure.RESUME, Cure.RESET, Cure.RESTART)
 
@@ -63,7 +63,7 @@ def _differs(report: dict[str, float], before: dict[str, float]) -> bool:
 
 
 def _is_expected(report: dict[str, float], exercise: Exercise) -> bool:
-    """Whether a report tells the state that an exercise expects."""
+    """Whether a report contains the state that an exercise expects."""
     is_fault = not exercise.faults or Fault(int(report["fault"])) in exercise.faults
     return is_fault and State(int(report["state"])) in exercise.states
 
@@ -83,7 +83,7 @@ def recover(outcome: Outcome, rig: LiveRig) -> None:
 
 
 def help_on(rig: LiveRig) -> Cure:
-    """Do what the arm's state asks for."""
+    """Send the commands that the arm needs in its state."""
     if rig.session.dead():
         rig.session.start()
         return Cure.RESTART

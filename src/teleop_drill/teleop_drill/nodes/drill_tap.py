@@ -170,7 +170,8 @@ class Tap:
             self._listen()
             due += hand.PERIOD
             now = self._now()
-            if due <= now:  # its own work took longer than a period, so the delay says nothing about the machine
+            if due <= now:  # the tap's own work took longer than a period, so its delay does not show the load of the
+                # machine
                 due = now if due < now - _FAR_BEHIND else due
                 continue
             self._world.sleep(due - now)
@@ -186,7 +187,7 @@ class Tap:
                         heard.append((taken.sent_ns, taken.number, taken.data))
 
     def _count(self, name: str, sent_ns: int, data: bytes) -> bool:
-        """Count a message of a stream; False for one that the drill itself has forged."""
+        """Count a message of a stream; return False for a message that the drill itself has forged."""
         if name not in self._counted:
             return True
         if len(data) < _STAMP_AT + _STAMP.size:

@@ -15,7 +15,7 @@ from teleop_drill.simulation.machine import Process
 from teleop_drill.simulation.scheduler import Scheduler
 
 _SOCKET = 4 << 20
-"""Bytes that can wait for a process that stands still, as in the middleware's profile."""
+"""Bytes that can wait for a process that does not run, as in the middleware's profile."""
 _LEASE_NS = 20_000_000_000
 """Time after which a process that was killed counts as gone [ns]."""
 _GID = 16

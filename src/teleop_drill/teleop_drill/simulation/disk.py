@@ -1,4 +1,4 @@
-"""Disk: where a simulated process writes its recording, and the thread that does it."""
+"""Disk: the disk to which a simulated process writes its recording, and the thread that writes."""
 
 import errno
 import os
@@ -23,7 +23,7 @@ class Jobs:
         self._waiting: list[Strand] = []
 
     def put(self, job: Any) -> None:
-        """Append, as soon as there is room."""
+        """Append a job as soon as the queue has a free place."""
         while len(self._jobs) >= self._size:
             self._wait()
         self._jobs.append(job)
@@ -84,7 +84,7 @@ class Disk:
         return taken
 
     def cut(self, file: BinaryIO, size: int) -> None:
-        """Let a file end after so many bytes, if the disk lets it; raises OSError."""
+        """Truncate a file to ``size`` bytes; raise OSError if the disk has failed."""
         self._insist()
         SYSTEM.cut(file, size)
 

@@ -58,7 +58,7 @@ class SimulatedSite:
         return 0.0
 
     def session(self, observer: Observer) -> SimulatedSession:
-        """Processes of a session, of which an observer hears."""
+        """Processes of a session whose topics an observer receives."""
         graph = self._configuration.graph
         shared = {n: nodes for crew in crews(graph, self._processes) for n, nodes in crew.items()}
         if self.is_composed:  # the recorder too, as of `ros2 run teleop_core teleop_session`
@@ -82,24 +82,24 @@ def simulated_drill(
     drives: Work | None = None,
     arm: Work | None = None,
 ) -> list[Outcome]:
-    """Do exercises on a simulated machine.
+    """Run exercises on a simulated machine.
 
     Args:
-        exercises: What is done, as of :func:`teleop_drill.drill.chosen`.
-        folder: Where recordings go.
-        say: Told a line about each.
-        seed: What everything is drawn from.
-        processes: How the nodes are shared out.
+        exercises: Exercises to run, from :func:`teleop_drill.drill.chosen`.
+        folder: Folder of the recordings.
+        say: Called with one line about each exercise.
+        seed: Seed of everything random.
+        processes: Distribution of the nodes over processes.
         files: Parameter files over the scenario ``free_motion``.
         texts: Parameters ``key=value`` over all files.
-        drives: Drives that the slave leads in place of the simulated ones, such as a bridge;
-            exercises that break the simulator are left out.
-        arm: What the drives lead, such as a model of a controller. It is started before them, and
-            nothing is done to it.
+        drives: Drives that replace the simulated ones, such as a bridge; exercises that break the simulator are left
+            out.
+        arm: Process that the drives command, such as the model of a controller. It is started before the drives, and
+            the drill does not break it.
 
     Raises:
-        ParameterError: There are ``drives`` where all nodes share one process, or an ``arm``
-            without drives.
+        ParameterError: ``drives`` are given although all nodes share one process, or an ``arm`` is given without
+            drives.
         TeleopError: A parameter is wrong, or a session cannot be started.
     """
     if drives is not None and processes is not Processes.NODES:

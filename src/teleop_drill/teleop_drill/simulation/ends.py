@@ -67,7 +67,7 @@ class Writer:
         bus = self._bus
         bus.scheduler.now_ns = now_ns = bus.scheduler.now_ns + _PUBLISH_NS
         self.number += 1
-        # The middleware reads the machine's clock: one that the drill steps is Python's alone.
+        # The middleware reads the machine's clock; the clock that the drill steps is used only by Python code.
         taken = Taken(data, self.sender, self.number, now_ns + self._clock.ahead_ns(now_ns), 0)
         self.history.append(taken)
         if self.topic in bus.seen:
@@ -166,14 +166,14 @@ class Reader:
             self._bus.scheduler.at(came_ns, self.tell)
 
     def wake_up(self, since_ns: int, room: int) -> int:
-        """Keep of what came to a process that stood still what its socket took.
+        """Keep, of the messages that arrived while the process did not run, only those for which its socket had room.
 
         Args:
-            since_ns: Since when it stood still [ns].
-            room: Bytes that the socket still takes.
+            since_ns: Time from which on the process did not run [ns].
+            room: Free bytes of the socket.
 
         Returns:
-            The room that is left.
+            The remaining free bytes.
         """
         now_ns, kept, lost = self._bus.scheduler.now_ns, deque[tuple[int, int, Taken]](), []
         for entry in self.coming:

@@ -1,4 +1,4 @@
-"""Laws: conditions that must be true whatever goes wrong, checked by an observer of the whole machine."""
+"""Laws: conditions that must hold under any faults, checked by an observer of the whole machine."""
 
 import math
 import re
@@ -29,7 +29,7 @@ _NO_DISK = "cannot be written"
 _SAFE = re.compile(r"the first [\d.]+ s \((\d+) of \d+ messages\)")
 _SLACK = 1e-6
 _CURVED = 1e-2
-"""Share by which the tip's way in a tick exceeds that of joints whose steps were shortened."""
+"""Share by which the tip's displacement in a tick may exceed the one computed from shortened joint steps."""
 _TELL = 0.3
 """Time within which a new state is reported to the operator [s]; only time in which the arm works counts."""
 _OBEY = 0.1
@@ -80,9 +80,9 @@ class Laws:
 
     Attributes:
         broken: First breach of each law.
-        looks: How often each law was looked at.
-        in_force: Kinds of the faults that are in force.
-        under: How often each law was looked at while a fault met a state of the arm.
+        looks: Number of checks of each law.
+        in_force: Kinds of the present faults.
+        under: Number of checks of each law by present fault and state of the arm.
     """
 
     def __init__(self, stage: Stage, numbers: Numbers) -> None:
@@ -102,7 +102,7 @@ class Laws:
         self._slave: Any = None
         self._process: Process | None = None
         self._worked = 0.0
-        """Time for which the slave has worked [s]: it does nothing while it stands still."""
+        """Time for which the slave's process has run [s], without the time in which it was stopped."""
         self._seen_state, self._since = -1, 0.0
         self._offset_ns = self._stepped_ns = self._old = 0
         self._resting_since: float | None = None
@@ -170,7 +170,7 @@ class Laws:
             self._moved_at = self._worked
 
     def _judge_age(self, stamp_ns: int, moves: bool) -> None:
-        """No command is followed long after it was given, such as one that waited in a queue."""
+        """Check that the slave does not follow old commands, such as commands that waited in a queue."""
         offset_ns = self._stage.machine.clock.ahead_ns(self._scheduler.now_ns)
         if abs(offset_ns - self._offset_ns) > _LOOK_NS:
             self._offset_ns, self._stepped_ns = offset_ns, self._scheduler.now_ns
@@ -181,7 +181,7 @@ class Laws:
             return
         self._count("age")
         master: Any = self._stage.session.node("haptic_master")
-        # A process that started with another clock keeps stamping by it.
+        # A process that started with another clock continues to use it for its stamps.
         epoch_ns = getattr(master, "epoch_ns", offset_ns)
         age = 1e-9 * (self._scheduler.now_ns + epoch_ns - stamp_ns)
         self._old = self._old + 1 if age > _OLD + self._late() else 0
@@ -199,7 +199,7 @@ class Laws:
         if slave is not self._slave:
             self._slave, self._seen_state, self._press = slave, -1, None
             self._presses = len(stage.presses)
-            for button in stage.held:  # this slave has never heard of it
+            for button in stage.held:  # this slave never received a message of the button
                 self._press, self._obey_by = (button, False), math.inf
         works = slave is not None and slave.stage is not None and slave.is_at_work
         if works and process is not None and not process.is_stopped:
@@ -263,7 +263,7 @@ class Laws:
         return on_the_way + lost + 20e-9 * self._scheduler.costs.crowd_ns + 0.05
 
     def _judge_ends(self) -> None:
-        """No process ends that was not told to."""
+        """Check that no process ends without an order to end."""
         self._count("ends")
         for process in self._stage.session.running.values():
             if process.is_dead and process not in self._stage.killed:
@@ -289,7 +289,7 @@ class Laws:
     # -- at the end ------------------------------------------------------------------------------
 
     def judge_recording(self, path: Path, told: Mapping[str, str]) -> None:
-        """Sent messages are recorded or counted as lost; if the disk failed, this applies to saved messages.
+        """Check that all sent messages (all saved ones if the disk failed) are recorded or counted as lost.
 
         Args:
             path: A recording whose recorder was not killed, while no clock was stepped.
@@ -309,7 +309,7 @@ class Laws:
         if self._stage.kills:
             if told.get("cut_feeds") == "0":
                 self._break("recorded", "a process was killed, and the recorder does not say so")
-            for k, part in enumerate(parts[:-1]):  # what waited in it is lost with it
+            for k, part in enumerate(parts[:-1]):  # messages in its queue are lost with the process
                 last_ns = np.max(kept_ns[kept_ns <= part[-1]], initial=0)
                 parts[k] = part[part <= last_ns]
         sent_ns = np.concatenate(parts)

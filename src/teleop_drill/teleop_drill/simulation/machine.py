@@ -166,11 +166,11 @@ class Machine:
     """One computer.
 
     Attributes:
-        scheduler: Its time.
-        clock: Its system's clock, of the processes that do not have one of their own.
-        processes: All that ever were, in their order.
+        scheduler: Simulated time of the machine.
+        clock: System clock, for all processes without their own clock.
+        processes: All processes that were ever started, in their order.
         places: Listeners by address.
-        log: What nodes have said.
+        log: Log lines of the nodes.
     """
 
     scheduler: Scheduler
@@ -207,13 +207,13 @@ class Machine:
         return found[0]
 
     def outsider(self, name: str) -> Process:
-        """Process of an outside caller that lets time pass, such as a test."""
+        """Process of a caller outside of the simulation that advances the time, such as a test."""
         process = Process(self, name, lambda: 0)
         self.processes.append(process)
         return process
 
     def fail(self, process: Process, error: BaseException) -> None:
-        """Note what has ended a process that nobody expected."""
+        """Note the unexpected error that has ended a process."""
         text = "".join(traceback.format_exception(error))
         self.log.append(Said(self.scheduler.now_ns, process.name, "fatal", text))
 
@@ -229,7 +229,7 @@ class Machine:
         return near
 
     def listen(self, process: Process, place: str) -> Listener:
-        """Listen at a place; raises OSError if another one does."""
+        """Listen at an address; raise OSError if another process already listens there."""
         if place in self.places:
             raise OSError(place)
         self.places[place] = listener = Listener(self, place)

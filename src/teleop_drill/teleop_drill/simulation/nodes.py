@@ -32,7 +32,7 @@ class SimulatedExecutor:
         self.wake()
 
     def spin_once(self, timeout_sec: float | None = None) -> None:
-        """Serve one thing, or none within the time [s]."""
+        """Serve one request, or none if none comes within the time [s]."""
         if not self._due:
             self._waiting = self._scheduler.current
             self._scheduler.wait(timeout_sec)
@@ -118,7 +118,7 @@ class Answer:
         return self._value
 
     def add_done_callback(self, told: Callable[["Answer"], None]) -> None:
-        """Have somebody told when it is there."""
+        """Call a function when the answer has arrived."""
         self._told.append(told)
 
     def set(self, value: Any) -> None:
@@ -169,7 +169,7 @@ class Client:
 
 
 class Log:
-    """As of :class:`~teleop_core.middleware.world.Log`; kept by the machine."""
+    """Log with the interface of :class:`~teleop_core.middleware.world.Log`; the machine stores its lines."""
 
     def __init__(self, node: "SimulatedNode") -> None:
         self._node = node

@@ -12,9 +12,9 @@ from teleop_drill.simulation.machine import Process
 _TOPIC, _SLAVE = f"/{SLAVE_SERVO_JP.name}", "/slave"
 _STAMP = struct.Struct("<4xiI")
 _SLACK_NS = 10_000_000
-"""By how much two looks at a clock, or two turns, may differ [ns]."""
+"""Tolerance for the time between two readings of a clock, or between two turns of a loop [ns]."""
 _SILENCE_NS = round(1e9 * NodeParameters().owner_silence) - _SLACK_NS
-"""Silence of the commanding sender after which another one may command."""
+"""Silence of the commanding sender after which another sender may command."""
 _STREAM = 3
 """Commands in a row that nothing else may interrupt."""
 
@@ -23,11 +23,11 @@ class Owner:
     """Detects whether two senders command an arm at the same time.
 
     Args:
-        bus: The middleware, whose commands it notes.
+        bus: The middleware, whose commands are observed.
         timeout: Silence after which a stream no longer commands the arm [s].
 
     Attributes:
-        followed_ns: When a setpoint followed another command than the one before [ns].
+        followed_ns: Time at which a setpoint last followed a new command [ns].
     """
 
     def __init__(self, bus: Bus, timeout: float) -> None:

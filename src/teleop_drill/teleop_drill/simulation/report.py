@@ -13,15 +13,15 @@ from teleop_drill.simulation.stage import NO_STATE
 
 @dataclass
 class Coverage:
-    """Schedules that were run so far.
+    """Counts of the schedules that were run so far.
 
     Attributes:
-        sessions: How many schedules were run.
+        sessions: Number of schedules that were run.
         seconds: Simulated time [s].
-        met: How often each fault met each state of the arm.
-        looks: How often each law was looked at.
-        under: The same while a fault met a state of the arm.
-        broken: How many schedules broke each law.
+        met: Number of times that each fault happened in each state of the arm.
+        looks: Number of checks of each law.
+        under: Number of checks of each law by present fault and state of the arm.
+        broken: Number of schedules that broke each law.
     """
 
     sessions: int = 0

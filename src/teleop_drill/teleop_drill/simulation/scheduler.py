@@ -1,4 +1,4 @@
-"""Scheduler: simulated time, and the strands that take turns in it.
+"""Scheduler: simulated time, and the strands that run in it, one at a time.
 
 A strand is a thread of a simulated process. One runs at a time, until it waits: for time, for a
 lock, for a message. Strands of one process share its interpreter, so that they exclude each other;
@@ -28,10 +28,10 @@ class Deadlock(Exception):  # noqa: N818
 
 
 class Costs:
-    """How long things take, in nanoseconds.
+    """Durations of all operations [ns].
 
     Args:
-        random: Where it is drawn from.
+        random: Random generator of the durations.
     """
 
     def __init__(self, random: Random) -> None:
@@ -61,13 +61,13 @@ class Strand:
     """Thread of a process.
 
     Args:
-        scheduler: Who lets it run.
-        process: Whose it is.
-        name: Of the thread.
-        work: What it does.
+        scheduler: Scheduler of the strand.
+        process: Process that owns the strand.
+        name: Name of the thread.
+        work: Function that the strand runs.
 
     Attributes:
-        error: What ended it, if that was an error.
+        error: Error that ended the strand; None if it ended without an error.
     """
 
     _numbers = count(1)
@@ -155,14 +155,14 @@ class Scheduler:
     """Simulated time.
 
     Args:
-        seed: What everything is drawn from.
-        breaks: Share of the looks at a clock at which the interpreter passes to another thread.
+        seed: Seed of everything random.
+        breaks: Share of the clock readings after which the interpreter switches to another thread.
 
     Attributes:
-        now_ns: Time, as monotonic clocks have it [ns].
+        now_ns: Monotonic time [ns].
         hub: Greenlet in which the scheduler decides.
-        current: What runs now: a strand, or the creator of the scheduler outside of the simulation.
-        costs: How long things take.
+        current: The running strand, or the creator of the scheduler outside of the simulation.
+        costs: Durations of all operations.
     """
 
     def __init__(self, seed: int, breaks: float = 0.0) -> None:
@@ -246,7 +246,7 @@ class Scheduler:
             raise strand.error
 
     def _pump(self) -> bool:
-        """Run the simulation until the thread outside of it goes on; returns whether somebody woke that."""
+        """Run the simulation until the thread outside of it continues; return whether a strand woke that thread."""
         queue, pop = self._queue, heapq.heappop
         while queue:
             time_ns, _, what, token, value = pop(queue)

@@ -27,11 +27,11 @@ class Fault:
     """A fault, or an action of a person.
 
     Attributes:
-        at: When it begins, from the time at which the arm follows [s].
-        kind: What it is.
+        at: Begin, relative to the time at which the arm follows [s].
+        kind: Kind of fault.
         where: Process that it affects; empty for all.
-        seconds: How long it lasts.
-        amount: How much of it, from 0 to 1.
+        seconds: Duration [s].
+        amount: Strength of the fault, from 0 to 1.
     """
 
     at: float
@@ -172,7 +172,7 @@ def _drive(stage: Stage, fault: Fault) -> Callable[[], None]:
 
 
 def _intrude(stage: Stage, fault: Fault) -> Callable[[], None]:
-    """Command joints near the present ones, as another publisher of the same topic."""
+    """Publish joint commands near the present ones, as a second publisher of the same topic."""
     form, drives = layout(SLAVE_SERVO_JP, stage.robot.joint_names), stage.robot.drives
     assert drives is not None
     off = 0.05 * np.sin(np.arange(stage.robot.n) + 10.0 * fault.amount)

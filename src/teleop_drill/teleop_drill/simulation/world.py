@@ -91,4 +91,4 @@ class SimulatedWorld:
         return self
 
     def shutdown(self) -> None:
-        """Leave the middleware: the end of the process does it."""
+        """Does nothing: the simulated process leaves the middleware when it ends."""

@@ -1,4 +1,4 @@
-"""Four channels: positions and forces go both ways, and the slave yields to the difference of the forces."""
+"""Four channels: positions and forces are sent in both directions; the slave yields to the difference of the forces."""
 
 from dataclasses import dataclass
 

@@ -166,7 +166,7 @@ class RunningTremorFilter(RunningStage):
         numbers, step = kind.numbers(parameters.kind.parameters), kind.filter_pointer
         if step is self._part.filter and len(numbers) == len(self._part.numbers):
             self.state["is_retuned"] |= not np.array_equal(numbers, self._part.numbers)
-            self._part.numbers[:] = numbers  # the tick that is composed already goes on
+            self._part.numbers[:] = numbers  # in place, so that the composed tick stays valid
             return
         self._part = Part(step, numbers, self._part.memory)
         self.arguments = (self.parameters, self.state, self._part)

@@ -58,7 +58,7 @@ class ScalingState(
     is_fixture_on: int
     stylus: Vector3
     has_led: int  # whether the last sample moved the slave
-    aligned: int  # how often following and alignment began anew
+    aligned: int  # numbers of restarts of following and of alignment
 
 
 _FOLLOWING, _CLUTCHED = STATE["is_following"], STATE["is_clutched"]
@@ -156,7 +156,7 @@ def _move(p: ScalingNumbers, s: ScalingState, fixture: Held, gain: float, positi
 
 @inner
 def _wall(p: ScalingNumbers, s: ScalingState, fixture: Held, period: float, stylus: Array, force: Array) -> None:
-    """Write the push (3,) [N] of the fixture's wall; after a pause it begins anew."""
+    """Write the push (3,) [N] of the fixture's wall; after a pause the wall restarts without a previous position."""
     offset, out, length = room(3), room(3), 0.0
     for i in range(3):
         offset[i], out[i] = stylus[i] - s.center[i], 0.0
@@ -211,7 +211,7 @@ def _refuse(
     stylus: Array,
     row: Row,
 ) -> None:
-    """Answer an implausible sample: hold the command, write no force, and begin anew after it."""
+    """Answer an implausible sample: hold the command, write no force, and restart at the next sample."""
     s.must_latch = 1
     limits.remember(s, sent, row.master_measured_cp_ns)
     walls.forget_wall(s, stylus)
@@ -243,7 +243,7 @@ def motion_scaling_step(
         dt: Tick [s].
 
     Position is incremental (X_S += gain X_P), so a change of gain alone causes no motion. Orientation follows the
-    stylus absolutely, up to an alignment that is latched whenever the slave is engaged anew. While clutched the
+    stylus absolutely, except for an alignment that is stored whenever the slave is engaged again. While clutched the
     command is held. While the slave does not follow, the command is the slave's own setpoint. A command out of reach
     is cut, and motion continues from there: see :mod:`teleop_core.coupling.mapping.limits`. The slave follows the
     pose, which a tremor filter may have delayed. Forces on the hand use the unfiltered stylus. A fixture that confines
@@ -344,7 +344,7 @@ class MotionScaling(RunningStage):
             self.state["is_fine"] = gains.MODES.index(parameters.mode)
         turned = ("tool_roll", "axes", "tool_axes")
         if any(getattr(parameters, name) != getattr(self._values, name) for name in turned):
-            self.state["must_latch"] = 1  # align anew: the tool does not turn
+            self.state["must_latch"] = 1  # align again, so that the tool does not turn
         self._values = parameters
 
     def present(self) -> gains.MotionScalingParameters:
@@ -369,7 +369,8 @@ class MotionScaling(RunningStage):
             s["center"] += s["beyond"]
             s["beyond"] = 0.0
         if held.distance is last.distance and len(held.numbers) == len(last.numbers):
-            last.numbers[:], last.place[:] = held.numbers, held.place  # the composed tick goes on
+            last.numbers[:], last.place[:] = held.numbers, held.place  # in place, so that the composed tick stays
+            # valid
             return
         self._held = held
         self._compose_anew()

@@ -15,7 +15,7 @@ from teleop_core.kernels import Array, Fields, PoseRow, Vector3, inner
 
 @dataclass(frozen=True, kw_only=True)
 class HandLimits:
-    """What a hand on the master can do."""
+    """Bounds of the motion that a hand on the master can make."""
 
     speed: float = parameter(
         3.0,
@@ -45,7 +45,7 @@ class HandLimits:
 
 @dataclass(frozen=True, kw_only=True)
 class PlausibilityParameters(HandLimits):
-    """What a hand on the master can do, and how long its buttons may be silent."""
+    """Bounds of the motion that a hand on the master can make, and of the silence of its buttons."""
 
     button_silence: float = parameter(
         0.5,
@@ -85,8 +85,9 @@ _SHORTEST = 1e-3
 # In a gap of the samples, a motion cannot be told from a jump. So the hand may move no farther than its speed limit
 # allows in this time [s], or in two periods of a slower stream.
 _GAP = 20e-3
-# So many messages no farther apart than this are a stream [ns]. A pause takes so many away from at
-# most twice as many: the one in which the poses were silent too leaves a stream one, two do not.
+# This number of messages, no farther apart than this time [ns], is a stream. The count is at most twice this number,
+# and a pause reduces it by this number. After one pause in which the poses were silent too there is still a stream;
+# after two there is none.
 _STREAM, _STREAM_NS = 20, 100_000_000
 
 

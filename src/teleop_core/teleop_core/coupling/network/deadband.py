@@ -38,7 +38,7 @@ class DeadbandState(LinkState):
 
 @dataclass(frozen=True, kw_only=True)
 class DeadbandParameters:
-    """Change of position, rotation or force after which a packet is sent; one of them is enough."""
+    """Changes of position, rotation and force after which a packet is sent; a single one of these changes is enough."""
 
     is_on: bool = parameter(False, doc="whether a packet is sent only if its content has changed")
     place: float = parameter(2e-4, Within(0.0, 0.1, "m"), "distance that the tip must move before a packet is sent")

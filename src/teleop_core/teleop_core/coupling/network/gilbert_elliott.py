@@ -11,7 +11,7 @@ _LEVEL = "published: UVA-DSA telesurgery QoS analysis 2026, loss of 10 %"
 
 @dataclass(frozen=True, kw_only=True)
 class GilbertElliottParameters:
-    """Good times and bad ones, each with bursts of lost packets of its own length."""
+    """Good and bad periods, which differ in the lengths of bursts of lost packets."""
 
     to_bad: float = parameter(
         0.05, Within(0.0, 1.0), "probability, at each packet, that a bad period begins", source=_LEVEL

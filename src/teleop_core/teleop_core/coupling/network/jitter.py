@@ -27,7 +27,7 @@ class JitterParameters:
 
 @kernel
 def jitter_draw(numbers: Array, memory: Array, chances: Array, now: float) -> float:
-    """Delay beyond the least delay [s]: drawn anew, or that of the last packet.
+    """Delay beyond the least delay [s]: a new random delay, or the delay of the last packet.
 
     ``memory`` contains the delay, when the last packet was sent, and whether there was one.
     """

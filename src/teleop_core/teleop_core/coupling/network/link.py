@@ -1,7 +1,8 @@
 """Link: packets in transit, one direction of a network.
 
 A packet waits in a queue while the line is busy with earlier packets. Its transmission begins at ``max(sent, end of
-the one before)`` and lasts its size divided by the bandwidth: a queue of one server (Kleinrock 1975, section 1.2). The
+the previous transmission)`` and lasts its size divided by the bandwidth: a queue of one server (Kleinrock 1975,
+section 1.2). The
 tick of its arrival is determined when its transmission begins. Packets due at the same tick share an entry in a
 calendar of ticks, which keeps the newest packet. So the cost of a tick does not depend on the delay.
 """

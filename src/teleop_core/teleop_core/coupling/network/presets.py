@@ -1,4 +1,4 @@
-"""Presets of the network, measured ones among them, and its parameters: two directions, each of a kind."""
+"""Presets of the network, some of them measured, and its parameters: two directions, each with a kind of network."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -57,10 +57,10 @@ PRESETS: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
     "iss": _far(0.4, 0.05),
     "ets7": _far(3.4, 0.1),
 }
-"""Networks by name. Loss, delay and outages are the nine levels of the UVA-DSA telesurgery QoS
-analysis 2026, on the way to the slave alone. Its table gives outages in milliseconds, the program
-it ships counts packets (``_packets``), of which its recording has 517 a second. ``iss`` takes 0.8
-to 1 s there and back, ``ets7`` 7 s (ETS-VII 1999); how the delay of these two varies is assumed."""
+"""Networks by name. Loss, delay and outages are the nine levels of the UVA-DSA telesurgery QoS analysis 2026; they
+affect only packets to the slave. The table of that analysis gives outages in milliseconds, but its program counts
+packets (``_packets``); its recording has 517 packets a second. ``iss`` has a round trip of 0.8 to 1 s, ``ets7`` of 7 s
+(ETS-VII 1999); the variation of these two delays is assumed."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -118,7 +118,7 @@ class NetworkParameters:
 
     @property
     def ways(self) -> tuple[WayParameters, WayParameters]:
-        """Parameters to the slave, and back from it: those of the preset, or the given ones."""
+        """Parameters of the directions to and from the slave: from the preset, or else the given ones."""
         if self.preset == "own":
             return self.there, self.back
         named = PRESETS[self.preset]

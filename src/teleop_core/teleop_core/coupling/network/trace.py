@@ -31,8 +31,8 @@ def read_trace(path: str) -> Array:
     """Numbers of a trace: times [s] from 0, each followed by its delay [s] or :data:`LOST`.
 
     Raises:
-        ParameterError: The file cannot be read, or its times are negative or not in order, or a
-            delay is negative, or either looks like milliseconds; the text names the line.
+        ParameterError: The file cannot be read; times are negative or not in order; a delay is negative; or times or
+            delays seem to be in milliseconds. The text names the line.
     """
     try:
         with Path(path).expanduser().open(newline="", encoding="utf-8") as file:

@@ -177,7 +177,7 @@ def wave_slave(
     wave = _take(memory, flow[0], heard, port, period)
     memory[0] += port[MARGIN] - before + flow[1]
     port[MARGIN] += flow[1] - flow[2]
-    if is_free:  # a part of the damper's energy is kept, for a possible debt from the arm's lag
+    if is_free:  # a part of the damper's energy is reserved for a debt that the arm's lag may cause
         port[MARGIN] *= numbers[0] / (numbers[0] + period)
         memory[0] = port[MARGIN]
     for i in range(3):

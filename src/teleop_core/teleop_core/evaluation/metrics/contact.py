@@ -1,4 +1,4 @@
-"""Contact: the energy that the device's force took from the hand and gave back to it."""
+"""Contact: the energy that the device's force absorbed from the hand and returned to it."""
 
 from dataclasses import dataclass
 

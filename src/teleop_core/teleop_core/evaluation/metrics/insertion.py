@@ -1,4 +1,4 @@
-"""Insertion: how deep the slave's tip went into a hole, and which force and torque resisted."""
+"""Insertion: the depth of the slave's tip in a hole, and the force and torque that resisted it."""
 
 from teleop_core.evaluation.metric import figure
 from teleop_core.evaluation.objects import ObjectMetric

@@ -54,7 +54,7 @@ class LatencyMetric(Metric):
             arrivals = logs - (stamps if before is None else _arrivals(window, before, stamps))
             self._delays[stage].add(arrivals[arrivals > -_NEVER // 2])
             before = topic
-        # At its start, the last stage holds a pose that nobody commanded; only commands count.
+        # At its start, the last stage holds a pose that was not commanded; only commands count.
         is_command = same_stamp(stamps, window.around(self._command).stamp_ns) != NONE
         self._delays[TOTAL].add((logs - stamps)[is_command])
 

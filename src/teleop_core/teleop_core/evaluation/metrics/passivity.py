@@ -1,4 +1,4 @@
-"""Passivity: the energy that went in and out at hand and slave, and the cost of keeping the session passive."""
+"""Passivity: the energy into and out of the ports of hand and slave, and the cost of keeping the session passive."""
 
 from dataclasses import dataclass, fields
 
@@ -84,7 +84,7 @@ class _Port:
         return PortScore(into, out, withheld, _MJ * self._least)
 
     def line(self) -> tuple[Array, Rows]:
-        """Times [s] and in, out, heard and withheld [mJ]."""
+        """Times [s], and energies in, out, received from the other side and withheld [mJ]."""
         return self._trace.line()
 
 

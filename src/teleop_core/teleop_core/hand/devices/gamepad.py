@@ -99,7 +99,7 @@ class Gamepad:
         self._sdl.pygame.event.pump()
         self._sdl.pygame.event.clear()
         if not self._own.attached():
-            raise SessionError(f"gamepad {self.name} is gone")
+            raise SessionError(f"gamepad {self.name} is disconnected")
         pad, axis, button = self._sdl.pygame, self._axis, self._button
         right, left = map(axis, (pad.CONTROLLER_AXIS_TRIGGERRIGHT, pad.CONTROLLER_AXIS_TRIGGERLEFT))
         rates = np.array(

@@ -15,7 +15,7 @@ _LONGEST = 0.05  # time beyond this between two readings is not integrated [s]
 
 @dataclass(frozen=True, kw_only=True)
 class RateParameters:
-    """How fast a device that says rates moves the stylus."""
+    """Speeds of the stylus for devices whose deflection commands a velocity."""
 
     speed: float = parameter(
         0.04,
@@ -42,7 +42,7 @@ class RateParameters:
 
 @dataclass(frozen=True, kw_only=True)
 class PilotParameters(RateParameters):
-    """How a device that says rates moves the stylus."""
+    """Motion of the stylus by a device whose deflection commands a velocity."""
 
     device: str = parameter("", fixed=True, doc="part of the name of the device to use; empty: the first device found")
 

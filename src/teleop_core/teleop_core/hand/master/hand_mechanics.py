@@ -104,7 +104,7 @@ def _push_on(p: HandNumbers, s: HandState, aim_speed: Array, force: Array, time:
         given[i, 2] = s.hand[i] - s.position[i]
         given[i, 3] = s.wanted[i] + time * aim_speed[i] - s.hand[i]
         given[i, 4], given[i, _PUSH] = aim_speed[i], force[i]
-        # Force against which the device would stand still at the end of the step.
+        # Force with which the device would be at rest at the end of the step.
         needed[i] = _flows(p.flow[0, i, _SPEED], given[i]) / p.flow[0, i, _SPEED, _PUSH]
         square += needed[i] * needed[i]
         rests = rests and s.speed[i] == 0.0

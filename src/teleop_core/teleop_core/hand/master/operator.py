@@ -148,7 +148,7 @@ class RunningOperator(RunningStage):
         row[topics.HAND_BUTTONS.field] = row[topics.HAND_TREMOR.field] = row[topics.HAND_JAW.field] = 0.0
 
     def retune(self, parameters: OperatorParameters) -> None:
-        """Take new tremor and patience from the next tick on; the motion goes on."""
+        """Use new values of tremor and patience from the next tick on; the motion continues."""
         p, operator = self.parameters, OPERATORS.find(self._fixed.kind.kind)
         p["tremor"] = 0.0 if operator.trembles else parameters.tremor_amplitude
         p["frequency"] = parameters.tremor_frequency

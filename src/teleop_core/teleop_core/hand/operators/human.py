@@ -166,7 +166,7 @@ class HumanParameters:
 
 
 class Submovement(NamedTuple):
-    """A minimum-jerk movement: when it begins, how long it takes [s], and where it leads.
+    """A minimum-jerk movement: its begin [s], its duration [s] and its displacement.
 
     ``step`` (6,) is the displacement [m] and the rotation vector [rad].
     """

@@ -23,7 +23,7 @@ from teleop_core.kernels.axes import axis_map
 from teleop_core.kernels.geometry import turn_within
 
 AHEAD = 16
-"""Ticks for which it is asked at once, about a frame; the eye needs longer, so this adds no delay."""
+"""Number of ticks per request of the motion, about one frame; the delay of the eye is longer, so this adds no delay."""
 _COLUMNS = ("number", "act", "goal_x", "width", "goal_qw", "turn", "force", "clearance")
 _NUMBER, _ACT, _GOAL, _WIDTH, _ATTITUDE, _TURN, _FORCE, _CLEARANCE = map(topics.TASK_STATE.columns.index, _COLUMNS)
 _BOX, _SIZE = STATE["fixture_center_x"], STATE["fixture_size_x"]
@@ -150,7 +150,7 @@ class Observer:
             self._softness *= min(max(pressed / more / self._softness, 1.0 / 3.0), 3.0)
 
     def _pressed(self, move: Move) -> float:
-        """How far a submovement went against the force that was felt before it [m]."""
+        """Displacement of a submovement against the force that was felt before it [m]."""
         force = move.seen.force
         return -float(dot(product(self._hand_of_slave, move.way.step), force)) / max(float(length(force)), _FELT)
 
@@ -206,7 +206,7 @@ class Observer:
         return np.concatenate((b.tip[:3] - a.tip[:3], lever * turn))
 
     def _half_way(self, move: Move, until: float) -> float:
-        """When the tip was seen half way [s]; infinite if this was not before ``until``."""
+        """Time at which the tip was seen at half of the path [s]; infinite if this was not before ``until``."""
         unseen, whole = move.unseen, float(dot(move.unseen, move.unseen))
         half = 1.0 - 0.5 * float(length(move.way.both)) / math.sqrt(whole)
         before: tuple[float, float] | None = None

@@ -75,8 +75,8 @@ def load_urdf(
 
     Raises:
         RecordingError: The file cannot be read, or is not XML.
-        ParameterError: An element that is missing or not possible; the message names it. With
-            dynamics of links also a joint beside the way to the tip that moves with one on it.
+        ParameterError: An element is missing or not possible; the message names it. With dynamics of links also: a
+            joint outside of the path to the tip moves with a joint on the path.
         UnknownNameError: A tip, direction, dynamics, link, type of joint, argument of a xacro, or
             joint or entry of the drives that does not exist.
         TeleopError: The package ``xacro`` is needed and not installed.

@@ -1,4 +1,4 @@
-"""Notes on a URDF: what may be read differently from what its author meant."""
+"""Notes on a URDF: content that may be read differently from the author's intention."""
 
 from collections.abc import Callable, Iterator, Sequence
 

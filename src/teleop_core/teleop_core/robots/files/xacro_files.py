@@ -12,7 +12,7 @@ from teleop_core.base import ParameterError, TeleopError, UnknownNameError, dama
 from teleop_core.robots.files import urdf_tree, visuals
 
 EXPANDED = ".expanded.urdf"
-"""Suffix of the expanded URDF that a recording keeps of a xacro; arguments for it are allowed and ignored."""
+"""Suffix of the expanded URDF that a recording stores for a xacro; arguments for it are allowed and ignored."""
 _DECLARED = re.compile(r"<xacro:arg\s[^>]*?name=[\"']([^\"']+)")
 _MOST_CHARACTERS = 300  # characters kept of the package's message, which may be pages long
 

@@ -1,7 +1,7 @@
-"""Arm bridge: the stage that stands between the arm's server and the controller of a real arm.
+"""Arm bridge: the stage between the slave stage, which is the arm's server, and the controller of a real arm.
 
 It replaces ``slave_sim``: it reads the same setpoints and writes the measured joints of the real arm. It does not pass
-on samples that cannot be true. The server then holds the arm and reports ``feedback``.
+on invalid samples. The server then holds the arm and reports ``feedback``.
 """
 
 from dataclasses import dataclass
@@ -127,7 +127,7 @@ class ControllerBridge(RunningStage):
 
     Args:
         stage: Description of the stage: setpoints are its first input, measured joints its output.
-        parameters: Of the bridge.
+        parameters: Parameters of the bridge.
         joints: Map between the robot's joints and those of the controller.
         lead: Computes the commands to the controller.
         speed_limit: Rated speeds (n,) [rad/s or m/s].
@@ -150,7 +150,7 @@ class ControllerBridge(RunningStage):
         """Take a sample of the arm that came at ``now_ns`` [ns]; return whether ``slave/measured_js`` is new.
 
         After a jump, or when the server went on without the arm, ``slave/measured_js`` is not updated until the server
-        has left ENABLED. Then the arm begins anew.
+        has left ENABLED. Then the arm restarts as after its first sample.
         """
         hearing, row = self.hearing, self.signals
         if row["slave_operation"][_STATE] != State.ENABLED:
@@ -217,7 +217,7 @@ class ControllerBridge(RunningStage):
         return bool(self.signals["slave_operation"][_BRAKED] > 0.0)
 
     def _leads(self, setpoint: Array, now_ns: int, elapsed: float) -> bool:
-        """Go towards the setpoint. If the server went on without the arm, wait until the setpoint is at rest."""
+        """Move towards the setpoint. If the setpoint has moved away without the arm, wait until it is at rest."""
         lead = self.lead_arm
         go = lead.rejoin if self._is_left(now_ns) else lead.step
         goes = go(setpoint, self.hearing.position, self.joints.ours, elapsed)

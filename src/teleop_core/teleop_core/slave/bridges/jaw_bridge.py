@@ -1,4 +1,4 @@
-"""Jaw bridge: the stage that stands between the jaw's server and a real gripper.
+"""Jaw bridge: the stage between the jaw's server and a real gripper.
 
 It does for the jaw what ``arm_bridge`` does for the arm, with two differences. Brakes of the arm do not open the jaw.
 Fingers that press on an object stop before their setpoint.

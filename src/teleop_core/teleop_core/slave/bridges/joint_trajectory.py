@@ -1,4 +1,4 @@
-"""Joint trajectories of one point: what ``joint_trajectory_controller`` of ros2_control takes.
+"""Joint trajectories of one point, the commands of ``joint_trajectory_controller`` of ros2_control.
 
 Each message replaces the trajectory before it. Its point lies at least two periods ahead. So the arm does not reach
 the end of its trajectory and stop when one message is late.

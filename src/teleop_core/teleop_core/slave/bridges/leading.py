@@ -6,7 +6,7 @@ from teleop_core.kernels.geometry import Array
 
 _CATCHING_UP = 1.2
 """Largest speed of commands, in rated speeds. Setpoints need at most 1; the rest makes up for late setpoints."""
-_SLOWLY = 0.1  # speed of an arm that catches up with a setpoint that went on without it, in rated speeds
+_SLOWLY = 0.1  # speed of an arm that catches up with a setpoint that has moved away, divided by the rated speed
 _LONGEST = 2.0  # largest number of missed periods that one command makes up for
 
 
@@ -75,9 +75,9 @@ class Lead:
         return True
 
     def rejoin(self, setpoint: Array, measured: Array, names: tuple[str, ...], elapsed: float) -> bool:
-        """Go slowly to a setpoint that went on without the arm; arguments and result as in :meth:`step`.
+        """Move slowly to a setpoint that has moved away from the arm; arguments and result as in :meth:`step`.
 
-        The setpoint must stand still. The arm must have been commanded before, and must still be at its last command:
+        The setpoint must be at rest. The arm must have been commanded before, and must still be at its last command:
         an arm that was moved meanwhile gets no command. Normal commands resume when the arm arrives.
         """
         is_still = bool((setpoint == self._setpoint).all())

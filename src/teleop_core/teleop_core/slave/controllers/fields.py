@@ -21,7 +21,7 @@ def ratio(what: str) -> Any:
 
 
 def friction_share(use: str) -> Any:
-    """Share of known dry friction that is used; ``use`` says for what."""
+    """Share of known dry friction that a law uses; ``use`` completes the text with its purpose."""
     return parameter(
         0.8,
         Within(0.0, 1.5),
@@ -41,7 +41,7 @@ def friction_counts() -> Any:
 
 
 def dead_band(use: str) -> Any:
-    """Error [encoder counts] within which a joint counts as at rest; ``use`` says what stops there."""
+    """Error [encoder counts] within which a joint counts as at rest; ``use`` ends the text with the effect."""
     return parameter(
         0.5,
         Within(0.0, 100.0),

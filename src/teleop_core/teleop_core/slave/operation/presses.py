@@ -113,7 +113,7 @@ class Presses:
         self._heard_ns.clear()
 
     def knows(self, sender: bytes) -> bool:
-        """Whether this button has been heard."""
+        """Whether a message of this button was received."""
         return sender in self._heard_ns or sender in self._last
 
     def _note(self, sender: bytes, now_ns: int, *, is_pressed: bool) -> tuple[bool, ...]:

@@ -130,7 +130,7 @@ def _steps(drives: Drives, bits: int) -> Array:
 
 
 def hardware_physics(parameters: HardwareParameters, robot: Robot) -> Physics:
-    """Numbers of a robot's drive table and of its faults, less those that are left out.
+    """Numbers of a robot's drive table and of its faults, without the faults that are left out.
 
     Raises:
         ParameterError: The length of a list is not the robot's number of joints, or a weight has no value.

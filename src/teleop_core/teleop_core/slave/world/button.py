@@ -1,7 +1,8 @@
-"""Button: an upright post whose surface gives way with a click, over a stiff stop.
+"""Button: an upright post whose surface yields with a click, above a stiff stop.
 
 Its spring force grows up to the click force, and then falls until the button is on its stop. The stop has the material
-of the world. On release the button pushes less than on the press, because of dry friction, a share of its force. This
+of the world. On release the button pushes less than on the press because of dry friction, which is a share of its
+force. This
 friction is a second spring that yields at that bound.
 """
 
@@ -78,7 +79,7 @@ class ButtonParameters(CylinderParameters):
 
 @inner
 def _spring(p: ButtonNumbers, depth: float) -> float:
-    """Force of the spring on the way in [N], at a depth [m]."""
+    """Force of the spring during a press [N], at a depth [m]."""
     if depth <= p.click_travel:
         return p.click_force * max(depth, 0.0) / p.click_travel
     fallen = min((depth - p.click_travel) / (p.stroke - p.click_travel), 1.0)

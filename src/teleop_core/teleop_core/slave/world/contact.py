@@ -180,7 +180,7 @@ def _touch_at(
     Args:
         p: Parameters.
         s: State of the point; written.
-        arm: As :func:`touch` takes it.
+        arm: As in :func:`touch`.
         has_jacobian: Whether ``arm.J`` already belongs to this tick.
         lever: Point relative to the tip (3,) [m]; overwritten with the point of contact.
         q: Joints of the links (n,).
