@@ -16,7 +16,7 @@ from pathlib import Path
 from teleop_core.kernels.shipped import FOLDER, TIER
 
 HERE = Path(__file__).resolve().parent
-PLATFORM = "manylinux_2_28_x86_64"  # as numba's own
+PLATFORM = "manylinux_2_28_x86_64"  # the same platform as numba's wheels
 TAG = f"cp{sys.version_info[0]}{sys.version_info[1]}"
 CORE = "teleop_core"
 OTHERS = (

@@ -29,7 +29,7 @@ OWN_PAGE = "Teleop-Page"
 PRESS = "Teleop-Press"
 """Header with the name of a press: a press that the page repeats because no answer came keeps its name."""
 _SCRIPTS = tuple(Path(__file__).with_name(name) for name in ("page.js", "strip.js"))
-_FIELDS = 100  # of an address
+_FIELDS = 100  # largest number of query parameters in an address
 _FURNITURE = b'<head><link rel="stylesheet" href="teleop.css"><script src="teleop.js"></script>'
 
 
@@ -80,7 +80,7 @@ class Answers:
         self.stop: Callable[[], None] | None = None
         self.jaw: Callable[[float], None] | None = None
         self._drivers = drivers
-        self._pages: dict[str, int] = {}  # by names that no other page can guess
+        self._pages: dict[str, int] = {}  # pages by random names that no other page can guess
         self._heard: deque[str | None] = deque(maxlen=100)  # presses, by their names
         self.start, self.strip = StartPage(drivers), StripPage(drivers)
         self.form: Form = form or self.start

@@ -125,7 +125,7 @@ class LiveLink(Observer):
     def _robot(self, arm: str) -> Robot:
         slave = "/".join(filter(None, (arm, "slave")))
         values = self._client.values(slave, ["robot", "geometry"])  # no answer is no RCRT-1
-        told = self._client.values(slave, [_HEARTBEAT])  # which a foreign slave may lack
+        told = self._client.values(slave, [_HEARTBEAT])  # a foreign slave may lack this parameter
         self.has_heartbeat = self.has_heartbeat or bool(told.get(_HEARTBEAT))
         geometry = values.get("geometry")
         texts = tuple(map(str, geometry)) if isinstance(geometry, tuple) else ()
@@ -161,7 +161,8 @@ class LiveLink(Observer):
             self._hear_nodes(view)
             self._hear_marks(view)
             view.time, view.age = now - self._begun, now - self._heard
-            view.display = self._seen[self.arms[0].name][-1].rhythm()  # of the display, which is last
+            # frame rate of the display's topic, which is the last one
+            view.display = self._seen[self.arms[0].name][-1].rhythm()
             view.is_fresh = view.age < SILENCE
             return view
 

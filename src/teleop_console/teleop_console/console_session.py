@@ -178,7 +178,7 @@ def _both(say: Callable[[str], None], *, is_on_page: bool) -> Callable[[str], No
     """Print a line in the terminal and, while a session starts, also show it on the page if it matters."""
 
     def tell(line: str) -> None:
-        if "s  " not in line:  # its line of every second is on the page
+        if "s  " not in line:  # the line that the session prints each second is already on the page
             print(printable(line), flush=True)
             if is_on_page:
                 say(line)

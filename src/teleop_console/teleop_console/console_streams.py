@@ -18,10 +18,10 @@ from teleop_core.nodes.streams import Subscription, message_type
 SILENCE = 1.0
 """Time without a message after which a stream is not fresh any more, and another source of the stream is searched [s].
 """
-_PRESS = 0.12  # of a button [s]
+_PRESS = 0.12  # duration of a button press [s]
 _FRAMES = 512  # samples of a stream that may wait to be shown
 _SCREEN_NS = 33_000_000  # delay of the page itself, the default latency of a display [ns]
-_RHYTHM_NS = 3_000_000_000  # over which the frames of a display are counted [ns]
+_RHYTHM_NS = 3_000_000_000  # time over which the frames of a display are counted [ns]
 
 
 def now_of(owner: Owner) -> float:

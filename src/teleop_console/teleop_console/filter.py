@@ -34,14 +34,14 @@ FLOOD = f"more than {RATE:g} messages or {BYTES_RATE / 1e6:g} MB a second; it wa
 
 _Name = Annotated[str, Meta(max_length=200)]
 _Unit = Annotated[float, Meta(ge=-1.01, le=1.01)]
-_Place = Annotated[float, Meta(ge=-1.0, le=1.0)]  # of a stylus in master_base [m]
-_Far = Annotated[float, Meta(ge=-1e4, le=1e4)]  # of a camera [m]
+_Place = Annotated[float, Meta(ge=-1.0, le=1.0)]  # coordinate of a stylus in master_base [m]
+_Far = Annotated[float, Meta(ge=-1e4, le=1e4)]  # coordinate of a camera [m]
 _Length = Annotated[float, Meta(gt=0.0, le=1e6)]
 _Pixels = Annotated[int, Meta(ge=1, le=16384)]
 _Quaternion = tuple[_Unit, _Unit, _Unit, _Unit]
 _Number = Annotated[float, Meta(ge=-1e15, le=1e15)]
 _Count = Annotated[int, Meta(ge=-(10**15), le=10**15)]
-_OFF_UNIT = 1e-2  # of the square of a quaternion's length
+_OFF_UNIT = 1e-2  # tolerance of the squared length of a unit quaternion
 
 
 class _Message(Struct, tag_field="type", forbid_unknown_fields=True):

@@ -62,7 +62,7 @@ class Front:
         self._opened, self._paths, self._answer, self._slow = opened, paths, answer, slow
         self._line: queue.Queue[tuple[socket.socket, bytes] | None] = queue.Queue(_LINE)
         threading.Thread(target=self._work, name="console start", daemon=True).start()
-        self._waiting: dict[socket.socket, float] = {}  # until when
+        self._waiting: dict[socket.socket, float] = {}  # time limit of each waiting connection
         self._partial: set[socket.socket] = set()  # number of these connections that have begun to send a request
         inner, self._told = socket.socketpair()
         self.passed_on = PassedOn(inner, opened.getsockname())

@@ -91,7 +91,7 @@ class Server(viser.ViserServer):
         self._front = Front(opened, answers.paths, answer, answers.slow_paths)
         self._drivers, self._public = drivers, set[str]()
         self.filter = Filter(self, drivers.may_drive, _logger().warning)
-        rich.get_console().quiet = True  # which only viser writes to
+        rich.get_console().quiet = True  # only viser writes to this console
         with _STARTING, _opening(_server_at(self._front.passed_on, guard, answers, self)):
             super().__init__(host=host, port=port, label=label, verbose=False)
         for message in (_messages.ShareUrlRequest, _messages.ShareUrlDisconnect):

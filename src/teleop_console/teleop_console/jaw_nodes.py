@@ -11,9 +11,9 @@ from teleop_console.poses import move
 from teleop_core.graph.topics import SLAVE_JAW_BOARD, SLAVE_JAW_MEASURED_JS, SLAVE_JAW_OBJECT_CP
 from teleop_core.kernels.geometry import Array, quaternion_products, rotations_from_quaternions
 
-_THICK = 0.1  # of a finger, over its length
+_THICK = 0.1  # thickness of a finger divided by its length
 _PEG = 0.2  # thickness of a peg, over that of an object
-_FIRST = SLAVE_JAW_BOARD.columns.index("x0")  # of the middles of objects
+_FIRST = SLAVE_JAW_BOARD.columns.index("x0")  # first column with the middles of objects
 _DRAWN = ("finger_length", "object.size", "object.place", "pegs.place", "pegs.height")
 
 

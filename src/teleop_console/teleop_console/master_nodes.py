@@ -56,7 +56,7 @@ class ForceArrow:
         return size
 
 
-_DIM = 0.35  # of the device, behind which the handles of the stylus are seen
+_DIM = 0.35  # opacity of the device, so that the stylus's handles behind it are visible
 
 
 class MasterNodes:

@@ -22,7 +22,7 @@ from teleop_core.base.errors import TeleopError
 
 WIDTH = 320.0
 """Of the panel on a desk [px]; on a phone it is as wide as the screen."""
-_PERIOD = 0.2  # between two drawings of the texts [s]
+_PERIOD = 0.2  # time between two updates of the texts [s]
 
 
 class Panel:

@@ -81,7 +81,8 @@ class Past(ABC):
 
     def __init__(self) -> None:
         self.columns = {}
-        self._errors: dict[str, tuple[Rows, Rows, Rows]] = {}  # by arm, with the rows from which they were computed
+        # errors by arm, with the rows from which they were computed
+        self._errors: dict[str, tuple[Rows, Rows, Rows]] = {}
 
     @abstractmethod
     def rows(self, topic: str) -> Rows | None:

@@ -16,7 +16,7 @@ from teleop_core.base.errors import ParameterError, TeleopError
 _MOST = 50
 """Recordings that are listed."""
 _FILE = "metadata.yaml"
-_COLUMNS = 132  # of what a command says
+_COLUMNS = 132  # width of a command's output in characters
 _KIND = {"score": "evaluate", "export": "export"}
 
 

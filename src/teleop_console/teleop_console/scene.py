@@ -18,7 +18,7 @@ from teleop_core.kernels.geometry import Array
 
 _POINTS = {"tour": "tour.points", "points": "points"}
 """Operators that move to points, and the parameter with these points."""
-_PIECES = 6  # of a line of the floor, each of which fades evenly
+_PIECES = 6  # number of pieces of a floor line, each with a linear fade
 
 
 def targets_of(parameters: Parameters, arm: str) -> Array:

@@ -24,7 +24,7 @@ LINGER = 1.0
 """Time for which the stylus is held after a small step, so that the next step can follow [s]."""
 GRIP = "grip"
 """Name of a gizmo's node below that of its master."""
-_SIZE = 0.08  # of a gizmo [m]
+_SIZE = 0.08  # size of a gizmo [m]
 
 
 @dataclass

@@ -145,8 +145,8 @@ class Insets:
                     self._images[name].image = picture
 
 
-_SETTLING = 4.0  # until a window has its panel beside it [s]
-_LOOK = 1.0  # between two checks whether the work has left the picture [s]
+_SETTLING = 4.0  # time until the panel of a new window has its final size [s]
+_LOOK = 1.0  # time between two checks whether the work has left the picture [s]
 _GROWN, _STILL = 0.08, 1e-4  # shares of its distance by which a camera has moved: for a new view, for a view that
 # follows
 

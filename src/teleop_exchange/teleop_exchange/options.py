@@ -156,7 +156,7 @@ class ImportOptions:
         x, *others = self.signed_axes
         if self.handedness == "right":
             return axis_map("--axes", (x, *others))
-        mirror = np.array([[-1.0], [1.0], [1.0]])  # of the first row
+        mirror = np.array([[-1.0], [1.0], [1.0]])  # mirrors the first row
         try:
             return np.asarray(mirror * axis_map("--axes", (x.translate(str.maketrans("+-", "-+")), *others)))
         except ParameterError:

@@ -48,7 +48,7 @@ class OurBag:
         self._bag, self.is_ros2 = bag, not bag.is_ros1
         found = {name: info.type for name, info in bag.topics.items() if info.count}
         self.types, self.typestore = found, ros_types.typestore()
-        if bag.is_ros1:  # whose types are written geometry_msgs/PoseStamped
+        if bag.is_ros1:  # ROS 1 types are written geometry_msgs/PoseStamped
             self.types = {name: _SHORT.sub(r"\1/msg/\2", kind) for name, kind in found.items()}
             self.typestore = get_typestore(Stores.ROS1_NOETIC)
             self.typestore.register(get_types_from_msg(_TRANSFORMS, "tf2_msgs/msg/TFMessage"))

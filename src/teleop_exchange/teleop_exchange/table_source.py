@@ -171,7 +171,7 @@ class TableSource:
         columns = tuple(range(width - 4, width))
         if width in {7, 8} and not self._options.position and self._are_unit(columns):
             wanted = self._options.quaternion_order
-            order = "xyzw" if wanted == "auto" else wanted  # as in that benchmark
+            order = "xyzw" if wanted == "auto" else wanted  # the order of that benchmark
             self._told(f"quaternion in the order {order}", columns)
             return Attitudes("quaternion", order), columns
         self.told.append("orientation: none found, constant")

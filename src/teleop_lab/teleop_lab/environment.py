@@ -25,7 +25,7 @@ Observed = NDArray[np.float32]
 _ACT, _GOAL, _ATTEMPTS, _SUCCESSES, _STEP = (
     TASK_STATE.columns.index(name) for name in ("act", "goal_x", "attempts", "successes", "step")
 )
-_PERIOD = 0.02  # of a step [s]
+_PERIOD = 0.02  # duration of a step [s]
 _SCALE = 0.02
 """Length that is 1 in an observation [m]."""
 _BLOCKS = 3

@@ -63,7 +63,7 @@ def compression_mode(index: Path) -> str:
 def _is_file(path: Path) -> bool:
     try:
         return path.is_file()
-    except OSError:  # its name is too long
+    except OSError:  # the file name is too long
         return False
 
 

@@ -28,7 +28,7 @@ from teleop_core.robots.files import visuals, xacro_files
 from teleop_core.robots.parts import DESCRIPTION, arguments_of, file_of
 
 TOUCHED, FIXTURE = "mesh", "fixture_mesh"
-_PLACES = range(8)  # of a shape that is made of several: they are called mesh, mesh1, mesh2
+_PLACES = range(8)  # parts of a combined shape: their meshes are called mesh, mesh1, mesh2
 _ROBOT, _DRIVES, _FILE, _MESHES = "robot", "drives", "_file", "_meshes"
 _PACKED, _DIGEST = "zlib, base64: ", "sha256:"
 _LEVEL = 4  # 27 MB of an arm's meshes take 0.4 s; level 6 takes 1.5 s for 5 % less size

@@ -210,7 +210,7 @@ class BagWriter:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         if error is not None and error is self._failure:
-            self._failure = None  # on its way already
+            self._failure = None  # the failure is being raised
         self.close()
 
     # -- between the threads ---------------------------------------------------------------------

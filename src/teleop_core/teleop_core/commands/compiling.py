@@ -67,7 +67,7 @@ def phases_of(*, is_all: bool) -> Iterator[Sequence[Job]]:
     yield [(scenario, "", "") for scenario in list_scenarios() if scenario != _FIRST]
     if is_all:
         named = [name for name in SHAPES if find_spec("trimesh") or not _reads_a_file(name)]
-        shapes = {SHAPES.find(name).distance: name for name in named}.values()  # one per kernel
+        shapes = {SHAPES.find(name).distance: name for name in named}.values()  # one shape per kernel
         for key, parts in (("robot", ROBOTS), ("controller", CONTROLLERS), ("plant", PLANTS), ("fixture", shapes)):
             yield [(_FIRST, f"{key}={name}", "") for name in parts]
 

@@ -64,7 +64,7 @@ class SessionParameters:
 
 SESSION = "teleop"
 """Name of the group of the session as a whole."""
-_EVERY = "/**"  # in ROS 2 parameter files, every node
+_EVERY = "/**"  # name for every node in ROS 2 parameter files
 RENAMED = {
     "haptic_master.path.": "operator.",
     "haptic_master.operator.": "operator.",
@@ -90,7 +90,7 @@ RENAMED = {
     },
 }
 """Former names, or their prefixes, which recordings and files may still contain, with the present names."""
-_READER = ("slave/servo_jp@slave_sim=", "slave/servo_jp@slave=")  # of commands, before and now
+_READER = ("slave/servo_jp@slave_sim=", "slave/servo_jp@slave=")  # reader of commands: former and present name
 _OF_ROBOT = ("robot", "geometry")
 
 Layer = dict[str, dict[str, object]]
@@ -275,7 +275,7 @@ def _hits(key: str) -> list[tuple[str, Spec]]:
     for wanted in (key, f"{key}.kind"):
         if hits := [e for full, e in declared.items() if wanted in {full, e[1].name}]:
             return hits
-    known = dict(declared)  # by former names too
+    known = dict(declared)  # includes former names
     for full, entry in declared.items():
         for old, new in RENAMED.items():
             if full == new or (new.endswith(".") and full.startswith(new)):

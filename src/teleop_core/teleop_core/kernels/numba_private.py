@@ -277,7 +277,7 @@ class _Cache(FunctionCache):
             with store.locked(folder):
                 try:
                     super().save_overload(sig, data)
-                except _BROKEN:  # by another version of the package, after this version checked
+                except _BROKEN:  # written by another version of the package after this version checked the file
                     self.flush()
                     super().save_overload(sig, data)
 

@@ -23,7 +23,8 @@ from teleop_core.nodes.streams import Input, message_type
 from teleop_core.nodes.tuned import TunedNode
 from teleop_core.session.reports import report_of
 
-_GATE_PATIENCE = 1.0  # on a busy machine, a tick of a whole session takes a hundredth of this time
+# longest wait for the gate; even on a busy machine, a session's tick takes a hundredth of this time
+_GATE_PATIENCE = 1.0
 _NEWS = {"active": "at work", "finalized": "ended"}  # others: the state itself
 
 
@@ -272,7 +273,7 @@ class CoreNode(TunedNode):
         if self._feed is not None and has_stopped:
             self._feed.close()
             self._feed = None
-        if not (has_stopped and is_free):  # its outputs are silent because the sending thread hangs
+        if not (has_stopped and is_free):  # the outputs are silent because the sending thread hangs
             raise SessionError(f"{self.member_name} does not answer and is left running")
         self.stop()
 

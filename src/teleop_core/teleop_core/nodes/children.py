@@ -22,7 +22,8 @@ from teleop_core.nodes.starter import NODE, Starter
 
 # Not SIGINT: a process that a shell started in the background ignores it, and so do its children.
 _PATIENCE = ((signal.SIGTERM, 30.0), (signal.SIGKILL, 5.0))
-_STILL_PATIENCE = ((signal.SIGTERM, 2.0), (signal.SIGKILL, 5.0))  # of one that stands still
+# signals to a process that does not run, with the wait after each [s]
+_STILL_PATIENCE = ((signal.SIGTERM, 2.0), (signal.SIGKILL, 5.0))
 _TROUBLE = ("[ERROR]", "[FATAL]", "Traceback")
 _STILL = 3.0  # a separate thread reports ten times a second, whatever the process is doing
 _STILL_STARTING = 60.0  # the interpreter loads, perhaps from a cold disk

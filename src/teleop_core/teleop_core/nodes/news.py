@@ -7,7 +7,7 @@ from teleop_core.graph.stage import Stage
 from teleop_core.middleware.world import Owner
 from teleop_core.nodes.streams import Input
 
-_CALM_NS = 1_000_000_000  # the same trouble is logged again after this [ns]
+_CALM_NS = 1_000_000_000  # time after which the same trouble is logged again [ns]
 _COMMANDS = ("servo_", "move_", "interpolate_")
 
 

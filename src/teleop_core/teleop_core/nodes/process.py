@@ -74,7 +74,7 @@ def serve(crew: Crew, watch: Watching, world: World) -> int:
         executor.add_node(node.ros)
         node.ended, node.ending = first.ended, first.ending
     first.ended.add_done_callback(lambda _: executor.wake())
-    with ExitStack() as end:  # in reverse order, and each node even if another one fails
+    with ExitStack() as end:  # end the nodes in reverse order, and each node even if another one fails
         end.callback(executor.shutdown)
         for node in reversed(nodes):
             end.callback(node.flush)  # this blocks all threads of the process

@@ -66,7 +66,7 @@ class _Channel:
         self.topic, self._node, self._world = topic, node, node.world
         self.received = self.lost = 0
         self._numbers: dict[bytes, int] = {}  # last number of each publisher
-        self._since_ns = 0  # since when it listens
+        self._since_ns = 0  # time since which the topic is read [ns]
         self._given: deque[Arrival] = deque()
         self._subscription: Subscription | None = None
         self._inside_ns: int | None = None

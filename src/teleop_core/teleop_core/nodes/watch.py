@@ -22,9 +22,9 @@ from teleop_core.nodes.parent import Parent
 ENDS = tuple(number for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT))
 """Signals that ask for an orderly end: Ctrl-C, a supervisor, a closed terminal, Ctrl-\\."""
 _PERIOD = 0.1
-_END_PATIENCE = 4.0  # until the main thread begins the end
-_LEAVE_PATIENCE = 5.0  # until the middleware is closed
-_FLUSH_PATIENCE = 20.0  # until the main thread has finished it; a slow disk needs time
+_END_PATIENCE = 4.0  # longest time until the main thread begins the end [s]
+_LEAVE_PATIENCE = 5.0  # longest time until the middleware is closed [s]
+_FLUSH_PATIENCE = 20.0  # longest time until the recording is closed; a slow disk needs time [s]
 
 
 class Crew(Protocol):

@@ -62,5 +62,5 @@ def _jacobians(robot: arm.Arm, postures: Array, lever: float) -> Array:
     found, row = np.empty((len(postures), 6, robot.n)), robot.geometry_row
     for q, jacobian in zip(postures, found, strict=True):
         robot.kernels.jacobian(q.copy(), row, jacobian)
-    found[:, :3] /= lever or 1.0  # of a tip that only turns
+    found[:, :3] /= lever or 1.0  # 1 for a tip that only turns
     return found

@@ -218,7 +218,7 @@ def _tell_stops(path: Path, samples: Samples, setting: Setting) -> None:
     """Warn of a motion that leaves the device's workspace, with a hint how to keep it inside."""
     device = setting.common.device
     size, start = np.array(device.workspace), np.array(device.start)
-    places = samples.moves + np.array(setting.common.center) + start  # from the middle
+    places = samples.moves + np.array(setting.common.center) + start  # positions relative to the middle
     beyond = np.abs(places) - 0.5 * size
     is_beyond = (beyond > 0.0).any(axis=1)
     if not is_beyond.any():

@@ -53,7 +53,7 @@ class Shape:
     """The distance as an argument for kernels."""
 
 
-_FILE = re.compile(r"""\bfile\s*=\s*['"]([^'"]*)['"]""")  # in the text of a part
+_FILE = re.compile(r"""\bfile\s*=\s*['"]([^'"]*)['"]""")  # file name in the text of a part
 
 
 def files_of(parameters: object) -> list[str]:

@@ -104,7 +104,7 @@ def _section_distance(out: float, up: float, shape: Array) -> tuple[float, float
         else:
             x, z = out - rim, up - min(max(up, -thickness), 0.0)
         beyond = math.sqrt(x * x + z * z)
-        if beyond <= directions.MIDDLE:  # on a face, up to rounding
+        if beyond <= directions.MIDDLE:  # the point is on a face, up to rounding
             return _section_depth(out, up, shape)
         if beyond < distance:
             distance, way_out, way_up = beyond, x / beyond, z / beyond

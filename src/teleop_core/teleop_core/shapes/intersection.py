@@ -8,7 +8,7 @@ from teleop_core.kernels import Array, inner, kernel
 from teleop_core.shapes import Shape
 from teleop_core.shapes.basis import combined, directions
 
-_ROUNDS = 200  # at most
+_ROUNDS = 200  # largest number of rounds
 _STILL = 1e-12  # moves that count [m]
 _INSIDE = 1e-8  # distance that counts as zero [m]
 

@@ -51,7 +51,7 @@ class SlaveState(ServerState, WayState):
     """State record of an arm's server."""
 
     filtered: PerJoint
-    step: PerJoint  # of the setpoint in the last tick [rad or m]
+    step: PerJoint  # step of the setpoint in the last tick [rad or m]
     move_from: PerJoint
     move_to: PerJoint
     drive: PerJoint  # wanted speeds of the joints [rad/s or m/s]

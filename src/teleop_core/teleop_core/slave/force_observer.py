@@ -158,7 +158,7 @@ def estimate(p: ObserverNumbers, s: ObserverState, arm: Arm, lag: float, dt: flo
     copy(s.measured, arm.measured)
     copy(s.speed, arm.joints)
     write_model(arm.acceleration, arm.model, arm.measured, arm.joints, model)
-    if not s.is_observed:  # until now the arm was held, in balance or by its brakes
+    if not s.is_observed:  # until now the arm was held in balance or by its brakes
         copy(model[:n], s.last_effort)
         copy(s.speed, s.last_speed)
     _observe(p, s, model, dt)

@@ -22,7 +22,7 @@ class WayState(Fields):
     slope: PerJoint  # first slope at the beginning
     bend: PerJoint  # second slope there
     end_slope: PerJoint
-    ticks: int  # that are done
+    ticks: int  # number of finished ticks
     span: int  # ticks in all
 
 

@@ -126,7 +126,7 @@ def slave_step(
     joints = arm.joints
     _take_measured(p, s, arm, row)
     watch.begin_tick(p, s, row.now_ns)
-    if s.asked_ns != 0:  # as a message of servo_jp would
+    if s.asked_ns != 0:  # the same as a message of servo_jp
         copy(s.asked, row.slave_servo_jp)
         row.slave_servo_jp_ns, s.asked_ns = s.asked_ns, 0
     row.command_status = commands.take_command(p, s, row, dt)

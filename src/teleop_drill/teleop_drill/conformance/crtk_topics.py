@@ -21,7 +21,7 @@ class Verdict(Enum):
     """Result of a row."""
 
     OK = "ok"
-    ABSENT = "absent"  # and not required
+    ABSENT = "absent"  # absent and not required
     SKIPPED = "not tried"
     NOTED = "noted"  # works, but with a weakness
     FAILED = "FAILED"

@@ -21,7 +21,7 @@ RADIUS, ROUND = 0.02, 2.0
 SPEED = 2.0 * math.pi * RADIUS / ROUND
 """Speed of the stylus [m/s]."""
 _EASE = 1.0  # it sets in within this time [s]
-_SEED = 1  # of what is lost or scattered at random
+_SEED = 1  # seed of random losses and scatter
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,7 +17,7 @@ JUST_BEFORE_NS = 11_000_000
 """Time before a given moment in which the present speed is measured [ns]."""
 _SILENT_NS = 100_000_000  # longer than the period of any publisher of the tip
 _SHORT = 10  # samples of which the present speed is taken
-_ROUNDING = 1e-12  # of a step [rad or m]
+_ROUNDING = 1e-12  # rounding error of a step [rad or m]
 _ENOUGH = 41  # samples that decide whether an arm follows
 _MOVING = 0.3  # least share of ticks in which a circling setpoint moves
 _FOLLOWED = 0.1  # least share of the setpoint's path; encoder noise is far less, and a lag does not shorten the path

@@ -15,7 +15,7 @@ _SERVICE = 0.02
 _RACE = 0.1
 """Time in which the slave must detect a joint at twice its speed [s]; the drill pushes the joint every 5 ms."""
 _STILL = 0.3  # less than what pauses the arm [s]
-_BEAT = 0.02  # from one message of a stop button to the next [s]
+_BEAT = 0.02  # time between two messages of a stop button [s]
 _REFUSED = "refused"
 _ROUNDS = 2.0  # within this time [s] the circle of the hand has pulled in every direction
 
@@ -82,7 +82,7 @@ def _note_answer(rig: Rig, *, is_taken: bool) -> None:
 def _press_while_masked(rig: Rig) -> None:
     """Press and ask for a reset; then release, and ask for motion without a reset."""
     rig.press(is_pressed=True)
-    rig.wait(0.5)  # until the arm is at rest: before that, enable is refused anyway
+    rig.wait(0.5)  # wait until the arm is at rest, because enable is refused before
     is_taken = rig.command("reset")
     rig.press(is_pressed=False)
     is_taken = rig.command("enable") or rig.command("resume") or is_taken

@@ -175,7 +175,7 @@ class Arm(Guest):
         """Publisher of a command, once the arm reads it."""
         row = _BY_NAME[name]
         if row.name not in self._publishers:
-            quality = Qos(is_latched=row.name == "state_command")  # as in the stock client
+            quality = Qos(is_latched=row.name == "state_command")  # the same QoS as in the stock client
             own = self.ros.create_publisher(message_type(row.ros_type), self.path(row.name), quality)
             self._publishers[row.name] = own
             self.wait(lambda: own.get_subscription_count() > 0, 3.0)

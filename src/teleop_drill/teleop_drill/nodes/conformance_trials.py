@@ -19,9 +19,9 @@ WAY = 0.003
 """How far the tip is moved [m]."""
 _NEAR = 0.05  # share of the displacement that may be missing at the end
 _MOVED = 0.3  # least share of the displacement that counts as a motion
-_PATIENCE = 10.0  # of a move [s]
+_PATIENCE = 10.0  # longest duration of a move [s]
 _NOTHING = 1.5  # after this time without any motion, none is expected [s]
-_STATE = 3.0  # of a change of state [s]
+_STATE = 3.0  # longest duration of a change of state [s]
 _STILL = 1e-4  # a joint that moved by less counts as at rest [rad or m]
 Outcome = tuple[Verdict, str]
 _OK: Outcome = (Verdict.OK, "")

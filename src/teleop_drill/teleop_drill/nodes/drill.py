@@ -26,7 +26,7 @@ from teleop_drill.nodes.drill_site import Session, Site
 
 _PRIORITY = 30
 _BEFORE = 0.2  # motion that is seen before a fault [s]
-_FOLLOWS = 90.0  # until it follows after the start [s]
+_FOLLOWS = 90.0  # longest time from the start until the arm follows [s]
 _CIRCLE = (
     "operator.kind=circle",
     f"operator.size=[{2 * hand.RADIUS}, 0.0, {2 * hand.RADIUS}]",
@@ -37,7 +37,7 @@ _CIRCLE = (
 )
 _MEASURED = 2.0  # time in which the wake-up delay of this machine is measured [s]
 _STOOD_STILL = 0.5  # share of the command timeout: if the machine stands still that long, a result is not valid
-_MORE = 2  # how often an exercise is repeated for that reason
+_MORE = 2  # number of repetitions of an exercise for that reason
 _STEADY = 4  # checks, a tenth of a second apart, that the arm follows
 Say = Callable[[str], None]
 
@@ -242,7 +242,7 @@ class _Drill:
             try:
                 self._ready()
             except SessionError:
-                break  # what was found stands
+                break  # keep the results so far
             outcome = self._repeated(exercise, rig)
         return outcome
 

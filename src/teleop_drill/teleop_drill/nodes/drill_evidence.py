@@ -9,7 +9,7 @@ from teleop_drill.drill.outcome import Outcome
 from teleop_drill.nodes.drill_rig import LiveRig
 
 _PATIENCE = 1.0  # waiting time for an arm that resumes by itself [s]
-_LONGEST = 60.0  # until an arm follows again, whatever it takes [s]
+_LONGEST = 60.0  # longest time until an arm follows again [s]
 _STRENGTH = (Cure.NOTHING, Cure.RESUME, Cure.RESET, Cure.RESTART)
 
 

@@ -111,7 +111,7 @@ class Laws:
         """Newest press that is not in force: its button, and whether it was sent to the slave."""
         self._obey_by, self._was_idle = 0.0, False
         self._presses = 0
-        self._sent_ns: dict[bytes, list[int]] = {}  # of each publisher
+        self._sent_ns: dict[bytes, list[int]] = {}  # times of sending, by publisher
         """When setpoints were sent, by the system's clock [ns]."""
         stage.bus.seen[f"/{SLAVE_SETPOINT_JS.name}"] = self._judge_setpoint
         self._scheduler.at(0, self._look)
@@ -270,7 +270,7 @@ class Laws:
                 self._stage.killed.add(process)
                 said = [one.text for one in self._stage.machine.log if one.level in _BAD]
                 if process in self._stage.lost_disk and _NO_DISK in "".join(said[-1:]):
-                    continue  # what it has saved is judged at the end
+                    continue  # the end of the session checks what the recorder has saved
                 self._break("ends", f"{process.name} has ended: {' '.join(said[-1:])[-300:]}")
 
     def _judge_queues(self) -> None:

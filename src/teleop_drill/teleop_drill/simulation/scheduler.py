@@ -113,7 +113,7 @@ class Turns:
     """What the scheduler knows of a process."""
 
     def __init__(self) -> None:
-        self.busy_ns = 0  # until when its interpreter works
+        self.busy_ns = 0  # time until which its interpreter is busy
         self.is_dead = self.is_stopped = False
         self.parked: list[tuple[Strand, int, bool]] = []
 
@@ -204,7 +204,7 @@ class Scheduler:
     def _switch(self, until_ns: int | None) -> bool:
         strand, here = self.current, getcurrent()
         if here is not (self.hub if strand is self._outside else strand.greenlet):
-            raise GreenletExit  # of a simulation that is over, whose strands are thrown away
+            raise GreenletExit  # ends a strand of a simulation that is over
         if until_ns is not None:
             self._push(until_ns, strand, strand.token, False)
         return self._pump() if strand is self._outside else bool(self.hub.switch())

@@ -15,7 +15,7 @@ from teleop_drill.simulation.stage import Stage
 
 BEGIN, END = 1.0, 9.0
 """Within this time of a session all faults begin [s]."""
-_LONGEST = 3.0  # that one lasts [s]
+_LONGEST = 3.0  # longest duration of a fault [s]
 _NAMES = sorted((*COMMANDS, "release"))
 _LEADS = {"": 8, "disable": 2, "kill": 3, "pause": 4, "press": 2}
 """Commands before a fault, with their weights; states that faults met rarely have larger weights."""

@@ -94,7 +94,7 @@ def run_seed(
             found: Found = machine.run(
                 lambda owner: _Run(bus, owner, Found(seed, planned, processes, breaks), folder or Path(place)).run()
             )
-        except Exception as error:  # of one schedule, which must not end all others
+        except Exception as error:  # an error in one schedule must not end all others
             at = 1e-9 * (machine.scheduler.now_ns - BEGIN_NS)
             text = "".join(traceback.format_exception(error)[-2:])
             found = Found(seed, planned, processes, breaks, (Broken("runs", at, text),), seconds=at)

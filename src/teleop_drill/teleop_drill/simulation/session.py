@@ -23,7 +23,7 @@ from teleop_drill.simulation.machine import Process
 from teleop_drill.simulation.stand_ins import SimulatedWatch, Work, stand_by
 from teleop_drill.simulation.world import SimulatedWorld
 
-_START = 0.4  # of a process, until its node is made [s]
+_START = 0.4  # time from the start of a process until its node is made [s]
 _STARTED = 60.0  # patience with the start [s]
 _ENDED = 10.0  # patience with the end [s]
 _NEVER_NS = 2**62

@@ -70,7 +70,7 @@ def _outcomes(names: tuple[str, ...], seed: int) -> "list[Outcome]":
             bench.progress = progress
             outcomes.append(experiment.run(bench))
             progress(1, 1)
-        if len(found) > 1 and not sys.stderr.isatty():  # where there is no bar
+        if len(found) > 1 and not sys.stderr.isatty():  # there is no progress bar
             took = time.monotonic() - begin
             print(f"{number} of {len(found)}, {experiment.name}: {took:.0f} s", file=sys.stderr)
     return outcomes

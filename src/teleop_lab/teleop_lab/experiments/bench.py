@@ -116,7 +116,7 @@ class Bench:
         self.seed, self.progress, self.workers = seed, progress, workers
         self._settings = dict(settings or {})
         self._known: dict[object, Session] = {}
-        self._streams: dict[object, Mapping[str, Stream]] = {}  # of the last sessions
+        self._streams: dict[object, Mapping[str, Stream]] = {}  # streams of the last sessions
 
     @property
     def seeds(self) -> range:

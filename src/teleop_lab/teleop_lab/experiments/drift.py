@@ -22,7 +22,7 @@ CONTACTS = 10
 GOAL_MM = 1.0
 """Drift that may be left when the next contact begins; assumed."""
 _READY = 4.0  # time at which the arm follows [s], without the network
-_APPROACH, _PERIOD, _REST = 3.0, 2.0, 1.0  # of the hand [s]; assumed
+_APPROACH, _PERIOD, _REST = 3.0, 2.0, 1.0  # durations of the hand's approach, period and rest [s]; assumed
 _WAY = 0.02  # displacement of the hand [m], 9 mm of it within the object of palpation; assumed
 _TOUCH = 0.01  # smallest force of a contact [N]
 _STILL = 200  # ticks at the end over which a position is averaged

@@ -16,7 +16,7 @@ from teleop_core.graph.signals import DT, TICK_NS
 from teleop_core.hand.master.haptic_master import HapticMaster, HapticMasterParameters
 from teleop_core.kernels.geometry import Array
 
-_AXIS = 1  # of the master's base, along which the hand is pushed
+_AXIS = 1  # axis of the master's base along which the hand is pushed
 _KICK = 1e-5  # speed that the hand is given [m/s]: far from every limit
 _SETTLE, _LOOK = 1.0, 3.0  # time before the growth is measured, and time for which it is measured [s]
 _SETTLED, _LOOKS = 10, 20  # additional times of the same kind, in units of the force's delay

@@ -104,7 +104,7 @@ def _visits(bench: Bench, settings: Settings, *, seeing: bool) -> list[Visits]:
         return first
     axes, found = axis_map("axes", MotionScalingParameters.axes), []
     for seed, visits in zip(bench.seeds, first, strict=True):
-        missed = 1e-3 * visits.missed_mm * (1.0, 1.0, 0.0)  # in the plane that the camera shows
+        missed = 1e-3 * visits.missed_mm * (1.0, 1.0, 0.0)  # only the part in the plane that the camera shows
         aims = tuple((p.stops - missed @ axes).ravel().tolist())
         again = bench.session(SCENARIO, seed, {**settings, "operator.tour.points": aims})
         found.append(visits_of(again, p, center, approach))

@@ -100,7 +100,7 @@ def measure_puncture(bench: Bench, job: Job) -> Puncture:
         return Puncture(float(falls[begin]), math.nan, math.nan, math.nan)
     hears = begin + round(0.5e3 * late)  # the force before this time cannot show the puncture
     led = int(rows["teleop_state"][:, 0].argmax())  # the hand waits until the arm follows
-    end = led + round(1e3 * (_APPROACH + _PUSH))  # from here on the hand itself reduces the force
+    end = led + round(1e3 * (_APPROACH + _PUSH))  # from this sample on the hand itself reduces the force
     push = np.linalg.norm(rows["master_servo_cf"][hears:end, :3], axis=1)
     most = np.maximum.accumulate(push)
     fell = np.flatnonzero(push < (1.0 - NOTICED) * most)

@@ -28,7 +28,7 @@ _PEAK_S = (0.08, 0.0, 0.0, 0.08, 0.02, 0.02)
 _SETTLED_S = (None, 0.12, 0.12, 0.10, None, None)
 _REST = 0.1  # share of (largest error minus error at rest) within which an error has settled
 _SPEED, _SETTLE_S = 0.5, 1.0  # share of the speed limits; rest after the move
-_CURVE = 4  # of how many samples one is drawn
+_CURVE = 4  # every fourth sample is drawn
 _SCALES = np.array([math.degrees(1.0), math.degrees(1.0), 1e3, *[math.degrees(1.0)] * 3])
 _UNITS = ("°", "°", "mm", "°", "°", "°")
 

@@ -11,7 +11,7 @@ from teleop_core.hand.master.haptic_master import HapticMaster
 from teleop_core.kernels.geometry import Array
 from teleop_lab.experiments import one_axis
 
-AXIS = 1  # of the master's base, along which the hand is pushed
+AXIS = 1  # axis of the master's base along which the hand is pushed
 _BLOCK = 500  # ticks for which noise is drawn at once
 _KICK = 1e-4  # speed that the hand is given [m/s]
 _SECONDS, _SETTLE = 0.6, 0.1  # duration of a simulation, and time before the growth is measured [s]

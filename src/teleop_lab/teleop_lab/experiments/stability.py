@@ -32,7 +32,7 @@ _WAYS: tuple[transmission.Way, ...] = (
 _TWO_PORTS = ("tdpa",)
 """Passivities that need the slave's port."""
 _ROUNDS = 8
-_SECONDS = 8.0  # of each session: two touches
+_SECONDS = 8.0  # duration of each session: two touches [s]
 _TOUCH = 2000  # ticks before the tip is on its path
 _WINDOW = 20  # ticks over which a speed is measured: encoder steps are small compared with the motion in this time
 _THROWN = 2.0

@@ -127,7 +127,7 @@ def hybrid_matrix(experiments: Sequence[Ports]) -> Complex:
     """
     given = np.stack([np.stack((ports.hand_speed, ports.tip_force), axis=-1) for ports in experiments], axis=1)
     answers = np.stack([np.stack((ports.hand_force, -ports.tip_speed), axis=-1) for ports in experiments], axis=1)
-    sizes = np.linalg.norm(given, axis=1, keepdims=True)  # of speed and force
+    sizes = np.linalg.norm(given, axis=1, keepdims=True)  # magnitudes of speed and force
     scaled = given / np.where(sizes > 0.0, sizes, 1.0)
     if (np.linalg.matrix_rank(scaled, tol=1e-6) < 2).any():
         raise ParameterError("experiments", len(experiments), "two or more whose worlds differ")

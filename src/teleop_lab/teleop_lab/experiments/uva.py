@@ -52,7 +52,7 @@ class Level(NamedTuple):
     delay: float = 0.0  # mean [s]
     loss: float = 0.0  # share of the increments
     outage: float = 0.0  # mean length [s]
-    pause: float = 0.0  # between two of them [s]
+    pause: float = 0.0  # time between two outages [s]
 
 
 LEVELS = (

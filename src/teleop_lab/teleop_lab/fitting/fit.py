@@ -23,8 +23,8 @@ from teleop_lab.fitting.rest_table import RestTable
 from teleop_lab.fitting.rests import rest_positions
 
 _WEAK = 0.1  # singular value over the largest below which a direction is not identifiable
-_STEP = 0.01  # of differences, in units of the start
-_SHARE = 0.95  # of intervals
+_STEP = 0.01  # step of finite differences, in units of the start value
+_SHARE = 0.95  # confidence level of intervals
 _ROUNDS = 60
 _UNITS = {"coulomb": "N·m or N", "bias": "N·m or N", "weight": "kg·m"}
 _WANDER = 0.3  # with which the effect of varying friction is measured

@@ -14,7 +14,7 @@ from teleop_core.slave.commands import SlaveRow
 from teleop_core.slave.pair import ArmParameters, SimulatedArm, arm_step
 from teleop_core.slave.trajectory import cubic_move, shortest_move_time
 
-_FINE = 1e-4  # of an encoder step
+_FINE = 1e-4  # step of smooth encoders, divided by the real encoder step
 
 
 @kernel

@@ -74,7 +74,7 @@ def _try(part: Architecture) -> None:
     """Push for some samples, so that errors are reported before anything runs."""
     needs = "one with push(numbers, memory, felt, away, period, out) and parameters that all have defaults"
     with tried("architecture", part.name, needs):
-        numbers, _ = fenced(part.numbers(part.parameters()))  # one too far is NaN
+        numbers, _ = fenced(part.numbers(part.parameters()))  # an index one too large reads NaN
         memory, fence = fenced(np.zeros(MEMORY))
         out, behind = fenced(np.zeros(3))
         for size in (0.0, 1.0, -3.0):

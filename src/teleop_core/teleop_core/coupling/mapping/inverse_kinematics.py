@@ -52,7 +52,7 @@ class SolverNumbers(Fields):
     speed: PerJoint  # rated [rad/s or m/s]
     longest_ns: int
     timeout_ns: int
-    tolerance: Annotated[Array, 2]  # of position and rotation [m, rad]
+    tolerance: Annotated[Array, 2]  # tolerances of position and rotation [m, rad]
 
 
 class SolverState(Fields):

@@ -33,18 +33,18 @@ class LimitState(Fields):
 
     command: PoseRow
     hand: Vector3  # position to which the hand moves the slave [m]
-    tool: Quaternion  # how it turns it
+    tool: Quaternion  # tool orientation that the hand commands
     alignment: Quaternion
-    moved: Vector3  # what was cut off all commands so far
+    moved: Vector3  # sum of everything that was cut off commands so far
     turned: Quaternion
     answered_ns: int  # index of the command that was answered last
-    sent: int  # how many there were
+    sent: int  # number of sent commands
     limit: int
     joint: int
     until_ns: int
-    anchor: Vector3  # where the hand met the limit
-    out: Vector3  # which way is out
-    depth: float  # how far beyond it is
+    anchor: Vector3  # position at which the hand reached the limit
+    out: Vector3  # outward direction
+    depth: float  # distance beyond the limit
     turn_anchor: Quaternion
     turn_out: Vector3
     turn_depth: float

@@ -36,7 +36,7 @@ class ScalingNumbers(
     slave_master: Quaternion
     axis: Annotated[Integers, 3]
     sign: Vector3
-    size: Vector3  # of the fixture [m]
+    size: Vector3  # size of the fixture [m]
     rotation_gain: float
     reach_stiffness: float  # [N/m]
     reach_depth: float  # [m]
@@ -302,7 +302,7 @@ class MotionScaling(RunningStage):
 
     def __init__(self, parameters: gains.MotionScalingParameters, dt: float = DT) -> None:
         super().__init__(MOTION_SCALING, 0, dt)
-        self.changes_itself = True  # its mode, by a button
+        self.changes_itself = True  # a button changes the stage's mode
         self.parameters, self.state = record(ScalingNumbers), record(ScalingState)
         self._sent = record_array(limits.Sent, limits.SENT)
         self._values = parameters

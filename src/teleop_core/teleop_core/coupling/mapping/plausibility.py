@@ -62,7 +62,7 @@ class PlausibilityNumbers(Fields):
     hand_acceleration: float  # [m/s²]
     hand_turn: float  # [rad/s]
     hand_reach: float  # [m]
-    silence_ns: int  # of buttons
+    silence_ns: int  # allowed silence of the buttons
     pause_ns: int  # pause after which any sample is plausible
 
 
@@ -72,7 +72,7 @@ class PlausibilityState(Fields):
     raw: PoseRow
     raw_rate: Vector3
     raw_ns: int
-    raw_elapsed_ns: int  # from the sample before
+    raw_elapsed_ns: int  # time since the previous sample
     implausible: int
     is_doubted: int
     is_lost: int

@@ -46,7 +46,7 @@ class ReflectionState(FollowingState):
     heard: float  # share of the force that counts
     seen: float  # share of the slave's place that counts
     push: Vector3  # the last one [N]
-    pushed_at: Vector3  # where it began [m]
+    pushed_at: Vector3  # position at which the push began [m]
     scale: float  # the hand's energy, divided by the slave's
     command: PoseRow  # position to which the hand moves the slave
     led_from: PoseRow  # the same before

@@ -29,7 +29,7 @@ class WallState(Fields):
     """Fields of a state record with the last sample."""
 
     felt: Vector3  # place [m]
-    rate: Vector3  # its smoothed rate [m/s]
+    rate: Vector3  # smoothed rate of the hand [m/s]
 
 
 # The speed is that of the readings after a first-order lag. Its time constant is the time in which the hand moves this

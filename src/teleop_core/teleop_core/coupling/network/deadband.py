@@ -23,7 +23,7 @@ class DeadbandNumbers(Fields):
 
     has_deadband: int
     place: float  # [m]
-    chord: float  # between quaternions
+    chord: float  # chord between quaternions
     force_share: float
     least_force: float  # [N]
     longest_ticks: int
@@ -32,7 +32,7 @@ class DeadbandNumbers(Fields):
 class DeadbandState(LinkState):
     """Fields of a state record with the values of the last packets."""
 
-    told_pose: Annotated[Array, 2, 7]  # of each direction
+    told_pose: Annotated[Array, 2, 7]  # last sent poses of both directions
     told_force: Annotated[Array, 2, 3]  # [N]
 
 

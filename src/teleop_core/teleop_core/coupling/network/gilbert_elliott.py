@@ -48,7 +48,7 @@ def gilbert_elliott_draw(numbers: Array, memory: Array, chances: Array, now: flo
     if memory[0] < 1.0:
         at = 4 if memory[1] > 0.0 else 2
         length = numbers[at + 1] * ((1.0 - chances[1]) ** (-1.0 / numbers[at]) - 1.0)
-        memory[0] = float(int(min(length, 1e9))) + 1.0  # and one that passes
+        memory[0] = float(int(min(length, 1e9))) + 1.0  # the burst, and one packet that passes
     memory[0] -= 1.0
     return LOST if memory[0] >= 1.0 else 0.0
 

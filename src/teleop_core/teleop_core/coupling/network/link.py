@@ -42,7 +42,7 @@ class LinkState(Fields):
     behind: int  # ticks by which the present tick is late
     sent: _BothWays
     lost: _BothWays
-    newest: _BothWays  # that arrived
+    newest: _BothWays  # newest packets that arrived
     last_due: _BothWays  # tick
     sent_tick: _BothWays
     arrived: _BothWays  # whether one just came

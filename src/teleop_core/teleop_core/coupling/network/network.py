@@ -69,7 +69,7 @@ class NetworkState(deadband.DeadbandState):
 
     sent_ns: int
     first_ns: int  # time of the first tick
-    base: Vector3  # from where increments count [m]
+    base: Vector3  # origin of increments [m]
 
 
 @inner

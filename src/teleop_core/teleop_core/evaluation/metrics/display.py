@@ -15,7 +15,7 @@ class DisplayMetric(Metric):
     rate_hz = figure("Hz", "shown frames per second whose pose differs from the frame before", "frames")
 
     def __init__(self, _: Context) -> None:
-        self._log_ns = self._stamp_ns = NO_COMMAND_NS  # of the newest frame
+        self._log_ns = self._stamp_ns = NO_COMMAND_NS  # times of the newest frame
         self._frames, self._span_s, self._seen = 0, 0.0, 0.0
 
     def add(self, window: Window) -> None:

@@ -105,7 +105,7 @@ class ReachMetric(Metric):
             return
         stretch = np.cumsum(np.diff(is_off, prepend=True) != 0)
         sums = np.bincount(stretch, weights=np.where(is_off, spans, 0.0))
-        sums[0] += self._open_s  # until the first change, the earlier stretch continues
+        sums[0] += self._open_s  # the earlier stretch continues until the first change
         self._longest_s = max(self._longest_s, float(sums.max()))
         self._open_s = float(sums[-1]) if is_off[-1] else 0.0
 

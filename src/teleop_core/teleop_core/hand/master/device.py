@@ -112,7 +112,7 @@ class Handle(NamedTuple):
 class ReadingNumbers(Fields):
     """Fields of a parameter record with the resolution of the device."""
 
-    resolution: float  # of its place [m]
+    resolution: float  # resolution of the position [m]
     gimbal: float  # bound of the noise of its attitude [rad]
 
 

@@ -14,7 +14,7 @@ from teleop_core.kernels.room import room
 
 _FASTEST = 1.5
 """Largest phase [rad] of the oscillation of hand against device in one step of constant friction."""
-_PLACE, _SPEED, _HAND, _HAND_SPEED = range(4)  # what a step gives
+_PLACE, _SPEED, _HAND, _HAND_SPEED = range(4)  # indices of the results of a step
 _PUSH = 5  # index of the last input of a step
 
 
@@ -49,20 +49,20 @@ class HandNumbers(Fields):
     """Fields of a parameter record with the mechanics of hand and device."""
 
     friction: float  # dry, of the device [N]
-    steps: int  # of equal length, in a tick
-    flow: Annotated[Array, 2, 3, 4, 6]  # of join()
-    center: Vector3  # of the workspace [m]
-    half: Vector3  # of its sides [m]
+    steps: int  # number of equal steps in a tick
+    flow: Annotated[Array, 2, 3, 4, 6]  # matrices of join()
+    center: Vector3  # centre of the workspace [m]
+    half: Vector3  # half of the workspace's sides [m]
 
 
 class HandState(Fields):
     """Fields of a state record with position and speed of hand and device."""
 
-    position: Vector3  # of the device [m]
+    position: Vector3  # position of the device [m]
     speed: Vector3  # [m/s]
-    hand: Vector3  # where the hand is [m]
+    hand: Vector3  # position of the hand [m]
     hand_speed: Vector3
-    wanted: Vector3  # where it wants to be [m]
+    wanted: Vector3  # wanted position of the hand [m]
 
 
 @inner

@@ -29,7 +29,7 @@ POSE_MESSAGES = (
 """Message types with the pose of a stylus; the last type has joint positions instead."""
 RATE_MESSAGE = "sensor_msgs/msg/Joy"
 """Message type in which gamepads and 3-D mice send the speed of the stylus."""
-_OFF_UNIT = 1e-2  # of a quaternion's length
+_OFF_UNIT = 1e-2  # tolerance of a quaternion's length
 _THREE = ("+x", "+y", "+z")
 
 

@@ -23,14 +23,14 @@ class OperatorNumbers(Fields):
     """Parameter record of the operator."""
 
     tremor: float  # amplitude [m]
-    frequency: float  # of the tremor [Hz]
+    frequency: float  # frequency of the tremor [Hz]
     patience_ns: int
 
 
 class OperatorState(Fields):
     """State record of the operator."""
 
-    phase: Vector3  # of the tremor [rad]
+    phase: Vector3  # phase of the tremor [rad]
     wander: Vector3
     next: int
     next_noise: int

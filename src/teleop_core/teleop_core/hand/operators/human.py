@@ -313,7 +313,7 @@ def tremor(size: float, rng: np.random.Generator) -> Motion:
     angles = first + (last - first) * places
     rates = 2.0 * math.pi * (_PEAK + _HALF_WIDTH * np.sin(angles) / np.cos(angles))
     phases = rng.uniform(0.0, 2.0 * math.pi, (3, _LINES))
-    share = (high - low) / (last - first)  # of its power within the band
+    share = (high - low) / (last - first)  # share of the power within the band
     amplitude = size * math.sqrt(2.0 / (3 * _LINES * share))
 
     def motion(times: Array) -> Array:

@@ -52,7 +52,7 @@ class Observer:
         self._room = HandRoom(setting.common.device.corners, p.largest_turn)
         self._rng = np.random.default_rng((setting.seed, 3))
         self._glances = Glances(p.eye)
-        self._hand = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])  # where the last submovement ends
+        self._hand = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])  # pose at which the last submovement ends
         self._softness = p.softness  # last felt compliance: displacement per newton [m/N]
         self._move: Move | None = None
         self._turns = False  # whether the last submovement turns the stylus
@@ -62,7 +62,7 @@ class Observer:
         self._is_still = self._was_felt = False  # whether the end of the last motion was seen, or only felt
         self._close = -math.inf  # when the hand closes for a moment [s]
         self._holds, self._since = False, -math.inf  # whether the hand stays closed, and since when
-        self._lag = -1.0  # how late the last motion was seen, without the eye's delay [s]; < 0: not known
+        self._lag = -1.0  # delay with which the last motion was seen, without the eye's delay [s]; < 0: not known
 
     def __call__(self, times: Array) -> Array:
         """Rows (N, 13) of :data:`~teleop_core.hand.operators.Motion` for times (N,) [s]."""

@@ -20,8 +20,8 @@ __all__ = ["REMOTE", "Person", "RemoteHand", "RemoteParameters", "remote_operato
 AHEAD = follower.MOST
 """Largest number of ticks per call. A new target takes effect at most this many ticks late."""
 BUTTONS = ("clutch", "fixture", "mode")
-_PRESSED, _BETWEEN = 0.1, 0.05  # how long a button is pressed, and released at least [s]
-_UNIT = 1e-3  # how far a quaternion may be from unit length
+_PRESSED, _BETWEEN = 0.1, 0.05  # shortest times for which a button is pressed, and released [s]
+_UNIT = 1e-3  # tolerance of a quaternion's length
 _FARTHEST = 10.0  # poses farther than this from the master's base are refused [m]
 
 

@@ -19,7 +19,7 @@ from teleop_core.kernels.room import room
 _SLACK = 1e-9
 # Amplitude below which an equation does not determine its angle; the angle is then the seed.
 _FREE = 1e-12
-_STEPS = 60  # of a bracketed Newton search
+_STEPS = 60  # largest number of steps of a bracketed Newton search
 
 
 @inner

@@ -101,7 +101,7 @@ def load_urdf(
     reach = sum(float(length(joint.origin[:3, 3])) for joint in chain)
     reach += sum(max(map(abs, urdf_tree.limits_of(j))) for j in moving if j.kind == "prismatic")
     home, n = np.array([limit.home for limit in limits]), len(limits)
-    may_be_any = dynamics == "independent"  # whose inertia counts as assumed
+    may_be_any = dynamics == "independent"  # the inertia then counts as assumed
     bodies, inertia = _bodies(moving, base, links, joints, may_be_any), np.zeros((n, n))
     chain_numbers = chain_row(kinds, fixed, bodies, np.zeros(len(moving)))
     follower_inertia(home, dynamics_row(followers, chain_numbers, np.zeros(n)), inertia)

@@ -36,7 +36,7 @@ EDGE = 2
 """Nodes at each end of the grid where the spline is not used, because it is straight there."""
 _MADE = "1"  # must change when a file is converted differently
 _MOST = 4_000_000  # nodes of a grid, 32 MB
-_SIDES = (1e-3, 2.0)  # of a mesh's longest side [m]
+_SIDES = (1e-3, 2.0)  # allowed length of a mesh's longest side [m]
 _THINNEST = 4.0  # steps across the shortest side of a mesh
 _SHARP = math.cos(math.radians(30.0))
 

@@ -14,13 +14,13 @@ class DriveNumbers(Fields):
 
     upper: float  # largest angle [rad]
     effort: float  # largest one of the drive [N·m]
-    stiffness: float  # of the control law [N·m/rad]
-    damping: float  # of the control law [N·m·s/rad]
+    stiffness: float  # stiffness of the control law [N·m/rad]
+    damping: float  # damping of the control law [N·m·s/rad]
     inertia: float  # [kg·m²]
     friction: float  # viscous [N·m·s/rad]
-    length: float  # of a finger [m]
-    size: float  # of the object [m]
-    pad_stiffness: float  # of both pads and the object [N/m]
+    length: float  # length of a finger [m]
+    size: float  # size of the object [m]
+    pad_stiffness: float  # stiffness of both pads and the object [N/m]
     pad_damping: float  # [N·s/m]
 
 
@@ -30,8 +30,8 @@ class DriveState(Fields):
     setpoint: float  # [rad]
     angle: float  # [rad]
     velocity: float  # [rad/s]
-    effort: float  # of the drive [N·m]
-    force: float  # of each finger on the object [N]
+    effort: float  # effort of the drive [N·m]
+    force: float  # force of each finger on the object [N]
     is_between: int  # whether the object is between the fingers
 
 

@@ -32,15 +32,15 @@ _LETS_GO = 0.01  # a setpoint wider than the grip's tightest one by more than th
 class GripNumbers(drive.DriveNumbers):
     """Parameter record of the jaw."""
 
-    objects: int  # how many there are
+    objects: int  # number of objects
     place: Vector3  # initial position of the first object on the table [m]
-    pegs: int  # how many there are
-    axes: Annotated[geometry.Array, 2 * PEGS]  # of the pegs, x and y of each [m]
+    pegs: int  # number of pegs
+    axes: Annotated[geometry.Array, 2 * PEGS]  # axes of the pegs, x and y of each [m]
     peg_height: float  # [m]
     clearance: float  # clearance of a peg in an object, on each side [m]
     mass: float  # [kg]
     pad_friction: float
-    second_base: Vector3  # of the second arm, in the first one's [m]
+    second_base: Vector3  # position of the second arm's base in the first arm's base [m]
 
 
 class GripState(drive.DriveState):
@@ -48,7 +48,7 @@ class GripState(drive.DriveState):
 
     tip_ns: int
     tips: Annotated[geometry.Array, 14]  # pose of each hand's tip; second arm: last two of its own tip
-    held: Vector3  # of the second arm: the object's middle in the tip's frame as the grip began [m]
+    held: Vector3  # middle of the second arm's object in the tip's frame when the grip began [m]
     forces: Annotated[geometry.Array, 2]  # force of each hand's fingers on its object [N]
     numbers: Annotated[Integers, 2]  # number of the object that each hand moves, or moved last
     objects: Annotated[geometry.Array, 7 * topics.JAW_OBJECTS]  # poses
@@ -60,7 +60,7 @@ class GripState(drive.DriveState):
     dropped: int
     is_gripped: int
     tightest: float  # setpoint of the present grip [rad]
-    slid: float  # in the present grip [m]
+    slid: float  # sliding distance in the present grip [m]
     grips: int
     slips: int
     drops: int

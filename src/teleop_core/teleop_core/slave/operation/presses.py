@@ -21,7 +21,7 @@ class Presses:
     def __init__(self) -> None:
         self._last: dict[bytes, int] = {}
         self._heard_ns: dict[bytes, int] = {}
-        self._holders: dict[bytes, None] = {}  # in the order of their presses
+        self._holders: dict[bytes, None] = {}  # pressed buttons, in the order of their presses
         self._doubted: set[bytes] = set()
         self._missing = self._told = 0
 

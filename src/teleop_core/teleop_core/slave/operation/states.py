@@ -88,7 +88,7 @@ class OperatingState(Fields):
     is_homing: int
     must_plan: int  # a move is to be planned; during homing, to the start position
     is_stopped: int  # an emergency stop is latched
-    is_pressed: int  # its cause is still there
+    is_pressed: int  # the cause of the stop still exists
     is_moving: int  # the arm is not at rest
     must_home: int  # a pause interrupted homing; resume restarts homing
     fault: int

@@ -35,7 +35,7 @@ class ButtonState(Fields):
 
     gap: float  # gap of the tip along the present normal [m]
     is_pressed: int
-    presses: int  # so far
+    presses: int  # number of presses so far
     held: float  # bend of the friction's spring, positive inwards [m]
 
 
@@ -141,7 +141,7 @@ def count_presses(depths: Array, parameters: ButtonParameters, *, is_pressed: bo
         Number of new presses, and whether the button is pressed at the end.
     """
     is_down = depths >= parameters.stroke
-    is_known = is_down | (depths <= parameters.click_travel)  # in between it stays as it was
+    is_known = is_down | (depths <= parameters.click_travel)  # between both depths the state does not change
     states = np.append(is_pressed, is_down[is_known])
     return int(np.sum(states[1:] & ~states[:-1])), bool(states[-1])
 

@@ -29,7 +29,7 @@ class WorldNumbers(PunctureNumbers, ButtonNumbers):
     world_damping: float
     world_friction: float
     world_center: Vector3
-    tool_length: float  # from the tip to the last of several points [m]
+    tool_length: float  # distance from the tip to the last of several points [m]
     tool_radius: float  # [m]
 
 

@@ -29,7 +29,7 @@ class PunctureState(Fields):
     normal: Vector3
     stuck: Vector3  # bend of the bristle across the normal [m]
     is_open: int  # the tip is in the channel, or above its hole
-    punctures: int  # so far
+    punctures: int  # number of punctures so far
     hole: Vector3  # position of the hole, from the middle of the object [m]
     channel: Vector3  # direction of the channel, a unit vector out of the object
     cut: float  # depth from which tissue ahead of the tip resists [m]
