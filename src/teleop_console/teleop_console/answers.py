@@ -64,15 +64,15 @@ class Answers:
 
     Args:
         drivers: Receives the signs of life of pages.
-        form: What is shown while nothing runs; None for the form on which sessions are chosen.
+        form: Form that is shown while no session runs; None for the form that chooses a session.
 
     Attributes:
-        situation: What pages show; the session or replay that is shown writes it.
+        situation: Data that pages show; the shown session or replay writes it.
         stop: Presses the emergency stop; it must not block.
         jaw: Closes the hand by a share, 0 to 1; it must not block.
         start: The form on which sessions are chosen.
         strip: The strip of time.
-        form: What is shown while nothing runs.
+        form: Form that is shown while no session runs.
     """
 
     def __init__(self, drivers: Drivers, form: Form | None = None) -> None:

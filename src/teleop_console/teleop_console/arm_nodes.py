@@ -61,7 +61,7 @@ class ArmNodes:
 
     Attributes:
         bodies: Bodies of its robot.
-        world: What its tip touches.
+        world: Object that its tip can touch.
         jaw: Its fingers, and what they grip.
         low: Lowest corner (3,) [m] of the space that arm and master take, in slave_base.
         high: Highest corner (3,) [m].

@@ -61,8 +61,8 @@ class Connection(ws.ServerConnection):
     Args:
         gate: Decides about its messages.
         crowd: Connections of the same server.
-        arguments: As the library gives them.
-        options: As the library gives them.
+        arguments: Arguments from the library.
+        options: Options from the library.
 
     Attributes:
         budget: Frames and bytes that the browser may still send.

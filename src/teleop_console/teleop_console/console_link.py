@@ -46,10 +46,10 @@ class LiveLink(Observer):
 
     Args:
         domain: ROS domain of the session.
-        title: What it is called.
+        title: Name of the session.
         patience: Time in which an arm must be found [s].
         button: Stop button that may have been pressed before the arm was found; None for a new button.
-        world: Where it is.
+        world: World of the session.
 
     Raises:
         SessionError: There is no arm on this domain, or an arm does not report its robot.

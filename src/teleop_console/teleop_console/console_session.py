@@ -148,7 +148,7 @@ def show_session(
 
     Args:
         server: The page.
-        configuration: What runs.
+        configuration: Configuration of the session.
         out: Directory of the recording.
         is_over: Returns whether the session must end; called at every drawing with the present view.
         renew: As in :class:`~teleop_console.app.Console`.

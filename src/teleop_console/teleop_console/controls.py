@@ -26,7 +26,7 @@ class Control:
 
     Attributes:
         name: Label of the button.
-        hint: What the button does, shown when the pointer is over it.
+        hint: Effect of the button, shown when the pointer is over it.
         act: ``act(link, arm)`` does the action for the arm with this name (empty for the default arm), and
             returns the result as :data:`Answers`. It runs in a separate thread. The link sends commands
             (``link.command``), sets parameters (``link.change``), and more. If the last answer is no, the page

@@ -16,7 +16,7 @@ class LiveScores:
     The scores of a recording use every sample; these figures are a preview.
 
     Attributes:
-        time: How long the arm has followed the hand [s], without clutched time.
+        time: Time for which the arm has followed the hand [s], without clutched time.
         way: Length of the tip's path [m].
         rms: RMS distance between wanted and measured position [m].
         largest: Largest distance between wanted and measured position [m].

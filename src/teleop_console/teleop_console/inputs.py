@@ -57,7 +57,7 @@ class Input:
         names: Names of a vector's numbers; if their count does not match, x, y, z or 1, 2, ... are used.
 
     Attributes:
-        kind: Which of :data:`KINDS` it is.
+        kind: Kind of value, one of :data:`KINDS`.
         parts: Its elements, one for each number of a vector.
     """
 

@@ -59,7 +59,7 @@ class JawNodes:
         """Set the sizes from parameters of the jaw.
 
         Args:
-            values: By their names in the group ``jaw_sim``; none of a session without.
+            values: Parameters by their names in the group ``jaw_sim``; empty for a session without this group.
         """
         values = {name: values[name] for name in _DRAWN if name in values}
         if values == self._values:

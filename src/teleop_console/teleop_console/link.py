@@ -59,7 +59,7 @@ class View:
 
     Attributes:
         time: Time since the beginning of the session [s].
-        arms: By namespace.
+        arms: Views of the arms, by namespace.
         is_fresh: Whether streams arrive; false if the session is silent or has ended.
         news: Warnings of the nodes, a line each.
         delay: Median and 99th percentile from master sample to slave command [s]; NaN if unknown.
@@ -120,7 +120,7 @@ class SessionLink(Protocol):
 
     Attributes:
         arms: The arms, the default one first.
-        title: What the session is called: scenario or recording.
+        title: Name of the session: scenario or recording.
         is_live: Whether it can be commanded; false for a recording.
     """
 

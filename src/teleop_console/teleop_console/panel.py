@@ -31,7 +31,7 @@ class Panel:
     Args:
         server: The page.
         link: The session.
-        drivers: Who drives.
+        drivers: Object that knows which page drives.
         renew: Begins a new session with other settings, and returns why it does not, empty if it
             does; None where the session is not ours.
         of_session: Parameters of the session as a whole, which no node has.

@@ -48,7 +48,7 @@ class ParameterClient:
     """Asks nodes for their parameters; the caller must spin an executor.
 
     Args:
-        owner: Whose clients they are.
+        owner: Node that owns the clients.
     """
 
     def __init__(self, owner: Owner) -> None:

@@ -26,7 +26,7 @@ class Entry:
 
     Attributes:
         name: Its name in the folder.
-        made: When it was closed [s since 1970].
+        made: Time at which it was closed [s since 1970].
         about: Scenario, robot and length, a line; empty before they are known.
         verdict: Line that names the worst first; empty before it is known.
         is_good: Whether all figures are within their bounds; None before this is known.
@@ -43,7 +43,7 @@ class Recordings:
     """Recordings of a folder.
 
     Args:
-        folder: Where they are.
+        folder: Folder of the recordings.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -74,7 +74,7 @@ class Recordings:
 
         Args:
             kind: ``score`` or ``export``.
-            names: Of the recordings, at least one; several are compared.
+            names: Names of the recordings, at least one; several are compared.
 
         Raises:
             ParameterError: A name is that of no recording, or the kind is another.

@@ -25,7 +25,7 @@ def targets_of(parameters: Parameters, arm: str) -> Array:
     """Points (N, 3) [m] in master_base to which the operator of an arm moves; empty for operators without points.
 
     Args:
-        parameters: As :meth:`~teleop_console.link.SessionLink.parameters` gives them.
+        parameters: Result of :meth:`~teleop_console.link.SessionLink.parameters`.
         arm: Namespace of the arm.
     """
     node = f"{arm}/operator" if arm else "operator"

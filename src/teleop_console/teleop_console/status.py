@@ -90,7 +90,7 @@ def next_step(view: View, *, is_led_here: bool) -> str:
     """What an operator does next; empty where nothing is to be done.
 
     Args:
-        view: What is known.
+        view: Newest data of the session.
         is_led_here: Whether a person at the page moves the hand.
     """
     button = next_button(view)

@@ -232,7 +232,7 @@ class Steps:
 
     Args:
         server: The page.
-        stylus: What moves.
+        stylus: Stylus that moves.
         arms: Namespaces of the arms; keys move the chosen one.
         may_drive: Whether a browser may command the arms.
     """

@@ -26,8 +26,8 @@ class Tail:
     Args:
         server: The page.
         name: Path of its node.
-        color: Where it is new.
-        thickness: Of the line [px].
+        color: Colour of the newest part.
+        thickness: Thickness of the line [px].
     """
 
     def __init__(self, server: viser.ViserServer, name: str, color: Color, thickness: float = 2.5) -> None:

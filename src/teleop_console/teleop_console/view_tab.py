@@ -34,8 +34,8 @@ class ViewTab:
 
     Args:
         server: The page.
-        scene: What they control.
-        visitors: Whose cameras are moved.
+        scene: Scene that they control.
+        visitors: Visitors whose cameras are moved.
     """
 
     def __init__(self, server: Server, scene: Scene, visitors: "Visitors") -> None:
@@ -86,7 +86,7 @@ class Insets:
 
     Args:
         server: The page.
-        scene: What is seen.
+        scene: Scene of the page.
     """
 
     def __init__(self, server: viser.ViserServer, scene: Scene) -> None:
@@ -156,10 +156,10 @@ class _Fit:
     """What the camera of a browser shows.
 
     Attributes:
-        since: When it came [s].
+        since: Time at which the page was opened [s].
         aspect: Width over height of its picture.
-        looked: When its picture was last compared with the work [s].
-        camera: What it was given.
+        looked: Time at which its picture was last compared with the work [s].
+        camera: Camera that was last set for it.
         is_own: Whether the person at the browser has chosen another view.
     """
 
@@ -182,8 +182,8 @@ class Visitors:
 
     Args:
         server: The page.
-        drivers: Who drives.
-        scene: What is seen.
+        drivers: Object that knows which page drives.
+        scene: Scene of the page.
         is_live: Whether it is a session, and not a recording.
     """
 

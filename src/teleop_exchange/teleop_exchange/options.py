@@ -72,9 +72,9 @@ class ImportOptions:
         angles: Unit of Euler angles and rotation vectors: ``auto``, ``rad`` or ``deg``.
         orientation: ``auto``: guessed if no columns are given; ``none``: constant.
         clutch: Column of the button, pressed above ``threshold``; empty for none.
-        fixture: As ``clutch``.
-        mode: As ``clutch``.
-        threshold: Above it a button is pressed.
+        fixture: Column of the fixture button, as for ``clutch``.
+        mode: Column of the mode button, as for ``clutch``.
+        threshold: Value above which a button counts as pressed.
         skip: Lines to leave out at the beginning of a text.
         episode: Number of the recording in a table that contains several; None if it contains one.
         topic: Topic of the poses in a bag, or the end of its name; empty if there is only one.

@@ -44,7 +44,7 @@ def grade(
     Args:
         data: Folder of a LeRobot data set, or a table with a column of episodes.
         figures: Keys below ``motion.hand`` of a score.
-        options: As of :func:`teleop_exchange.import_recording`: columns, units, frames.
+        options: As in :func:`teleop_exchange.import_recording`: columns, units, frames.
         recordings: Folder for a recording of each episode; None for no recordings.
         say: Called with a line after each episode.
 

@@ -29,7 +29,7 @@ def decompress(name: str, data: bytes, size: int) -> bytes:
     A chunk larger than :data:`LARGEST` is not unpacked, whatever size its record states.
 
     Args:
-        name: As in the chunk's record; empty for none.
+        name: Name in the chunk's record; empty for none.
         data: Compressed bytes.
         size: Size that the unpacked chunk must have, [bytes].
 

@@ -29,7 +29,7 @@ class Layout:
     """Bytes of every message of one stream.
 
     Attributes:
-        kind: What the values are.
+        kind: Kind of the values.
         joint_names: Names in the order of the columns; empty without joints.
         frame_id: Frame in the header.
         size: Bytes of one message.
@@ -197,7 +197,7 @@ def discover(kind: Kind, data: bytes) -> Layout | None:
     """Layout of the stream that a message comes from; None if the message fits no layout.
 
     Args:
-        kind: What the values are. For joints, the message itself decides whether it has velocity and effort.
+        kind: Kind of the values. For joints, the message itself decides whether it has velocity and effort.
         data: CDR of the stream's first message.
     """
     try:

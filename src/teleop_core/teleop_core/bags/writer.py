@@ -51,7 +51,7 @@ class BagWriter:
         topics: Topics that may be written; topics that the parameters deselect are ignored.
         joint_names: Joints of the robot, in the order of the columns. For several arms: the joints of each arm, by its
             namespace.
-        parameters: Which topics are recorded, at what rate and how compressed.
+        parameters: Recorded topics, their rates and the compression.
         compression: Replaces ``parameters.compression``.
         metadata: Names and texts stored with the recording: configuration, seed.
         start_ns: Log time at which the session starts, [ns].

@@ -183,7 +183,7 @@ def part_check(kind: str, form: type[Part], *calls: str) -> Callable[[str, objec
     """Check of a registry whose parts are dataclasses with ``parameters`` and functions.
 
     Args:
-        kind: As the registry's.
+        kind: Kind of the registry's parts.
         form: Class of its parts.
         calls: Names of the attributes that must be callable.
     """
@@ -209,7 +209,7 @@ def tried(kind: str, name: str, needs: str) -> Iterator[None]:
     """Convert exceptions of a part inside this ``with`` into a :class:`PartError`.
 
     Args:
-        kind: As the registry's.
+        kind: Kind of the registry's parts.
         name: Name of the part.
         needs: Requirement on the part: "one with ...".
 

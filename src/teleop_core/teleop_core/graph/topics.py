@@ -179,9 +179,9 @@ class Topic:
     Attributes:
         name: Name below the arm's namespace, such as ``slave/servo_cp``.
         kind: Kind of its values.
-        stamp: Which time its header carries.
+        stamp: Meaning of the stamp in its header.
         frame_id: Frame of the header, below the arm's namespace.
-        quality: How it is transported.
+        quality: QoS of the topic.
         columns: Names of the numbers, of reports and of :attr:`Kind.NUMBERS`; else empty.
         adds_to: Name of a topic whose readers get the sum of both, such as ``master/servo_cf`` for
             another source of force; empty for a topic of its own.

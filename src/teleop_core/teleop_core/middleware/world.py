@@ -55,8 +55,8 @@ class Endpoint(NamedTuple):
         node: Name of its node, with the namespace and a leading slash.
         sender: As in :class:`Taken`; for a reader, its own number.
         ros_type: Type of its messages, such as ``sensor_msgs/msg/JointState``.
-        is_reliable: As of :class:`Qos`.
-        is_latched: As of :class:`Qos`.
+        is_reliable: As in :class:`Qos`.
+        is_latched: As in :class:`Qos`.
     """
 
     node: str

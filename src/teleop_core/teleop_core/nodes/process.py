@@ -60,7 +60,7 @@ class Watching(Protocol):
     """Watcher that ends a process.
 
     Attributes:
-        word: What the process is doing: starting, at work, ending, leaving.
+        word: Activity of the process: starting, at work, ending, leaving.
     """
 
     word: str

@@ -78,7 +78,7 @@ class Watch:
         parent: Line to the parent, if there is one.
 
     Attributes:
-        word: What the process is doing: starting, at work, ending, leaving.
+        word: Activity of the process: starting, at work, ending, leaving.
     """
 
     def __init__(self, crew: Crew, signals: int, parent: Parent | None) -> None:

@@ -135,7 +135,7 @@ def load_robot_set(name: str, settings: Iterable[str]) -> Robot:
     """Robot by name, with its geometry as texts ``symbol=value``; gives no warnings.
 
     Args:
-        name: As for :func:`load_robot`.
+        name: As in :func:`load_robot`.
         settings: Lengths and angles [m, rad] such as ``L6=0.04``, options such as
             ``heading=carried``, or arguments of a xacro such as ``xacro.prefix=left_``.
 

@@ -41,7 +41,7 @@ class LinkErrors:
 
     Args:
         a: Along the common normal, (n,) [m].
-        alpha: Of the twist about it, (n,) [rad].
+        alpha: Errors of the twist about the common normal, (n,) [rad].
         d: Along the joint's axis, (n,) [m]; the offset of a sliding joint.
         theta: About the joint's axis, (n,) [rad]; the offset of a turning joint.
 
@@ -110,7 +110,7 @@ class Chain:
     """A serial arm T_base_tip = F0 J1 F1 J2 ... Jn Fn, Ji about or along the local z axis.
 
     Args:
-        kinds: Of each joint as in :mod:`~teleop_core.kinematics.dh_kernels`, (n,).
+        kinds: Kind of each joint as in :mod:`~teleop_core.kinematics.dh_kernels`, (n,).
         fixed: Transforms F0 ... Fn, (n + 1, 4, 4).
         row: Geometry row of the kernels.
     """

@@ -83,7 +83,7 @@ def file_of(name: str) -> tuple[Path, dict[str, str]] | None:
     """File of a robot's name, and arguments that come with it for a xacro; None of other names.
 
     Raises:
-        TeleopError: As :func:`~teleop_core.robots.files.descriptions.description_file`.
+        TeleopError: As in :func:`~teleop_core.robots.files.descriptions.description_file`.
     """
     if name.endswith(DESCRIPTION) and name not in ROBOTS.names():
         from teleop_core.robots.files.descriptions import description_file

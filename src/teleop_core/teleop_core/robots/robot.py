@@ -78,9 +78,9 @@ class Robot:
         row: Numbers for the kernels (k,); None for the values of the geometry.
         drives: Drive table, None for robots that are not used as slaves.
         dynamics: Rigid-body model; None for independent axes.
-        hardware: How the real arm differs from its model; None if unknown.
+        hardware: Differences between the real arm and its model; None if unknown.
         task_mask: Directions that the robot controls: x, y, z, then rotations about x, y, z.
-        solution: How inverse kinematics are solved, in words; empty if unknown.
+        solution: Text about the method of inverse kinematics; empty if unknown.
         visuals: Shapes of its links, if its file has them; nothing is read before it is drawn.
         notes: Texts about content of its file that may have been read differently from the author's intention.
         describe: Draws its bodies (:func:`teleop_core.robots.bodies.bodies_of`), for joints that are not a chain; None

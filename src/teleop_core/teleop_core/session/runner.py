@@ -36,7 +36,7 @@ def simulate(configuration: Configuration, out: Path, progress: Progress = silen
     """Run a session in virtual time and record it.
 
     Args:
-        configuration: What runs.
+        configuration: Configuration of the session.
         out: Directory of the recording, made here.
         progress: Called with ticks done and ticks in all, after every simulated second.
 

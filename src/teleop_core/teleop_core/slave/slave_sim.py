@@ -199,7 +199,7 @@ class SlaveSim(RunningStage):
         """Take new parameters from the next tick on; a law with ``shift`` keeps the effort continuous.
 
         Raises:
-            ParameterError: As :meth:`examine`, unless these parameters were examined before; nothing has changed then.
+            ParameterError: See :meth:`examine`; unless these parameters were examined before; nothing has changed then.
         """
         if parameters is not self._examined:
             self.examine(parameters)

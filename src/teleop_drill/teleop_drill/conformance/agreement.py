@@ -31,7 +31,7 @@ class Trail:
     """Messages of one topic during a motion.
 
     Attributes:
-        sent: When each was sent, shape (N,) [s].
+        sent: Time of sending of each sample, shape (N,) [s].
         stamp: Time of its sample, shape (N,) [s].
         place: Joint positions or position of the tip, shape (N, k).
         rate: Velocities, shape (N, k); empty if the topic has none.

@@ -173,7 +173,7 @@ class Exercise:
         text: Description of the fault.
         inject: Causes the fault; returns when the fault has begun, or is over.
         undo: Removes a fault that lasts.
-        motion: What the arm does during the fault.
+        motion: Allowed motion of the arm during the fault.
         states: Operating states that may follow; None among them: the slave is gone.
         faults: Faults that may be reported; empty for any or none.
         cures: Actions that the arm may need before it moves again.

@@ -68,15 +68,15 @@ class Seen:
     """Messages of one fault that an independent tap received.
 
     Attributes:
-        begin_ns: When the fault began [ns].
-        end_ns: When the fault was removed [ns].
+        begin_ns: Begin of the fault [ns].
+        end_ns: End of the fault [ns].
         setpoint_js: Joint setpoints.
         measured_js: Joints that the slave measures: position, speed, effort.
         true_cp: True pose of the tip, from the plant.
-        told_ns: When ``slave/operation`` first reported a state or a fault [ns]; None if it did not.
-        warned_ns: When a node first warned of something new [ns]; None if none did.
-        scheduling: How late this machine woke the drill during the fault.
-        deaf: For how long the slave's process stood still [s].
+        told_ns: Time at which ``slave/operation`` first reported a state or a fault [ns]; None if it did not.
+        warned_ns: Time of a node's first new warning [ns]; None if none did.
+        scheduling: Lateness of the drill's wake-ups during the fault.
+        deaf: Time for which the slave's process was stopped [s].
     """
 
     begin_ns: int

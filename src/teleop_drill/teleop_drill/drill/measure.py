@@ -28,7 +28,7 @@ class Trace:
     """Messages of one topic as they were sent.
 
     Attributes:
-        sent_ns: When each was sent, shape (N,) [ns].
+        sent_ns: Time of sending of each sample, shape (N,) [ns].
         number: Its number in the sequence of its publisher, shape (N,).
         values: Shape (N, width).
         stamp_ns: Stamp of its header, shape (N,) [ns].
@@ -60,7 +60,7 @@ def step_ratio(setpoints: Trace, speed_limit: Array, dt: float) -> float:
 
     Args:
         setpoints: Joint setpoints, values (N, n) [rad or m].
-        speed_limit: Of each drive, shape (n,) [rad/s or m/s].
+        speed_limit: Speed limit of each drive, shape (n,) [rad/s or m/s].
         dt: Time from one message to the next [s].
     """
     ticks = np.diff(setpoints.number)
@@ -91,7 +91,7 @@ def travel(places: Trace, since_ns: int, until_ns: int) -> float:
     """Largest distance of the tip from its position at one moment, up to another moment [m]; NaN if unknown.
 
     Args:
-        places: Of the tip, values (N, 3 or more) [m].
+        places: Positions of the tip, values (N, 3 or more) [m].
         since_ns: Begin of the measured time [ns].
         until_ns: The other [ns].
     """
@@ -124,7 +124,7 @@ def tip_speed(places: Trace) -> float:
     """Largest speed of the tip over ten samples, by their stamps [m/s]; 0 with fewer samples.
 
     Args:
-        places: Of the tip, values (N, 3 or more) [m].
+        places: Positions of the tip, values (N, 3 or more) [m].
     """
     speeds, _ = _speeds(places)
     return float(np.max(speeds, initial=0.0))
@@ -145,7 +145,7 @@ def rest_delay(places: Trace, since_ns: int, slow: float, until_ns: int) -> floa
     If the pose of the tip is no longer published, it is the time of the last sample.
 
     Args:
-        places: Of the tip.
+        places: Positions of the tip.
         since_ns: Begin of the measured time [ns].
         slow: The speed [m/s].
         until_ns: End of the observation [ns].
@@ -181,7 +181,7 @@ def ramp(setpoints: Trace, braking: Array, dt: float) -> float:
 
     Args:
         setpoints: Joint setpoints up to rest, values (N, n) [rad or m].
-        braking: Of each drive, shape (n,) [rad/s² or m/s²].
+        braking: Deceleration of each drive, shape (n,) [rad/s² or m/s²].
         dt: Tick [s].
     """
     steps = np.abs(np.diff(setpoints.values, axis=0))
@@ -268,7 +268,7 @@ def braking_way(setpoints: Trace, moment_ns: int, jacobian: Array, braking: Arra
     Args:
         setpoints: Joint setpoints, values (N, n) [rad or m].
         moment_ns: The moment [ns].
-        jacobian: Of the tip, shape (6, n).
+        jacobian: Jacobian of the tip, shape (6, n).
         braking: Deceleration of the drives, shape (n,) [rad/s² or m/s²].
     """
     speeds = joint_speeds(setpoints, moment_ns - JUST_BEFORE_NS, moment_ns)

@@ -25,7 +25,7 @@ class Outcome:
         recording: State of the recording in words; empty before it has been checked.
         is_recorded: Whether the recording is as expected.
         recovered: Time from the end of the fault until the arm followed again [s]; NaN if never.
-        cure: What the arm needed to follow again.
+        cure: Actions that the arm needed to follow again.
         note: Further remarks.
         load: Load of the machine over its cores, as the fault began.
     """

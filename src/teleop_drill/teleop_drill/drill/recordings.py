@@ -33,7 +33,7 @@ class Verdict:
     """State of a recording.
 
     Attributes:
-        text: In words.
+        text: State of the recording in words.
         is_good: Whether the state is as expected.
         is_saved: Whether the recording can be read up to its end, possibly only after ``recover``.
         bag: The recording, or the result of ``recover``, if it can be read.

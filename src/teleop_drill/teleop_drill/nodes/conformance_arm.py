@@ -69,7 +69,7 @@ class Arm(Guest):
     """Client of one arm.
 
     Args:
-        namespace: Where its topics are, such as ``/PSM1`` or ``slave``.
+        namespace: Namespace of the arm's topics, such as ``/PSM1`` or ``slave``.
         domain: ROS domain; None for that of the environment.
     world: Middleware and time of the client.
 

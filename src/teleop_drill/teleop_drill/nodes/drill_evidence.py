@@ -43,7 +43,7 @@ def seen_of(outcome: Outcome, rig: LiveRig, time_ns: tuple[int, int], scheduling
         outcome: Outcome with the reports.
         rig: The session.
         time_ns: Begin and end of the fault [ns].
-        scheduling: How late this machine was at the start.
+        scheduling: Lateness of this machine at the start.
     """
     begin_ns, end_ns = time_ns
     true_cp, measured_cp, setpoints, joints = rig.tap.traces(

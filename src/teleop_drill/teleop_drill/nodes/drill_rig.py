@@ -45,8 +45,8 @@ class LiveRig:
     """A session of processes with the drill's own nodes beside them.
 
     Args:
-        site: Where it is.
-        configuration: What runs.
+        site: Site of the session.
+        configuration: Configuration of the session.
         robot: The slave.
     """
 

@@ -46,7 +46,7 @@ class Tap:
 
     Args:
         owner: Node that owns its topics; no executor serves it.
-        joint_names: Of the slave.
+        joint_names: Joint names of the slave.
         real_time: Priority and other settings of its thread.
         has_hand: Whether it is the master.
 

@@ -55,7 +55,7 @@ class Disk:
     """As of :class:`~teleop_core.bags.background.Background`, of one process.
 
     Args:
-        process: Who writes.
+        process: Process that writes.
     """
 
     def __init__(self, process: Process) -> None:

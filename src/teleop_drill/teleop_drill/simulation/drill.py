@@ -30,11 +30,11 @@ class SimulatedSite:
     Args:
         bus: Its middleware.
         owner: Process of the drill.
-        configuration: What runs.
-        folder: Where recordings go.
-        master: Who moves the hand.
-        interrupt: What ends a wait of the drill with KeyboardInterrupt.
-        processes: How the nodes are shared out.
+        configuration: Configuration of the session.
+        folder: Folder of the recordings.
+        master: Kind of operator that moves the hand.
+        interrupt: Object that ends a wait of the drill with KeyboardInterrupt.
+        processes: Distribution of the nodes over processes.
         foreign: Processes that are none of ours, by name.
     """
 

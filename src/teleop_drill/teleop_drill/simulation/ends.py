@@ -40,8 +40,8 @@ class Writer:
     """One end of a topic; as of :class:`~teleop_core.middleware.world.Publisher`.
 
     Args:
-        bus: Where it is.
-        process: Whose it is.
+        bus: The simulated middleware.
+        process: Process that owns it.
         node: Name of its node, with the namespace.
         topic: Full name.
         kind: Class of its messages.
@@ -90,8 +90,8 @@ class Reader:
     """Other end of a topic; as of :class:`~teleop_core.middleware.world.Taker`.
 
     Args:
-        bus: Where it is.
-        process: Whose it is.
+        bus: The simulated middleware.
+        process: Process that owns it.
         kind: Class of its messages.
         topic: Full name.
         qos: Its quality.
@@ -195,9 +195,9 @@ class Service:
     """Service of a node.
 
     Args:
-        process: Whose it is.
-        answer: Told a request; has the answer sent.
-        born_ns: When it was made [ns].
+        process: Process that owns it.
+        answer: Called with a request; sends the answer.
+        born_ns: Time at which it was made [ns].
     """
 
     def __init__(self, process: Process, answer: Callable[[Any, Callable[[Any], None]], object], born_ns: int) -> None:

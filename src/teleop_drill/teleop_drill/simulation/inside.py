@@ -16,7 +16,7 @@ class SimulatedSteering:
     """As of :class:`~teleop_drill.nodes.drill_site.Steering`.
 
     Args:
-        machine: Where the processes are.
+        machine: Machine of the processes.
 
     Attributes:
         session: The processes.

@@ -57,7 +57,7 @@ class Broken:
     Attributes:
         law: Its name.
         at: When, from the time at which the arm followed [s].
-        text: What happened.
+        text: Description of the breach.
     """
 
     law: str

@@ -18,7 +18,7 @@ class Clock:
 
     Attributes:
         offset_ns: Error of the clock [ns].
-        drift: How much faster the clock runs than real time, as a share.
+        drift: Rate of the clock minus that of real time, as a share.
     """
 
     offset_ns: int = 0
@@ -44,8 +44,8 @@ class Process(Turns):
     """Process of a machine.
 
     Args:
-        machine: Where it is.
-        name: What it is called.
+        machine: Machine of the process.
+        name: Name of the process.
         work: Its main thread; what it returns is the exit code.
 
     Attributes:

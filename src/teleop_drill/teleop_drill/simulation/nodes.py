@@ -187,10 +187,10 @@ class SimulatedNode:
     """As of :class:`~teleop_core.middleware.world.Node`.
 
     Args:
-        bus: Where it is.
-        process: Whose it is.
-        name: What it is called.
-        namespace: Where its names are.
+        bus: The simulated middleware.
+        process: Process that owns it.
+        name: Name of the node.
+        namespace: Namespace of the node.
     """
 
     def __init__(self, bus: Bus, process: Process, name: str, namespace: str = "", **_: object) -> None:

@@ -47,7 +47,7 @@ class Owner:
         """Error in who commands the arm, in words; empty if there is none.
 
         Args:
-            process: Whose setpoint it is.
+            process: Process of the setpoint.
             stamp_ns: Stamp of the command that it follows [ns].
             is_driven: Whether a speed command moves the arm.
         """

@@ -78,7 +78,7 @@ def told(found: Found, shortest: Found, law: str) -> list[str]:
     Args:
         found: The schedule as it was drawn.
         shortest: The faults that are needed to break the law.
-        law: Which law.
+        law: Name of the law.
     """
     (one,) = (broken for broken in shortest.broken if broken.law == law)
     kept = ",".join(str(found.faults.index(fault)) for fault in shortest.faults)

@@ -57,7 +57,7 @@ def draw(seed: int, processes: tuple[str, ...]) -> tuple[Fault, ...]:
     would meet an ENABLED arm.
 
     Args:
-        seed: What they are drawn from.
+        seed: Seed of the random faults.
         processes: Names of the processes that they may befall.
     """
     random = Random(f"{seed}/schedule")

@@ -41,11 +41,11 @@ class SimulatedSession:
     Args:
         bus: The middleware.
         owner: Process of the drill.
-        configuration: What runs.
-        processes: How the nodes are shared out.
-        folder: Where the recordings go.
+        configuration: Configuration of the session.
+        processes: Distribution of the nodes over processes.
+        folder: Folder of the recordings.
         observer: Receives the reports of the nodes.
-        master: Who moves the hand.
+        master: Kind of operator that moves the hand.
         foreign: Processes that are none of ours, by name: drives in the place of the simulator, and
             the arm that these lead.
     """
@@ -238,7 +238,7 @@ def parameters_of(configuration: Configuration, out: str, namespace: str = "") -
     Args:
         configuration: The session.
         out: Directory of the recording.
-        namespace: Where all nodes are, without slashes before and after it.
+        namespace: Namespace of all nodes, without leading and trailing slash.
     """
     content = session_parameters(configuration, out, namespace)
     content.pop(SESSION, None)

@@ -22,12 +22,12 @@ class SimulatedWatch:
     """Finds loops that hang, and ends a process that does not end by itself.
 
     Args:
-        world: Where it is.
-        crew: What is watched.
-        process: What ends.
+        world: World of the process.
+        crew: Nodes that are watched.
+        process: Process that is ended.
 
     Attributes:
-        word: What the process is doing.
+        word: Activity of the process.
     """
 
     def __init__(self, world: SimulatedWorld, crew: Crew, process: Process) -> None:

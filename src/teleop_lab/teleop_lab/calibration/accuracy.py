@@ -37,7 +37,7 @@ class Accuracy:
     """Errors of the tip before and after a calibration, by axis and in total.
 
     Attributes:
-        where: At which poses, in words.
+        where: Text with the poses at which it was measured.
         before: Spread with the nominal arm.
         after: Spread with the found errors.
     """

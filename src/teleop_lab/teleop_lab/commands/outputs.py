@@ -13,10 +13,10 @@ def add_study(
     """Add the file of a study, its store, ``--jobs``, and the arguments of :func:`add_files`.
 
     Args:
-        parser: Of the command.
+        parser: Parser of the command.
         what: Description of the file.
-        line: What each line of the table is for.
-        only: When the outputs count, such as ``, of --compare``.
+        line: Content of each line of the table.
+        only: Suffix for outputs that need an option, such as ``, of --compare``.
         must_keep: Whether a store has to be given.
     """
     keeps = (

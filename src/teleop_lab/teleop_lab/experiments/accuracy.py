@@ -35,9 +35,9 @@ class Axis(NamedTuple):
         read_mm: Reading of the ruler at each target (10,) [mm].
         step_mm: Smallest step between those readings [mm].
         error_mm: Desired minus measured, as printed (10,) [mm].
-        rms: As printed [mm].
-        deviation: As printed [mm].
-        largest: As printed [mm].
+        rms: RMS as printed [mm].
+        deviation: Standard deviation as printed [mm].
+        largest: Largest error as printed [mm].
     """
 
     direction: tuple[float, float, float]

@@ -191,7 +191,7 @@ class Bench:
 
         Args:
             scenario: One of ``teleop scenarios``.
-            seconds: How long it lasts [s].
+            seconds: Duration of the session [s].
             settings: Parameters over the scenario and the bench's settings.
             motion: Wanted motion of the hand, in place of the scenario's operator.
 

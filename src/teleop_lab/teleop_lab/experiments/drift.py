@@ -65,7 +65,7 @@ def measure_drift(bench: Bench, job: Job) -> Drift:
     """Drift over ten contacts of a hand that ignores the force.
 
     Args:
-        bench: Where it runs.
+        bench: Bench on which the sessions run.
         job: Material, passivity and round trip [s].
     """
     material, passivity, round_trip = job

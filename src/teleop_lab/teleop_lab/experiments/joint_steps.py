@@ -31,7 +31,7 @@ def answer_to_steps(parameters: ArmParameters) -> StepAnswer:
     """Step each joint by itself, from home, towards the middle of its range.
 
     Args:
-        parameters: Of the slave. Its reference filter should be off, and its start at home.
+        parameters: Parameters of the slave. Its reference filter should be off, and its start at home.
     """
     n = SimulatedArm(parameters).robot.n
     overshoot, travel, errors = np.zeros(n), np.zeros(n), []

@@ -42,8 +42,8 @@ def movement_time(way: float, width: float, lag: float) -> tuple[float, float]:
     """Time [s] to press inside a target that is seen late, and the number of looks.
 
     Args:
-        way: To the target [m].
-        width: Of the target [m].
+        way: Distance to the target [m].
+        width: Width of the target [m].
         lag: Delay of the display, without the delay of the eye [s].
     """
     p = ObserverParameters()

@@ -78,8 +78,8 @@ def sampled_boundary(grip: Grip, ticks: int, damping: float = 0.0, period: float
     Args:
         grip: The hand.
         ticks: Whole periods by which the wall's force comes late.
-        damping: Of the wall, on the difference of two samples [N·s/m].
-        period: Between two samples, for which a force is held [s].
+        damping: Damping of the wall, on the difference of two samples [N·s/m].
+        period: Time between two samples, for which a force is held [s].
 
     Source:
         Eigenvalues of the exact step of mass, spring and damper under a held force, with the delayed positions and
@@ -165,7 +165,7 @@ def growth(grip: Grip, delay: float, stiffness: float) -> float:
     Args:
         grip: The hand.
         delay: Delay of the force, in whole ticks, in addition to the tick of the graph [s].
-        stiffness: Of the spring [N/m], at the place where the slave's tip is commanded.
+        stiffness: Stiffness of the spring [N/m] at the commanded position of the slave's tip.
     """
     chain = Mapped(grip)
     late = deque([np.zeros(3)] * (round(delay / DT) + 1))

@@ -87,7 +87,7 @@ def measure_puncture(bench: Bench, job: Job) -> Puncture:
     """A puncture by a hand that pushes on, and by the same hand that stops as it has noticed.
 
     Args:
-        bench: Where it runs.
+        bench: Bench on which the sessions run.
         job: Way and round trip [s].
     """
     settings, late = _settings(*job), job[1]

@@ -27,7 +27,7 @@ class Wall:
     """A wall on both sides of a plane, sampled once a period of 1 ms.
 
     Attributes:
-        stiffness: Of its spring [N/m].
+        stiffness: Stiffness of the wall's spring [N/m].
         damping: On the difference of two samples [N·s/m].
         late: Whole periods by which its force comes late.
     """
@@ -125,7 +125,7 @@ def wall_boundary(grip: one_axis.Grip, damping: float, late: int) -> float:
 
     Args:
         grip: The hand.
-        damping: Of the wall [N·s/m].
+        damping: Damping of the wall [N·s/m].
         late: Periods by which its force comes late.
     """
     start = 0.3 * one_axis.sampled_boundary(grip, late, damping)
@@ -143,7 +143,7 @@ def press_energy(damping: float, wall: Wall, length: int, speed: float) -> float
         damping: Viscous friction of the device [N·s/m].
         wall: The wall.
         length: Periods in, and as many out.
-        speed: Of the hand [m/s].
+        speed: Speed of the hand [m/s].
     """
     loop = SampledDevice(one_axis.Grip(5.0, 1.0, 0.1), wall)
     loop.origin -= 0.25 * speed * DT  # no sample is on the plane: force 0 would end the contact
@@ -175,7 +175,7 @@ def is_restless(wall: Wall, friction: float, resolution: float, push: float) -> 
         wall: The wall.
         friction: Dry friction of the device [N].
         resolution: Step of its reading [m].
-        push: Of the hand [steps of the wall's force].
+        push: Push of the hand [steps of the wall's force].
     """
     grip = one_axis.Grip(0.045, 1.0, 0.1)
     loop = SampledDevice(grip, wall, friction=friction, position_resolution=resolution)

@@ -69,7 +69,7 @@ def fastest(bench: Bench, grip: one_axis.Grip, delay: float, stiffness: float, w
     """Largest speed of the hand [m/s] in ``palpation``, with an object without damper and friction.
 
     Args:
-        bench: Where it runs.
+        bench: Bench on which the sessions run.
         grip: The hand.
         delay: Delay of the force [s].
         stiffness: Stiffness of the object [N/m].
@@ -92,7 +92,7 @@ def chain_boundary(bench: Bench, grip: one_axis.Grip, delay: float, way: transmi
     The device has its friction and its steps, the arm its lag and the reference its filter.
 
     Args:
-        bench: Where it runs.
+        bench: Bench on which the sessions run.
         grip: The hand.
         delay: Delay of the force [s].
         way: Architecture and passivity.

@@ -67,7 +67,7 @@ class Cell(NamedTuple):
     """Measurement of an architecture with a passivity and a round trip.
 
     Attributes:
-        ports: By world.
+        ports: Ports by world.
         hybrid: Hybrid matrix (L, 2, 2) of all worlds together.
         stray: Largest share of a force outside of the spectral lines.
     """
@@ -128,7 +128,7 @@ def measure_ports(bench: Bench, job: Job) -> Ports:
     """Both ports in a session of the whole chain, along the normal of the object.
 
     Args:
-        bench: Where it runs.
+        bench: Bench on which the sessions run.
         job: Way, round trip [s] and world.
     """
     rows = bench.signals("palpation", _SECONDS, settings(*job), _motion)

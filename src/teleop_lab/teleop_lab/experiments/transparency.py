@@ -161,7 +161,7 @@ def report(cells: Cells, known: Cell) -> Findings:
     """Rows and figures of what was measured.
 
     Args:
-        cells: Of the chain, position-force without passivity and round trip among them.
+        cells: Results of the chain; they include position-force without passivity and round trip.
         known: The two-port of :func:`lag_cell`.
     """
     arm, rows = cells[_FORCE, 0.0].hybrid, _lag_rows(known)

@@ -75,7 +75,7 @@ class Ports:
 
         Args:
             hand: Place of the hand (N,) [m].
-            push: Of the master on the hand (N,) [N].
+            push: Push of the master on the hand (N,) [N].
             tip: Place of the slave's tip (N,) [m].
             reaction: Push of the world on the tip (N,) [N].
 
@@ -192,7 +192,7 @@ class Lag:
 
     Attributes:
         time: Time constant [s].
-        compliance: How far it yields to the world's push [m/N].
+        compliance: Displacement of the arm per force of the world [m/N].
         late: Delay of a command, and of a force, in ticks.
     """
 

@@ -49,8 +49,8 @@ def linear_law(damping: float, wall_damping: float, delay: float) -> float:
 
     Args:
         damping: Viscous friction of the device [N·s/m].
-        wall_damping: Of the wall [N·s/m].
-        delay: Of the force, beside half a period for its hold [s].
+        wall_damping: Damping of the wall [N·s/m].
+        delay: Delay of the force, in addition to half a period for its hold [s].
 
     Source:
         Gil et al. 2009, K < (b + B) / (T / 2 + td).
@@ -76,7 +76,7 @@ def press_law(damping: float, wall_damping: float, length: int) -> float:
 
     Args:
         damping: Viscous friction of the device [N·s/m].
-        wall_damping: Of the wall [N·s/m].
+        wall_damping: Damping of the wall [N·s/m].
         length: Periods in, and as many out.
     """
     return (damping + wall_damping * (1.0 - 2.0 / length)) / (0.5 * DT)

@@ -91,7 +91,7 @@ class Journal:
         """Note the new state of a trial.
 
         Args:
-            code: Of the participant.
+            code: Code of the participant.
             trial: Its number.
             state: One of :data:`DONE`, :data:`SKIPPED`, :data:`AGAIN` and :data:`FAILED`.
             facts: Such as ``bag``, ``scores``, ``verdict`` and ``reason``.

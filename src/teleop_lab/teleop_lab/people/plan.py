@@ -161,7 +161,7 @@ def conditions_of(participant: int, count: int, order: str) -> list[int]:
 
     Args:
         participant: Number from 0 on.
-        count: How many conditions there are.
+        count: Number of conditions.
         order: One of fixed, shuffled and latin; ``shuffled`` is the same for the same participant always.
 
     Source:

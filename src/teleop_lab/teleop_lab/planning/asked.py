@@ -19,7 +19,7 @@ class AskedPath:
     """Motion of a hand.
 
     Attributes:
-        name: What it is called in tables.
+        name: Name of the path in tables.
         stamp_ns: Stamps (N,) [ns], rising.
         poses: Poses (N, 7) of the master: position [m], quaternion w, x, y, z.
         buttons: Clutch, fixture, mode (N, 3): 1 pressed.

@@ -56,7 +56,7 @@ def write_reach_page(reaches: "Sequence[Reach]", file: Path) -> None:
     """Write one self-contained page.
 
     Args:
-        reaches: What was found for each recording, at least one.
+        reaches: Result for each recording, at least one.
         file: Page to write; its folder must exist.
 
     Raises:

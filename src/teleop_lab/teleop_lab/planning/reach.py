@@ -61,8 +61,8 @@ class Reach:
         path: Motion of the hand.
         robot: The slave.
         goal: Share of the time in which the slave must follow.
-        given: With the parameters as they are.
-        proposed: With the best placement; the given one if that reaches the goal.
+        given: Result with the given parameters.
+        proposed: Result with the best placement; the given one if that reaches the goal.
         arm: Namespace of the arm; empty for the default one.
     """
 

@@ -33,10 +33,10 @@ class Point:
 
     Attributes:
         place: Its value in every dimension.
-        scenario: As the study's.
+        scenario: Scenario of the study.
         settings: All parameters that are given.
         seed: Its seed.
-        length: How long the hand moves [s].
+        length: Duration of the hand's motion [s].
         key: Digests of all that its result depends on.
     """
 
@@ -59,11 +59,11 @@ class Result:
     """Result of a point: scores, or an error.
 
     Attributes:
-        name: Of the point.
+        name: Name of the point.
         key: Its key.
         scores: Numbers by key of a score; None where it does not apply.
         error: Text of the error; empty without one.
-        seconds: How long it took [s].
+        seconds: Time that the session took [s].
     """
 
     name: str

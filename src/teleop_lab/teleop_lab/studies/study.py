@@ -125,7 +125,7 @@ class Study:
         """Points of all seeds at a value for each swept parameter, be it one of the study or not.
 
         Raises:
-            TeleopError: They cannot run; the text names the value.
+            TeleopError: Some points cannot run; the text names the wrong value.
         """
         found, code = [], code_digest() + own_digest()
         given = {**self.settings, **chosen}
@@ -143,11 +143,11 @@ class Study:
         """How many sessions, how long and how many bytes, without running one.
 
         Args:
-            store: Where results are already.
+            store: Store with earlier results.
             jobs: Processes; None: as many as processors.
 
         Raises:
-            TeleopError: As :meth:`points`, or the store is another study's.
+            TeleopError: As in :meth:`points`, or the store belongs to another study.
         """
         points = self.points()
         kept = Store.open(store, self) if store is not None else None
@@ -185,7 +185,7 @@ class Study:
             progress: Called with the number of finished points, and the number of all.
 
         Raises:
-            TeleopError: As :meth:`explain`, before the first session.
+            TeleopError: As in :meth:`explain`, before the first session.
         """
         from teleop_lab.studies.dataset import dataset_of
         from teleop_lab.studies.workers import in_processes, on_dask
@@ -227,11 +227,11 @@ def sweep(
         seed: Seeds.
         settings: Parameters by name; a list is swept, any other value applies to all sessions.
         parts: Files that register parts of your own.
-        store: As in :meth:`Study.run`, and so those that follow.
-        jobs: As there.
-        client: As there.
-        progress: As there.
-        **parameters: As ``settings``, with ``__`` for each dot: ``display__latency=[0.0, 0.3]``.
+        store: As in :meth:`Study.run`.
+        jobs: As in :meth:`Study.run`.
+        client: As in :meth:`Study.run`.
+        progress: As in :meth:`Study.run`.
+        **parameters: Parameters like ``settings``, with ``__`` for each dot: ``display__latency=[0.0, 0.3]``.
 
     Raises:
         TeleopError: A name or value is wrong; nothing was run.

@@ -38,7 +38,7 @@ class Trial(NamedTuple):
     """Result of some values.
 
     Attributes:
-        values: By parameter.
+        values: Values by parameter.
         score: Mean over the seeds; None where a session failed or does not have it.
         error: Reason why there is no score.
     """

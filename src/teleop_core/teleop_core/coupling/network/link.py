@@ -137,7 +137,7 @@ def send_packet(p: LinkNumbers, s: LinkState, way: Way, k: int, dt: float) -> No
         p: Parameters.
         s: State; written.
         way: Written.
-        k: Which direction it is.
+        k: Index of the direction.
         dt: Tick [s].
     """
     s.sent[k] += 1
@@ -178,7 +178,7 @@ def serve_line(p: LinkNumbers, s: LinkState, way: Way, k: int, dt: float) -> Non
         p: Parameters.
         s: State; written.
         way: Written.
-        k: Which direction it is.
+        k: Index of the direction.
         dt: Tick [s].
     """
     while s.waits[k] > 0 and s.free[k] <= s.tick:

@@ -144,7 +144,7 @@ class MasterBridge(RunningStage):
     and ``force`` for the force to send.
 
     Attributes:
-        wrong: What is wrong with the newest pose, in words; empty if it is valid.
+        wrong: Text about the fault of the newest pose; empty if the pose is valid.
         heard_ns: Arrival time of the newest valid pose [ns]; 0 before the first.
         refused: Number of rejected poses, by reason.
 

@@ -105,7 +105,7 @@ class RemoteHand:
 
     Attributes:
         room: Corners low and high (3,) [m] of the box that the stylus stays in.
-        closing: How far the hand closes the jaw, 0 open to 1 closed; it does not change when no poses come.
+        closing: Share by which the hand closes the jaw, 0 open to 1 closed; it does not change when no poses come.
         refused: Number of poses that were not used.
     """
 
@@ -138,7 +138,7 @@ class RemoteHand:
 
         Args:
             pose: Position [m] in the master's base and quaternion w, x, y, z of unit length, (7,).
-            time: When it was wanted, in the time of :meth:`motion` [s]; None for now.
+            time: Time of the wanted pose, in the time of :meth:`motion` [s]; None for now.
 
         Returns:
             Whether the pose is used. A pose is refused if it is not finite, is more than 10 m away, or has no unit
@@ -236,7 +236,7 @@ class RemoteHand:
         Args:
             first: Time of the first tick [s].
             tick: Length of a tick [s].
-            count: How many ticks, 1 to 4.
+            count: Number of ticks, 1 to 4.
 
         Returns:
             Records (count,) of :class:`teleop_core.hand.operators.follower.Wanted`: positions and attitudes in the

@@ -135,7 +135,7 @@ def lead_on(numbers: Array, memory: Array, scene: Array, state: Array, y: float,
     Args:
         numbers: Numbers of the task, those of :class:`LedParameters` first.
         memory: Memory of the task: the position at its start (3,), and the time of the next step [s].
-        scene: What the task sees.
+        scene: Data that the task sees.
         state: State of the task; written.
         y: Present y of the goal, relative to the start of the task [m].
         z: Present z of the goal, relative to the start of the task [m].

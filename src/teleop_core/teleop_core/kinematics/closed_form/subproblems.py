@@ -176,7 +176,7 @@ def open_pairs(A: Array, B: Array, h: Array, rule: Array, seeds: Array, pairs: A
         A: Factors of x, (2, 2).
         B: Factors of y, (2, 2).
         h: Right-hand side (2,).
-        rule: How to solve (4,): 0 if B has a null vector, 1 if A has one, 2 if neither; the null vector, two numbers;
+        rule: Method (4,): 0 if B has a null vector, 1 if A has one, 2 if neither; the null vector, two numbers;
             and the row that remains for the second angle.
         seeds: Values of x and y to use if the equations leave them free (2,).
         pairs: Written.

@@ -94,7 +94,7 @@ class Body:
         name: Unique in the robot; the first is ``base``, the last ``tip``.
         solids: Its shapes, in its frame.
         parent: Index of its parent body; -1 for the base.
-        joint: How it moves.
+        joint: Kind of joint that moves the body.
         origin: Its pose (7,) in the parent's frame, with its coordinate at zero; unused for a free body.
         coordinate: Index of its coordinate, or of its pose for a free body; -1 for a fixed body.
     """

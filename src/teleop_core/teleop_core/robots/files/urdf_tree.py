@@ -242,7 +242,7 @@ def numbers_of(where: str, element: Xml.Element | None, key: str, default: tuple
     """Numbers of an attribute, or the default where element or attribute is missing.
 
     Args:
-        where: What has the attribute, for the error.
+        where: Name of the element with the attribute, for the error.
         element: The element.
         key: Name of the attribute.
         default: Default values; their number is the required number.

@@ -26,7 +26,7 @@ class Lead:
         position: The last command (n,) [rad or m].
         velocity: Velocity of the last command (n,) [rad/s or m/s].
         is_leading: Whether the arm is commanded towards the setpoint.
-        waits: What is commanded instead, and why; empty while ``is_leading``.
+        waits: Text with the reason why the arm does not follow the setpoint; empty while ``is_leading``.
     """
 
     def __init__(

@@ -285,7 +285,7 @@ def _hold(p: GripNumbers, s: GripState, tips: geometry.Array, number: int, hands
         s: State; written.
         tips: Present poses of both tips (2, 7).
         number: Number of the object.
-        hands: Which jaws hold it: 1 this jaw, 2 the second arm's, 3 both.
+        hands: Jaws that hold the object: 1 this jaw, 2 the second arm's, 3 both.
         dt: Tick [s].
     """
     pose, motion = s.objects[7 * number : 7 * number + 7], s.motions[3 * number : 3 * number + 3]

@@ -68,7 +68,7 @@ class Presses:
             number: Number of the message at its button, 1 for the first; 0 where the middleware
                 does not number messages.
             now_ns: Time [ns], of any clock that never goes back.
-            is_pressed: What the message says.
+            is_pressed: State in the message.
             is_idle: Whether the arm is disabled. Then presses before the first message from this button are ignored.
 
         Returns:
@@ -89,7 +89,7 @@ class Presses:
         Args:
             sender: Identity of the button; messages of a button that :meth:`take` knows are ignored.
             now_ns: Time [ns], as in :meth:`take`.
-            is_pressed: What the message says.
+            is_pressed: State in the message.
         """
         return () if sender in self._last else self._note(sender, now_ns, is_pressed=is_pressed)
 

@@ -174,7 +174,7 @@ def answer_text(event: Event, answer: Answer, state: State) -> str:
 
     Args:
         event: The event.
-        answer: What :func:`change` returned.
+        answer: Result of :func:`change`.
         state: State before the event.
     """
     name = event.name.lower()

@@ -171,7 +171,7 @@ class WorldParameters:
         """Middle of the object (3,) [m] in the arm's base, for a tip that begins at a pose (4, 4).
 
         Raises:
-            ParameterError: As :meth:`below`.
+            ParameterError: As in :meth:`below`.
         """
         return np.array(self.place) - np.array(self.base) if self.place else self.below(T_base_tip)
 
