@@ -58,7 +58,7 @@ KINDS = (
 
 
 class BuildError(Exception):
-    """What is missing, or what the compiler said."""
+    """A tool is missing, or the compiler reported an error."""
 
 
 def generate(folder: Path, share: Path) -> dict[str, list[Path]]:

@@ -226,7 +226,7 @@ BAD_STAGES = {
         {"writes": (Topic("test/x", Kind.POSE, passed_on("slave/servo_cp")),)},
         "slave/servo_cp",
     ),
-    "spares a text": ({"spares": "operator"}, "spares as a tuple of names"),
+    "spares a text": ({"spares": "operator"}, "spares is a tuple of names"),
     "has no step": ({"step": None}, "with a step"),
     "has a step of three arguments": ({"step": lambda p, s, row: None}, "four arguments"),
     "has a step and a maker": ({"make": lambda p, dt: None}, "with a step"),

@@ -73,7 +73,7 @@ def test_scores_frames_and_copies_of_it_cost_what_its_samples_cost(
 
 
 def test_a_stamp_in_the_middle_that_is_late_does_not_move_the_others(session: tc.Recording) -> None:
-    with pytest.warns(UserWarning, match="left out"):
+    with pytest.warns(UserWarning, match="leaves out"):
         again = tc.replay(moved(session, HOUR, which=700))
     assert again.duration == pytest.approx(session.duration, abs=2.5)
 

@@ -35,7 +35,7 @@ _FURNITURE = b'<head><link rel="stylesheet" href="teleop.css"><script src="teleo
 
 @dataclass(frozen=True)
 class Situation:
-    """What every page shows beside viser's elements.
+    """Data that every page shows in addition to viser's elements.
 
     Attributes:
         can_stop: Whether a stop has any effect; false while a recording is shown.
@@ -113,7 +113,7 @@ class Answers:
 
     @property
     def slow_paths(self) -> frozenset[str]:
-        """Those of :attr:`paths` whose answers may take a while."""
+        """The :attr:`paths` whose answers may take long."""
         return self.form.paths | self.strip.paths
 
     def to(self, request: Request) -> Response:

@@ -38,7 +38,7 @@ from teleop_core.robots.dexterity import sample_workspace
 from teleop_core.robots.robot import Robot
 
 Path = Callable[[Topic, str, float], tuple[Array, Array]]
-"""From a topic, an arm and a length [s]: times (N,) [s] and rows (N, width) up to now."""
+"""Function of a topic, an arm and a length [s] that returns times (N,) [s] and rows (N, width) up to now."""
 _AT = 1e-3
 """Share of a joint's range next to its end that counts as at its limit."""
 _WORK, _GRIP = 0.05, 0.1  # free space on all sides of a tip and of a stylus with its handles [m]

@@ -36,7 +36,7 @@ class Camera:
 
     @property
     def quaternion(self) -> Array:
-        """Its orientation (4,): x to the right, y downwards, z into the picture."""
+        """Orientation of the camera (4,): x to the right, y downwards, z into the picture."""
         z = self.look_at - self.position
         z = z / np.linalg.norm(z)
         x = np.cross(z, self.up)

@@ -106,7 +106,7 @@ FOLLOWED, TIP = "followed", "tip"
 """Further words: the file that an operator ``bag`` or ``file`` follows; the tip of a URDF."""
 _PATHS = {"bag": "operator.bag", "file": "operator.file.path"}  # parameter of the file, by the kind of operator
 START: Chosen = {"operator": PERSON}
-"""What is chosen at first."""
+"""Choice when the form is opened."""
 _LONGEST = 500  # characters of a word
 _TASK_TIME = 60.0  # shortest time for which a simulated operator works at a task [s]
 _NOTHING = "none"  # word of a field with a stage that does not need the stage

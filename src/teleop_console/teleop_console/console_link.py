@@ -146,7 +146,7 @@ class LiveLink(Observer):
     # -- seeing ----------------------------------------------------------------------------------
 
     def view(self) -> View:
-        """What is known now."""
+        """Newest data of the session."""
         with self._lock:
             view, now = self._view, now_of(self)
             for arm in self.arms:

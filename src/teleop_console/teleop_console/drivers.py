@@ -9,7 +9,7 @@ PATIENCE = 5.0
 
 
 class Drivers:
-    """Which of the open pages may command the session.
+    """Decides which of the open pages may command the session.
 
     The first page drives. Other pages watch until they take control, which always succeeds, because two people at one
     arm talk to each other. A page that opens while no page drives gets control, so that a reloaded page continues to

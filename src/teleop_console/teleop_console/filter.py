@@ -124,7 +124,7 @@ def decode(data: bytes | str) -> _Message | None:
 
 
 class Elements(Protocol):
-    """What is on the page now."""
+    """Elements that are on the page now."""
 
     def control(self, page: int, uuid: str) -> Any | None:
         """Handle of an input that the page shows; None if there is none."""

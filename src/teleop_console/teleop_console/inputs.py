@@ -23,7 +23,7 @@ _DIGITS = 6  # digits after the decimal point of a slider's numbers
 
 
 def kind_of(info: ParameterInfo) -> str:
-    """Which of :data:`KINDS` shows a parameter."""
+    """Kind of element, one of :data:`KINDS`, that shows a parameter."""
     value = info.value
     if isinstance(value, bool):
         return "switch"
@@ -87,7 +87,7 @@ class Input:
 
     @property
     def said(self) -> object:
-        """What it shows, as it is shown."""
+        """Shown value, in the form in which the element shows it."""
         return self._own.value if self.kind != "vector" else shown(self.value or ())
 
     def show(self, value: Setting) -> bool:
@@ -188,7 +188,7 @@ def _words(values: tuple[float | str, ...]) -> list[float | str]:
 
 
 def form(info: ParameterInfo) -> str:
-    """What a value of a parameter is, in words."""
+    """Text that names the type of a parameter's value."""
     if isinstance(info.value, tuple):
         return "list such as [0.1, 0.2]"
     return {bool: "yes or no", int: "whole number", float: "number"}.get(type(info.value), "text")

@@ -30,7 +30,7 @@ class Arm:
 
 @dataclass
 class ArmView:
-    """What is known of one arm now.
+    """Newest data of one arm.
 
     Attributes:
         streams: Newest values of each stream by its name without the arm, such as
@@ -55,7 +55,7 @@ class ArmView:
 
 @dataclass
 class View:
-    """What is known of a session at one time.
+    """Data of a session at one time.
 
     Attributes:
         time: Time since the beginning of the session [s].
@@ -129,7 +129,7 @@ class SessionLink(Protocol):
     is_live: bool
 
     def view(self) -> View:
-        """What is known now; cheap, called at the rate of the page."""
+        """Newest data of the session; takes little time, because it is called at the frame rate of the page."""
 
     def command(self, word: str, arm: str = "") -> tuple[bool, str]:
         """Send one of ``topics.STATE_COMMANDS``; returns whether it was accepted, and the reason."""

@@ -21,7 +21,7 @@ from teleop_console.status import alive, leader, next_button, next_step, status_
 from teleop_core.base.errors import TeleopError
 
 WIDTH = 320.0
-"""Of the panel on a desk [px]; on a phone it is as wide as the screen."""
+"""Width of the panel on a desktop [px]; on a phone it is as wide as the screen."""
 _PERIOD = 0.2  # time between two updates of the texts [s]
 
 

@@ -223,7 +223,7 @@ def below(arm: str, topic: str) -> str:
 
 
 def _values(view: ArmView) -> Iterator[tuple[str, Array]]:
-    """What is known of an arm, by topics."""
+    """Known data of an arm, by topics."""
     yield from view.streams.items()
     if view.state:
         yield topics.TELEOP_STATE.name, np.array([view.state[name] for name in topics.TELEOP_STATE.columns])

@@ -59,7 +59,7 @@ class RecordedLink(SessionLink):
     # -- seeing ----------------------------------------------------------------------------------
 
     def view(self, time: float | None = None) -> View:
-        """What was known at a time of the replay [s]; None for the present one."""
+        """Data at a time of the replay [s]; None for the present time."""
         time = self._time if time is None else time
         view = View(
             time=time,

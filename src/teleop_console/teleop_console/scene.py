@@ -63,7 +63,7 @@ def floor_lines(radius: float, cell: float) -> tuple[Array, Array]:
 
 
 class Scene:
-    """What is seen of a session; the axes of the page are those of the first arm's base, z up.
+    """Three-dimensional scene of a session; the axes of the page are those of the first arm's base, z up.
 
     Args:
         server: The page.
@@ -199,7 +199,7 @@ class Scene:
 
 
 def _look(parameters: Parameters, node: str, kind: str) -> Look:
-    """What the fixture of a node is."""
+    """Kind of fixture of a node."""
     values = _values_below(parameters, node, f"fixture.{kind}.")
     if (place := parameters.get((node, "fixture.place"))) is not None:
         values["place"] = place.value

@@ -72,7 +72,7 @@ def free_port(host: str = "127.0.0.1") -> int:
 
 
 def owner(port: int) -> str:
-    """Which process listens at a port, in words; ``another process`` where it cannot be known."""
+    """Text that names the process that listens on a port; ``another process`` if it is unknown."""
     wanted = {f"socket:[{inode}]" for inode in _inodes(port)}
     for folder in Path("/proc").glob("[0-9]*"):
         with suppress(OSError):

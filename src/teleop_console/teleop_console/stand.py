@@ -51,7 +51,7 @@ class Stand:
 
     @property
     def quaternion(self) -> Array:
-        """Its turn (4,): w, x, y, z."""
+        """Rotation of the device (4,): w, x, y, z."""
         out = np.empty(4)
         quaternion_from_rotation(np.ascontiguousarray(self.axes), out)
         return out

@@ -35,7 +35,7 @@ Told = tuple[http.HTTPStatus, object]
 
 @dataclass(frozen=True)
 class Wish:
-    """What a person at the page wants next.
+    """Next action that a person at the page requests.
 
     Attributes:
         chosen: Words of a session, see :mod:`~teleop_console.choices`.
@@ -51,7 +51,7 @@ class Form(Protocol):
 
     @property
     def script(self) -> Path:
-        """Its script."""
+        """Script of the form."""
 
     @property
     def style(self) -> Path | None:
@@ -63,7 +63,7 @@ class Form(Protocol):
 
     @property
     def paths(self) -> frozenset[str]:
-        """Paths of its requests."""
+        """Paths of the form's requests."""
 
     def answer(self, path: str, query: Query, page: int, body: Body = bytes) -> Told:
         """Answer to a request; ``page`` is the number of the page, -1 if the page is not open."""
@@ -101,7 +101,7 @@ class StartPage:
 
     @property
     def paths(self) -> frozenset[str]:
-        """Paths of its requests."""
+        """Paths of the form's requests."""
         return frozenset({"/start", "/take", "/robot", *self._acts})
 
     def wait(self) -> Wish:

@@ -34,7 +34,7 @@ RESTS = "nobody holds the stylus"
 
 
 def situation(view: View) -> Situation:
-    """What every page shows of a live session, whatever is scrolled or folded."""
+    """State of a live session that every page always shows."""
     is_pressed = any(arm.operation.get("is_stopped") for arm in view.arms.values())
     is_latched = any(
         State(int(arm.operation["state"])) is State.FAULT and Fault(int(arm.operation["fault"])) is Fault.STOP
@@ -48,7 +48,7 @@ def situation(view: View) -> Situation:
 
 
 def alive(view: View) -> dict[str, bool]:
-    """Which controls can do something now, by their names."""
+    """Names of the controls that have an effect now."""
     states = {State(int(arm.operation["state"])) for arm in view.arms.values() if arm.operation}
     is_stopped = situation(view).is_stopped
     may_move = bool(states) and not is_stopped
@@ -82,12 +82,12 @@ _LEADERS = {
 
 
 def leader(kind: str) -> str:
-    """What moves the hand, by the kind of the operator; empty if it is the person at the page."""
+    """Text that names the mover of the hand, by the kind of operator; empty for the person at the page."""
     return "" if kind in {"", "remote"} else _LEADERS.get(kind, f"operator {kind} leads, simulated")
 
 
 def next_step(view: View, *, is_led_here: bool) -> str:
-    """What an operator does next; empty where nothing is to be done.
+    """Next action of an operator; empty if there is none.
 
     Args:
         view: Newest data of the session.

@@ -75,7 +75,7 @@ class Timeline:
     # -- requests ----------------------------------------------------------------------------------
 
     def state(self, words: Mapping[str, str]) -> object:
-        """Where time is; with ``find`` the columns whose name or unit has all of its words, too."""
+        """The shown time; with ``find`` also the columns whose name or unit contains all words of the search."""
         link, seen = self._replay, self._seen
         begin, end = seen.span() if seen is not None else (0.0, link.duration if link else 0.0)
         told = {
@@ -232,7 +232,7 @@ class StripPage:
     """
 
     paths = frozenset({"/timeline", "/strip", "/time", "/over"})
-    """Paths of its requests."""
+    """Paths of the strip's requests."""
 
     def __init__(self, drivers: Drivers) -> None:
         self.shown: Timeline | None = None

@@ -153,7 +153,7 @@ _GROWN, _STILL = 0.08, 1e-4  # shares of its distance by which a camera has move
 
 @dataclass(frozen=True)
 class _Fit:
-    """What the camera of a browser shows.
+    """View of one browser's camera.
 
     Attributes:
         since: Time at which the page was opened [s].
@@ -178,7 +178,7 @@ def _is_moved(client: viser.ClientHandle, given: Camera) -> bool:
 
 
 class Visitors:
-    """What each browser gets for itself.
+    """Elements that each browser gets separately.
 
     Args:
         server: The page.

@@ -184,7 +184,7 @@ class BagSource:
         return found
 
     def blocks(self) -> Iterator[source.Block]:
-        """The same as for any source.
+        """All rows in the order of the file.
 
         Raises:
             RecordingError: The file is damaged.
@@ -210,7 +210,7 @@ class BagSource:
         return source.Block(stamps, poses[:, :3], quaternions, log_ns=logs)
 
     def presses(self) -> source.Presses | None:
-        """The same as for any source."""
+        """Buttons with their own stream; None if there are none. Must be called after the blocks were read."""
         if not self._joy:
             return None
         with self._opened() as bag:
@@ -220,7 +220,7 @@ class BagSource:
         return source.Presses(stamps[order], logs[order], pressed[order])
 
     def check(self, finite: Array) -> None:
-        """The same as for any source."""
+        """Refuse columns without any number."""
         if not finite.all():
             names = np.array(["x", "y", "z", "orientation"])[finite == 0]
             raise RecordingError(self.path, f"{self._topic}: {', '.join(names)} holds no numbers")

@@ -54,7 +54,7 @@ class OurBag:
             self.typestore.register(get_types_from_msg(_TRANSFORMS, "tf2_msgs/msg/TFMessage"))
 
     def raw(self, topic: str) -> Iterator[Raw]:
-        """The same as for any recording."""
+        """Messages of a topic in the order of the file: time of recording [ns], bytes."""
         yield from self._bag.stored(topic)
 
 
@@ -67,7 +67,7 @@ class ForeignBag:
         self.types = {plain(name): str(info.msgtype) for name, info in topics if info.msgcount}
 
     def raw(self, topic: str) -> Iterator[Raw]:
-        """The same as for any recording."""
+        """Messages of a topic in the order of the file: time of recording [ns], bytes."""
         chosen = [c for c in self._reader.connections if plain(c.topic) == topic]
         count, listed = 0, sum(connection.msgcount for connection in chosen)
         # There is only one file, so its reader need not be merged with others.

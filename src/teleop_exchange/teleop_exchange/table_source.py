@@ -270,7 +270,7 @@ class TableSource:
         return None
 
     def blocks(self) -> Iterator[source.Block]:
-        """The same as for any source.
+        """All rows in the order of the file.
 
         Raises:
             RecordingError: A cell is no number, or the file is damaged.

@@ -95,7 +95,7 @@ class TextTable:
             return data.decode("latin-1"), "latin-1"
 
     def sample(self, column: int) -> Numbers:
-        """The same as for any table."""
+        """The first values of a column; NaN for values that are not numbers."""
         cells = [row[column] if column < len(row) else "" for row in self._form.rows]
         if self._is_truth(column):
             return np.array([cell.strip().lower() == "true" for cell in cells], np.int64)
@@ -106,7 +106,7 @@ class TextTable:
         return np.array([number(cell, self._form.decimal) for cell in cells], np.float64)
 
     def is_clock(self, column: int) -> bool:
-        """The same as for any table."""
+        """Whether a column contains dates, which are read as nanoseconds since 1970."""
         return self._clock(column) is not None
 
     def _clock(self, column: int) -> re.Match[str] | None:
@@ -120,7 +120,7 @@ class TextTable:
         return bool(cells) and cells <= {"true", "false"}
 
     def blocks(self, columns: Sequence[int]) -> Iterator[list[Numbers]]:
-        """The same as for any table."""
+        """Some columns, block by block."""
         self.bad_rows = 0
         with damage_told(self.path):
             try:

@@ -58,7 +58,7 @@ def key_table() -> str:
 
 @dataclass(frozen=True)
 class Session:
-    """Which recording was scored; texts as in its metadata, None if it has none.
+    """The scored recording; texts as in its metadata, None if the metadata lack them.
 
     ``arm`` is empty for the default arm of a recording that names no arms. ``from_s`` and ``to_s`` are the begin and
     end of the scored part, since the first message; None means the last message. ``missing`` lists the parts that the
@@ -238,7 +238,7 @@ class Score:
     # -- the metrics of this package, typed ------------------------------------------------------
 
     samples = _Found(Samples)
-    """How many slave poses were scored."""
+    """Number of scored slave poses."""
     reach = _Found(ReachScore)
     """Share of the time in which the slave followed, and the causes of the rest."""
     asked_error_mm = _Found(Spread)

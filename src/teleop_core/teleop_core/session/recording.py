@@ -126,7 +126,7 @@ class Recording:
 
     @property
     def metadata(self) -> dict[str, str]:
-        """Texts stored with it: version, scenario, robot, seed, configuration."""
+        """Texts stored with the recording: version, scenario, robot, seed, configuration."""
         return dict(self._bag.metadata)
 
     @property

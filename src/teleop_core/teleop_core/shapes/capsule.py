@@ -26,7 +26,7 @@ class CapsuleParameters:
 
 
 def capsule_outline(parameters: CapsuleParameters) -> Array:
-    """Its silhouette from two sides, (N, 3) [m] around the middle."""
+    """Silhouette of the capsule from two sides, (N, 3) [m] around the middle."""
     axis, angle = drawing.unit_vector(parameters.direction), np.linspace(0.0, math.pi, 21)[:, None]
     end = 0.5 * parameters.length * axis
     loops = []

@@ -32,7 +32,7 @@ def height_field_numbers(parameters: HeightFieldParameters) -> Array:
 
 
 def height_field_outline(parameters: HeightFieldParameters) -> Array:
-    """Its edges and three sections through its middle, (N, 3) [m]; raises as the numbers."""
+    """Edges of the field and three sections through its middle, (N, 3) [m]; raises the errors of the numbers."""
     return _grid(parameters).outline
 
 

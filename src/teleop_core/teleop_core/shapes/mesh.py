@@ -108,7 +108,7 @@ def mesh_numbers(parameters: MeshParameters) -> Array:
 
 
 def mesh_outline(parameters: MeshParameters) -> Array:
-    """Its sharp edges and three sections through its middle, (N, 3) [m]; raises as the numbers."""
+    """Sharp edges of the mesh and three sections through its middle, (N, 3) [m]; raises the errors of the numbers."""
     return _grid(parameters).outline
 
 

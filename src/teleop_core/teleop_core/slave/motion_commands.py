@@ -24,11 +24,11 @@ _REACHED = (IkStatus.FOLLOWED, IkStatus.NEAR_SINGULAR)
 # A goal may exceed a limit by this rounding, such as that of a setpoint at the limit [rad or m].
 _SLACK = 1e-6
 Told = tuple[Answer, str]
-"""Answer to a command, and the same in words."""
+"""Answer to a command, and its text."""
 
 
 class Commanded(Protocol):
-    """What motion commands need of a slave."""
+    """Parts of a slave that motion commands need."""
 
     robot: Robot
     parameters: Any

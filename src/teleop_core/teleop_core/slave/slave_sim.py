@@ -160,12 +160,12 @@ class SlaveSim(RunningStage):
 
     @property
     def punctures(self) -> int:
-        """How often the tip has punctured the object so far."""
+        """Number of punctures of the object so far."""
         return int(self.arm.contacts[0]["punctures"])
 
     @property
     def presses(self) -> int:
-        """How often the tip has pressed a button down to its stop so far."""
+        """Number of presses of a button down to its stop so far."""
         return int(self.arm.contacts[0]["presses"])
 
     @property
@@ -199,7 +199,7 @@ class SlaveSim(RunningStage):
         """Take new parameters from the next tick on; a law with ``shift`` keeps the effort continuous.
 
         Raises:
-            ParameterError: See :meth:`examine`; unless these parameters were examined before; nothing has changed then.
+            ParameterError: As in :meth:`examine`, which runs first if it did not yet; nothing has changed then.
         """
         if parameters is not self._examined:
             self.examine(parameters)

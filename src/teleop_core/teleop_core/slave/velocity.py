@@ -12,7 +12,7 @@ from teleop_core.slave.commands import SlaveNumbers, SlaveState
 
 
 class Motion(IntEnum):
-    """What moves the setpoint of an enabled slave that is not moving to a goal."""
+    """Source of the setpoint's motion while an enabled slave does not move to a goal."""
 
     FOLLOWING = 0  # references of its joints
     JOINTS = 1  # a speed of its joints

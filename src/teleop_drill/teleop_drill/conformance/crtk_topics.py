@@ -10,7 +10,7 @@ from enum import Enum
 
 
 class Group(Enum):
-    """What a topic is for."""
+    """Purpose of a topic."""
 
     STATE = "state"
     QUERY = "query"
@@ -78,7 +78,7 @@ STATES = ("DISABLED", "ENABLED", "PAUSED", "FAULT")
 
 @dataclass(frozen=True)
 class Finding:
-    """What was found in one row.
+    """Result of one row.
 
     Attributes:
         row: The row, or the trial that concerns several rows.

@@ -14,14 +14,14 @@ from teleop_drill.drill.numbers import Numbers
 
 
 class Master(Enum):
-    """What moves the hand."""
+    """Kind of operator that moves the hand."""
 
     DEVICE = "the simulated device of the session, a stage like all others"
     DRILL = "the drill itself, which publishes what a device would"
 
 
 class Motion(Enum):
-    """What the arm does under a fault."""
+    """Allowed motion of the arm under a fault."""
 
     RESTS = "it comes to rest by itself"
     HOLDS = "it goes to the last sound command, and stays there as if clutched"
@@ -30,7 +30,7 @@ class Motion(Enum):
 
 
 class Cure(Enum):
-    """What the arm needs to move again."""
+    """Action that the arm needs to move again."""
 
     NOTHING = "by itself"
     RESUME = "resume"
@@ -111,7 +111,7 @@ class Rig(Protocol):
         """Call a service of the slave; returns whether the command was done."""
 
     def commands(self, *names: str) -> list[bool]:
-        """As :meth:`command`, but several commands at once, without waiting for the answers in between."""
+        """Like :meth:`command`, for several commands, without waiting for the answers in between."""
 
     def set(self, node: str, name: str, value: object) -> bool:
         """Set a parameter of a running node; returns whether it was accepted."""

@@ -26,7 +26,7 @@ _SEED = 1  # seed of random losses and scatter
 
 @dataclass(frozen=True, eq=False)
 class Sample:
-    """What a master sends.
+    """Samples that a master sends.
 
     Attributes:
         stamp_ns: Stamp [ns].
@@ -38,7 +38,7 @@ class Sample:
 
 
 class Distortion(Protocol):
-    """What becomes of a sample: the samples that are sent in its place, in their order."""
+    """Function that returns the samples that are sent instead of a sample, in their order."""
 
     def __call__(self, sample: Sample, /) -> list[Sample]:
         """Take one sample."""

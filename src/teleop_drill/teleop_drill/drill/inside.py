@@ -51,12 +51,12 @@ class Control:
 
     @property
     def word(self) -> int:
-        """What the stage does."""
+        """Present order to the stage."""
         return int(_FORM.unpack(self._map)[0])
 
     @property
     def offset_ns(self) -> int:
-        """By how much the clock is off [ns]."""
+        """Offset of the stepped clock [ns]."""
         return int(_FORM.unpack(self._map)[1])
 
     def write(self, word: int = WORKS, offset_ns: int = 0) -> None:
@@ -72,7 +72,7 @@ class Steered(Protocol):
 
     @property
     def word(self) -> int:
-        """What it does."""
+        """Present order to the stage, as a number."""
 
 
 class Passing(RunningStage):

@@ -105,7 +105,7 @@ class Numbers:
 
     @staticmethod
     def of(configuration: Configuration) -> "Numbers":
-        """Those of a session."""
+        """Numbers of a session."""
         given, scaling = configuration.group("slave"), configuration.group("motion_scaling")
         slave, lag = Slave(given), given.reference_filter
         drives = slave.robot.drives

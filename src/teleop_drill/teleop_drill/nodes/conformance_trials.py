@@ -14,9 +14,9 @@ from teleop_drill.conformance.crtk_topics import Verdict
 from teleop_drill.nodes.conformance_arm import Arm, numbers_of
 
 TURN = 0.01
-"""How far a joint is moved [rad or m]."""
+"""Distance by which a joint is moved [rad or m]."""
 WAY = 0.003
-"""How far the tip is moved [m]."""
+"""Distance by which the tip is moved [m]."""
 _NEAR = 0.05  # share of the displacement that may be missing at the end
 _MOVED = 0.3  # least share of the displacement that counts as a motion
 _PATIENCE = 10.0  # longest duration of a move [s]
@@ -58,7 +58,7 @@ class Trials:
     # -- where it is -----------------------------------------------------------------------------
 
     def joints(self) -> Array:
-        """Its joints: the setpoint, or the measurement if there is no setpoint."""
+        """Joint positions of the arm: the setpoint, or the measurement if there is no setpoint."""
         name = "setpoint_js" if self.arm.publishers("setpoint_js") else "measured_js"
         return self._fresh(name)["position"]
 
@@ -317,4 +317,4 @@ TRIALS: Mapping[str, Callable[[Trials], Outcome]] = {
     "servo_cv": lambda t: t.run_tip("servo_cv"),
     "hold": Trials.hold,
 }
-"""What is tried with each command."""
+"""Trial of each command."""

@@ -137,7 +137,7 @@ class _Drill:
         self._counted: dict[Path, Counted] = {}
         self._sessions_of: dict[Path, Session] = {}
         self.interrupt = Interrupt()
-        """What ends a wait of this drill with KeyboardInterrupt."""
+        """Object that ends a wait of this drill with KeyboardInterrupt."""
         self.is_over = False
         """Whether it was stopped before its end."""
 
@@ -172,7 +172,7 @@ class _Drill:
     # -- sessions --------------------------------------------------------------------------------
 
     def _prepared(self) -> LiveRig:
-        """As :meth:`_ready`; if a session cannot continue, a new one is tried once."""
+        """Like :meth:`_ready`; if a session cannot continue, a new one is tried once."""
         if self._rig is None:
             return self._ready()
         try:
@@ -199,7 +199,7 @@ class _Drill:
         return self._rig
 
     def _measure_scheduling(self, rig: LiveRig) -> None:
-        """How late this machine wakes the drill's own thread while the session works."""
+        """Lateness of the wake-ups of the drill's own thread while the session works."""
         since_ns = rig.now_ns()
         rig.wait(_MEASURED)
         found = self._scheduling = rig.tap.scheduling(since_ns)

@@ -111,13 +111,13 @@ class Tap:
         )
 
     def counted(self) -> Counted:
-        """Of every stream: when each message since the start was sent, and its stamp [ns]."""
+        """Time of sending and stamp of each message since the start [ns], by stream."""
         with self._lock:
             both = {n: [np.array(a, np.int64) for a in two] for n, two in self._counted.items()}
         return {name: (sent, stamps) for name, (sent, stamps) in both.items()}
 
     def scheduling(self, since_ns: int) -> Scheduling:
-        """How late this thread was woken since a time [ns]."""
+        """Lateness of this thread's wake-ups since a time [ns]."""
         with self._lock:
             late = [seconds for at_ns, seconds in self._late if at_ns >= since_ns]
         return Scheduling(float(np.median(late)), max(late)) if late else Scheduling()

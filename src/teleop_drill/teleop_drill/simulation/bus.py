@@ -132,7 +132,7 @@ class Bus:
         return self.found_ns(process, entity) <= self.scheduler.now_ns
 
     def found_ns(self, process: Process, entity: Writer | Reader | Service) -> int:
-        """When a process has found an entity of another process, or will find it [ns].
+        """Time at which a process discovers an entity of another process [ns].
 
         Processes first discover each other, which takes long; then they exchange their topics quickly.
         """
@@ -144,7 +144,7 @@ class Bus:
         return self._known[key]
 
     def _met(self, one: Process, other: Process) -> int:
-        """When one process has found another, or will have [ns]."""
+        """Time at which one process discovers another [ns]."""
         pair = one, other
         if pair not in self._meetings:
             both_ns = max(self._born_ns.get(process, 0) for process in pair)

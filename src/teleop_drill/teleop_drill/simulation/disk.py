@@ -11,11 +11,11 @@ from teleop_drill.simulation.machine import Process
 from teleop_drill.simulation.scheduler import Strand
 
 _BYTE_NS = 2
-"""What writing a byte takes [ns]."""
+"""Time to write a byte [ns]."""
 
 
 class Jobs:
-    """As of :class:`~teleop_core.bags.background.Jobs`."""
+    """Simulated form of :class:`~teleop_core.bags.background.Jobs`."""
 
     def __init__(self, process: Process, size: int) -> None:
         self._scheduler, self._size = process.machine.scheduler, size
@@ -52,7 +52,7 @@ class Jobs:
 
 
 class Disk:
-    """As of :class:`~teleop_core.bags.background.Background`, of one process.
+    """Simulated form of :class:`~teleop_core.bags.background.Background`, of one process.
 
     Args:
         process: Process that writes.

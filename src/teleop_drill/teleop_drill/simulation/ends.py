@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from teleop_drill.simulation.bus import Bus
 
 _PUBLISH_NS, _TAKE_NS = 12_000, 900
-"""What the middleware needs to hand a message over, measured with rclpy."""
+"""Time that the middleware needs to hand over a message, measured with rclpy."""
 
 
 def _name_of(kind: Any) -> str:
@@ -37,7 +37,7 @@ class Match:
 
 
 class Writer:
-    """One end of a topic; as of :class:`~teleop_core.middleware.world.Publisher`.
+    """One end of a topic, with the interface of :class:`~teleop_core.middleware.world.Publisher`.
 
     Args:
         bus: The simulated middleware.

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 class SimulatedSteering:
-    """As of :class:`~teleop_drill.nodes.drill_site.Steering`.
+    """Simulated form of :class:`~teleop_drill.nodes.drill_site.Steering`.
 
     Args:
         machine: Machine of the processes.

@@ -112,7 +112,7 @@ class Laws:
         self._obey_by, self._was_idle = 0.0, False
         self._presses = 0
         self._sent_ns: dict[bytes, list[int]] = {}  # times of sending, by publisher
-        """When setpoints were sent, by the system's clock [ns]."""
+        """Times at which setpoints were sent, by the system's clock [ns]."""
         stage.bus.seen[f"/{SLAVE_SETPOINT_JS.name}"] = self._judge_setpoint
         self._scheduler.at(0, self._look)
 
@@ -256,7 +256,7 @@ class Laws:
             self._break("stop", f"no stop is in force, although {since} long enough ago")
 
     def _late(self) -> float:
-        """What the machine itself may add [s]: bad lines, and processors that are busy with other work."""
+        """Delay that the machine itself may add [s]: bad lines, and busy processors."""
         lines = self._stage.bus.lines.values()
         on_the_way = max((line.delay + 20.0 * line.jitter for line in lines), default=0.0)
         lost = 0.2 * any(line.loss for line in lines)

@@ -39,7 +39,7 @@ _WORDS = {
 
 
 class SimulatedLifecycleNode(SimulatedNode):
-    """As of :class:`~teleop_core.middleware.world.LifecycleNode`.
+    """Simulated form of :class:`~teleop_core.middleware.world.LifecycleNode`.
 
     Args:
         bus: The simulated middleware.

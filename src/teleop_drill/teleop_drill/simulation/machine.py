@@ -60,11 +60,11 @@ class Process(Turns):
         self.room: int | None = None
         """Bytes that it may still write; None for no limit."""
         self.disk_delay = 0.0
-        """What each of its writes waits for the disk [s]."""
+        """Time that each write of the process waits for the disk [s]."""
         self.disk_error = 0
         """Number of the error that its writes meet; 0: none."""
         self.due: list[deque[Callable[[], object]]] = []
-        """What waits for each of its executors."""
+        """Requests that wait for each executor of the process."""
         self.lines: list[SocketEnd] = []
         self.listeners: list[Listener] = []
         self.on_end: list[Callable[[bool], None]] = []
@@ -112,7 +112,7 @@ class Process(Turns):
 
 
 class Listener:
-    """As of :class:`~teleop_core.middleware.world.Listener`."""
+    """Simulated form of :class:`~teleop_core.middleware.world.Listener`."""
 
     def __init__(self, machine: "Machine", place: str) -> None:
         self._machine, self._place = machine, place
@@ -128,7 +128,7 @@ class Listener:
 
 
 class SocketEnd:
-    """As of :class:`~teleop_core.middleware.world.Line`."""
+    """Simulated form of :class:`~teleop_core.middleware.world.Line`."""
 
     def __init__(self) -> None:
         self.came = bytearray()

@@ -67,7 +67,7 @@ class Coverage:
         }
 
     def lines(self) -> list[str]:
-        """What was found, in a few lines."""
+        """Result in a few lines."""
         laws = [f"{law}: {self.looks[law]} looks, {self.broken[law]} broken" for law in self.looks]
         return [f"{self.sessions} sessions of {self.seconds:.0f} s in all", *sorted(laws)]
 

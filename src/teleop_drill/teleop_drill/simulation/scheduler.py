@@ -14,9 +14,9 @@ from typing import Any
 from greenlet import GreenletExit, getcurrent, greenlet
 
 BEGIN_NS = 1_000_000_000_000
-"""Where monotonic clocks begin [ns]."""
+"""First value of monotonic clocks [ns]."""
 EPOCH_NS = 1_800_000_000_000_000_000
-"""How far the system's clocks are ahead of the monotonic clocks [ns]."""
+"""Offset of the system's clocks from the monotonic clocks [ns]."""
 _LOOK_NS = 60
 """Cost of reading a clock [ns], so that time passes in a loop that only reads the clock."""
 _BREAK_NS = 1_000_000
@@ -110,7 +110,7 @@ class Strand:
 
 
 class Turns:
-    """What the scheduler knows of a process."""
+    """The scheduler's data about a process."""
 
     def __init__(self) -> None:
         self.busy_ns = 0  # time until which its interpreter is busy
@@ -119,7 +119,7 @@ class Turns:
 
 
 class Lock:
-    """As of :class:`~teleop_core.middleware.world.Lock`."""
+    """Simulated form of :class:`~teleop_core.middleware.world.Lock`."""
 
     def __init__(self, scheduler: "Scheduler") -> None:
         self._scheduler, self._waiting = scheduler, list[Strand]()
@@ -187,7 +187,7 @@ class Scheduler:
         return self.now_ns
 
     def look_and_pass(self) -> int:
-        """As :meth:`look_ns`; now and then other threads of the process work before it returns."""
+        """Like :meth:`look_ns`; sometimes other threads of the process run before it returns."""
         if self._breaking.random() < self.breaks and getcurrent() is self.current.greenlet:
             self._switch(self.now_ns + round(_BREAK_NS * self._breaking.random()))
         return self.look_ns()

@@ -41,7 +41,7 @@ class Fault:
     amount: float
 
     def text(self) -> str:
-        """The same in words."""
+        """Description of the fault in words."""
         where = f" of {self.where}" if self.where else ""
         return f"at {self.at:.3f} s {self.kind}{where} for {self.seconds:.3f} s ({self.amount:.2f})"
 
@@ -73,7 +73,7 @@ def draw(seed: int, processes: tuple[str, ...]) -> tuple[Fault, ...]:
 
 
 def _led(lead: str, at: float, processes: tuple[str, ...]) -> list[Fault]:
-    """What brings the arm into another state."""
+    """Commands that bring the arm into another state."""
     if lead in COMMANDS:
         return [Fault(at, "command", "", 0.1, (_NAMES.index(lead) + 0.5) / len(_NAMES))]
     where = processes[-2] if lead == "kill" else ""  # the slave's: the recorder's is the last

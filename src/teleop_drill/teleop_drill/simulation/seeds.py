@@ -102,7 +102,7 @@ def run_seed(
 
 
 class _Run:
-    """One schedule."""
+    """One running schedule."""
 
     def __init__(self, bus: Bus, owner: Process, found: Found, folder: Path) -> None:
         bus.watch(owner)

@@ -36,7 +36,7 @@ Processes = Mapping[str, tuple[str, ...]]
 
 
 class SimulatedSession:
-    """As of :class:`~teleop_drill.nodes.drill_site.Session`.
+    """Simulated form of :class:`~teleop_drill.nodes.drill_site.Session`.
 
     Args:
         bus: The middleware.
@@ -68,7 +68,7 @@ class SimulatedSession:
         self.running: dict[str, Process] = {}
         """Newest process of each name."""
         self.crews: dict[Process, Crew] = {}
-        """What works in each process."""
+        """Nodes of each process."""
         self.recordings: list[Path] = []
         self._begun_ns: list[int] = []
         self._bystander: Process | None = None

@@ -69,7 +69,7 @@ class Stage:
         self.killed: set[Process] = set()
         """Processes that were told to end."""
         self.kills = 0
-        """How many processes of nodes were killed."""
+        """Number of killed node processes."""
         self.lost_disk: set[Process] = set()
         """Processes that may end because their disk failed, if they report what they have saved."""
         self.stopped: list[tuple[Process, int]] = []

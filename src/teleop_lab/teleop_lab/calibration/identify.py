@@ -14,7 +14,7 @@ from teleop_lab.calibration.measured import CalibrationError, Measured
 from teleop_lab.calibration.model import FRAME, Model, aligned
 
 LEVEL = 0.95
-"""Of the confidence intervals."""
+"""Level of the confidence intervals."""
 NOT_SURE = "is not told from zero"
 # Largest plausible error of an angle [rad], and of a length as a share of the arm's length.
 _ABSURD = 0.35

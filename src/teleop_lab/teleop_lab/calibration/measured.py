@@ -87,7 +87,7 @@ class Measured:
         return len(self)
 
     def part(self, rows: Array) -> "Measured":
-        """Some of the poses, by a mask or by their places."""
+        """A part of the poses, selected by a mask or by indices."""
         at = np.arange(len(self))[rows]
         return Measured(
             joints=self.joints[at],

@@ -169,7 +169,7 @@ class Bench:
             del self._streams[next(iter(self._streams))]
 
     def sessions(self, scenario: str, settings: Settings | None = None, *, is_scored: bool = True) -> list[Session]:
-        """The same session by several hands; see :meth:`session`."""
+        """Run a session with several hands; see :meth:`session`."""
         return [self.session(scenario, seed, settings, is_scored=is_scored) for seed in self.seeds]
 
     def slave(self, settings: Settings | None = None) -> ArmParameters:

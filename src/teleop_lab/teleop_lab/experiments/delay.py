@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 LATE = "network.there.least_delay"
 GAIN = "coarse_gain"
 DELAYS = (0.0, 0.25, 0.5, 1.0)
-"""Of the commands [s]."""
+"""Delays of the commands [s]."""
 FOLLOWED = DELAYS[:3]
 GAINS = (1.0, 0.5, 0.2)
 SCALED = 0.5

@@ -66,14 +66,14 @@ def _signed(difference: float, published: float) -> str:
 
 
 def spread(row: "Comparison") -> str:
-    """From the smallest to the largest of several seeds."""
+    """Text with the smallest and largest value of several seeds."""
     if row.lowest is None or row.highest is None:
         return ""
     return f"{row.lowest:.3g} … {row.highest:.3g}"
 
 
 def within(row: "Comparison") -> str:
-    """What counts as agreement."""
+    """Text of the tolerance."""
     if row.within is None:
         return ""
     return row.within.text(row.unit) + f", {row.basis}" * (row.basis != "printed")

@@ -11,7 +11,7 @@ Plain = str | int | float | bool | None | list["Plain"] | dict[str, "Plain"]
 _KINDS = ("exact", "share", "absolute", "factor")
 _ROUNDING = 1e-9
 BASES = ("printed", "law", "goal")
-"""What a row is judged against."""
+"""Origins of the values against which rows are judged."""
 
 
 @dataclass(frozen=True)
@@ -155,7 +155,7 @@ class Comparison:
 
 
 class Findings(NamedTuple):
-    """What the function of an experiment returns.
+    """Return value of an experiment's function.
 
     Attributes:
         rows: Numbers, published and predicted.
@@ -197,7 +197,7 @@ class Outcome:
 
     @property
     def judged(self) -> int:
-        """How many published figures are judged."""
+        """Number of published figures that are judged."""
         return self.count()[1]
 
     @property

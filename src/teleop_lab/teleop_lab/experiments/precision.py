@@ -33,7 +33,7 @@ _SOURCE = "Vongbunyong 2008, tables 7.1-7.7 and 8.1, misprints corrected"
 
 
 class Rests(NamedTuple):
-    """Where the slave came to rest.
+    """Rest positions of the slave.
 
     Attributes:
         off: Rest position minus target (6, runs, 6) [rad, m].

@@ -45,7 +45,7 @@ Job = tuple[Way, float]
 
 @dataclass(frozen=True)
 class Puncture:
-    """How a hand reacts to a puncture; infinity or NaN if the hand does not notice it.
+    """Reaction of a hand to a puncture; infinity or NaN if the hand does not notice it.
 
     Attributes:
         tip_drop: Largest fall of the force on the tip from tick to tick [N].

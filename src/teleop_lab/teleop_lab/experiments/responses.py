@@ -34,7 +34,7 @@ _UNITS = ("°", "°", "mm", "°", "°", "°")
 
 
 class Response(NamedTuple):
-    """One move, a row a tick.
+    """One move, with a row for each tick.
 
     Attributes:
         times: Since the move began (N,) [s].

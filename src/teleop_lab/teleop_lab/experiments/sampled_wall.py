@@ -62,12 +62,12 @@ class SampledDevice:
 
     @property
     def reading(self) -> float:
-        """What the device reads [m]."""
+        """Position that the device measures [m]."""
         return float(self.master.signals["master_measured_cp"][AXIS])
 
     @property
     def place(self) -> float:
-        """Where the device is [m]."""
+        """True position of the device [m]."""
         return float(self.master.state["position"][AXIS])
 
     @property

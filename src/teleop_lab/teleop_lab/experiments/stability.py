@@ -20,7 +20,7 @@ GRIPS: Mapping[str, one_axis.Grip] = {
 }
 """Hands that hold the stylus: mass with the device, stiffness and damping; assumed."""
 DELAYS = (0.0, 0.02, 0.05, 0.1, 0.2)
-"""By which the force comes later [s]."""
+"""Delays of the force [s]."""
 SOFTEST, STIFFEST = 20.0, 50_000.0
 """Objects that are tried [N/m]: softer than tissue, and steel."""
 _WAYS: tuple[transmission.Way, ...] = (

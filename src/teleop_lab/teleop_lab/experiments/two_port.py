@@ -17,7 +17,7 @@ from teleop_lab.experiments.one_axis import Grip, Mapped
 Complex = NDArray[np.complex128]
 
 PERIOD = 10.0
-"""Of the excitation [s]: one line each 0.1 Hz."""
+"""Period of the excitation [s]; its lines are multiples of 0.1 Hz."""
 _TICKS = round(PERIOD / DT)
 BINS = np.unique(2 * (np.geomspace(1.0, 300.0, 24) / 2.0).round().astype(int) + 1)
 """Odd multiples of 1/PERIOD that are excited, 0.1 to 30 Hz: quadratic distortion has only even multiples."""

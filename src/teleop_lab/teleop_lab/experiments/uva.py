@@ -83,7 +83,7 @@ def _plain(primitive: Primitive, level: Level) -> float:
 
 
 def _mackenzie(primitive: Primitive, level: Level) -> float:
-    """The same by the law of MacKenzie and Ware 1993: MT = 230 + (169 + 1.03 lag) ID ms."""
+    """Time of a primitive by the law of MacKenzie and Ware 1993: MT = 230 + (169 + 1.03 lag) ID ms."""
     bits = float(difficulty(primitive.way, primitive.width))
     return 0.230 + (0.169 + 1.03 * (LATENCY + level.delay)) * bits
 
@@ -112,7 +112,7 @@ Table = dict[str, dict[str, float]]
 """Times [s] by level and primitive."""
 PERSONS = 15
 _T95 = 2.145
-"""Of Student's distribution with 14 degrees of freedom, both sides."""
+"""Factor of a two-sided 95 % confidence interval: Student's distribution with 14 degrees of freedom."""
 _FOLDER = files("teleop_lab.experiments")
 
 
@@ -142,7 +142,7 @@ def _lines(name: str) -> list[dict[str, str]]:
 
 
 def from_normal(table: Table) -> Table:
-    """The same slowing of each level, from the printed times without faults."""
+    """Times with the predicted slowing of each level, from the printed times without faults."""
     means, _ = published()
     begin = LEVELS[0].name
     return {
@@ -152,7 +152,7 @@ def from_normal(table: Table) -> Table:
 
 
 def inside(table: Table, levels: Iterable[Level] = LEVELS) -> int:
-    """How many times of a table lie within people's intervals."""
+    """Number of times of a table that lie within people's intervals."""
     means, halves = published()
     return sum(
         abs(table[level.name][p.name] - means[level.name][p.name]) <= halves[level.name][p.name]

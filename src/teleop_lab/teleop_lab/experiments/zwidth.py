@@ -20,13 +20,13 @@ friction is assumed."""
 LATE = (0, 1, 2, 3, 5, 10)
 """Periods of 1 ms by which the wall's force comes later."""
 WALL_DAMPINGS = (0.0, 5.0)
-"""Of the walls [N·s/m]; assumed."""
+"""Dampings of the walls [N·s/m]; assumed."""
 DAMPINGS = ((2.0, 0.0), (5.0, 2.0), (5.0, 5.0))
 """Viscous frictions of the device and dampings of the wall for which the energy is computed [N·s/m]."""
 PRESSES = (1, 2, 5, 20, 50)
 """Lengths of the presses, in periods in and as many out."""
 SPEEDS = (0.005, 0.1)
-"""Of the presses [m/s]."""
+"""Speeds of the presses [m/s]."""
 _OWN = DeviceParameters()
 DEVICES = (
     (_OWN.friction, _OWN.position_resolution),

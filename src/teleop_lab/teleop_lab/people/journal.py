@@ -128,7 +128,7 @@ class Journal:
         return path
 
     def step(self, code: str) -> tuple[str, Trial | None]:
-        """What a participant does next: ``consent``, ``begin`` or ``wait`` with a trial, ``questions``, ``thanks``."""
+        """Next step of a participant: ``consent``, ``begin`` or ``wait`` with a trial, ``questions``, ``thanks``."""
         if not self._own[code]["consent"]:
             return "consent", None
         trials = self._plan.trials(code)

@@ -78,7 +78,7 @@ class PeoplePage:
         return f"{address}conduct{'?' + query if query else ''}#{quote(self.key)}"
 
     def answer(self, path: str, query: Query, page: int, body: Body = bytes) -> Told:
-        """Answer to a request, of which each word is checked."""
+        """Answer to a request; every parameter of the request is checked."""
         del body
         try:
             with self._lock:

@@ -111,7 +111,7 @@ class PeopleParameters:
 
 @dataclass(frozen=True)
 class Plan:
-    """What people do in a study.
+    """Work of the people in a study.
 
     Attributes:
         study: Conditions, and the scores that are compared.

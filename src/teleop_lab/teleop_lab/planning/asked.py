@@ -45,7 +45,7 @@ class AskedPath:
         return np.array(self.poses[int(is_free.argmax()), 3:])
 
     def limited(self, count: int) -> "AskedPath":
-        """The same path with about ``count`` samples at most, evenly spread over the time."""
+        """Copy of the path with at most about ``count`` samples, evenly spread over the time."""
         return self if len(self) <= count else self.excerpt(count / self.time[-1], 2 * count)
 
     def excerpt(self, rate: float, count: int) -> "AskedPath":
@@ -70,7 +70,7 @@ class AskedPath:
 
 
 def asked_path(bag: Bag) -> AskedPath:
-    """What the hand of a recording did.
+    """Motion of the hand in a recording.
 
     Args:
         bag: Recording with ``master/measured_cp`` and, if it has them, ``master/buttons``.

@@ -11,7 +11,7 @@ Setting = float | str | list[float] | list[str]
 
 @dataclass(frozen=True, kw_only=True)
 class Placement:
-    """How a slave is arranged for a hand's motion.
+    """Arrangement of a slave for a hand's motion.
 
     Attributes:
         robot: Name of the slave: ``robot`` of all stages with this parameter.
@@ -73,11 +73,11 @@ class Placement:
         }
 
     def texts(self, arm: str = "") -> list[str]:
-        """The same as ``key=value`` for ``--set``; no value holds blanks."""
+        """Placement as ``key=value`` texts for ``--set``; no value contains blanks."""
         return [f"{name}={_text(value)}" for name, value in self.settings(arm).items()]
 
     def parameter_file(self, arm: str = "") -> str:
-        """The same as a ROS 2 parameter file, which ``--config`` takes."""
+        """Placement as a ROS 2 parameter file for ``--config``."""
         stages: dict[str, dict[str, dict[str, Setting]]] = {}
         for name, value in self.settings(arm).items():
             stage, _, parameter = name.partition(".")

@@ -55,7 +55,7 @@ class Followed:
 
 @dataclass(frozen=True, eq=False)
 class Reach:
-    """How much of a motion a slave can follow.
+    """Share of a motion that a slave can follow.
 
     Attributes:
         path: Motion of the hand.

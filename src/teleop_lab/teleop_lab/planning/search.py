@@ -139,7 +139,7 @@ class Search:
         return None
 
     def _improved(self, found: Found) -> Found:
-        """The same placement with its start shifted by the motion that was cut off, as long as that helps."""
+        """Placement whose start is shifted by the motion that was cut off, as long as this increases the share."""
         for _ in range(_ROUNDS):
             if found[0] >= 1.0:
                 break

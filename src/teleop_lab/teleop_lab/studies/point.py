@@ -21,7 +21,7 @@ from teleop_core.session import api, configuration
 
 @dataclass(frozen=True)
 class Key:
-    """What a result depends on: digests of its parameters and of the code that made it."""
+    """Digests of everything that a result depends on: its parameters, and the code that made it."""
 
     recipe: str
     code: str

@@ -140,7 +140,7 @@ class Study:
         return found
 
     def explain(self, store: Path | str | None = None, jobs: int | None = None) -> Explained:
-        """How many sessions, how long and how many bytes, without running one.
+        """Number, duration and bytes of the sessions, without running one.
 
         Args:
             store: Store with earlier results.

@@ -10,7 +10,7 @@ from teleop_core.coupling.architectures.three_channel import ThreeChannelParamet
 
 @dataclass(frozen=True, kw_only=True)
 class FourChannelParameters(ThreeChannelParameters):
-    """What the hand gets of the slave, and what the slave gets of the hand's force."""
+    """Gains of the channels between hand and slave."""
 
     hand_gain: float = parameter(
         1.0,

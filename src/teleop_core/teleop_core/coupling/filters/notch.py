@@ -13,7 +13,7 @@ _WIDEST = 0.45
 
 @dataclass(frozen=True, kw_only=True)
 class NotchParameters:
-    """Where the notch is, and how narrow."""
+    """Frequency and width of the notch."""
 
     frequency: float = parameter(10.0, Within(3.0, 25.0, "Hz"), "frequency that the filter removes")
     quality: float = parameter(

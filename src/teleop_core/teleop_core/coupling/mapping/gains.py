@@ -102,7 +102,7 @@ class ReachForceParameters:
 
 @dataclass(frozen=True, kw_only=True)
 class ReflectionParameters:
-    """What the hand feels of the slave, and of what the slave touches."""
+    """Force on the hand from the slave and its contacts."""
 
     architecture: Choice = choice(ARCHITECTURES, "unilateral", doc="law by which the hand feels the slave")
     max_force: float = parameter(

@@ -247,7 +247,7 @@ class InverseKinematics(RunningStage):
         self._told = 0, 0
 
     def concerns(self) -> list[str]:
-        """What kept the slave from following since the last call, in words."""
+        """Texts with the reasons why the slave could not follow since the last call."""
         asked, limited = int(self.state["asked"]), int(self.state["limited"])
         share = (limited - self._told[1]) / max(asked - self._told[0], 1)
         self._told = asked, limited

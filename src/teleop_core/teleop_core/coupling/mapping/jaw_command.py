@@ -10,14 +10,14 @@ from teleop_core.graph import Row, Stage, topics
 from teleop_core.kernels import Fields, kernel
 
 SOURCES = ("hand", "clutch", "fixture", "mode")
-"""What closes the jaw: the hand's handle, or a button, in the order of ``master/buttons``."""
+"""Sources that can close the jaw: the hand's handle, or a button, in the order of ``master/buttons``."""
 _HAND = SOURCES.index("hand")
 _PRESSED = 0.5
 
 
 @dataclass(frozen=True, kw_only=True)
 class JawCommandParameters:
-    """What closes the jaw, and how far."""
+    """Source that closes the jaw, and the angles of the jaw."""
 
     source: str = parameter(
         "hand",

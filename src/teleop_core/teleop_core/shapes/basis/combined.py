@@ -90,7 +90,7 @@ class Combined(Protocol):
 
     @property
     def parts(self) -> tuple[str, ...]:
-        """Texts of its parts."""
+        """Texts of the shape's parts."""
 
 
 def numbers_of_parts(parameters: Combined) -> Array:

@@ -42,7 +42,7 @@ _SHARP = math.cos(math.radians(30.0))
 
 
 class GridRequest(NamedTuple):
-    """What a grid depends on.
+    """Everything that a grid depends on.
 
     Attributes:
         file: Path of the mesh or the heights.

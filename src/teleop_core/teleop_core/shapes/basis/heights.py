@@ -17,7 +17,7 @@ from teleop_core.shapes.basis import spline, triangles
 
 FIELD = "height_field"
 THICKNESS = 0.02
-"""Of the block below the lowest height [m]."""
+"""Thickness of the block below the lowest height [m]."""
 _LEAST = 4  # least number of heights along x and along y
 _MOST = 400_000  # places of the surface
 

@@ -26,7 +26,7 @@ class Fault(IntEnum):
 
     @property
     def word(self) -> str:
-        """Its name in parameters and reports: ``"joint_limit"``."""
+        """Name of the fault in parameters and reports: ``"joint_limit"``."""
         return self.name.lower()
 
 

@@ -23,7 +23,7 @@ class State(IntEnum):
 
 
 class Event(IntEnum):
-    """What may change the state: commands, and events that the arm detects itself."""
+    """Events that may change the state: commands, and events that the arm detects itself."""
 
     ENABLE = 0
     DISABLE = 1

@@ -36,7 +36,7 @@ FAULTS = {
 
 @dataclass(frozen=True, kw_only=True)
 class HardwareParameters:
-    """Which faults to simulate, values that replace the robot's, and values that no robot file states."""
+    """Simulated effects, values that replace the robot's, and values that no robot file states."""
 
     without: tuple[str, ...] = parameter(
         (), choices=tuple(FAULTS), fixed=True, doc="effects that the plant leaves out, to see what each contributes"

@@ -44,7 +44,7 @@ _FARTHEST = 3.0  # distance below a tip within which an object is looked for [m]
 
 @dataclass(frozen=True, kw_only=True)
 class WorldParameters:
-    """What the tip can touch."""
+    """Parameters of the object that the tip can touch."""
 
     kind: Choice = choice(WORLD_OBJECTS, "empty", fixed=True, doc="object that the tip can touch", usual=_USUAL)
     place: tuple[float, ...] = parameter(
