@@ -43,7 +43,7 @@ _AT = 1e-3
 """Share of a joint's range next to its end that counts as at its limit."""
 _WORK, _GRIP = 0.05, 0.1  # free space on all sides of a tip and of a stylus with its handles [m]
 _GOAL = TASK_STATE.columns.index("goal_x")
-_LEAST_GOAL = 1e-3  # width of a goal as it is drawn [m]
+_LEAST_GOAL = 1e-3  # smallest drawn width of a goal [m]
 _NEAR = 0.4  # part of the robot's length about the start of the tip in which an object is framed
 _TOUCH = 0.05  # smallest wall force that counts as a contact [N]
 SHOWN = ("axes", "ghost", "reach", "paths")
@@ -223,7 +223,7 @@ class ArmNodes:
             self._goal = self._server.scene.add_icosphere(
                 f"{self.path}/goal", 0.5, TARGET, subdivisions=2, opacity=0.5, cast_shadow=False
             )
-            self._server.scene.add_label(f"{self.path}/goal/name", "goal")  # it may be within the tool, or small
+            self._server.scene.add_label(f"{self.path}/goal/name", "goal")  # the goal may be inside the tool, or small
         if self._goal is None:
             return
         self._goal.visible = is_there

@@ -86,7 +86,7 @@ class LiveLink(Observer):
 
     def close(self) -> None:
         """Disconnect; the session keeps running."""
-        self._is_closed = True  # first, because an executor that is shut down while it spins raises an error
+        self._is_closed = True  # must be first, because an executor that is shut down while it spins raises an error
         self._executor.wake()
         self._thread.join(PATIENCE)
         self._executor.shutdown()
@@ -124,7 +124,7 @@ class LiveLink(Observer):
 
     def _robot(self, arm: str) -> Robot:
         slave = "/".join(filter(None, (arm, "slave")))
-        values = self._client.values(slave, ["robot", "geometry"])  # no answer is no RCRT-1
+        values = self._client.values(slave, ["robot", "geometry"])  # a slave that does not answer counts as no RCRT-1
         told = self._client.values(slave, [_HEARTBEAT])  # a foreign slave may lack this parameter
         self.has_heartbeat = self.has_heartbeat or bool(told.get(_HEARTBEAT))
         geometry = values.get("geometry")
@@ -239,7 +239,7 @@ class LiveLink(Observer):
         found: dict[tuple[str, str], ParameterInfo] = {}
         services = [name for name, _ in self.ros.get_service_names_and_types()]
         for node in sorted(name.removesuffix(_LIST).strip("/") for name in services if name.endswith(_LIST)):
-            with suppress(SessionError):  # it may be leaving
+            with suppress(SessionError):  # the session may be ending
                 found |= {(node, name): info for name, info in self._client.read(node).items()}
         self._known = found
         return MappingProxyType(found)

@@ -52,7 +52,7 @@ class Seen:
             return False
         found: Any = self._layout.decode_one(newest) or read_any(self.topic.kind, newest, self._joints)
         if not isinstance(found, tuple) or not np.isfinite(found[1]).all():
-            return False  # refused and counted by the nodes that need it
+            return False  # the nodes that need the topic refuse and count its messages
         now_ns = self._owner.world.time_ns()
         self._waiting.append((now_ns, found[0], found[1].copy()))
         if not self._frames or self._frames[-1][1] != found[0]:
@@ -112,7 +112,8 @@ class Hand:
             self._say(np.array([0.0, name == "fixture", name == "mode"]))
             self._world.sleep(_PRESS)
             self._say(np.zeros(3))
-            self._world.sleep(_PRESS)  # released for the same time, because otherwise two presses would be one
+            # keep the button released for the same time, because otherwise two presses would be one
+            self._world.sleep(_PRESS)
 
     def close_jaw(self, share: float) -> None:
         """Close the jaw by a share."""

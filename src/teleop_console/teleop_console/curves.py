@@ -16,7 +16,7 @@ STRETCHES = 400
 TICKS = 200
 """Largest number of tick marks; faults have priority."""
 _GAP, _GAPS = 0.5, 10.0  # a pause is at least this long [s], and at least this many usual steps
-_FAULTS = 100.0  # more than there are kinds of faults
+_FAULTS = 100.0  # larger than the number of kinds of faults
 _STATES = {
     float(state): (state.name, meaning) for state, meaning in zip(State, ("idle", "good", "held", "wrong"), strict=True)
 }

@@ -55,7 +55,7 @@ class Wake(asyncio.Event):
 
     def set(self) -> None:
         """Wake the waiting task, on the loop's own thread only: viser asks the loop to do so too."""
-        with suppress(RuntimeError):  # no loop runs in this thread
+        with suppress(RuntimeError):  # viser calls this also in a thread without a loop
             asyncio.get_running_loop()
             super().set()
 

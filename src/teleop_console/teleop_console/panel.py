@@ -49,8 +49,8 @@ class Panel:
         self._make_public, self._may_drive = server.make_public, drivers.may_drive
         self._take, self._drawn = drivers.take, 0.0
         self.scores = {arm.name: LiveScores() for arm in link.arms}
-        self._gui.main_panel.dock_right()  # beside the scene, not over it
-        self._gui.main_panel.set_width(WIDTH)  # without it, a wide screen keeps the layout of a phone
+        self._gui.main_panel.dock_right()  # the panel is beside the scene, not over it
+        self._gui.main_panel.set_width(WIDTH)  # without a width, a wide screen keeps the layout of a phone
         self._buttons: dict[str, viser.GuiButtonHandle] = {}
         self._controls: list[Control] = []
         self._status = self._gui.add_html("")

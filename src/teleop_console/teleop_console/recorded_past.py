@@ -134,6 +134,6 @@ class Recorded(Past):
 
     def _marks_of(self) -> Iterator[tuple[float, str]]:
         for bag in self._bags.values():
-            with suppress(TeleopError):  # most have none
+            with suppress(TeleopError):  # most recordings have no marks
                 for mark in bag.reports(MARKS):
                     yield (mark.stamp_ns - self._start_ns) * 1e-9, mark.message

@@ -25,7 +25,7 @@ ROBOTS = Path("robots")
 """Folder of the robots that were dropped on the form."""
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}\.urdf")
 _LARGEST = 4 * 1024 * 1024  # bytes of a robot's file
-_TRY = 0.25  # for which options are tried before the page is answered [s]
+_TRY = 0.25  # time for which options are checked before the page is answered [s]
 _LOOK = 0.2  # time between two checks for new verdicts [s]
 Query = Mapping[str, Sequence[str]]
 Body = Callable[[int], bytes]

@@ -98,7 +98,7 @@ class Stylus:
                 return
             is_taken = hand.client is not None and hand.client != client
             if client in hand.refused or is_taken or not self._may_drive(client):
-                hand.refused.add(client)  # for the whole gesture
+                hand.refused.add(client)  # the refusal lasts for the whole gesture
                 if hand.client == client:
                     self._let_go(arm, hand)
                 return

@@ -78,7 +78,7 @@ def theme(server: viser.ViserServer, *, is_dark: bool) -> None:
 
 PERIOD = 0.5
 """Time between two pictures of an inset [s]."""
-_PATIENCE = 10.0  # for a browser that does not answer [s]
+_PATIENCE = 10.0  # longest wait for a browser that does not answer [s]
 
 
 class Insets:

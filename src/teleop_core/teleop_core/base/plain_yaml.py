@@ -173,7 +173,7 @@ def check_regular(path: Path) -> None:
     """
     try:
         mode = path.stat().st_mode
-    except ValueError as error:  # a zero byte in its name
+    except ValueError as error:  # the file name contains a zero byte
         raise UnreadableError(f"is no valid file name: {error}") from error
     if not stat.S_ISREG(mode) and not stat.S_ISDIR(mode):  # reading a directory raises a clear error itself
         raise UnreadableError("is a pipe or a device, must be a file")

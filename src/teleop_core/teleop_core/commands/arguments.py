@@ -27,7 +27,7 @@ def command(
 ) -> argparse.ArgumentParser:
     """Parser of a command, which calls ``run``; its help contains ``text``, then the examples."""
     parser: argparse.ArgumentParser = commands.add_parser(name, help=text, description=text, epilog=examples)
-    if examples is not None:  # with the line breaks of the source
+    if examples is not None:  # keep the line breaks of the source
         parser.formatter_class = argparse.RawDescriptionHelpFormatter
     parser.set_defaults(run=run)
     parser.add_argument(

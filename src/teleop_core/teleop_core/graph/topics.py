@@ -31,7 +31,7 @@ class Quality(Enum):
 class Limit(IntEnum):
     """Limit that keeps the slave from following the hand completely."""
 
-    NONE = 0  # it follows
+    NONE = 0  # the slave follows
     JOINT = 1  # a joint is at the end of its range
     WORKSPACE = 2  # no joint vector brings the tip to the commanded pose
     SINGULARITY = 3  # joints would have to turn faster than they can, because the arm is near a singularity

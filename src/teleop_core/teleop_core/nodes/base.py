@@ -254,7 +254,7 @@ class CoreNode(TunedNode):
         for name, output in outputs.items():
             output.tap = self._feed.channels[name].give
             self._feed.channels[name].join(True)
-        self._feed.flush()  # before the middleware publishes the first message
+        self._feed.flush()  # send fed messages before the middleware publishes the first message
 
     def _fed_turn(self) -> None:
         self.turn()

@@ -208,7 +208,7 @@ class _Session:
             if not self._ready and progress.since_begin() < _LOOK:
                 self._insist_on_one_owner(0)
             for name in [name for name in waiting if self._observer.is_active(name)]:
-                if self._children[home[name]].doing != "at work":  # another session's node
+                if self._children[home[name]].doing != "at work":  # the sender is a node of another session
                     continue
                 waiting.remove(name)
                 self.say(f"{name} is ready")

@@ -101,7 +101,7 @@ class TeleopSession:
     def _turn(self) -> None:
         """Run all stages for each tick that is due."""
         if not self._loop.is_ready and self._are_all_there():
-            self._stages[-1].prepare()  # after all kernels are compiled
+            self._stages[-1].prepare()  # give the loop its priority after all kernels are compiled
             self._schedule.start()  # ticks that passed meanwhile must not be caught up
             self._loop.is_ready = True
         with self._gate:
@@ -162,7 +162,7 @@ class TeleopSession:
             entry.join(entry.topic.name in outputs)
         for name, channel in channels.items():
             channel.join(name in outputs)
-        self._feed.flush()  # before the middleware publishes the first message
+        self._feed.flush()  # send fed messages before the middleware publishes the first message
 
 
 def _fed(stages: Sequence[CoreNode]) -> list[str]:

@@ -16,7 +16,7 @@ from teleop_core.nodes.quality import PREFIX, QualityOverrides
 from teleop_core.nodes.sender import Sender
 
 _LOCK_PATIENCE = 1.0
-spare_generator()  # before the first node
+spare_generator()  # must be called before the first node is made
 
 
 @dataclass(frozen=True, kw_only=True)

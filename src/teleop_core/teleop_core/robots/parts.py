@@ -147,7 +147,7 @@ def _try(part: RobotPart) -> None:
         _try_dynamics(robot)
     except TeleopError:
         raise
-    except Exception as error:  # whatever a user's kernel raises, one line names the kernel
+    except Exception as error:  # one line names the kernel for any exception that a user's kernel raises
         reason = " ".join(str(error).split())[:_MOST_CHARACTERS]
         raise PartError("robot", name, f"one whose kernels run at home; {type(error).__name__}: {reason}") from error
 

@@ -95,6 +95,6 @@ def _are_sound(bag: reader.Bag, name: str) -> bool:
         return False
     try:
         stamps = bag.read(name).stamp_ns
-    except RecordingError:  # more or fewer buttons
+    except RecordingError:  # messages have another number of buttons
         return False
     return not (len(stamps) > 1 and (stamps == stamps[0]).all()) and bool((np.diff(stamps) >= 0).all())

@@ -251,7 +251,7 @@ def describe(configuration: Configuration) -> dict[str, str]:
     about = {"version": __version__, "scenario": configuration.scenario}
     if graph.arms != ("",):
         about["arms"] = " ".join(graph.arms)
-    for arm, prefix in prefixes.items():  # before the robots' meshes, which are only drawn
+    for arm, prefix in prefixes.items():  # store these files before the robots' meshes, which are only drawn
         for name, kind in (("world", kept_files.TOUCHED), ("fixture", kept_files.FIXTURE)):
             part = configuration.value(name, arm)
             for place, file in enumerate(files_of(part.kind.parameters) if part else ()):

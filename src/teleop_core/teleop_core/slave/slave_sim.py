@@ -129,7 +129,7 @@ class SlaveSim(RunningStage):
         self._check_world(parameters.world)
         self._check_loop(parameters)
         self._examined, self._gains_in_force = parameters, self.arm.gains.copy()
-        handover.missing_effort(self.arm, np.zeros(n), self.arm.gains, dt, ticks=0)  # compiles it
+        handover.missing_effort(self.arm, np.zeros(n), self.arm.gains, dt, ticks=0)  # compiles the kernels
 
     def reset(self) -> None:
         """Go back to home, at rest."""
@@ -283,7 +283,7 @@ class SlaveSim(RunningStage):
         """Move the effort that the new gains no longer give into the integrators, once these gains are in force."""
         if np.array_equal(self.arm.gains, self._gains_in_force):
             return
-        if self.signals["now_ns"] > 0:  # before the first tick nothing moves, and nothing must be handed over
+        if self.signals["now_ns"] > 0:  # before the first tick nothing moves, so no effort must be handed over
             speed = np.array(self.state["speed"])
             missing = handover.missing_effort(self.arm, speed, self._gains_in_force, self.dt)
             self._law.shift(self.arm.memory, missing)

@@ -20,7 +20,7 @@ RADIUS, ROUND = 0.02, 2.0
 """Radius [m] and time of one round [s] of the circle."""
 SPEED = 2.0 * math.pi * RADIUS / ROUND
 """Speed of the stylus [m/s]."""
-_EASE = 1.0  # it sets in within this time [s]
+_EASE = 1.0  # time within which the motion reaches full speed [s]
 _SEED = 1  # seed of random losses and scatter
 
 
@@ -30,7 +30,7 @@ class Sample:
 
     Attributes:
         stamp_ns: Stamp [ns].
-        pose: Place [m] in the master's base and quaternion w, x, y, z, shape (7,).
+        pose: Position [m] in the master's base and quaternion w, x, y, z, shape (7,).
     """
 
     stamp_ns: int

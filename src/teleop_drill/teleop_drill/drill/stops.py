@@ -14,7 +14,7 @@ _SERVICE = 0.02
 """Time in which a service call must reach the arm's loop, through the executors of both sides [s]."""
 _RACE = 0.1
 """Time in which the slave must detect a joint at twice its speed [s]; the drill pushes the joint every 5 ms."""
-_STILL = 0.3  # less than what pauses the arm [s]
+_STILL = 0.3  # shorter than the silence that pauses the arm [s]
 _BEAT = 0.02  # time between two messages of a stop button [s]
 _REFUSED = "refused"
 _ROUNDS = 2.0  # within this time [s] the circle of the hand has pulled in every direction
@@ -40,7 +40,7 @@ def _press_briefly(rig: Rig) -> None:
 
 
 def _release(rig: Rig) -> None:
-    for _ in range(5):  # a reader on a bad line may miss one
+    for _ in range(5):  # a reader on a bad line may miss a message
         rig.press(is_pressed=False)
         rig.wait(0.01)
 
@@ -91,7 +91,7 @@ def _press_while_masked(rig: Rig) -> None:
 
 def _press_two(rig: Rig) -> None:
     """Press one button, and publish with a second button that this one is released."""
-    rig.press(is_pressed=False, button=1)  # it is known before
+    rig.press(is_pressed=False, button=1)  # the slave knows the second button before the press
     rig.press(is_pressed=True)
     rig.wait(0.5)
     rig.press(is_pressed=False, button=1)

@@ -81,7 +81,7 @@ class Arm(Guest):
     """
 
     def __init__(self, namespace: str, domain: int | None = None, world: World = ROS) -> None:
-        for row in CRTK_TOPICS:  # before anything moves
+        for row in CRTK_TOPICS:  # subscribe before the arm moves
             message_type(row.ros_type)
         super().__init__("teleop_conformance", domain, world)
         self._own = f"/{self.ros.get_name()}"

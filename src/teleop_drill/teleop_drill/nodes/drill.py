@@ -75,7 +75,7 @@ def drill(
     """
     if is_priority_granted(_PRIORITY):
         texts = (f"real_time.priority={_PRIORITY}", *texts)
-    sys.setswitchinterval(2e-4)  # the drill's own hand must not wait 5 ms for its turn
+    sys.setswitchinterval(2e-4)  # the drill's own hand must not wait 5 ms for the interpreter
     foreign = {SIMULATOR: drives, ARM: arm}
 
     def site(master: Master, made: Configuration, place: Path, interrupt: Interrupt) -> Site:
@@ -216,7 +216,7 @@ class _Drill:
             else:
                 steady = 0
                 rig.session.check()
-                help_on(rig)  # a busy machine may have paused it already
+                help_on(rig)  # a busy machine may already have paused the arm
             rig.wait(0.1)
             if rig.now() > deadline:
                 raise SessionError(f"the slave does not follow: {rig.complaints()}")

@@ -34,7 +34,7 @@ STREAMS_HEARD = (SLAVE_SETPOINT_JS, SLAVE_MEASURED_JS, SLAVE_MEASURED_CP, SLAVE_
 _HEARD = (*STREAMS_HEARD, SLAVE_OPERATION, TELEOP_STATE)
 _STAMP = struct.Struct("<iI")
 _DAY_NS = 86_400 * SECOND_NS
-_STAMP_AT = 4  # behind the encapsulation
+_STAMP_AT = 4  # offset of the stamp behind the encapsulation
 _QUEUE = 4000
 _BUTTONS_EVERY = 5
 _FAR_BEHIND = 0.1
@@ -64,7 +64,7 @@ class Tap:
         self._heard: dict[str, Heard] = {topic.name: [] for topic in _HEARD}
         self._counted = {topic.name: (array("q"), array("q")) for topic in STREAMS_HEARD}
         self._late: list[tuple[int, float]] = []
-        self._listened_ns = 0  # when it last began to take waiting messages
+        self._listened_ns = 0  # time at which it last began to take waiting messages
         self._subscriptions = [Subscription(owner, t, f"/{t.name}", _QUEUE) for t in _HEARD]
         self._hand = _Hand(owner, self) if has_hand else None
         self._is_running, self._lock = True, self._world.lock()

@@ -140,7 +140,7 @@ class Laws:
         if self._last is not None and self._last[2] is process:
             step = np.abs(q - self._last[0])
             self._judge_speed(step, math.dist(tip, self._last[1]))
-            if slave.row["command_status"] == CommandStatus.FRESH:  # else it may brake still
+            if slave.row["command_status"] == CommandStatus.FRESH:  # otherwise the slave may still brake
                 self._judge_age(found[0], bool(step.any()))
         self._last, self._stage.setpoint = (q, tip, process), q
 
@@ -302,7 +302,7 @@ class Laws:
             return
         if saved is not None:
             path, count = recover(path)
-            if count < saved:  # a last chunk, whole but for its index, is found as well
+            if count < saved:  # a last chunk that lacks only its index is found as well
                 self._break("recorded", f"{saved} messages were said to be safe, {count} are")
         kept_ns = Bag(path).read(SLAVE_SETPOINT_JS).log_ns
         parts = [np.array(times) for times in self._sent_ns.values()]

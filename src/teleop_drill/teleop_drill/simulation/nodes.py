@@ -244,7 +244,7 @@ class SimulatedNode:
 
         def told() -> None:
             nonlocal turns
-            if qos.keeps_all or turns < qos.depth:  # no turn for what the queue has lost
+            if qos.keeps_all or turns < qos.depth:  # messages that the queue has lost need no turn
                 turns += 1
                 self.post(hand_over)
 

@@ -32,8 +32,8 @@ class Owner:
 
     def __init__(self, bus: Bus, timeout: float) -> None:
         self._bus, self._timeout_ns = bus, round(1e9 * timeout) - _SLACK_NS
-        self._senders: dict[int, bytes] = {}  # who sent the command of a stamp
-        self._silences: dict[int, int] = {}  # for how long the leader was silent before it [ns]
+        self._senders: dict[int, bytes] = {}  # sender of the command with a stamp
+        self._silences: dict[int, int] = {}  # silence of the leader before each change of the leader [ns]
         self._heard_ns: dict[bytes, int] = {}
         self._process: Process | None = None
         self._forget(None)
@@ -44,7 +44,7 @@ class Owner:
         self._stamp_ns = self._new_ns = self.followed_ns = self._in_row = 0
 
     def judge(self, process: Process | None, stamp_ns: int, *, is_driven: bool) -> str:
-        """Error in who commands the arm, in words; empty if there is none.
+        """Text about an error in the ownership of the arm; empty if there is none.
 
         Args:
             process: Process of the setpoint.

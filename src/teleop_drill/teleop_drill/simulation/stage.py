@@ -183,7 +183,7 @@ class Stage:
     def help(self) -> None:
         """Send the commands that an operator would send in the arm's state."""
         if self.session.dead():
-            with suppress(SessionError):  # killed again meanwhile: the next help starts it
+            with suppress(SessionError):  # the slave was killed again meanwhile; the next call starts it
                 self.session.start()
             return
         told = self.operation

@@ -96,7 +96,7 @@ def measure_puncture(bench: Bench, job: Job) -> Puncture:
     force = np.linalg.norm(rows["slave_measured_cf"][:, :3], axis=1)
     falls = force[:-1] - force[1:]
     begin = int(falls.argmax())
-    if falls[begin] < _FELL:  # it never got through
+    if falls[begin] < _FELL:  # the tip never punctured the membrane
         return Puncture(float(falls[begin]), math.nan, math.nan, math.nan)
     hears = begin + round(0.5e3 * late)  # the force before this time cannot show the puncture
     led = int(rows["teleop_state"][:, 0].argmax())  # the hand waits until the arm follows

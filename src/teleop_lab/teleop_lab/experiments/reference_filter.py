@@ -27,7 +27,7 @@ _RESTS: Settings = {
 }
 _JUDGED = "theta5"  # the gimbal turns theta5 one to one; near the home pose theta4 and theta6 turn more
 _WRIST = ("theta4", "theta5", "theta6")
-_QUIET_S = 6.0  # after the approach, and after the filter has settled
+_QUIET_S = 6.0  # begin of the quiet time, after the approach and the settling of the filter [s]
 
 
 def lag(value: float, last_input: float, last_output: float) -> float:

@@ -27,7 +27,7 @@ _STEP = 0.01  # step of finite differences, in units of the start value
 _SHARE = 0.95  # confidence level of intervals
 _ROUNDS = 60
 _UNITS = {"coulomb": "N·m or N", "bias": "N·m or N", "weight": "kg·m"}
-_WANDER = 0.3  # with which the effect of varying friction is measured
+_WANDER = 0.3  # relative variation of friction with which its effect is measured
 # Simulated runs divided by runs of the table. The position at which a joint sticks is practically random, so a change
 # of the last bit changes the spread of ten runs by a tenth, and that of forty runs by a thirtieth.
 _TIMES = 4

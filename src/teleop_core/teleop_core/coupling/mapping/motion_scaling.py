@@ -365,7 +365,7 @@ class MotionScaling(RunningStage):
         p, s = self.parameters, self.state
         p["size"] = fixture.made.size()
         p["holds_hand"], p["holds_slave"] = fixture.side != "slave", fixture.side != "hand"
-        if fixture.made != self._values.fixture.made:  # the new one begins where the slave is
+        if fixture.made != self._values.fixture.made:  # a new fixture begins at the slave's position
             s["center"] += s["beyond"]
             s["beyond"] = 0.0
         if held.distance is last.distance and len(held.numbers) == len(last.numbers):

@@ -45,7 +45,7 @@ class ReflectionState(FollowingState):
 
     heard: float  # share of the force that counts
     seen: float  # share of the slave's place that counts
-    push: Vector3  # the last one [N]
+    push: Vector3  # last push [N]
     pushed_at: Vector3  # position at which the push began [m]
     scale: float  # the hand's energy, divided by the slave's
     command: PoseRow  # position to which the hand moves the slave
@@ -69,7 +69,7 @@ class Law(NamedTuple):
     out: Array
     hand: Any
     kept: Array  # numbers of the passivity
-    left: Array  # its memory
+    left: Array  # memory of the passivity
     last: Array
     moved: Array
     led: Array
@@ -78,7 +78,7 @@ class Law(NamedTuple):
     heard: Array  # energies of the slave, its wave along the master's base
     port: Array
     wall: Array  # force of fixture and limits since the last sample [N]
-    walls: Array  # its energies
+    walls: Array  # energies of this force
 
     def clear(self) -> None:
         """Forget what happened."""

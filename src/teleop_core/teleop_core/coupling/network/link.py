@@ -29,7 +29,7 @@ class LinkNumbers(Fields):
     least_delay: Annotated[Array, 2]  # [s]
     loss: Annotated[Array, 2]
     keeps_order: _BothWays
-    every: _BothWays  # least ticks from packet to packet
+    every: _BothWays  # smallest number of ticks between two packets
     byte_ticks: Annotated[Array, 2]  # ticks that a byte takes; 0 without a bound
     queue: _BothWays  # packets that wait at most
 
@@ -45,7 +45,7 @@ class LinkState(Fields):
     newest: _BothWays  # newest packets that arrived
     last_due: _BothWays  # tick
     sent_tick: _BothWays
-    arrived: _BothWays  # whether one just came
+    arrived: _BothWays  # whether a packet arrived in this tick
     free: Annotated[Array, 2]  # tick, with fractions, at which the line is free
     head: _BothWays  # index of the packet that has waited longest
     waits: _BothWays  # packets that wait

@@ -79,7 +79,7 @@ class Laws(NamedTuple):
     slaves: Any
     numbers: Array
     memory: Array
-    flow: Array  # heard, in and out since the last command
+    flow: Array  # energies since the last command: received from the other side, in, out
     last: Array  # the command that was given last (7,)
 
 

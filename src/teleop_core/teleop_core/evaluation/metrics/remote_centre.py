@@ -48,7 +48,7 @@ class RemoteCentreMetric(Metric):
         places, poses = window.around(REMOTE_CENTRE), window.samples(SLAVE_MEASURED_CP)
         counts = poses.stamp_ns >= self._begin_ns
         if len(places):
-            self._last = places.values[-1]  # it does not change during a session
+            self._last = places.values[-1]  # the centre does not change during a session
         if self._last is None or not counts.any():
             return
         off, depth = distances(poses.values[counts, :7], self._last[:3], self._last[3:])

@@ -72,7 +72,7 @@ def display_step(p: DisplayNumbers, s: DisplayState, row: Row, dt: float) -> Non
         dt: Tick [s].
     """
     stamp_ns = row.slave_servo_cp_ns if p.shows == 1 else row.slave_measured_cp_ns
-    if row.now_ns >= s.due_ns and stamp_ns > 0:  # without it there is no pose to show yet
+    if row.now_ns >= s.due_ns and stamp_ns > 0:  # without a stamp there is no pose to show yet
         s.due_ns = max(s.due_ns, row.now_ns - 1_000_000_000) + int(1e9 / p.rate)
         at = s.taken % _FRAMES
         shown = row.slave_servo_cp if p.shows == 1 else row.slave_measured_cp

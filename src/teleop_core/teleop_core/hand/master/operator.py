@@ -171,10 +171,11 @@ class RunningOperator(RunningStage):
         """Compute the wanted motion of the next ticks, as far ahead as the operator allows."""
         self._noise.prepare(self.state, ticks)
         now = int(self.state["next"])
-        left = self._end - now  # with the record of the present tick
+        left = self._end - now  # number of remaining records, including that of the present tick
         if left > ticks:
             return
-        as_bytes = self._wanted.view(np.dtype((np.void, self._wanted.itemsize)))  # not field by field, which is slow
+        # copy whole records, because copying each field is slow
+        as_bytes = self._wanted.view(np.dtype((np.void, self._wanted.itemsize)))
         as_bytes[:left] = as_bytes[now : self._end]
         self._end = max(ticks, min(left - 1 + self._operator.ahead, BLOCK)) + 1
         self.state["next"] = 0

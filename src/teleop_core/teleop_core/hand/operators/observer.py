@@ -85,7 +85,7 @@ class Observer:
         if (move := self._move) is None:
             return
         if not move.is_clutched and not self._turns and move.begin + move.duration < times[0]:
-            rows[:, :3] = move.start[:3] + move.step  # it is over
+            rows[:, :3] = move.start[:3] + move.step  # the submovement is over
             return
         share, has_begun = minimum_jerk((times - move.begin) / move.duration), times >= move.begin
         moved = move.start[:3] + share[:, None] * move.step

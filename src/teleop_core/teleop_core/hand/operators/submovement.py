@@ -32,5 +32,5 @@ class Move(NamedTuple):
     turn: Array  # rotation of the stylus in its own frame (3,) [rad]
     seen: Glance  # data that were seen when the submovement began
     way: Way  # path of the tip, as the hand feels it
-    unseen: Array  # this motion, and those before it that were felt but not seen (6,) [m]
+    unseen: Array  # motions that were felt but not yet seen, including this one (6,) [m]
     is_clutched: bool = False  # the slave does not follow

@@ -50,9 +50,9 @@ class Miss(IntEnum):
     """What was wrong with an attempt at a task."""
 
     NONE = 0  # nothing
-    BESIDE = 1  # it ended beside the goal
-    LATE = 2  # it took too long
-    FORCE = 3  # it pressed too hard
+    BESIDE = 1  # the attempt ended beside the goal
+    LATE = 2  # the attempt took too long
+    FORCE = 3  # the tip pressed too hard
     DROP = 4  # the carried object came to rest beside its goal
     WRONG = 5  # the carried object came to rest on another object's goal
 

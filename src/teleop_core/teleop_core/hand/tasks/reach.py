@@ -56,7 +56,7 @@ def reach_judge(numbers: Array, memory: Array, scene: Array, state: Array) -> No
     goal_y = memory[1] + numbers[1] * ((0.5 + at * _STEPS[1]) % 1.0 - 0.5)
     goal_z = memory[2] + numbers[2] * ((0.5 + at * _STEPS[2]) % 1.0 - 0.5)
     attempts.begin_goal(memory, scene, state, attempts.PASS, goal_x, goal_y, goal_z, numbers[3])
-    if numbers[6] > 0.0:  # about an axis that varies over all directions
+    if numbers[6] > 0.0:  # turn the goal about an axis that varies over all directions
         height, angle = 2.0 * (at * _STEPS[0] % 1.0) - 1.0, 2.0 * math.pi * (at * _STEPS[1] % 1.0)
         size, across = numbers[6] * (0.25 + 0.75 * (at * _STEPS[2] % 1.0)), math.sqrt(1.0 - height * height)
         x, y = size * across * math.cos(angle), size * across * math.sin(angle)

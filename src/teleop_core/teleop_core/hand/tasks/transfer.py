@@ -58,7 +58,7 @@ def _begin_step(numbers: Array, memory: Array, scene: Array, state: Array, step:
         share = 1.0 if scene[_SECOND] > 0.0 else 0.5
         x, y = memory[start] + share * way_x, memory[start + 1] + share * way_y
         z = memory[start + 2] + lift
-    elif step == _CARRY:  # so that the block comes above the peg, whatever its position in the jaw
+    elif step == _CARRY:  # bring the block above the peg, at any position in the jaw
         x = scene[1] + memory[start] + way_x - scene[now]
         y = scene[2] + memory[start + 1] + way_y - scene[now + 1]
         z = scene[3] + memory[start + 2] + memory[1] - scene[now + 2]

@@ -114,7 +114,7 @@ def _loaded(kept: Path) -> DistanceGrid | None:
     try:
         with np.load(io.BytesIO(kept.read_bytes())) as file:
             grid = DistanceGrid(file["numbers"], file["outline"])
-        os.utime(kept)  # it was used, see teleop_core.kernels.store.prune
+        os.utime(kept)  # note that the grid was used, see teleop_core.kernels.store.prune
     except Exception:  # a damaged archive may raise anything
         return None
     is_whole = len(grid.numbers) == HEADER + grid.numbers[:3].prod()

@@ -53,7 +53,7 @@ def read_triangles(path: Path, data: bytes, placed: Array) -> Triangles:
             mesh = trimesh.load_mesh(io.BytesIO(data), file_type=path.suffix.lower().lstrip("."))
             mesh.merge_vertices(merge_tex=True, merge_norm=True)
         points, faces = np.array(mesh.vertices, np.float64), np.array(mesh.faces, np.int64)
-        faces = faces.reshape(-1, 3)  # without triangles it has no second axis
+        faces = faces.reshape(-1, 3)  # an empty array has no second axis otherwise
     except Exception as error:  # a third-party reader may raise anything for an arbitrary file
         text = f"a mesh that can be read, such as STL or OBJ ({type(error).__name__}: {error})"
         raise ParameterError(name, str(path), text) from error

@@ -7,7 +7,7 @@ from teleop_core.kernels.geometry import Array
 _CATCHING_UP = 1.2
 """Largest speed of commands, in rated speeds. Setpoints need at most 1; the rest makes up for late setpoints."""
 _SLOWLY = 0.1  # speed of an arm that catches up with a setpoint that has moved away, divided by the rated speed
-_LONGEST = 2.0  # largest number of missed periods that one command makes up for
+_LONGEST = 2.0  # largest number of missed periods that one command may catch up
 
 
 class Lead:

@@ -116,7 +116,7 @@ def weighted_setpoint(setpoint: float, measured: float, gains: Array, memory: Ar
         dt: Tick [s], > 0.
     """
     pull, weight, near = gains[_KI] * dt, gains[_WEIGHT], setpoint
-    if weight == 1.0 or pull == 0.0:  # without an integral the lag would stand still
+    if weight == 1.0 or pull == 0.0:  # without an integral the lag would not change
         memory[_LAGGED] = setpoint
         return setpoint
     linear = room / (max(weight, THIRD) * gains[_KP] + 1e-300)

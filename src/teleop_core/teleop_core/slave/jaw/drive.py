@@ -13,7 +13,7 @@ class DriveNumbers(Fields):
     """Fields of a parameter record with the jaw's drive and the stiffness of what it grips."""
 
     upper: float  # largest angle [rad]
-    effort: float  # largest one of the drive [N·m]
+    effort: float  # largest effort of the drive [N·m]
     stiffness: float  # stiffness of the control law [N·m/rad]
     damping: float  # damping of the control law [N·m·s/rad]
     inertia: float  # [kg·m²]

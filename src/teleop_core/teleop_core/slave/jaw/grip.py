@@ -47,7 +47,7 @@ class GripState(drive.DriveState):
     """State record of the jaw. The two hands are this jaw and the second arm's jaw."""
 
     tip_ns: int
-    tips: Annotated[geometry.Array, 14]  # pose of each hand's tip; second arm: last two of its own tip
+    tips: Annotated[geometry.Array, 14]  # pose of each hand's tip; for the second arm, the last two poses of its tip
     held: Vector3  # middle of the second arm's object in the tip's frame when the grip began [m]
     forces: Annotated[geometry.Array, 2]  # force of each hand's fingers on its object [N]
     numbers: Annotated[Integers, 2]  # number of the object that each hand moves, or moved last

@@ -46,9 +46,9 @@ class JawState(Fields):
     """State record of the jaw's server."""
 
     told_ns: int  # stamp of the newest command
-    heard_ns: int  # when it came
+    heard_ns: int  # time of arrival of the newest command [ns]
     sampled_ns: int  # stamp of the newest slave/jaw/measured_js
-    seen_ns: int  # when it came
+    seen_ns: int  # time of arrival of the newest measured angle [ns]
     off: float  # distance of the jaw from its setpoint at that time [rad]
     setpoint: float  # [rad]
     is_led: int  # whether the jaw has followed commands since its last hold

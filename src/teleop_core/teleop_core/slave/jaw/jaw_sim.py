@@ -128,7 +128,7 @@ def jaw_sim_step(p: GripNumbers, s: GripState, row: Row, dt: float) -> None:
         dt: Tick [s].
     """
     before = s.setpoint
-    if row.slave_jaw_setpoint_js_ns > topics.NO_COMMAND_NS:  # without a setpoint the jaw stays where it begins
+    if row.slave_jaw_setpoint_js_ns > topics.NO_COMMAND_NS:  # without a setpoint the jaw stays at its start
         s.setpoint = row.slave_jaw_setpoint_js[0]
     row.slave_jaw_measured_js[0], row.slave_jaw_measured_js[1] = s.angle, s.velocity
     drive(p, s, (s.setpoint - before) / dt, dt)

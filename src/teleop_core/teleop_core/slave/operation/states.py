@@ -48,7 +48,7 @@ class Answer(IntEnum):
 
     DONE = 0
     ALREADY = 1  # nothing had to change
-    REFUSED = 2  # not in this state
+    REFUSED = 2  # the event is refused in this state
     STOPPED = 3  # the emergency stop is still pressed, or must be reset first
     BRAKING = 4  # the arm is not at rest yet
 
