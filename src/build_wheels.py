@@ -16,7 +16,7 @@ from pathlib import Path
 from teleop_core.kernels.shipped import FOLDER, TIER
 
 HERE = Path(__file__).resolve().parent
-PLATFORM = "manylinux_2_28_x86_64"  # as numba's own
+PLATFORM = "manylinux_2_28_x86_64"  # the same platform as numba's wheels
 TAG = f"cp{sys.version_info[0]}{sys.version_info[1]}"
 CORE = "teleop_core"
 OTHERS = (
@@ -84,7 +84,7 @@ def compile_kernels(tree: Path, script: str = COMPILE) -> None:
 
 
 def run(tree: Path, tier: str | None, script: str) -> str:
-    """What a Python script prints; its kernels are for a tier, or for this processor if None."""
+    """Output of a Python script whose kernels are compiled for a tier, or for this processor if None."""
     kept = {name: value for name, value in os.environ.items() if not name.startswith("NUMBA_")}
     kept |= {"PYTHONPATH": str(tree), "TELEOP_KERNELS": ""}  # beside their sources
     if tier is not None:

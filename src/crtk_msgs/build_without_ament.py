@@ -58,14 +58,14 @@ KINDS = (
 
 
 class BuildError(Exception):
-    """What is missing, or what the compiler said."""
+    """A tool is missing, or the compiler reported an error."""
 
 
 def generate(folder: Path, share: Path) -> dict[str, list[Path]]:
     """Sources of all interfaces, by the generator that wrote them.
 
     Args:
-        folder: Where they are written, one folder per generator.
+        folder: Folder of the generated files, with one folder per generator.
         share: Folder ``share`` of the ROS installation.
     """
     with warnings.catch_warnings():
@@ -104,8 +104,8 @@ class Compiler:
 
     Args:
         prefix: The installation.
-        folder: Where the generators wrote, one folder each.
-        lib: Where libraries are written.
+        folder: Folder of the generated files, with one folder per generator.
+        lib: Folder of the libraries.
     """
 
     def __init__(self, prefix: Path, folder: Path, lib: Path) -> None:
@@ -154,8 +154,8 @@ def build(prefix: Path, folder: Path, ros: Path) -> None:
     """Generate, compile and install the package.
 
     Args:
-        prefix: Where it is installed.
-        folder: Where its sources are generated.
+        prefix: Folder of the installation.
+        folder: Folder of the generated sources.
         ros: The ROS installation.
 
     Raises:

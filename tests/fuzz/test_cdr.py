@@ -60,7 +60,7 @@ def reports(columns: tuple[str, ...]) -> Callable[..., None]:
         found = messages.read_numbers(data, columns)
         assert isinstance(found, messages.Refusal) or found[1].shape == (len(columns),)
         if found is messages.Refusal.MALFORMED:
-            with pytest.raises(ValueError, match="bytes are no"):
+            with pytest.raises(ValueError, match="bytes is no valid"):
                 messages.read_reports(data)
         else:
             messages.read_reports(data)

@@ -113,7 +113,7 @@ def test_a_stage_that_never_comes_back_is_found_within_a_second(
     session.wait_running()
     (tmp_path / "hang").touch()
     assert session.wait(120) == 2
-    found = re.search(r"\[FATAL\] \[([\d.]+)\].* hangs: nothing came of it for 0.8 s", session.text)
+    found = re.search(r"\[FATAL\] \[([\d.]+)\].* hangs: it made no progress for 0.8 s", session.text)
     assert found, session.text
     assert "hangs.py" in session.text  # where it is
     bag = session.recorded()

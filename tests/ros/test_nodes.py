@@ -26,7 +26,7 @@ def test_a_full_disk_ends_the_recorder_with_one_line_and_a_readable_bag(peer: "P
     assert recorder.wait(60) == 1
     told = recorder.stderr.read_text().strip().splitlines()
     (line,) = [one for one in told if "[INFO]" not in one]
-    assert "cannot be written any further" in line
+    assert "cannot be written any more" in line
     assert "recover" in line or "are safe" in line
     bag = tmp_path / "bag"
     if "recover" in line:  # not even the end of the file found room

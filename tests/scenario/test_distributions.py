@@ -68,7 +68,7 @@ def test_command_of_a_missing_distribution_says_what_to_install(
 
 
 def test_robot_of_a_missing_distribution_says_what_to_install() -> None:
-    text = "robot 'stewart' must be one that is installed: install teleop_machines, which has it"
+    text = "robot 'stewart' must be installed; it is in the distribution teleop_machines"
     assert alone("robot", "stewart", code=2).stderr == f"teleop robot: {text}\n"
     assert "stewart" not in alone("robot").stdout
 
@@ -93,7 +93,7 @@ def test_core_alone_names_what_reads_recordings_of_others(tmp_path: Path) -> Non
 
 def test_core_alone_names_what_makes_pages(tmp_path: Path) -> None:
     done = alone("evaluate", "bags/example", "--html", tmp_path / "page.html", code=2)
-    assert done.stderr == "teleop evaluate: --html: install teleop_console, which makes pages\n"
+    assert done.stderr == "teleop evaluate: --html needs the distribution teleop_console: install it\n"
 
 
 def test_commands_of_the_core_ask_no_installed_package(

@@ -233,7 +233,7 @@ def test_the_command_tells_wrong_use_in_one_line(tmp_path: Path, teleop_again: "
         (["bags/missing"], "bags/missing: does not exist; give a recording"),
         ([bag, "--robot", "nobody"], "must be one of: rcrt1"),
         ([bag, "--share", "0"], "--share 0 must be above 0"),
-        ([bag, bag, "--out", tmp_path / "x.yaml"], "--out takes the proposal of one"),
+        ([bag, bag, "--out", tmp_path / "x.yaml"], "--out writes the proposal for one"),
         ([bag, "--html", tmp_path / "no" / "x.html"], "make it first"),
         ([bag, "--arm", "left"], "arm of"),
     ):

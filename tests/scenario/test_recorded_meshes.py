@@ -104,7 +104,7 @@ def test_what_a_recording_has_no_room_for_is_told_in_one_line_and_again_when_it_
 ) -> None:
     path = arm(tmp_path)
     monkeypatch.setattr(kept_files, "_MOST", 1400)
-    with pytest.warns(UserWarning, match=r"keeps .* only digests of 2\.STL, 3\.obj$") as told:
+    with pytest.warns(UserWarning, match=r"keeps .* of 2\.STL, 3\.obj it keeps only digests$") as told:
         recording = recorded(tmp_path, path)
     assert len(told) == 1
     assert len(kept(recording.metadata)) == 2

@@ -66,7 +66,7 @@ class RealArm:
     def goes_on(self) -> None:
         self.measured.forget()
         self.peer.wait(lambda: self.measured.take() > 10, "samples that are passed on")
-        self.peer.wait(lambda: not self.says("not believed") and not self.says("nothing"), "news")
+        self.peer.wait(lambda: not self.says("are refused") and not self.says("no commands"), "news")
 
     def operation(self, text: str) -> bool:
         return text in self.peer.status("slave").values["operation"]
@@ -101,7 +101,7 @@ def assert_is_led_home_without_a_jump(arm: RealArm) -> None:
     assert first <= 2.5  # 1.2 of a rated speed, over two periods at most
     assert largest <= 2.5
     assert np.abs(arm.measured.values[0][:6] - STANDS).max() < 0.05  # it stood there
-    peer.wait(lambda: not arm.says("commands nothing"), "a bridge that leads")
+    peer.wait(lambda: not arm.says("sends no commands"), "a bridge that leads")
     peer.wait(lambda: peer.status("arm_bridge").number("commands") > 100, "commands")
 
 
@@ -138,11 +138,11 @@ def led_arm(common_peer: "Peer") -> RealArm:
 @pytest.mark.parametrize(
     ("how", "words"),
     [
-        ("names", "says nothing of slide"),
+        ("names", "it lacks slide"),
         ("strange", "heard are left_finger"),
-        ("stale", "s old, at most 0.1 s"),
-        ("back", "its stamp does not rise"),
-        ("mute", "no sound sample"),
+        ("stale", "differ from our clock by at most 0.1 s"),
+        ("back", "stamps must rise"),
+        ("mute", "no valid sample"),
     ],
 )
 def test_an_answer_that_cannot_be_believed_holds_the_arm_until_it_is_sound_again(
@@ -163,7 +163,7 @@ def test_another_order_of_names_changes_nothing(led_arm: RealArm) -> None:
     led_arm.measured.forget()
     led_arm.peer.wait(lambda: led_arm.measured.take() > 100, "samples in another order")
     assert np.abs(np.array(led_arm.measured.values)[:, :6] - ROBOT.home).max() < 1e-3
-    assert not led_arm.peer.status("arm_bridge").message.count("not believed")
+    assert not led_arm.peer.status("arm_bridge").message.count("are refused")
 
 
 URDF = Path(__file__).resolve().parents[2] / "examples/ur5e.urdf"

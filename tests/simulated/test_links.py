@@ -105,7 +105,7 @@ def test_an_answer_that_is_no_number_is_counted_and_told_but_not_sent(stages: No
         return answers.take()
 
     peer.wait(lambda: ask(0.25), "an answer")
-    told = "steps wrote NaN or infinity: not sent"
+    told = "steps wrote NaN or infinity; their outputs are not sent"
     peer.wait(lambda: ask(1.0) and told in peer.status("failing").message, "a warning")
     count = ask(0.25)
     peer.wait(lambda: ask(0.25) > count, "more answers")

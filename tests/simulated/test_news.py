@@ -23,9 +23,9 @@ def test_a_node_says_who_commands_it_when_that_changes(peer: "Peer") -> None:
     node = peer.start("slave")
     assert said(node, "comes from") == []
     peer.send(topics.SLAVE_SERVO_JP, 1, HOME)
-    peer.wait(lambda: said(node, "/slave/servo_jp comes from /peer"), "who commands")
+    peer.wait(lambda: said(node, "/slave/servo_jp now comes from /peer"), "who commands")
     ticks = peer.status("slave").number("ticks")
     peer.wait_value("slave", "ticks", lambda now: now > ticks + 3000)
     assert len(said(node, "comes from")) == 1
     peer.ros.destroy(peer.publisher(topics.SLAVE_SERVO_JP))
-    peer.wait(lambda: said(node, "/slave/servo_jp comes from nobody any more"), "nobody")
+    peer.wait(lambda: said(node, "/slave/servo_jp now comes from no node"), "nobody")

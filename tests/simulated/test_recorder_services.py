@@ -50,7 +50,7 @@ def count(path: Path, topic: Any = MASTER) -> int:
 def test_a_split_closes_the_recording_and_goes_on_in_the_next_directory(peer: "Peer", tmp_path: Path) -> None:
     session = Session(peer, out=str(tmp_path / "bag"))
     session.send()
-    assert session.ask("split") == (True, f"{tmp_path}/bag is closed; goes on in {tmp_path}/bag_1")
+    assert session.ask("split") == (True, f"{tmp_path}/bag is closed; the recording continues in {tmp_path}/bag_1")
     first = count(tmp_path / "bag")
     assert first >= 100
     session.send()
@@ -99,7 +99,7 @@ def test_marks_keep_their_text_and_time(peer: "Peer", tmp_path: Path) -> None:
 
 def test_a_recorder_that_waits_begins_at_the_start_service(peer: "Peer", tmp_path: Path) -> None:
     session = Session(peer, wait="", out=str(tmp_path / "bag"), autostart=False)
-    assert session.ask("split") == (False, "is not active, so that it does not record")
+    assert session.ask("split") == (False, "is not active, and therefore does not record")
     assert not (tmp_path / "bag").exists()
     assert session.ask("start") == (True, f"records to {tmp_path}/bag")
     peer.wait_state("recorder", "active")

@@ -36,7 +36,7 @@ def test_bytes_that_are_no_message_are_refused_on_every_topic_a_node_reads(peer:
         return all(f"refused.{topic.name}.malformed" in values for topic in reads)
 
     peer.wait(refused, "refusals")
-    assert "has bytes that are no message of its type" in peer.status(name).message
+    assert "has bytes that are no valid message of its type" in peer.status(name).message
     assert node.end() == 0
 
 

@@ -59,14 +59,14 @@ def test_names_in_another_order_among_others_are_read_by_name() -> None:
 @pytest.mark.parametrize(
     ("wrong", "reason", "words"),
     [
-        (sample(3, names=("a", "wrist")), Wrong.NAMES, "says nothing of elbow"),
+        (sample(3, names=("a", "wrist")), Wrong.NAMES, "it lacks elbow"),
         (sample(3, (0.1, 0.2, 0.3), ("a", "elbow", "a")), Wrong.NAMES, "a twice"),
         (sample(3, (0.1,)), Wrong.FORM, "position for each name"),
         (sample(3, (0.1, np.nan)), Wrong.FORM, "finite"),
-        (sample(2), Wrong.STAMP, "does not rise"),
-        (sample(1), Wrong.STAMP, "does not rise"),
+        (sample(2), Wrong.STAMP, "stamps must rise"),
+        (sample(1), Wrong.STAMP, "stamps must rise"),
         (sample(0), Wrong.STAMP, "no stamp; stamps: sent"),
-        (sample(200), Wrong.STAMP, "old, at most 0.1"),
+        (sample(200), Wrong.STAMP, "by at most 0.1"),
         (sample(3, (0.2, 0.2)), Wrong.JUMP, "a jumped by 0.1"),
     ],
 )
@@ -156,7 +156,7 @@ def test_a_silent_arm_server_or_setpoint_ends_the_commands() -> None:
     assert made.command(now + 3 * MS, 0.2, True) is None
     assert made.command(now + 4 * MS, 0.0, True) is not None
     assert made.command(now + 400 * MS, 0.0, True) is None
-    assert "no sound sample" in made.trouble()
+    assert "no valid sample" in made.trouble()
 
 
 def test_an_arm_that_jumped_is_commanded_nothing_while_it_is_enabled() -> None:

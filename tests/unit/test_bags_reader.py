@@ -291,13 +291,13 @@ def test_a_topic_of_another_type_counts_as_missing(tmp_path: Path) -> None:
     bag = Bag(path)
     with pytest.raises(RecordingError, match="not std_msgs/msg/String"):
         bag.read(topics.SLAVE_MEASURED_CP)
-    with pytest.raises(RecordingError, match="not read as numbers"):
+    with pytest.raises(RecordingError, match="cannot be read as numbers"):
         bag.read("slave/measured_cp")
 
 
 def test_reports_are_not_read_as_numbers_nor_numbers_as_reports_and_missing_joints_are_named(tmp_path: Path) -> None:
     bag = Bag(ours(tmp_path / "bag"))
-    with pytest.raises(RecordingError, match="not read as numbers"):
+    with pytest.raises(RecordingError, match="cannot be read as numbers"):
         bag.read(topics.TELEOP_STATE)
     with pytest.raises(RecordingError, match="slave/measured_cp"):
         bag.reports("slave/measured_cp")
@@ -364,6 +364,6 @@ def test_recovery_of_nothing_is_refused(tmp_path: Path) -> None:
         recover(tmp_path)
     with BagWriter(tmp_path / "bag", topics.ALL, JOINTS):
         pass
-    with pytest.raises(RecordingError, match="no whole chunk"):
+    with pytest.raises(RecordingError, match="no complete chunk"):
         recover(tmp_path / "bag")
     assert not (tmp_path / "bag_recovered").exists()

@@ -186,7 +186,7 @@ def foreign(small: MemoryBag, lacking: tuple[str, ...], metadata: dict[str, str]
     [
         ((), {}, "which robot moved"),
         (("slave/measured_js",), {"robot": "rcrt1"}, "lacks slave/measured_js"),
-        ((), {"robot": "r2d2"}, "robot cannot be made"),
+        ((), {"robot": "r2d2"}, "robot cannot be loaded"),
         ((), {"robot": "puma560"}, "lacks joints"),
     ],
 )

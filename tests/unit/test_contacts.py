@@ -173,9 +173,9 @@ def test_recording_that_does_not_tell_of_contacts_says_so(tmp_path: Path) -> Non
     [
         ({}, ""),
         ({"stiffness": 1020.0}, ""),
-        ({"stiffness": 1100.0}, "on z (1020 N/m): the hand feels 529 N/m"),
-        ({"wall": "source"}, "3300 N/m, more than the device renders on x, y, z"),
-        ({"wall": "step"}, "on x, y, z (1260, 2310, 1020 N/m): the hand feels 1260, 2310, 1020"),
+        ({"stiffness": 1100.0}, "along z (1020 N/m): the hand feels 529 N/m"),
+        ({"wall": "source"}, "3300 N/m, more than the device's own stiffness along x, y, z"),
+        ({"wall": "step"}, "along x, y, z (1260, 2310, 1020 N/m): the hand feels 1260, 2310, 1020"),
         ({"wall": "step", "max_force": 0.0}, ""),
     ],
 )
@@ -197,12 +197,12 @@ HELD = ((1000.0, 0.0), (333.0, 1e-3), (140.0, 3e-3))
 @pytest.mark.parametrize(("stiffness", "delay"), [*BROKEN, *HELD])
 def test_walls_that_were_seen_to_feed_a_hand_are_told_and_others_are_not(stiffness: float, delay: float) -> None:
     note = notes.passive_note(DEVICE, gains.FixtureParameters(stiffness=stiffness), delay)
-    assert ("may give back more energy than it took" in note) == bool(note) == ((stiffness, delay) in BROKEN)
+    assert ("may return more energy than it absorbs" in note) == bool(note) == ((stiffness, delay) in BROKEN)
 
 
 @pytest.mark.parametrize("wall", ["source", "soft", "step"])
 def test_a_wall_without_damping_is_told_whatever_its_stiffness(wall: str) -> None:
-    assert "it is not damped" in notes.passive_note(DEVICE, gains.FixtureParameters(wall=wall), 0.0)
+    assert "the wall has no damping" in notes.passive_note(DEVICE, gains.FixtureParameters(wall=wall), 0.0)
     for silent in ({"max_force": 0.0}, {"side": "slave"}):  # the hand feels nothing
         assert not notes.passive_note(DEVICE, gains.FixtureParameters(wall=wall, **silent), 0.0)
         assert not notes.rendered_note(DEVICE, gains.FixtureParameters(wall=wall, **silent))
@@ -220,7 +220,7 @@ def test_passive_stiffness_falls_with_delay_and_coarse_readings_and_gains_nothin
 
 def test_a_declared_delay_between_device_and_wall_counts() -> None:
     late = api.configuration("coarse_box", delays={"master/servo_cf": 1e-3})
-    assert "2 ms from sample to force it is passive up to 333 N/m" in " ".join(notes.notes_of(late))
+    assert "2 ms from sample to force, the wall is passive up to 333 N/m" in " ".join(notes.notes_of(late))
     both = dict.fromkeys(("master/measured_cp", "master/servo_cf"), 1e-3)
     assert "3 ms from sample to force" in " ".join(notes.notes_of(api.configuration("coarse_box", delays=both)))
     elsewhere = api.configuration("coarse_box", delays={"slave/servo_cp": 1e-3})

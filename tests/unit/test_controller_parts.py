@@ -124,7 +124,7 @@ BAD = {
     "kernel takes two arguments": ({"control": kernel(lambda gains, effort: None)}, FORM),
     "efforts are too many": ({"control": shaped(np.zeros(9))}, FORM),
     "efforts are no numbers": ({"control": shaped(math.nan)}, "efforts are finite"),
-    "control is none": ({"control": None}, "control can be called"),
+    "control is none": ({"control": None}, "callable control"),
     "gains take one argument": ({"gains": lambda parameters: None}, FORM),
     "gains are a row": ({"gains": table(np.zeros(3))}, "(4, k)"),
     "gains are of other joints": ({"gains": table(np.zeros((5, 3)))}, "(4, k)"),

@@ -216,7 +216,7 @@ def test_unknown_key_is_told_with_the_alternatives_nearby(bag: Bag) -> None:
 
 def test_attribute_that_a_score_has_not_leads_to_its_values(bag: Bag) -> None:
     score = evaluate(bag)
-    with pytest.raises(AttributeError, match=r"'jerk' .*: score\.value\('jerk\.rms'\)"):
+    with pytest.raises(AttributeError, match=r"'jerk' .*score\.value\('jerk\.rms'\)"):
         score.jerk  # noqa: B018
     assert not hasattr(score, "jerk")
 
@@ -273,7 +273,7 @@ def test_wrong_metric_is_refused_before_anything_runs(
 
 @pytest.mark.parametrize("name", ["session", "a.b", ""])
 def test_name_that_json_cannot_hold_is_refused(added: Callable[[str, object], None], name: str) -> None:
-    with pytest.raises(PartError, match=r"without dots|named by letters"):
+    with pytest.raises(PartError, match=r"without dots|named with letters"):
         added(name, changed(name=name, keys=()))
 
 
@@ -340,7 +340,7 @@ def test_accumulator_that_is_asked_for_too_late_is_refused(bag: Bag) -> None:
         def values(self) -> dict[Any, Any]:
             return {"rms": self._context.shared(Late)}  # type: ignore[type-var]
 
-    with pytest.raises(EvaluationError, match="Late is asked for too late"):
+    with pytest.raises(EvaluationError, match="Late is requested too late"):
         evaluate(bag, further=[LateMetric])
 
 

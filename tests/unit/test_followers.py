@@ -255,7 +255,7 @@ MISTAKES = {
         '<dynamics damping="0.5" friction="0.2"/>',
         '<mimic joint="follow"/>',
         {},
-        "does not follow it in turn",
+        "does not itself follow this joint",
     ),
     "factor of zero": ('multiplier="-2"', 'multiplier="0"', {}, "multiplier of mimic of joint"),
     "a word": ('multiplier="-2"', 'multiplier="two"', {}, "multiplier of mimic of joint follow"),
@@ -264,13 +264,13 @@ MISTAKES = {
         '<limit lower="-0.5"',
         '<mimic joint="lead"/><limit lower="-0.5"',
         {"dynamics": "links"},
-        "joint side is not on the way to the tip",
+        "joint side moves too, but is not on the path to the tip",
     ),
     "a leader beside the way": (
         'mimic joint="lead"',
         'mimic joint="side"',
         {"dynamics": "links"},
-        "joint side is not on the way to the tip",
+        "joint side moves too, but is not on the path to the tip",
     ),
 }
 

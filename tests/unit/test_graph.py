@@ -109,7 +109,7 @@ def test_answer_like_its_input_that_nobody_reads_is_noted_unless_it_replaces_or_
     watch = stage("watch", writes=(Topic("test/x", Kind.WRENCH, passed_on("slave/measured_cp")),))
     assert Graph((*BASE, limit(), push, watch)).notes == ()
     (note,) = Graph((*BASE, stage())).notes
-    assert "'echo' writes test/echo, which no stage reads; replaces= would lead it to the" in note
+    assert "'echo' writes test/echo, which no stage reads; with replaces= it would reach the" in note
     assert note.endswith("readers of slave/measured_cp")
     reader = stage("reader", (ECHO,), ())
     assert Graph((*BASE, stage(), reader)).notes == ()
@@ -167,16 +167,16 @@ CIRCLE = (stage("forth", (BACK,), (FORTH,)), stage("back", (FORTH,), (BACK,)))
 UNFED = stage(reads=(SLAVE_MEASURED_CP, UNWRITTEN))
 NOTED = stage(writes=(), notes=(("command_status", "i8"),))
 BAD_GRAPHS = {
-    "reader nobody writes for": (partial(Graph, (*BASE, UNFED)), "echo", "test/unwritten, which no stage writes"),
-    "two stages of one name": (partial(Graph, (*BASE, BASE[4])), "slave", "two have this name"),
+    "reader nobody writes for": (partial(Graph, (*BASE, UNFED)), "echo", "test/unwritten, but no stage writes it"),
+    "two stages of one name": (partial(Graph, (*BASE, BASE[4])), "slave", "two of them have this name"),
     "two writers of a topic": (
         partial(Graph, (*BASE, stage("a"), stage("b"))),
         "b",
-        "the only one that writes test/echo; a does",
+        "the only one that writes test/echo; a writes it too",
     ),
     "two stages for one column": (partial(Graph, (*BASE, NOTED)), "echo", "slave uses"),
     "stages that wait for each other": (partial(Graph, (*BASE, *CIRCLE)), "forth", "forth, back wait"),
-    "two arms of one name": (partial(Graph, BASE, ("left", "left")), "left", "two have this name"),
+    "two arms of one name": (partial(Graph, BASE, ("left", "left")), "left", "two of them have this name"),
     "an arm of two words": (partial(Graph, BASE, ("", "left arm")), "left arm", "letters"),
     "an arm without a name beside another": (partial(Graph, BASE, ("right", "")), "", "letters"),
     "an arm that begins with a digit": (partial(Graph, BASE, ("right", "2nd")), "2nd", "letters"),
@@ -208,7 +208,7 @@ BAD_STAGES = {
             "writes": (Topic("test/x", Kind.POSE),),
             "replaces": topics.MASTER_SERVO_CF,
         },
-        "writes its like first",
+        "writes a topic of the same type",
     ),
     "is late in what it does not read": ({"late": (SLAVE_SERVO_CP,)}, "slave/servo_cp (late)"),
     "needs what it does not read": ({"needs": (SLAVE_SERVO_CP,)}, "slave/servo_cp (needs)"),
@@ -217,7 +217,7 @@ BAD_STAGES = {
         {"writes": (Topic("test/x", Kind.POSE, passed_on("slave/servo_cp")),)},
         "slave/servo_cp",
     ),
-    "spares a text": ({"spares": "operator"}, "spares as a tuple of names"),
+    "spares a text": ({"spares": "operator"}, "spares is a tuple of names"),
     "has no step": ({"step": None}, "with a step"),
     "has a step of three arguments": ({"step": lambda p, s, row: None}, "four arguments"),
     "has a step and a maker": ({"make": lambda p, dt: None}, "with a step"),

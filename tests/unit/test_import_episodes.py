@@ -102,7 +102,7 @@ def test_what_is_wrong_for_all_episodes_is_said_once(tmp_path: Path) -> None:
     with pytest.raises(tc.ParameterError, match=r"--episode is 'all'.*episode_index"):
         teleop_exchange.import_episodes(tmp_path / "one.csv", tmp_path / "out")
     table((1,)).to_parquet(path / "data/again.parquet")
-    with pytest.raises(tc.RecordingError, match=r"holds episode 1 in .* and "):
+    with pytest.raises(tc.RecordingError, match=r"contains episode 1 twice, in .* and "):
         teleop_exchange.import_episodes(path, tmp_path / "out")
     for missing, reason in (("no", "does not exist"), ("out", "data/")):
         (tmp_path / "out").mkdir(exist_ok=True)

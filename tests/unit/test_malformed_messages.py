@@ -43,7 +43,7 @@ def test_a_message_that_is_padded_as_rclpy_does_is_one() -> None:
     for padding in (0, 4, 8, 11):
         found = ros_types.deserialise(data + bytes(padding), "sensor_msgs/msg/JointState")
         assert (found.header.stamp.nanosec, len(found.effort)) == (2, 0)
-    with pytest.raises(ValueError, match="are no sensor_msgs"):
+    with pytest.raises(ValueError, match="is no valid sensor_msgs"):
         ros_types.deserialise(data + bytes(12), "sensor_msgs/msg/JointState")
 
 
@@ -69,7 +69,7 @@ def test_a_recording_is_read_without_its_malformed_messages(tmp_path: Path, bad:
 
 
 def test_a_recording_of_malformed_messages_alone_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(RecordingError, match=r"nothing to read.*3 of 3 messages"):
+    with pytest.raises(RecordingError, match=r"no readable messages.*3 of 3 messages"):
         recorded(tmp_path / "bag", bad=(0, 1, 2), good=0).read("slave/measured_cp")
 
 

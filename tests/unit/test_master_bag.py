@@ -148,5 +148,5 @@ def test_a_recording_whose_frame_changes_is_told(tmp_path: Path) -> None:
             message = layouts.layout(place, (), "camera" if i >= 50 else "base").encode_one(stamp, POSES[i])
             writer.add_message(channel, stamp, message, stamp)
         writer.finish()
-    with pytest.warns(UserWarning, match=r"150 messages stand in the frame 'camera'.*'base'"):
+    with pytest.warns(UserWarning, match=r"150 messages are in the frame 'camera'.*'base'"):
         assert len(Bag(path).read(place)) == COUNT

@@ -186,7 +186,7 @@ def turned() -> Trimesh:
     ("make", "name", "requirement"),
     [
         (lambda: without(solid("box"), 0), "mesh.file", "it has a hole at the edge"),
-        (turned, "mesh.file", "two triangles look to opposite sides"),
+        (turned, "mesh.file", "two triangles face opposite sides"),
         (flat, "mesh.file", "encloses a volume"),
     ],
 )
@@ -395,7 +395,7 @@ def test_a_mesh_too_large_to_keep_is_told_when_it_is_not_that_of_the_recording(
     becomes: Callable[[Path], None], said: str, folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(kept_files, "_MOST", 10)
-    with pytest.warns(UserWarning, match="only digests of block.stl"):
+    with pytest.warns(UserWarning, match="of block.stl it keeps only digests"):
         recording, path = recorded(folder, tmp_path)
     assert kept_files.recorded_files(recording.metadata) == {str(path): str(path)}
     becomes(path)

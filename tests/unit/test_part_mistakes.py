@@ -101,7 +101,7 @@ def test_group_that_is_no_dataclass_but_an_object_is_refused(
 
 @pytest.mark.parametrize("name", ["", "my fixture", "a.b", "a/b", "-a", "a=b", None, 5])
 def test_name_that_keys_and_files_cannot_hold_is_refused(own_parts: None, name: str | int | None) -> None:
-    with pytest.raises(PartError, match="named by letters, digits, _ and -") as error:
+    with pytest.raises(PartError, match="named with letters, digits, _ and -") as error:
         register_shape(replace(sphere.SPHERE, name=cast(str, name)))
     assert (error.value.kind, error.value.name) == ("shape", name)
 
@@ -126,7 +126,7 @@ def test_topics_of_a_stage_that_are_no_tuple_of_topics_are_refused_with_an_examp
     word: str, value: str | Sequence[str | Topic] | Topic | None
 ) -> None:
     given: dict[str, Any] = {"reads": (SLAVE_MEASURED_CP,), "writes": (ECHO,), word: value}
-    with pytest.raises(PartError, match=rf"with {word} as a tuple of Topic, such as \(topics\."):
+    with pytest.raises(PartError, match=rf"whose {word} is a tuple of Topic, such as \(topics\."):
         Stage("echo", NoParameters, step=rest, **given)
 
 

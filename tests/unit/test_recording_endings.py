@@ -58,7 +58,7 @@ def test_a_moved_directory_is_finished_where_it_is_and_its_new_place_told(tmp_pa
 
 def test_a_removed_directory_is_made_again_with_every_message(tmp_path: Path) -> None:
     told = record(tmp_path / "bag", shutil.rmtree)
-    assert "was removed meanwhile, and is there again with all 4000 messages" in told
+    assert "was removed during the recording and is created again with all 4000 messages" in told
     assert_holds(tmp_path / "bag")
 
 
@@ -74,7 +74,7 @@ def test_a_removed_directory_whose_name_is_taken_is_made_beside_it(tmp_path: Pat
 
 def test_metadata_that_cannot_be_written_cost_no_message(tmp_path: Path) -> None:
     told = record(tmp_path / "bag", lambda path: (path / "metadata.yaml").mkdir())
-    assert "holds all 4000 messages" in told
+    assert "contains all 4000 messages" in told
     assert f"`teleop recover {tmp_path / 'bag'}/bag_0.mcap` completes it" in told
     assert (tmp_path / "bag" / "bag_0.mcap").stat().st_size > 4000 * TOPIC.width(6) * 8
     out, count = recover(tmp_path / "bag" / "bag_0.mcap")

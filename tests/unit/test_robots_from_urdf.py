@@ -264,7 +264,7 @@ def changed(old: str, new: str, **options: str) -> tuple[str, dict[str, str]]:
 MISTAKES: dict[str, tuple[tuple[str, dict[str, Any]], str]] = {
     "no tip": ((TEXT, {}), "tip is '', must be one of camera, tool0"),
     "unknown tip": ((TEXT, {"tip": "tool1"}), "tool1"),
-    "tip before every joint": ((TEXT, {"tip": "base"}), "some joint between"),
+    "tip before every joint": ((TEXT, {"tip": "base"}), "a joint must lie between"),
     "unknown option": ((TEXT, {"tip": "tool0", "L1": 1.0}), "L1"),
     "unknown dynamics": ((TEXT, {"tip": "tool0", "dynamics": "full"}), "independent, links"),
     "too weak": (changed('effort="80"', 'effort="0.05"', dynamics="links", **TOOL), "of joint elbow"),
@@ -362,13 +362,13 @@ def test_soft_limits_of_a_controller_are_kept_and_told(tmp_path: Path) -> None:
 
 def test_limits_that_mean_none_are_told_and_assumed_as_of_continuous_joints_whose_own_are_told(tmp_path: Path) -> None:
     text = changed(ELBOW, '"elbow" type="continuous"')[0]
-    assert told(text, tmp_path)[1] == "elbow: lower and upper left out: it is continuous"
+    assert told(text, tmp_path)[1] == "elbow: lower and upper are ignored: the joint is continuous"
     ends = f'<limit {LOW} upper="2.6"'
     text = changed(ends, f'<limit {LOW} upper="999999"')[0]
     robot, notes = told(text, tmp_path)
     elbow = robot.joint_names.index("elbow")
     assert robot.upper[elbow] == 2.0 * math.pi > -robot.lower[elbow] == 2.6
-    assert notes == "elbow: limits beyond 1000 rad mean none; 6.28 are assumed"
+    assert notes == "elbow: limits beyond 1000 rad count as no limits; 6.28 rad are assumed"
     robot, _ = told(changed(ends, '<limit lower="-999999" upper="999999"')[0], tmp_path)
     assert -robot.lower[elbow] == 2.0 * math.pi
 
@@ -396,7 +396,7 @@ def test_an_arm_that_may_not_be_meant_so_is_loaded_with_a_warning(tmp_path: Path
     assert [one.filename for one in of] == [__file__]
     load_robot_set(str(path), ["tip=tool0"])
     load_robot(str(EXAMPLE), **TOOL)
-    with pytest.warns(TeleopWarning, match="its tip moves in 5 of 6 directions at once"):
+    with pytest.warns(TeleopWarning, match="the tip moves in only 5 of 6 directions at once"):
         load_robot(str(EXAMPLE), tip="wrist_2")
 
 
@@ -518,7 +518,7 @@ def test_a_session_says_which_directions_such_an_arm_does_not_hold(task: str, to
     path = few("five axes", tmp_path)
     made = configuration(robot=path, geometry=[f"task={task}"] if task else [])
     (note, *_) = notes_of(made)
-    assert "its tip moves in 5 of 6 directions at once" in note
+    assert "the tip moves in only 5 of 6 directions at once" in note
     assert told in note
     assert "teleop reach" in note
 

@@ -139,7 +139,7 @@ def test_a_fixture_leads_back_to_the_nearest_place_of_the_side_that_it_allows(
     side = -1.0 if keep_out else 1.0
     fixture = Fixture(SHAPES.find(name), parameters, place, keep_out)
     if side * found(name, parameters, -np.array(place))[0] > 1e-12:
-        with pytest.raises(ParameterError, match="so that the middle, where the hand is, lies"):
+        with pytest.raises(ParameterError, match="so that the middle, where the hand starts, lies"):
             depth_of(fixture, offset)
         return
     depth, way = depth_of(fixture, offset)
@@ -263,7 +263,7 @@ BAD: dict[str, tuple[dict[str, Any], str]] = {
     "writes beyond": ({"distance": writes_four}, "three numbers"),
     "reads beyond": ({"distance": reads_beyond}, "a finite distance"),
     "does not grow": ({"distance": writes(0, 1, 0)}, "by 0 times that"),
-    "not called": ({"distance": None}, "distance can be called"),
+    "not called": ({"distance": None}, "callable distance"),
     "flat outline": ({"outline": lambda p: np.zeros((4, 2))}, "outline (N, 3)"),
     "no outline": ({"outline": lambda p: np.full((4, 3), np.nan)}, "finite points"),
     "outline of nothing": ({"outline": lambda: None}, "outline(parameters)"),

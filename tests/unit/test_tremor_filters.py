@@ -309,7 +309,7 @@ def test_a_teleport_passes_as_it_is_and_nothing_rings_after_it(kind: str, far: f
     np.testing.assert_array_equal(out, places)
     assert runner.state["begun"] == 3 if ticks > 1 else runner.state["begun"] >= 3
     assert runner.concerns() == [
-        f"began anew at {int(runner.state['implausible'])} samples of the master that no hand can make"
+        f"restarted at {int(runner.state['implausible'])} samples of the master that are implausible for a hand"
     ]
     assert runner.concerns() == []
 

@@ -1,13 +1,13 @@
 """Console: a page in the browser that shows a session, commands it and lets a person be the hand.
 
-A :class:`~teleop_console.link.SessionLink` is where a session is seen and commanded: a live one over
-its topics, or a recording. Everything else here draws what the link shows and passes on what people
-do on the page.
+A :class:`~teleop_console.link.SessionLink` gives access to a session: to a live session over its topics, or to a
+recording. All other modules of this package draw the link's data, and pass the actions of people on the page to the
+link.
 """
 
 import lazy_loader
 
 __version__ = "0.6.0"
 
-# The stub beside this file says what is where; a name is loaded on first use.
+# The stub beside this file lists the module of each name; a name is loaded on first use.
 __getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -29,23 +29,24 @@ OWN_PAGE = "Teleop-Page"
 PRESS = "Teleop-Press"
 """Header with the name of a press: a press that the page repeats because no answer came keeps its name."""
 _SCRIPTS = tuple(Path(__file__).with_name(name) for name in ("page.js", "strip.js"))
-_FIELDS = 100  # of an address
+_FIELDS = 100  # largest number of query parameters in an address
 _FURNITURE = b'<head><link rel="stylesheet" href="teleop.css"><script src="teleop.js"></script>'
 
 
 @dataclass(frozen=True)
 class Situation:
-    """What every page shows beside viser's elements.
+    """Data that every page shows in addition to viser's elements.
 
     Attributes:
         can_stop: Whether a stop has any effect; false while a recording is shown.
         is_stopped: Whether an emergency stop is in force.
-        text: What has happened, and what to do next; empty if nothing has.
-        doing: What is going on before a session can be shown; empty while a session is shown.
+        text: Text about the last event and the next action; empty if there was no event.
+        doing: Text about the progress before a session can be shown; empty while a session is shown.
         chooses: Whether a session is being chosen: the form is shown.
         can_end: Whether the page can end the session or replay, which returns to the form.
         state: State of all arms in words, for screen readers.
-        can_press: Whether a person at the page leads a hand that closes: at a task, or a jaw.
+        can_press: Whether a person at the page moves a hand that can press or close: in a task with pressing, or with
+            a jaw.
     """
 
     can_stop: bool = True
@@ -63,15 +64,15 @@ class Answers:
 
     Args:
         drivers: Receives the signs of life of pages.
-        form: What is shown while nothing runs; None for the form on which sessions are chosen.
+        form: Form that is shown while no session runs; None for the form that chooses a session.
 
     Attributes:
-        situation: What pages show; the session or replay that is shown writes it.
+        situation: Data that pages show; the shown session or replay writes it.
         stop: Presses the emergency stop; it must not block.
         jaw: Closes the hand by a share, 0 to 1; it must not block.
         start: The form on which sessions are chosen.
         strip: The strip of time.
-        form: What is shown while nothing runs.
+        form: Form that is shown while no session runs.
     """
 
     def __init__(self, drivers: Drivers, form: Form | None = None) -> None:
@@ -79,7 +80,7 @@ class Answers:
         self.stop: Callable[[], None] | None = None
         self.jaw: Callable[[float], None] | None = None
         self._drivers = drivers
-        self._pages: dict[str, int] = {}  # by names that no other page can guess
+        self._pages: dict[str, int] = {}  # pages by random names that no other page can guess
         self._heard: deque[str | None] = deque(maxlen=100)  # presses, by their names
         self.start, self.strip = StartPage(drivers), StripPage(drivers)
         self.form: Form = form or self.start
@@ -112,7 +113,7 @@ class Answers:
 
     @property
     def slow_paths(self) -> frozenset[str]:
-        """Those of :attr:`paths` whose answers may take a while."""
+        """The :attr:`paths` whose answers may take long."""
         return self.form.paths | self.strip.paths
 
     def to(self, request: Request) -> Response:
@@ -128,7 +129,7 @@ class Answers:
             return
         is_packed = response.headers.get("Content-Encoding") == "gzip"
         page = gzip.decompress(response.body) if is_packed else bytes(response.body)
-        page = page.replace(b"<head>", _FURNITURE, 1)  # before viser's own script, which is long
+        page = page.replace(b"<head>", _FURNITURE, 1)  # insert before viser's own script, which is long
         response.body = gzip.compress(page, 1) if is_packed else page
         del response.headers["Content-Length"]
         response.headers["Content-Length"] = str(len(response.body))

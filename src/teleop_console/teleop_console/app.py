@@ -34,7 +34,7 @@ class Console:
     """A page that shows a session and drives it.
 
     Args:
-        server: Where it is served.
+        server: Server of the page.
         link: The session.
         renew: Begins a new session with other settings; returns the reason if it cannot, else an empty text. None if
             the session is not ours.

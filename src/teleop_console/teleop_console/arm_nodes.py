@@ -38,14 +38,14 @@ from teleop_core.robots.dexterity import sample_workspace
 from teleop_core.robots.robot import Robot
 
 Path = Callable[[Topic, str, float], tuple[Array, Array]]
-"""From a topic, an arm and a length [s]: times (N,) [s] and rows (N, width) up to now."""
+"""Function of a topic, an arm and a length [s] that returns times (N,) [s] and rows (N, width) up to now."""
 _AT = 1e-3
 """Share of a joint's range next to its end that counts as at its limit."""
-_WORK, _GRIP = 0.05, 0.1  # room on all sides of a tip and of a stylus with its handles [m]
+_WORK, _GRIP = 0.05, 0.1  # free space on all sides of a tip and of a stylus with its handles [m]
 _GOAL = TASK_STATE.columns.index("goal_x")
-_LEAST_GOAL = 1e-3  # width of a goal as it is drawn [m]
+_LEAST_GOAL = 1e-3  # smallest drawn width of a goal [m]
 _NEAR = 0.4  # part of the robot's length about the start of the tip in which an object is framed
-_TOUCH = 0.05  # force of a wall that somebody touches [N]
+_TOUCH = 0.05  # smallest wall force that counts as a contact [N]
 SHOWN = ("axes", "ghost", "reach", "paths")
 """What may be shown or hidden: axes of bodies, the commanded posture, the positions that the tip can reach, the paths
 of the last seconds."""
@@ -61,7 +61,7 @@ class ArmNodes:
 
     Attributes:
         bodies: Bodies of its robot.
-        world: What its tip touches.
+        world: Object that its tip can touch.
         jaw: Its fingers, and what they grip.
         low: Lowest corner (3,) [m] of the space that arm and master take, in slave_base.
         high: Highest corner (3,) [m].
@@ -223,7 +223,7 @@ class ArmNodes:
             self._goal = self._server.scene.add_icosphere(
                 f"{self.path}/goal", 0.5, TARGET, subdivisions=2, opacity=0.5, cast_shadow=False
             )
-            self._server.scene.add_label(f"{self.path}/goal/name", "goal")  # it may be within the tool, or small
+            self._server.scene.add_label(f"{self.path}/goal/name", "goal")  # the goal may be inside the tool, or small
         if self._goal is None:
             return
         self._goal.visible = is_there
@@ -294,7 +294,7 @@ class ArmNodes:
 
 
 def posture(robot: Robot) -> Array:
-    """Where a session with it starts (n,) [rad, m]; its home if that cannot be found."""
+    """Start (n,) [rad, m] of the robot in a session; the robot's home if the start cannot be computed."""
     with suppress(TeleopError):
         return robot.start
     return robot.home

@@ -20,7 +20,7 @@ class BodyNodes:
 
     Args:
         server: The page.
-        path: Path of the node that they are below.
+        path: Path of the node above the bodies.
         bodies: The robot's bodies.
         looks: Meshes in place of the solids of some bodies, by their index.
         is_ghost: Whether the bodies are drawn transparent in one colour, without axes.

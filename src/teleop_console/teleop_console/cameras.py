@@ -22,12 +22,12 @@ _CLEAR = (0.4, 0.55)  # middle and half height of the free part of the picture t
 
 @dataclass(frozen=True, eq=False)
 class Camera:
-    """A place to look from, in the axes of the page.
+    """Camera pose in the axes of the page.
 
     Attributes:
-        position: Where it is (3,) [m].
-        look_at: What it looks at (3,) [m].
-        up: What is up on the screen (3,).
+        position: Position of the camera (3,) [m].
+        look_at: Point in the middle of its picture (3,) [m].
+        up: Direction that points up on the screen (3,).
     """
 
     position: Array
@@ -36,7 +36,7 @@ class Camera:
 
     @property
     def quaternion(self) -> Array:
-        """Its orientation (4,): x to the right, y downwards, z into the picture."""
+        """Orientation of the camera (4,): x to the right, y downwards, z into the picture."""
         z = self.look_at - self.position
         z = z / np.linalg.norm(z)
         x = np.cross(z, self.up)
@@ -88,8 +88,8 @@ def from_tool(pose: Array, size: float) -> Camera:
     """Camera on the tool that looks along its z.
 
     Args:
-        pose: Of the tip (7,), in the axes of the page.
-        size: Length [m] to which the robot reaches.
+        pose: Pose of the tip (7,), in the axes of the page.
+        size: Reach of the robot [m].
     """
     turn = rotations_from_quaternions(pose[None, 3:])[0]
     beside = pose[:3] - size * (turn @ np.array([0.16, 0.0, 0.10]))
@@ -97,6 +97,6 @@ def from_tool(pose: Array, size: float) -> Camera:
 
 
 def microscope(place: Array, size: float) -> Camera:
-    """Fixed camera that looks steeply down on a position (3,) [m], as a microscope over the task."""
+    """Fixed camera that looks steeply down on ``place`` (3,) [m], like a microscope above the task."""
     position = place + size * np.array([0.06, 0.0, 0.35])
     return Camera(position, place.copy(), np.array([1.0, 0.0, 0.0]))

@@ -45,7 +45,7 @@ OWN = (_PERSON, _FOR_EVER)
 
 @dataclass(frozen=True)
 class Field:
-    """One thing to choose.
+    """One option of a new session.
 
     Attributes:
         name: Its name.
@@ -104,9 +104,9 @@ FIELDS = (
 """All fields, in the order of the page."""
 FOLLOWED, TIP = "followed", "tip"
 """Further words: the file that an operator ``bag`` or ``file`` follows; the tip of a URDF."""
-_PATHS = {"bag": "operator.bag", "file": "operator.file.path"}  # by operator, where its file goes
+_PATHS = {"bag": "operator.bag", "file": "operator.file.path"}  # parameter of the file, by the kind of operator
 START: Chosen = {"operator": PERSON}
-"""What is chosen at first."""
+"""Choice when the form is opened."""
 _LONGEST = 500  # characters of a word
 _TASK_TIME = 60.0  # shortest time for which a simulated operator works at a task [s]
 _NOTHING = "none"  # word of a field with a stage that does not need the stage
@@ -188,7 +188,7 @@ def refusal(chosen: Chosen) -> str:
 
 
 def tips(chosen: Chosen) -> tuple[str, ...]:
-    """Links of a URDF without a child: one of them is the tip. Empty for another robot, or another file."""
+    """Links of a URDF without a child, one of which is the tip; empty if the robot is no valid URDF."""
     file = Path(chosen.get("robot", ""))
     with suppress(TeleopError, OSError):
         if file.suffix == ".urdf":

@@ -34,13 +34,17 @@ def add(commands: Any) -> None:
     text = "see a session in the browser, drive it, replay a recording"
     parser = command(commands, "console", _run, text, _EPILOG)
     parser.add_argument("bag", type=Path, nargs="?", help="recording to replay")
-    parser.add_argument("--attach", action="store_true", help="show a session that runs already")
-    parser.add_argument("--domain", type=int, metavar="N", help="its ROS domain, for --attach")
+    parser.add_argument("--attach", action="store_true", help="show a session that is running already")
+    parser.add_argument("--domain", type=int, metavar="N", help="ROS domain of the session, for --attach")
     parser.add_argument("--port", type=int, default=8080, help="port of the page (default: 8080)")
-    parser.add_argument("--host", default="127.0.0.1", help="address to serve at (default: this machine alone)")
-    parser.add_argument("--token", default="", help="secret of the page (default: made for --host)")
+    parser.add_argument(
+        "--host", default="127.0.0.1", help="network address of the page (default: reachable from this machine only)"
+    )
+    parser.add_argument(
+        "--token", default="", help="secret that opens the page (default: a new one with --host, else none)"
+    )
     parser.add_argument("--no-browser", action="store_true", help="open no browser")
-    parser.add_argument("--scenario", help="one of `teleop scenarios`, with a person as its hand")
+    parser.add_argument("--scenario", help="scenario, one of `teleop scenarios`; a person moves the hand")
     parser.add_argument("--out", type=Path, help="directory of the recording (default: bags/…)")
     without_argument(parser)
     setting_arguments(parser)
@@ -48,7 +52,7 @@ def add(commands: Any) -> None:
 
 def _run(arguments: argparse.Namespace) -> int:
     if arguments.bag is not None and arguments.attach:
-        raise ParameterError("BAG", str(arguments.bag), "a recording, or --attach, not both")
+        raise ParameterError("BAG", str(arguments.bag), "left out with --attach, which shows a running session")
     from teleop_console.answers import Situation
     from teleop_console.server import ConsoleServer
     from teleop_core.bags.finding import check_new

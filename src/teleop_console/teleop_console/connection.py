@@ -8,7 +8,7 @@ from websockets.typing import Data, DataLike
 from teleop_console.filter import Budget
 
 STUCK = 10.0
-"""Time in which a page must read some of the data that waits for it [s]."""
+"""Longest time for which a page may read none of its waiting data [s]."""
 OPENING = 32
 """Connections that may be opening or fetching files at the same time; if there are more, the oldest is closed."""
 ALL = 3.0
@@ -61,8 +61,8 @@ class Connection(ws.ServerConnection):
     Args:
         gate: Decides about its messages.
         crowd: Connections of the same server.
-        arguments: As the library gives them.
-        options: As the library gives them.
+        arguments: Arguments from the library.
+        options: Options from the library.
 
     Attributes:
         budget: Frames and bytes that the browser may still send.
@@ -76,7 +76,7 @@ class Connection(ws.ServerConnection):
         self.silent_until = 0.0
 
     def connection_made(self, transport: Any) -> None:
-        """Begin; if too many connections are opening, the oldest of them is closed."""
+        """Begin the connection; if too many connections are being opened, close the oldest of them."""
         super().connection_made(transport)
         opening = self._crowd.opening
         opening[self] = None

@@ -46,10 +46,10 @@ class LiveLink(Observer):
 
     Args:
         domain: ROS domain of the session.
-        title: What it is called.
+        title: Name of the session.
         patience: Time in which an arm must be found [s].
         button: Stop button that may have been pressed before the arm was found; None for a new button.
-        world: Where it is.
+        world: World of the session.
 
     Raises:
         SessionError: There is no arm on this domain, or an arm does not report its robot.
@@ -86,7 +86,7 @@ class LiveLink(Observer):
 
     def close(self) -> None:
         """Disconnect; the session keeps running."""
-        self._is_closed = True  # first, because an executor that is shut down while it spins raises an error
+        self._is_closed = True  # must be first, because an executor that is shut down while it spins raises an error
         self._executor.wake()
         self._thread.join(PATIENCE)
         self._executor.shutdown()
@@ -109,8 +109,8 @@ class LiveLink(Observer):
             names = {name.removesuffix(suffix).strip("/") for name, _ in topics if name.endswith(suffix)}
             if not names and now_of(self) > end:
                 raise SessionError(
-                    f"no arm answers on ROS domain {self.domain}; `teleop live` says which is its "
-                    "own, --domain N names another"
+                    f"no arm answers on ROS domain {self.domain}; `teleop live` prints the domain of its "
+                    "session; give it with --domain N"
                 )
             self.world.sleep(0.02)
         self.arms = tuple(Arm(name, self._robot(name)) for name in sorted(names))
@@ -124,8 +124,8 @@ class LiveLink(Observer):
 
     def _robot(self, arm: str) -> Robot:
         slave = "/".join(filter(None, (arm, "slave")))
-        values = self._client.values(slave, ["robot", "geometry"])  # no answer is no RCRT-1
-        told = self._client.values(slave, [_HEARTBEAT])  # which a foreign slave may lack
+        values = self._client.values(slave, ["robot", "geometry"])  # a slave that does not answer counts as no RCRT-1
+        told = self._client.values(slave, [_HEARTBEAT])  # a foreign slave may lack this parameter
         self.has_heartbeat = self.has_heartbeat or bool(told.get(_HEARTBEAT))
         geometry = values.get("geometry")
         texts = tuple(map(str, geometry)) if isinstance(geometry, tuple) else ()
@@ -146,21 +146,23 @@ class LiveLink(Observer):
     # -- seeing ----------------------------------------------------------------------------------
 
     def view(self) -> View:
-        """What is known now."""
+        """Newest data of the session."""
         with self._lock:
             view, now = self._view, now_of(self)
             for arm in self.arms:
                 taken = [seen.take() for seen in self._seen[arm.name]]
                 if any(taken):
                     self._heard = now
-                for seen in reversed(self._seen[arm.name]):  # the display, which is last of them, first
+                for seen in reversed(self._seen[arm.name]):  # search the display's topic first, which is the last in
+                    # this order
                     seen.show(view.arms[arm.name])
                 self._hear(arm, view.arms[arm.name])
             self._insist(view)
             self._hear_nodes(view)
             self._hear_marks(view)
             view.time, view.age = now - self._begun, now - self._heard
-            view.display = self._seen[self.arms[0].name][-1].rhythm()  # of the display, which is last
+            # frame rate of the display's topic, which is the last one
+            view.display = self._seen[self.arms[0].name][-1].rhythm()
             view.is_fresh = view.age < SILENCE
             return view
 
@@ -237,13 +239,13 @@ class LiveLink(Observer):
         found: dict[tuple[str, str], ParameterInfo] = {}
         services = [name for name, _ in self.ros.get_service_names_and_types()]
         for node in sorted(name.removesuffix(_LIST).strip("/") for name in services if name.endswith(_LIST)):
-            with suppress(SessionError):  # it may be leaving
+            with suppress(SessionError):  # the session may be ending
                 found |= {(node, name): info for name, info in self._client.read(node).items()}
         self._known = found
         return MappingProxyType(found)
 
     def changes(self) -> dict[tuple[str, str], Setting]:
-        """Parameters that have changed since the last call, by node and name, whoever changed them."""
+        """Parameters that have changed since the last call, by node and name, from any source."""
         return self._events.take()
 
     def change(self, node: str, name: str, value: Setting) -> str:
@@ -284,7 +286,7 @@ class LiveLink(Observer):
             raise ParameterError("name", name, "letters, digits, '.', '_' and '-', no more than 100")
         wanted = recording.with_name(name)
         if wanted.exists():
-            raise ParameterError("name", name, f"a new one; {wanted} exists already")
+            raise ParameterError("name", name, f"a new name; {wanted} exists already")
         is_done, text = self._trigger(f"/{self._recorder()}{_SPLIT}")
         if not is_done:
             raise SessionError(text)
@@ -292,7 +294,7 @@ class LiveLink(Observer):
         try:
             closed.rename(wanted)
         except OSError as error:
-            raise SessionError(f"{closed} is closed, but not called {name}: {error}") from error
+            raise SessionError(f"{closed} is closed, but could not be renamed to {name}: {error}") from error
         self._runs += 1
         with self._lock:
             self._view.run = self._runs

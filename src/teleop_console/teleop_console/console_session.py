@@ -1,4 +1,4 @@
-"""Console session: the live session behind a page, started and ended by it."""
+"""Console session: the live session behind a page, which the page starts and ends."""
 
 import threading
 from collections.abc import Callable, Collection
@@ -48,7 +48,7 @@ class _Lines:
 
 
 class ConsoleSession:
-    """A session in its own domain, to be used with ``with``; composed if all nodes are ours.
+    """A session in its own ROS domain, used as a context manager. All nodes run in one process if none is replaced.
 
     If ``ROS_DOMAIN_ID`` is set, the session uses that domain, and the process cannot run a second session.
 
@@ -148,7 +148,7 @@ def show_session(
 
     Args:
         server: The page.
-        configuration: What runs.
+        configuration: Configuration of the session.
         out: Directory of the recording.
         is_over: Returns whether the session must end; called at every drawing with the present view.
         renew: As in :class:`~teleop_console.app.Console`.
@@ -178,7 +178,7 @@ def _both(say: Callable[[str], None], *, is_on_page: bool) -> Callable[[str], No
     """Print a line in the terminal and, while a session starts, also show it on the page if it matters."""
 
     def tell(line: str) -> None:
-        if "s  " not in line:  # its line of every second is on the page
+        if "s  " not in line:  # the line that the session prints each second is already on the page
             print(printable(line), flush=True)
             if is_on_page:
                 say(line)

@@ -16,11 +16,12 @@ from teleop_core.nodes.display import displayed
 from teleop_core.nodes.streams import Subscription, message_type
 
 SILENCE = 1.0
-"""Time of silence after which a stream is no longer fresh, and another source of it is searched [s]."""
-_PRESS = 0.12  # of a button [s]
+"""Time without a message after which a stream is not fresh any more, and another source of the stream is searched [s].
+"""
+_PRESS = 0.12  # duration of a button press [s]
 _FRAMES = 512  # samples of a stream that may wait to be shown
 _SCREEN_NS = 33_000_000  # delay of the page itself, the default latency of a display [ns]
-_RHYTHM_NS = 3_000_000_000  # over which the frames of a display are counted [ns]
+_RHYTHM_NS = 3_000_000_000  # time over which the frames of a display are counted [ns]
 
 
 def now_of(owner: Owner) -> float:
@@ -51,7 +52,7 @@ class Seen:
             return False
         found: Any = self._layout.decode_one(newest) or read_any(self.topic.kind, newest, self._joints)
         if not isinstance(found, tuple) or not np.isfinite(found[1]).all():
-            return False  # refused and counted by the nodes that need it
+            return False  # the nodes that need the topic refuse and count its messages
         now_ns = self._owner.world.time_ns()
         self._waiting.append((now_ns, found[0], found[1].copy()))
         if not self._frames or self._frames[-1][1] != found[0]:
@@ -111,7 +112,8 @@ class Hand:
             self._say(np.array([0.0, name == "fixture", name == "mode"]))
             self._world.sleep(_PRESS)
             self._say(np.zeros(3))
-            self._world.sleep(_PRESS)  # released for the same time, because otherwise two presses would be one
+            # keep the button released for the same time, because otherwise two presses would be one
+            self._world.sleep(_PRESS)
 
     def close_jaw(self, share: float) -> None:
         """Close the jaw by a share."""

@@ -26,7 +26,7 @@ class Control:
 
     Attributes:
         name: Label of the button.
-        hint: What the button does, shown when the pointer is over it.
+        hint: Effect of the button, shown when the pointer is over it.
         act: ``act(link, arm)`` does the action for the arm with this name (empty for the default arm), and
             returns the result as :data:`Answers`. It runs in a separate thread. The link sends commands
             (``link.command``), sets parameters (``link.change``), and more. If the last answer is no, the page
@@ -64,7 +64,8 @@ def _insist(link: SessionLink, word: str, arm: str) -> tuple[bool, str]:
     until = time.monotonic() + _PATIENCE
     while True:
         is_taken, text = link.command(word, arm)
-        is_passing = AT_REST_ONLY in text or STILL_PRESSED in text  # a release may be on its way
+        is_passing = AT_REST_ONLY in text or STILL_PRESSED in text  # a release may have been sent, but has not arrived
+        # yet
         if is_taken or not is_passing or time.monotonic() > until:
             return is_taken, text
         time.sleep(_PAUSE)
@@ -108,7 +109,7 @@ def _checked(name: str, part: object) -> Control:
         raise PartError("control", name, f"a Control, not a {type(part).__name__}")
     for field in ("act", "text", "is_alive"):
         if not (callable(found := getattr(part, field)) or (found is None and field != "act")):
-            raise PartError("control", name, f"one whose {field} can be called")
+            raise PartError("control", name, f"one with a callable {field}")
     return part
 
 

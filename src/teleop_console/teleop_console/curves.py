@@ -12,11 +12,11 @@ from teleop_core.kernels.geometry import Array
 from teleop_core.slave.operation import State
 
 STRETCHES = 400
-"""Largest number of stretches of a band; the worst and the longest ones are kept."""
+"""Largest number of stretches drawn in a band; the worst and the longest stretches are drawn."""
 TICKS = 200
-"""Largest number of ticks; faults are kept first."""
+"""Largest number of tick marks; faults have priority."""
 _GAP, _GAPS = 0.5, 10.0  # a pause is at least this long [s], and at least this many usual steps
-_FAULTS = 100.0  # more than there are kinds of faults
+_FAULTS = 100.0  # larger than the number of kinds of faults
 _STATES = {
     float(state): (state.name, meaning) for state, meaning in zip(State, ("idle", "good", "held", "wrong"), strict=True)
 }
@@ -133,6 +133,6 @@ def _runs(times: Array, values: Array, begin: float, end: float) -> list[tuple[f
 
 
 def _most(runs: list[tuple[float, float, str, str]]) -> list[tuple[float, float, str, str]]:
-    """The stretches that are kept, in their order."""
+    """The stretches that are drawn, in their order."""
     kept = sorted(runs, key=lambda run: (run[3] != "wrong", run[0] - run[1]))[:STRETCHES]
     return [(round(a, 4), round(b, 4), text, meaning) for a, b, text, meaning in sorted(kept)]

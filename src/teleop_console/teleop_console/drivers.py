@@ -9,7 +9,7 @@ PATIENCE = 5.0
 
 
 class Drivers:
-    """Which of the open pages may command the session.
+    """Decides which of the open pages may command the session.
 
     The first page drives. Other pages watch until they take control, which always succeeds, because two people at one
     arm talk to each other. A page that opens while no page drives gets control, so that a reloaded page continues to
@@ -50,7 +50,7 @@ class Drivers:
         return self.is_for_all or page == self._driver
 
     def role(self, page: int) -> str:
-        """Text that tells the people at a page whether the page drives."""
+        """Text for the people at a page: whether the page drives."""
         if self.may_drive(page):
             return "you have control"
         return "you watch" if self._driver is not None else "you watch, nobody has control"

@@ -22,7 +22,7 @@ RATE, BURST = 200.0, 400.0
 BYTES_RATE, BYTES_BURST = 1e6, 2e6
 """Bytes that a page may send in a second, and in one burst; visible insets need 520,000 a second."""
 PICTURE = (180, 240)
-"""Height and width of a picture that a browser may be asked for [px]."""
+"""Height and width of the picture that the console may request from a browser [px]."""
 
 UNKNOWN = "no message that this page sends"
 WATCHES = "a page that watches cannot do this; take control first"
@@ -34,14 +34,14 @@ FLOOD = f"more than {RATE:g} messages or {BYTES_RATE / 1e6:g} MB a second; it wa
 
 _Name = Annotated[str, Meta(max_length=200)]
 _Unit = Annotated[float, Meta(ge=-1.01, le=1.01)]
-_Place = Annotated[float, Meta(ge=-1.0, le=1.0)]  # of a stylus in master_base [m]
-_Far = Annotated[float, Meta(ge=-1e4, le=1e4)]  # of a camera [m]
+_Place = Annotated[float, Meta(ge=-1.0, le=1.0)]  # coordinate of a stylus in master_base [m]
+_Far = Annotated[float, Meta(ge=-1e4, le=1e4)]  # coordinate of a camera [m]
 _Length = Annotated[float, Meta(gt=0.0, le=1e6)]
 _Pixels = Annotated[int, Meta(ge=1, le=16384)]
 _Quaternion = tuple[_Unit, _Unit, _Unit, _Unit]
 _Number = Annotated[float, Meta(ge=-1e15, le=1e15)]
 _Count = Annotated[int, Meta(ge=-(10**15), le=10**15)]
-_OFF_UNIT = 1e-2  # of the square of a quaternion's length
+_OFF_UNIT = 1e-2  # tolerance of the squared length of a unit quaternion
 
 
 class _Message(Struct, tag_field="type", forbid_unknown_fields=True):
@@ -99,7 +99,7 @@ class Sets(_Message, tag="GuiUpdateMessage"):
 
 
 class Triggers(_Message, tag="CommandTriggerMessage"):
-    """The page uses a key that stands for a command."""
+    """The page uses a keyboard shortcut of a command."""
 
     uuid: _Name
 
@@ -124,7 +124,7 @@ def decode(data: bytes | str) -> _Message | None:
 
 
 class Elements(Protocol):
-    """What is on the page now."""
+    """Elements that are on the page now."""
 
     def control(self, page: int, uuid: str) -> Any | None:
         """Handle of an input that the page shows; None if there is none."""
@@ -139,19 +139,19 @@ class Elements(Protocol):
         """Whether pages that watch may use an element."""
 
     def is_asked(self, page: int) -> bool:
-        """Whether a page has been asked for a picture."""
+        """Whether the console has requested a picture from a page."""
 
 
 class Filter:
-    """Judges the messages of all pages, and counts what it refuses.
+    """Checks the messages of all pages, and counts the refused messages.
 
     Args:
-        elements: What is on the page.
+        elements: Elements of the page.
         may_drive: Whether a page may command the session.
         say: Called with a line at the first refusal of each kind.
 
     Attributes:
-        refused: How often a message was refused, by the reason.
+        refused: Number of refused messages, by reason.
     """
 
     def __init__(self, elements: Elements, may_drive: Callable[[int], bool], say: Callable[[str], None]) -> None:
@@ -222,7 +222,7 @@ def takes(control: Any, value: object) -> bool:
 
 
 def is_picture(data: bytes) -> bool:
-    """Whether data begin as a PNG of the size that was asked for, so that it cannot decompress to more."""
+    """Whether data begin with the header of a PNG of the requested size, so that it cannot decompress to more."""
     return data[:8] == b"\x89PNG\r\n\x1a\n" and data[16:24] == struct.pack(">II", *PICTURE[::-1])
 
 
@@ -231,10 +231,10 @@ def _is_unit(wxyz: tuple[float, ...]) -> bool:
 
 
 class Budget:
-    """Frames and bytes that one page, or all of them, may still send.
+    """Number of frames and bytes that one page, or all pages together, may still send.
 
     Args:
-        share: Budget as a multiple of what one page may send.
+        share: Budget as a multiple of the budget of one page.
         clock: Monotonic time [s].
     """
 

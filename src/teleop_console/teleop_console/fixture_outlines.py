@@ -87,12 +87,12 @@ class OutlineNode:
             self.line.visible = False
 
     def draw(self, look: Look, center: Array, scale: Array, *, is_touched: bool) -> None:
-        """Draw one.
+        """Draw one outline.
 
         Args:
-            look: What it is.
-            center: Its middle (3,) [m] in the axes of the node above.
-            scale: Of its unit outline (3,), along the master's axes.
+            look: Kind of fixture that is drawn.
+            center: Middle of the fixture (3,) [m] in the axes of the node above.
+            scale: Scale factors of the unit outline (3,), along the master's axes.
             is_touched: Whether the hand or the slave touches its wall.
         """
         color = WRONG if is_touched else GOOD

@@ -34,7 +34,7 @@ _LARGEST = 16 * 1024  # bytes of a request's head
 _LOOK = 0.5  # s, between two checks of connections that have sent nothing
 _SOON = 0.02  # s, between two checks of a request that has begun
 _BACKLOG = 64
-_LINE = 32  # slow requests that may wait for an answer; one more is not answered
+_LINE = 32  # largest number of slow requests that wait; a further request is not answered
 _LENGTH = re.compile(rb"\r\nContent-Length: *([0-9]{1,9})(?=\r\n|$)", re.IGNORECASE)
 _MALFORMED = (EOFError, SecurityError, ValueError, NotImplementedError)
 
@@ -62,8 +62,8 @@ class Front:
         self._opened, self._paths, self._answer, self._slow = opened, paths, answer, slow
         self._line: queue.Queue[tuple[socket.socket, bytes] | None] = queue.Queue(_LINE)
         threading.Thread(target=self._work, name="console start", daemon=True).start()
-        self._waiting: dict[socket.socket, float] = {}  # until when
-        self._partial: set[socket.socket] = set()  # of these, those that have begun to say it
+        self._waiting: dict[socket.socket, float] = {}  # time limit of each waiting connection
+        self._partial: set[socket.socket] = set()  # number of these connections that have begun to send a request
         inner, self._told = socket.socketpair()
         self.passed_on = PassedOn(inner, opened.getsockname())
         self._told.setblocking(False)
@@ -74,7 +74,7 @@ class Front:
         self._thread.start()
 
     def close(self) -> None:
-        """Accept nobody any more."""
+        """Stop accepting connections."""
         self._is_closed = True
         self._thread.join()
         with suppress(queue.Full):  # no harm if the thread is not woken to end
@@ -92,7 +92,7 @@ class Front:
                 else:
                     self._look(key.fileobj)
             for one in partial:
-                if one in self._partial:  # it may have given way
+                if one in self._partial:  # the connection may have been closed for a newer one
                     self._look(one)
             now = time.monotonic()
             for one in [one for one, until in self._waiting.items() if until < now]:
@@ -101,7 +101,7 @@ class Front:
     def _accept(self) -> None:
         try:
             one, _ = self._opened.accept()
-        except OSError:  # it has left already, or this process has too many files open
+        except OSError:  # the client has left already, or this process has too many files open
             time.sleep(_SOON)
             return
         one.setblocking(False)
@@ -122,7 +122,7 @@ class Front:
         if not data:
             self._drop(one)
         elif not is_whole and len(data) < _LARGEST:
-            if one not in self._partial:  # it would be readable all the time
+            if one not in self._partial:  # the socket would count as readable all the time
                 self._selector.unregister(one)
                 self._partial.add(one)
         elif is_ours:
@@ -149,7 +149,7 @@ class Front:
     def _reply(self, one: socket.socket, data: bytes) -> None:
         with one, suppress(OSError, *_MALFORMED):
             head, end, _ = data.partition(b"\r\n\r\n")
-            one.recv(len(head + end))  # it is there
+            one.recv(len(head + end))  # the whole head has arrived
             body: Body = _none
             if _path(head.partition(b"\r\n")[0]) in self._slow:
                 head, length = _without_body(head)

@@ -1,7 +1,8 @@
 """Guard: which requests the page's server answers; a page of another origin must not drive an arm.
 
 Three things protect it. *Host*: a name that resolves to this machine but is not ours is an attack (DNS rebinding).
-*Origin*: browsers tell which page opens a WebSocket, or fetches anything; only our own may. *Token*: where others can
+*Origin*: browsers state which page opens a WebSocket or fetches a file; only the console's page may do this. *Token*:
+where others can
 reach the port, a secret in the address which the browser then keeps as a cookie.
 """
 
@@ -36,7 +37,7 @@ def is_loopback(host: str) -> bool:
 
 
 def is_wildcard(host: str) -> bool:
-    """Whether an address stands for all of this machine."""
+    """Whether an address stands for all network interfaces of this machine."""
     try:
         return ipaddress.ip_address(host).is_unspecified
     except ValueError:
@@ -49,8 +50,8 @@ class Request:
 
     Attributes:
         path: Path with its query.
-        is_socket: Whether it asks for a WebSocket.
-        header: All values of a header by its name.
+        is_socket: Whether the request opens a WebSocket.
+        header: Function that returns all values of a header by its name.
         body: Function that reads its body, of at most the given number of bytes.
     """
 
@@ -121,7 +122,7 @@ def _is_same(origins: Sequence[str], host: str) -> bool:
 
 
 def _is_visit(request: Request) -> bool:
-    """Whether a request comes from our own page or from no page, or opens our page in place of another one."""
+    """Whether a request comes from our own page or from no page, or navigates from another page to ours."""
     sites, modes = request.header("Sec-Fetch-Site"), request.header("Sec-Fetch-Mode")
     return set(sites) <= {"same-origin", "none"} or list(modes) == ["navigate"]
 

@@ -11,15 +11,15 @@ from teleop_core.kernels.geometry import Array
 
 @dataclass
 class LiveScores:
-    """Figures of one arm since they were last begun, from the samples that the page has seen.
+    """Figures of one arm since their last reset, from the samples that the page received.
 
     The scores of a recording use every sample; these figures are a preview.
 
     Attributes:
-        time: How long the arm has followed the hand [s], without clutched time.
+        time: Time for which the arm has followed the hand [s], without clutched time.
         way: Length of the tip's path [m].
-        rms: Root mean square of the distance between wanted and measured place [m].
-        largest: Largest such distance [m].
+        rms: RMS distance between wanted and measured position [m].
+        largest: Largest distance between wanted and measured position [m].
         force: Largest force at the stylus [N].
     """
 

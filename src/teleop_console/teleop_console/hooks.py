@@ -1,4 +1,4 @@
-"""Hooks: everything that is changed in viser, and the only place that knows its inner names.
+"""Hooks: all changes of viser's behaviour; the only module that uses viser's private names.
 
 viser 1.1 opens its port itself, answers every request, tries the next port if one is taken, prints a banner and offers
 a public tunnel to the page. It has no settings for these. So this module replaces the function with which viser opens
@@ -55,13 +55,13 @@ class Wake(asyncio.Event):
 
     def set(self) -> None:
         """Wake the waiting task, on the loop's own thread only: viser asks the loop to do so too."""
-        with suppress(RuntimeError):  # no loop runs in this thread
+        with suppress(RuntimeError):  # viser calls this also in a thread without a loop
             asyncio.get_running_loop()
             super().set()
 
 
 class _Buffer(_async_message_buffer.AsyncMessageBuffer):
-    """Messages on their way to pages."""
+    """Queue of messages that are sent to pages."""
 
     def __init__(self, *arguments: Any, **options: Any) -> None:
         super().__init__(*arguments, **options)
@@ -72,12 +72,12 @@ setattr(_infra, "AsyncMessageBuffer", _Buffer)  # noqa: B010
 
 
 class Server(viser.ViserServer):
-    """viser's server behind a guard and a filter, at a socket that listens already.
+    """viser's server behind a guard and a filter, on a socket that is already listening.
 
     Args:
         opened: Listening socket; it is closed with the server.
         guard: Decides about requests.
-        drivers: Is told which pages are open and alive, and which hold a gizmo.
+        drivers: Gets the pages that are open and alive, and the pages that drag a gizmo.
         answers: Answers to requests that are not for viser's page.
         label: Heading of the panel.
 
@@ -91,7 +91,7 @@ class Server(viser.ViserServer):
         self._front = Front(opened, answers.paths, answer, answers.slow_paths)
         self._drivers, self._public = drivers, set[str]()
         self.filter = Filter(self, drivers.may_drive, _logger().warning)
-        rich.get_console().quiet = True  # which only viser writes to
+        rich.get_console().quiet = True  # only viser writes to this console
         with _STARTING, _opening(_server_at(self._front.passed_on, guard, answers, self)):
             super().__init__(host=host, port=port, label=label, verbose=False)
         for message in (_messages.ShareUrlRequest, _messages.ShareUrlDisconnect):
@@ -106,7 +106,9 @@ class Server(viser.ViserServer):
 
     def request_share_url(self, verbose: bool = True) -> str | None:
         """Refuse: a public address would bypass the guard."""
-        raise SessionError("the console takes no public address; `ssh -L` reaches it from another machine")
+        raise SessionError(
+            "the console does not listen on public addresses; use `ssh -L` to reach it from another machine"
+        )
 
     def _tell(self, answers: Answers) -> None:
         """Report pages to the drivers, in the order of events, and therefore on the server's loop."""
@@ -157,11 +159,11 @@ class Server(viser.ViserServer):
         return uuid in self.gui._command_handle_from_uuid
 
     def has_gizmo(self, name: str) -> bool:
-        """Whether there is such a gizmo; one that is hidden now may still be let go."""
+        """Whether a gizmo with this name exists; a gizmo that is hidden now may still be released."""
         return name in self.scene._handle_from_transform_controls_name
 
     def is_asked(self, page: int) -> bool:
-        """Whether a page has been asked for a picture."""
+        """Whether the console has requested a picture from a page."""
         client, answer = self._connected_clients.get(page), _messages.GetRenderResponseMessage
         return client is not None and bool(client._websock_connection._incoming_handlers.get(answer))
 

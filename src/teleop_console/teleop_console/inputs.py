@@ -1,4 +1,4 @@
-"""Inputs: how a parameter is shown and changed on the page, one way for each of the seven kinds of values."""
+"""Inputs: the elements that show and change a parameter on the page, one type for each of seven kinds of values."""
 
 import ast
 import math
@@ -23,7 +23,7 @@ _DIGITS = 6  # digits after the decimal point of a slider's numbers
 
 
 def kind_of(info: ParameterInfo) -> str:
-    """Which of :data:`KINDS` shows a parameter."""
+    """Kind of element, one of :data:`KINDS`, that shows a parameter."""
     value = info.value
     if isinstance(value, bool):
         return "switch"
@@ -38,7 +38,7 @@ def kind_of(info: ParameterInfo) -> str:
 
 
 def _is_slider(info: ParameterInfo) -> bool:
-    """Whether it has bounds that span a range fit for a slider, and lies within them."""
+    """Whether a parameter lies within bounds whose range suits a slider."""
     low, high, value = info.lower, info.upper, info.value
     if low is None or high is None or not low <= float(value) <= high:  # type: ignore[arg-type]
         return False
@@ -57,7 +57,7 @@ class Input:
         names: Names of a vector's numbers; if their count does not match, x, y, z or 1, 2, ... are used.
 
     Attributes:
-        kind: Which of :data:`KINDS` it is.
+        kind: Kind of value, one of :data:`KINDS`.
         parts: Its elements, one for each number of a vector.
     """
 
@@ -87,7 +87,7 @@ class Input:
 
     @property
     def said(self) -> object:
-        """What it shows, as it is shown."""
+        """Shown value, in the form in which the element shows it."""
         return self._own.value if self.kind != "vector" else shown(self.value or ())
 
     def show(self, value: Setting) -> bool:
@@ -141,7 +141,7 @@ def _number(gui: viser.GuiApi, label: str, value: Any, info: ParameterInfo) -> A
     step = 1 if isinstance(value, int) else _step(value)
     low, high = info.lower, info.upper
     if not (-math.inf if low is None else low) <= value <= (math.inf if high is None else high):
-        low = high = None  # one that is allowed whatever the bounds: off
+        low = high = None  # the value `off` is allowed outside of the bounds
     return gui.add_number(label, value, min=low, max=high, step=step, hint=hint_of(info))
 
 
@@ -182,13 +182,13 @@ def text(value: Setting) -> str:
 
 
 def _words(values: tuple[float | str, ...]) -> list[float | str]:
-    """Numbers as they are; texts in quotes if one of them would fall apart in a list without."""
+    """Numbers unchanged; all texts in quotes if one of them could not be read from a list without quotes."""
     is_quoted = any(isinstance(one, str) and set(one) & set(",[]()'\"") for one in values)
     return [repr(one) if is_quoted and isinstance(one, str) else one for one in values]
 
 
 def form(info: ParameterInfo) -> str:
-    """What a value of a parameter is, in words."""
+    """Text that names the type of a parameter's value."""
     if isinstance(info.value, tuple):
         return "list such as [0.1, 0.2]"
     return {bool: "yes or no", int: "whole number", float: "number"}.get(type(info.value), "text")

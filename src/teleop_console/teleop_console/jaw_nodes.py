@@ -11,9 +11,9 @@ from teleop_console.poses import move
 from teleop_core.graph.topics import SLAVE_JAW_BOARD, SLAVE_JAW_MEASURED_JS, SLAVE_JAW_OBJECT_CP
 from teleop_core.kernels.geometry import Array, quaternion_products, rotations_from_quaternions
 
-_THICK = 0.1  # of a finger, over its length
+_THICK = 0.1  # thickness of a finger divided by its length
 _PEG = 0.2  # thickness of a peg, over that of an object
-_FIRST = SLAVE_JAW_BOARD.columns.index("x0")  # of the middles of objects
+_FIRST = SLAVE_JAW_BOARD.columns.index("x0")  # first column with the middles of objects
 _DRAWN = ("finger_length", "object.size", "object.place", "pegs.place", "pegs.height")
 
 
@@ -25,8 +25,8 @@ def finger_poses(tip: Array, angle: float, length: float) -> Array:
 
     Args:
         tip: Pose (7,) of the tip.
-        angle: Between the fingers [rad].
-        length: Of a finger [m].
+        angle: Angle between the fingers [rad].
+        length: Length of a finger [m].
     """
     half, turn = 0.5 * angle, rotations_from_quaternions(tip[None, 3:])[0]
     pivot = tip[:3] - length * np.cos(half) * turn[:, 2]
@@ -59,7 +59,7 @@ class JawNodes:
         """Set the sizes from parameters of the jaw.
 
         Args:
-            values: By their names in the group ``jaw_sim``; none of a session without.
+            values: Parameters by their names in the group ``jaw_sim``; empty for a session without this group.
         """
         values = {name: values[name] for name in _DRAWN if name in values}
         if values == self._values:
@@ -105,8 +105,8 @@ def _block_poses(place: Array, board: Array | None) -> Array:
     """Poses (N, 7) of all blocks, those at rest upright.
 
     Args:
-        place: Pose (7,) of the one that moved last.
-        board: Columns of ``slave/jaw/board``, if it is told.
+        place: Pose (7,) of the block that moved last.
+        board: Columns of ``slave/jaw/board``, if this topic exists.
     """
     middles = np.empty((0, 3)) if board is None else board[_FIRST:].reshape(-1, 3)
     middles = middles[middles.any(axis=1)]  # zero: there is no such block

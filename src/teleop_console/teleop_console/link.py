@@ -30,7 +30,7 @@ class Arm:
 
 @dataclass
 class ArmView:
-    """What is known of one arm now.
+    """Newest data of one arm.
 
     Attributes:
         streams: Newest values of each stream by its name without the arm, such as
@@ -55,11 +55,11 @@ class ArmView:
 
 @dataclass
 class View:
-    """What is known of a session at one time.
+    """Data of a session at one time.
 
     Attributes:
         time: Time since the beginning of the session [s].
-        arms: By namespace.
+        arms: Views of the arms, by namespace.
         is_fresh: Whether streams arrive; false if the session is silent or has ended.
         news: Warnings of the nodes, a line each.
         delay: Median and 99th percentile from master sample to slave command [s]; NaN if unknown.
@@ -120,7 +120,7 @@ class SessionLink(Protocol):
 
     Attributes:
         arms: The arms, the default one first.
-        title: What the session is called: scenario or recording.
+        title: Name of the session: scenario or recording.
         is_live: Whether it can be commanded; false for a recording.
     """
 
@@ -129,7 +129,7 @@ class SessionLink(Protocol):
     is_live: bool
 
     def view(self) -> View:
-        """What is known now; cheap, called at the rate of the page."""
+        """Newest data of the session; takes little time, because it is called at the frame rate of the page."""
 
     def command(self, word: str, arm: str = "") -> tuple[bool, str]:
         """Send one of ``topics.STATE_COMMANDS``; returns whether it was accepted, and the reason."""
@@ -143,7 +143,7 @@ class SessionLink(Protocol):
         """All parameters of all nodes by node and name, as of the last read."""
 
     def changes(self) -> Mapping[tuple[str, str], Setting]:
-        """Parameters that have changed since the last call, by node and name, whoever changed them."""
+        """Parameters that have changed since the last call, by node and name, from any source."""
         return {}
 
     def change(self, node: str, name: str, value: Setting) -> str:

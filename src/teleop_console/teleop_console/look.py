@@ -1,4 +1,4 @@
-"""Look: the colours and the type of the page, each colour named once by the one thing it means.
+"""Look: the colours and fonts of the page; each colour is defined once, with one meaning.
 
 Colours have a meaning; everything without a meaning is grey. Red is only for errors and the stop. Measured values are
 orange, wanted values and the next button blue, actions of the person violet, and forces magenta, both in the scene and
@@ -32,7 +32,7 @@ MEANINGS: Mapping[str, Meaning] = MappingProxyType(
         "measured": Meaning((217, 95, 2), "#b34d00", "#ff9f4d"),  # paths that were measured
         "wanted": Meaning((28, 109, 208), "#1c6dd0", "#74a9f2"),  # wanted values; what to press next
         "hand": Meaning((112, 72, 190), "#7048be", "#b197fc"),  # path of the stylus
-        "force": Meaning((190, 24, 132), "#a61e74", "#f06ec0"),  # on stylus and tip
+        "force": Meaning((190, 24, 132), "#a61e74", "#f06ec0"),  # forces on stylus and tip
         "target": Meaning((12, 133, 153), "#0b7285", "#3bc9db"),  # points and objects of a task
     }
 )
@@ -150,7 +150,7 @@ def style(form: Path | None = None) -> str:
     curves = {f"curve{i}": color for i, color in enumerate(CURVES)}
     light = _LIGHT | curves | {name: one.light for name, one in MEANINGS.items()}
     dark = _DARK | {name: one.dark for name, one in MEANINGS.items()}
-    stop = f"#{bytes(WRONG).hex()}"  # on any ground, under white letters
+    stop = f"#{bytes(WRONG).hex()}"  # readable on any background, below white letters
     files = (*_PARTS, *((form,) if form is not None else ()))
     return (
         "".join((_STYLE, *(file.read_text(encoding="utf-8") for file in files)))

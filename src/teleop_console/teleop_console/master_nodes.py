@@ -56,7 +56,7 @@ class ForceArrow:
         return size
 
 
-_DIM = 0.35  # of the device, behind which the handles of the stylus are seen
+_DIM = 0.35  # opacity of the device, so that the stylus's handles behind it are visible
 
 
 class MasterNodes:
@@ -64,8 +64,8 @@ class MasterNodes:
 
     Args:
         server: The page.
-        path: Path of that node.
-        stand: Where it stands.
+        path: Path of the node in master_base.
+        stand: Position and rotation of the device on the page.
     """
 
     def __init__(self, server: viser.ViserServer, path: str, stand: Stand) -> None:
@@ -90,9 +90,9 @@ class MasterNodes:
         """Draw stylus, its path and the force on it; returns the size of the force [N].
 
         Args:
-            time: Of the session [s].
-            pose: Of the stylus in master_base (7,); None where it is unknown.
-            force: Force on the stylus (3,) [N]; None where it is unknown.
+            time: Time of the session [s].
+            pose: Pose of the stylus in master_base (7,); None if unknown.
+            force: Force on the stylus (3,) [N]; None if unknown.
         """
         if pose is None:
             return 0.0

@@ -21,8 +21,8 @@ from teleop_console.status import alive, leader, next_button, next_step, status_
 from teleop_core.base.errors import TeleopError
 
 WIDTH = 320.0
-"""Of the panel on a desk [px]; on a phone it is as wide as the screen."""
-_PERIOD = 0.2  # between two drawings of the texts [s]
+"""Width of the panel on a desktop [px]; on a phone it is as wide as the screen."""
+_PERIOD = 0.2  # time between two updates of the texts [s]
 
 
 class Panel:
@@ -31,7 +31,7 @@ class Panel:
     Args:
         server: The page.
         link: The session.
-        drivers: Who drives.
+        drivers: Object that knows which page drives.
         renew: Begins a new session with other settings, and returns why it does not, empty if it
             does; None where the session is not ours.
         of_session: Parameters of the session as a whole, which no node has.
@@ -49,8 +49,8 @@ class Panel:
         self._make_public, self._may_drive = server.make_public, drivers.may_drive
         self._take, self._drawn = drivers.take, 0.0
         self.scores = {arm.name: LiveScores() for arm in link.arms}
-        self._gui.main_panel.dock_right()  # beside the scene, not over it
-        self._gui.main_panel.set_width(WIDTH)  # without it, a wide screen keeps the layout of a phone
+        self._gui.main_panel.dock_right()  # the panel is beside the scene, not over it
+        self._gui.main_panel.set_width(WIDTH)  # without a width, a wide screen keeps the layout of a phone
         self._buttons: dict[str, viser.GuiButtonHandle] = {}
         self._controls: list[Control] = []
         self._status = self._gui.add_html("")
@@ -185,7 +185,7 @@ class Panel:
             self._live.content = text
 
     def _draw_buttons(self, view: View) -> None:
-        """Show on the buttons their state, which of them can act, and which comes next."""
+        """Show the state of each button, whether it can be used, and which button is the next step."""
         arm, soon, now = next(iter(view.arms.values())), next_button(view), alive(view)
         labels = {c.name: f"{c.name.capitalize()}: {c.text(arm)}" for c in self._controls if c.text}
         own = {c.name: c.is_alive(view) for c in self._controls if c.is_alive is not None}

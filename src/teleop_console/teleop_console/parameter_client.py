@@ -22,7 +22,7 @@ class ParameterEvents:
     """Changes of parameters that nodes publish; the caller must spin an executor.
 
     Args:
-        owner: Node that hears them.
+        owner: Node that subscribes to the changes.
     """
 
     def __init__(self, owner: Owner) -> None:
@@ -48,7 +48,7 @@ class ParameterClient:
     """Asks nodes for their parameters; the caller must spin an executor.
 
     Args:
-        owner: Whose clients they are.
+        owner: Node that owns the clients.
     """
 
     def __init__(self, owner: Owner) -> None:
@@ -97,20 +97,20 @@ class ParameterClient:
 
 
 def call(world: World, client: Client, request: object, patience: float) -> Any:
-    """Answer of a service, asked from another thread than the executor's.
+    """Call a service from a thread other than the executor's, and return the answer.
 
     Raises:
         SessionError: There is no such service, or it did not answer in time.
     """
     if not client.wait_for_service(timeout_sec=patience):
-        raise SessionError(f"{client.srv_name} is not there")
+        raise SessionError(f"the service {client.srv_name} does not exist")
     waits = world.lock()
     waits.acquire()
     asked = client.call_async(request)
     asked.add_done_callback(lambda _: waits.release())
     if not waits.acquire(True, patience):
         client.remove_pending_request(asked)
-        raise SessionError(f"{client.srv_name} does not answer")
+        raise SessionError(f"the service the service {client.srv_name} does not answer")
     return asked.result()
 
 

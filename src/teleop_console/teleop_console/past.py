@@ -19,7 +19,7 @@ ERROR = "tracking error"
 DELAY = "session command_delay"
 """Column of the median delay from master sample to slave command [s], of live sessions."""
 ROWS = 4000
-"""Times that are kept of a live session: two minutes at 30 Hz."""
+"""Number of times that are stored of a live session: two minutes at 30 Hz."""
 _UNITS = {
     topics.Kind.POSE: ("m",) * 3 + ("",) * 4,
     topics.Kind.TWIST: ("m/s",) * 3 + ("rad/s",) * 3,
@@ -81,7 +81,8 @@ class Past(ABC):
 
     def __init__(self) -> None:
         self.columns = {}
-        self._errors: dict[str, tuple[Rows, Rows, Rows]] = {}  # by arm, with the rows from which they were computed
+        # errors by arm, with the rows from which they were computed
+        self._errors: dict[str, tuple[Rows, Rows, Rows]] = {}
 
     @abstractmethod
     def rows(self, topic: str) -> Rows | None:
@@ -183,7 +184,7 @@ class Seen(Past):
         return np.arange(max(0, self._count - ROWS), self._count) % ROWS
 
     def span(self) -> tuple[float, float]:
-        """First and last time [s] that are kept."""
+        """First and last stored time [s]."""
         with self._lock:
             times = self._times[self._order()]
             return (float(times[0]), float(times[-1])) if len(times) else (0.0, 0.0)
@@ -196,7 +197,7 @@ class Seen(Past):
             return (self._times[order], found[0][order]) if found else NOTHING
 
     def view(self, time: float) -> View:
-        """View at a time [s], but not before the first kept time."""
+        """View at a time [s]; at the first stored time if the time is earlier."""
         with self._lock:
             order = self._order()
             at = max(0, int(np.searchsorted(self._times[order], time, side="right")) - 1)
@@ -222,7 +223,7 @@ def below(arm: str, topic: str) -> str:
 
 
 def _values(view: ArmView) -> Iterator[tuple[str, Array]]:
-    """What is known of an arm, by topics."""
+    """Known data of an arm, by topics."""
     yield from view.streams.items()
     if view.state:
         yield topics.TELEOP_STATE.name, np.array([view.state[name] for name in topics.TELEOP_STATE.columns])

@@ -1,4 +1,4 @@
-"""Recorded link: a recording as the page sees a session, at any time of it."""
+"""Recorded link: gives the page access to a recording like to a session, at any time of the recording."""
 
 import math
 import threading
@@ -22,21 +22,21 @@ class RecordedLink(SessionLink):
     """A link to a recording, which refuses the commands of a session.
 
     A view has, for each stream, the last sample that was recorded up to the present time of the replay.
-    :meth:`advance` moves the time on; its caller has the clock.
+    :meth:`advance` advances this time; the caller has the clock.
 
     Args:
-        recording: Its path, or the recording itself.
+        recording: Path of the recording, or the recording itself.
 
     Attributes:
         duration: Time from the first to the last message [s].
-        loop: Whether it begins again at its end.
+        loop: Whether the replay starts again at the end.
         thinning: Every ``thinning``-th sample is kept; 1 for all.
-        past: Its columns, of all samples.
+        past: Columns of the recording, with all samples.
         recording: Its path.
 
     Raises:
-        RecordingError: It cannot be read, or does not say which robot moved or how its joints did;
-            the text says what is missing.
+        RecordingError: The recording cannot be read, or lacks the robot's name or its joint positions; the text names
+            what is missing.
     """
 
     is_live = False
@@ -59,7 +59,7 @@ class RecordedLink(SessionLink):
     # -- seeing ----------------------------------------------------------------------------------
 
     def view(self, time: float | None = None) -> View:
-        """What was known at a time of the replay [s]; None for the present one."""
+        """Data at a time of the replay [s]; None for the present time."""
         time = self._time if time is None else time
         view = View(
             time=time,
@@ -82,12 +82,12 @@ class RecordedLink(SessionLink):
         """Samples of a stream up to the present time.
 
         Args:
-            topic: A stream; nothing is found of one that was not recorded.
+            topic: A stream; the result is empty if it was not recorded.
             arm: Namespace of the arm.
-            length: How long before the present time it begins [s].
+            length: Duration before the present time [s].
 
         Returns:
-            Times (N,) [s] and rows (N, width), N at most some hundreds.
+            Times (N,) [s] and rows (N, width), with N at most some hundreds.
         """
         one = next(recorded for recorded in self._recorded if recorded.arm.name == arm)
         track = one.tracks.get(topic.name)
@@ -113,7 +113,7 @@ class RecordedLink(SessionLink):
 
     @property
     def is_playing(self) -> bool:
-        """Whether time goes on."""
+        """Whether the replay is running."""
         return self._is_playing
 
     @property

@@ -22,7 +22,7 @@ from teleop_core.session.runner import recorded_configuration
 from teleop_core.slave.operation.report import operation_text
 
 MOST = 200 << 20
-"""Bytes of samples that are kept; of a longer recording only every second, third ... sample is kept."""
+"""Largest size of the samples in memory [bytes]; of a longer recording only every second, third, … sample is loaded."""
 _STAMP_BYTES = 16
 _KEPT = (
     *topics.STREAMS,
@@ -38,7 +38,7 @@ _KEPT = (
 
 @dataclass(frozen=True, eq=False)
 class RecordedArm:
-    """Samples of one arm that are kept.
+    """Samples of one arm in memory.
 
     Attributes:
         arm: The arm.
@@ -66,15 +66,15 @@ class RecordedArm:
 def recorded_arms(
     bag: Bag, configuration: Configuration | None, most: int = MOST
 ) -> tuple[tuple[RecordedArm, ...], int]:
-    """All arms of a recording, the default one first, and the thinning n: every n-th sample is kept.
+    """All arms of a recording, the default arm first, and the thinning n: every n-th sample is loaded.
 
     Args:
         bag: The recording.
-        configuration: What it was made with; None if that is not known.
-        most: Bytes of samples that are kept.
+        configuration: Configuration of the recorded session; None if unknown.
+        most: Largest size of the samples in memory [bytes].
 
     Raises:
-        RecordingError: It does not say which robot moved, or how its joints did.
+        RecordingError: The recording lacks the robot's name or its joint positions.
     """
     bags = {name: of_arm(bag, arm) for name, arm in namespaces(bag).items()}
     arms = [Arm(name, _robot(one, configuration, name)) for name, one in bags.items()]
@@ -100,7 +100,7 @@ def _robot(bag: Bag, configuration: Configuration | None, arm: str) -> Robot:
     """Robot of one arm.
 
     Raises:
-        RecordingError: It is not told, or its joints were not recorded.
+        RecordingError: The recording does not name the robot, or its joints were not recorded.
     """
     name = bag.metadata.get("robot", "")
     geometry: tuple[str, ...] = ()
@@ -114,7 +114,7 @@ def _robot(bag: Bag, configuration: Configuration | None, arm: str) -> Robot:
     try:
         robot = load_robot_set(name, geometry)
     except (TeleopError, OSError) as error:
-        raise RecordingError(bag.path, f"its robot cannot be made: {error}") from error
+        raise RecordingError(bag.path, f"its robot cannot be loaded: {error}") from error
     bag.require([topics.SLAVE_MEASURED_JS])
     return robot
 
@@ -199,7 +199,7 @@ def parameters_of(
 
     Args:
         configuration: The session; None for none.
-        only: Names of the groups that are wanted; empty for all.
+        only: Names of the groups to return; empty for all.
     """
     found = {}
     groups: dict[str, Any] = {} if configuration is None else configuration.groups

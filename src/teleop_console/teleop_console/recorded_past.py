@@ -1,4 +1,4 @@
-"""Recorded past: every number of a recording over time, read when it is first asked for."""
+"""Recorded past: every number of a recording over time; each topic is read at its first request."""
 
 import threading
 import time
@@ -19,19 +19,19 @@ from teleop_core.evaluation.traces import Envelope
 from teleop_core.graph.topics import BY_NAME, REPORTS, Kind
 from teleop_core.robots.robot import Robot
 
-_KEPT = 8  # topics that are read at the same time; twice as many are kept
-_GATHER = 0.02  # time in which one request asks for all its topics [s]
+_KEPT = 8  # number of topics that are read at the same time; twice this number stays in memory
+_GATHER = 0.02  # time within which a page requests all topics that it needs together [s]
 
 
 class Recorded(Past):
-    """What was recorded: every column of every topic that has numbers.
+    """Every column of every recorded topic that contains numbers.
 
-    A topic is read when it is first asked for, in a thread: reading ten minutes takes five seconds.
+    A topic is read at its first request, in a thread: reading ten minutes takes five seconds.
     For recordings longer than eleven minutes, only the smallest and largest value of short intervals are kept.
 
     Args:
         bag: The recording.
-        robots: Robots of its arms by namespace, where they are known.
+        robots: Robots of the arms by namespace; unknown robots are missing.
     """
 
     def __init__(self, bag: Bag, robots: Mapping[str, Robot] | None = None) -> None:
@@ -69,7 +69,7 @@ class Recorded(Past):
             return ()
 
     def rows(self, topic: str) -> Rows | None:
-        """All rows of a topic; None until they are there. Topics asked for together are read together."""
+        """All rows of a topic; None until they are read. Topics that are requested together are read together."""
         with self._lock:
             if topic in self._read:
                 return self._read[topic]
@@ -120,20 +120,20 @@ class Recorded(Past):
 
     @staticmethod
     def _sorted(times: Any, values: Any) -> Rows:
-        """Rows in the order of their times; those of several writers may stand otherwise."""
+        """Rows sorted by their times; rows of several writers may be recorded in another order."""
         if len(times) and (np.diff(times) < 0.0).any():
             order = np.argsort(times, kind="stable")
             times, values = times[order], values[order]
         return times, values
 
     def marks(self) -> Sequence[tuple[float, str]]:
-        """Times [s] and texts of the marks that somebody set; the first call reads them."""
+        """Times [s] and texts of the marks in the recording; the first call reads them."""
         if self._marks is None:
             self._marks = tuple(self._marks_of())
         return self._marks
 
     def _marks_of(self) -> Iterator[tuple[float, str]]:
         for bag in self._bags.values():
-            with suppress(TeleopError):  # most have none
+            with suppress(TeleopError):  # most recordings have no marks
                 for mark in bag.reports(MARKS):
                     yield (mark.stamp_ns - self._start_ns) * 1e-9, mark.message

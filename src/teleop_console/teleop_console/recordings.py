@@ -16,7 +16,7 @@ from teleop_core.base.errors import ParameterError, TeleopError
 _MOST = 50
 """Recordings that are listed."""
 _FILE = "metadata.yaml"
-_COLUMNS = 132  # of what a command says
+_COLUMNS = 132  # width of a command's output in characters
 _KIND = {"score": "evaluate", "export": "export"}
 
 
@@ -26,7 +26,7 @@ class Entry:
 
     Attributes:
         name: Its name in the folder.
-        made: When it was closed [s since 1970].
+        made: Time at which it was closed [s since 1970].
         about: Scenario, robot and length, a line; empty before they are known.
         verdict: Line that names the worst first; empty before it is known.
         is_good: Whether all figures are within their bounds; None before this is known.
@@ -43,7 +43,7 @@ class Recordings:
     """Recordings of a folder.
 
     Args:
-        folder: Where they are.
+        folder: Folder of the recordings.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -52,7 +52,7 @@ class Recordings:
         self._judging: tuple[Entry, subprocess.Popen[bytes], Path] | None = None
 
     def entries(self) -> list[Entry]:
-        """The newest recordings, the newest first; each with what is known of it by now."""
+        """The newest recordings, the newest first; each with the data that are known so far."""
         found = []
         for file in self._folder.glob(f"*/{_FILE}"):
             name, made = file.parent.name, file.stat().st_mtime
@@ -66,7 +66,7 @@ class Recordings:
             ParameterError: There is no such recording in the folder.
         """
         if name not in {entry.name for entry in self.entries()}:
-            raise ParameterError("recording", name, f"one of those in {self._folder}")
+            raise ParameterError("recording", name, f"the name of a recording in {self._folder}")
         return self._folder / name
 
     def words(self, kind: str, names: Sequence[str]) -> list[str]:
@@ -74,7 +74,7 @@ class Recordings:
 
         Args:
             kind: ``score`` or ``export``.
-            names: Of the recordings, at least one; several are compared.
+            names: Names of the recordings, at least one; several are compared.
 
         Raises:
             ParameterError: A name is that of no recording, or the kind is another.
@@ -87,7 +87,7 @@ class Recordings:
 
     def run(self, kind: str, names: Sequence[str]) -> str:
         """Run such a command at low priority; returns what it printed."""
-        wide = os.environ | {"COLUMNS": str(_COLUMNS)}  # names of several recordings stand side by side
+        wide = os.environ | {"COLUMNS": str(_COLUMNS)}  # the request names several recordings
         words = [*_program(), *self.words(kind, names)]
         done = subprocess.run(words, capture_output=True, text=True, check=False, env=wide)
         return done.stdout or done.stderr
@@ -129,7 +129,7 @@ def _program() -> list[str]:
 
 
 def _operator(path: Path) -> list[str]:
-    """Kind of the first arm's operator; none where that is not told."""
+    """Kind of the first arm's operator; empty if the recording does not contain it."""
     from teleop_console.recorded_arms import configuration_of  # costly for a command that only lists itself
     from teleop_core.bags.reader import Bag
 
@@ -140,7 +140,7 @@ def _operator(path: Path) -> list[str]:
 
 
 def _judged(folder: Path, entry: Entry, out: Path) -> Entry:
-    """Entry with what a score says; one that could not be scored says so."""
+    """Entry with the verdict of its score, or with a note that it could not be scored."""
     if not out.is_file():
         return Entry(entry.name, entry.made, "", "could not be scored: teleop evaluate", False)
     score = json.loads(out.read_text(encoding="utf-8"))[0]

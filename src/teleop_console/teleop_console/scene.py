@@ -17,15 +17,15 @@ from teleop_core.kernels.axes import axis_map
 from teleop_core.kernels.geometry import Array
 
 _POINTS = {"tour": "tour.points", "points": "points"}
-"""Operators that go to points, and where these stand."""
-_PIECES = 6  # of a line of the floor, each of which fades evenly
+"""Operators that move to points, and the parameter with these points."""
+_PIECES = 6  # number of pieces of a floor line, each with a linear fade
 
 
 def targets_of(parameters: Parameters, arm: str) -> Array:
-    """Points (N, 3) [m] in master_base to which the operator of an arm goes; none for others.
+    """Points (N, 3) [m] in master_base to which the operator of an arm moves; empty for operators without points.
 
     Args:
-        parameters: As :meth:`~teleop_console.link.SessionLink.parameters` gives them.
+        parameters: Result of :meth:`~teleop_console.link.SessionLink.parameters`.
         arm: Namespace of the arm.
     """
     node = f"{arm}/operator" if arm else "operator"
@@ -38,16 +38,16 @@ def targets_of(parameters: Parameters, arm: str) -> Array:
 
 
 def floor_lines(radius: float, cell: float) -> tuple[Array, Array]:
-    """Lines of a floor that fade towards its rim, every fifth of them strong.
+    """Grid lines of a floor that fade towards its rim; every fifth line is stronger.
 
     With software rendering, a grid drawn by a shader takes a quarter of the time of a picture.
 
     Args:
-        radius: Where they end [m].
-        cell: Distance between two of them [m].
+        radius: Radius at which the lines end [m].
+        cell: Distance between two neighbouring lines [m].
 
     Returns:
-        Segments (N, 2, 3) [m] about the origin, and how strong each end of them is (N, 2), 0 to 1.
+        Segments (N, 2, 3) [m] about the origin, and the opacity of both ends of each segment (N, 2), 0 to 1.
     """
     count = round(radius / cell)
     joints = np.linspace(-count, count, _PIECES + 1)
@@ -63,7 +63,7 @@ def floor_lines(radius: float, cell: float) -> tuple[Array, Array]:
 
 
 class Scene:
-    """What is seen of a session; the axes of the page are those of the first arm's base, z up.
+    """Three-dimensional scene of a session; the axes of the page are those of the first arm's base, z up.
 
     Args:
         server: The page.
@@ -82,7 +82,7 @@ class Scene:
             for arm in arms:
                 nodes = ArmNodes(server, arm)
                 low, high = nodes.low, nodes.high
-                if self.arms:  # beside the one before, to its right
+                if self.arms:  # to the right of the previous arm
                     side -= float(high[1])
                 nodes.place(side)
                 side += float(low[1]) - 0.1 * nodes.bodies.size
@@ -101,7 +101,7 @@ class Scene:
                     nodes.draw(view.time, seen)
 
     def retune(self, parameters: Parameters) -> None:
-        """Apply those parameters of the session that change the picture: axes, fixture, targets, object.
+        """Apply the session's parameters that change the picture: axes, fixture, targets, object.
 
         Args:
             parameters: As :meth:`~teleop_console.link.SessionLink.parameters` returns them; missing ones change
@@ -199,7 +199,7 @@ class Scene:
 
 
 def _look(parameters: Parameters, node: str, kind: str) -> Look:
-    """What the fixture of a node is."""
+    """Kind of fixture of a node."""
     values = _values_below(parameters, node, f"fixture.{kind}.")
     if (place := parameters.get((node, "fixture.place"))) is not None:
         values["place"] = place.value
@@ -207,7 +207,7 @@ def _look(parameters: Parameters, node: str, kind: str) -> Look:
 
 
 def _values_below(parameters: Parameters, node: str, start: str) -> dict[str, Setting]:
-    """Values of a node's parameters by what their names say after a beginning."""
+    """Values of a node's parameters whose names begin with ``start``, by the rest of their names."""
     return {
         name.removeprefix(start): info.value
         for (owner, name), info in parameters.items()

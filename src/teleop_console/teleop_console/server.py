@@ -22,7 +22,7 @@ _SHOWN = 80
 
 
 def listen(host: str, port: int) -> socket.socket:
-    """A socket that listens.
+    """Open a listening socket.
 
     Args:
         host: Address of this machine.
@@ -32,7 +32,7 @@ def listen(host: str, port: int) -> socket.socket:
         The socket, bound and listening.
 
     Raises:
-        ParameterError: The port is none, or the address not one of this machine.
+        ParameterError: The port is not a port number, or the address does not belong to this machine.
         SessionError: The port is taken; the text says by what, and names a free one.
     """
     if not 0 <= port < 1 << 16:
@@ -54,7 +54,7 @@ def listen(host: str, port: int) -> socket.socket:
 
 
 def _refusal(host: str, port: int, error: OSError) -> Exception:
-    """What to say when an address cannot be listened at."""
+    """Error for an address on which the socket cannot listen."""
     import errno
 
     if error.errno == errno.EADDRINUSE:
@@ -72,7 +72,7 @@ def free_port(host: str = "127.0.0.1") -> int:
 
 
 def owner(port: int) -> str:
-    """Which process listens at a port, in words; ``another process`` where it cannot be known."""
+    """Text that names the process that listens on a port; ``another process`` if it is unknown."""
     wanted = {f"socket:[{inode}]" for inode in _inodes(port)}
     for folder in Path("/proc").glob("[0-9]*"):
         with suppress(OSError):
@@ -99,9 +99,9 @@ def _command(folder: Path) -> str:
 
 
 PORT = 8080
-"""Where the page is if nothing else is asked."""
-_LOOK = 0.5  # s, between looks at the driver
-_FORGET = 20  # looks between clearing up
+"""Default port of the page."""
+_LOOK = 0.5  # time between two checks of the driving page [s]
+_FORGET = 20  # number of checks between two removals of closed pages
 
 
 class ConsoleServer:
@@ -113,21 +113,22 @@ class ConsoleServer:
 
     Attributes:
         viser: The server to which scene and panel are added.
-        drivers: Which page drives.
-        answers: What pages are told beside viser's elements, and where their stop goes.
-        token: Secret that the address must carry; empty for none.
+        drivers: Object that knows which page drives.
+        answers: Data for pages in addition to viser's elements, and the receiver of their stops.
+        token: Secret that the address must contain; empty for none.
 
     Args:
         port: Port; 0 for any free one.
         host: Address of this machine to serve at; the loopback by default.
         token: Secret; made if the address is not the loopback and none is given.
         label: Heading of the panel.
-        form: What is shown while nothing runs, made of the drivers; None for the form on which sessions are chosen.
+        form: Makes the form that is shown while no session runs, from the drivers; None for the form that chooses a
+            session.
         patience: Time without a sign of life after which a page loses a held stylus [s].
 
     Raises:
         SessionError: The port is taken; the text says by what, and names a free one.
-        ParameterError: The address is none of this machine.
+        ParameterError: The address does not belong to this machine.
     """
 
     def __init__(

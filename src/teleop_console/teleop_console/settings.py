@@ -33,14 +33,13 @@ class SettingsPanel:
     Args:
         server: The page.
         link: The session.
-        may_drive: Asked before anything is changed.
-        renew: Begins a new session with other texts ``node.name=value``, for what is fixed while
-            one runs, and returns why it does not, empty if it does; None where the session is not
-            ours.
+        may_drive: Returns whether the page may change parameters; called before each change.
+        renew: Begins a new session with other texts ``node.name=value``, for parameters that are fixed while a session
+            runs. Returns the reason of a refusal, or an empty text. None if the console did not start the session.
         of_session: Parameters of the session as a whole, which no node has.
 
     Attributes:
-        known: All parameters, as they were when they were last asked for, or set here.
+        known: All parameters with the values that were last received or set here.
     """
 
     def __init__(
@@ -116,7 +115,7 @@ class SettingsPanel:
             listener(known)
 
     def keys(self) -> list[tuple[str, str]]:
-        """Parameters that are asked for: by search or choice, all or those that were changed."""
+        """Parameters that the search and the filters of the panel select."""
         chosen, words = self._choice.value, self._search.value.lower().split()
         keys = list(self.known)
         if words:

@@ -1,4 +1,4 @@
-"""Stand: where the master's device stands beside its slave, so that both move alike on the page."""
+"""Stand: the pose of the master's device beside its slave on the page, in which both move in the same direction."""
 
 from dataclasses import dataclass, field
 
@@ -11,7 +11,7 @@ from teleop_core.robots.bodies.meshes import mesh_of
 from teleop_core.robots.bodies.solids import Solid
 
 PUBLISHED_AXES = axis_map("axes", MotionScalingParameters.axes)
-"""Rotation (3, 3) from the master's base to the slave's axes, of a session that says no other."""
+"""Rotation (3, 3) from the master's base to the slave's axes; used if a session does not define one."""
 REST = np.array([0.0, -0.0655, -0.0881, 0.97918, -0.20300, 0.0, 0.0])
 """Pose (7,) of the stylus in the inkwell, in master_base."""
 _UPRIGHT = (np.sqrt(0.5), -np.sqrt(0.5), 0.0, 0.0)  # brings z of a solid to the device's y, upwards
@@ -51,7 +51,7 @@ class Stand:
 
     @property
     def quaternion(self) -> Array:
-        """Its turn (4,): w, x, y, z."""
+        """Rotation of the device (4,): w, x, y, z."""
         out = np.empty(4)
         quaternion_from_rotation(np.ascontiguousarray(self.axes), out)
         return out

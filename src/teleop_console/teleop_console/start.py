@@ -25,17 +25,17 @@ ROBOTS = Path("robots")
 """Folder of the robots that were dropped on the form."""
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}\.urdf")
 _LARGEST = 4 * 1024 * 1024  # bytes of a robot's file
-_TRY = 0.25  # for which options are tried before the page is answered [s]
-_LOOK = 0.2  # between looks at verdicts [s]
+_TRY = 0.25  # time for which options are checked before the page is answered [s]
+_LOOK = 0.2  # time between two checks for new verdicts [s]
 Query = Mapping[str, Sequence[str]]
 Body = Callable[[int], bytes]
 Told = tuple[http.HTTPStatus, object]
-"""Status of an answer, and what it says as JSON."""
+"""Status of an answer, and its content for JSON."""
 
 
 @dataclass(frozen=True)
 class Wish:
-    """What a person at the page wants next.
+    """Next action that a person at the page requests.
 
     Attributes:
         chosen: Words of a session, see :mod:`~teleop_console.choices`.
@@ -51,11 +51,11 @@ class Form(Protocol):
 
     @property
     def script(self) -> Path:
-        """Its script."""
+        """Script of the form."""
 
     @property
     def style(self) -> Path | None:
-        """Its style sheet, beside the one that forms share; None for none."""
+        """Style sheet of this form, in addition to the common one; None for none."""
 
     @property
     def documents(self) -> Mapping[str, bytes]:
@@ -63,21 +63,21 @@ class Form(Protocol):
 
     @property
     def paths(self) -> frozenset[str]:
-        """Paths of its requests."""
+        """Paths of the form's requests."""
 
     def answer(self, path: str, query: Query, page: int, body: Body = bytes) -> Told:
-        """Answer to a request of a page; -1 for one that is not open."""
+        """Answer to a request; ``page`` is the number of the page, -1 if the page is not open."""
 
 
 class StartPage:
-    """What the form shows, and what was asked of it; methods may be called from any thread.
+    """Content of the form, and the actions that people requested; methods may be called from any thread.
 
     Args:
-        drivers: Who may begin and end.
-        folder: Where recordings are.
+        drivers: Knows which page may begin and end a session.
+        folder: Folder of the recordings.
 
     Attributes:
-        is_open: Whether the form is shown: nothing runs.
+        is_open: Whether the form is shown because no session runs.
         told: Text for the person at the page: why the last session ended, or the output of a command.
     """
 
@@ -101,7 +101,7 @@ class StartPage:
 
     @property
     def paths(self) -> frozenset[str]:
-        """Paths of its requests."""
+        """Paths of the form's requests."""
         return frozenset({"/start", "/take", "/robot", *self._acts})
 
     def wait(self) -> Wish:
@@ -109,7 +109,7 @@ class StartPage:
         self._ends.clear()
         self.is_open = True
         try:
-            self._shown({})  # the first answer is the slowest: before anybody asks
+            self._shown({})  # compute the first answer, which is the slowest, before any page requests it
             while True:
                 try:
                     return self._wishes.get(timeout=_LOOK)
@@ -129,9 +129,10 @@ class StartPage:
 
         Args:
             path: One of :attr:`paths`.
-            query: Its words.
-            page: Page that asks.
-            body: Its body of at most so many bytes; only who may send one is listened to.
+            query: Query parameters of the request.
+            page: Number of the page that sent the request.
+            body: Returns the request's body of at most the given number of bytes; read only if the page may send a
+                body.
         """
         try:
             if path == "/start":
@@ -194,12 +195,12 @@ class StartPage:
         return ""
 
     def _run(self, query: Query) -> str:
-        """Score, compare or export, in a thread; the form shows what came of it."""
+        """Score, compare or export recordings in a thread; the form then shows the result."""
         self._insist_open()
         kind, names = _words(query).get("kind", ""), tuple(query.get("name", ()))
         words = self.recordings.words(kind, names)
         if not self._runs.acquire(blocking=False):
-            raise ParameterError("action", kind, "asked for after the action before it has ended")
+            raise ParameterError("action", kind, "sent after the previous action has ended")
         self.told = "$ teleop " + " ".join(words) + "\n…"
         threading.Thread(target=self._do, args=(kind, names), daemon=True).start()
         return ""
@@ -218,7 +219,7 @@ class StartPage:
             raise ParameterError("name", name, "letters, digits, '.', '_' and '-', then .urdf")
         data, file = body(_LARGEST), ROBOTS / name
         if file.exists() and file.read_bytes() != data:
-            raise ParameterError("name", name, f"a new one: {file} is another robot")
+            raise ParameterError("name", name, f"a new name: {file} is another robot")
         ROBOTS.mkdir(exist_ok=True)
         file.write_bytes(data)
         return str(file)
@@ -230,7 +231,7 @@ class StartPage:
 
     def _insist_open(self) -> None:
         if not self.is_open:
-            raise ParameterError("session", "one that runs", "ended before another is begun")
+            raise ParameterError("session", "one that runs", "ended before another session begins")
 
 
 def _words(query: Query) -> dict[str, str]:

@@ -30,11 +30,11 @@ _MISSED = {
     Miss.WRONG: "on the wrong goal",
 }
 RESTS = "nobody holds the stylus"
-"""How nodes of a hand end the line that says that it rests."""
+"""End of the status line of a hand's node while no person holds the stylus."""
 
 
 def situation(view: View) -> Situation:
-    """What every page shows of a live session, whatever is scrolled or folded."""
+    """State of a live session that every page always shows."""
     is_pressed = any(arm.operation.get("is_stopped") for arm in view.arms.values())
     is_latched = any(
         State(int(arm.operation["state"])) is State.FAULT and Fault(int(arm.operation["fault"])) is Fault.STOP
@@ -48,7 +48,7 @@ def situation(view: View) -> Situation:
 
 
 def alive(view: View) -> dict[str, bool]:
-    """Which controls can do something now, by their names."""
+    """Names of the controls that have an effect now."""
     states = {State(int(arm.operation["state"])) for arm in view.arms.values() if arm.operation}
     is_stopped = situation(view).is_stopped
     may_move = bool(states) and not is_stopped
@@ -82,15 +82,15 @@ _LEADERS = {
 
 
 def leader(kind: str) -> str:
-    """What moves the hand, by the kind of the operator; empty if it is the person at the page."""
+    """Text that names the mover of the hand, by the kind of operator; empty for the person at the page."""
     return "" if kind in {"", "remote"} else _LEADERS.get(kind, f"operator {kind} leads, simulated")
 
 
 def next_step(view: View, *, is_led_here: bool) -> str:
-    """What an operator does next; empty where nothing is to be done.
+    """Next action of an operator; empty if there is none.
 
     Args:
-        view: What is known.
+        view: Newest data of the session.
         is_led_here: Whether a person at the page moves the hand.
     """
     button = next_button(view)
@@ -125,12 +125,12 @@ def mode_text(arm: ArmView) -> str:
 
 
 def fixture_text(arm: ArmView) -> str:
-    """Whether the fixture of an arm is on, in words; empty before it has said that."""
+    """Text about the state of an arm's fixture; empty before the arm has reported it."""
     return ("on" if arm.state["is_fixture_on"] else "off") if arm.state else ""
 
 
 def task_text(arm: ArmView) -> str:
-    """What the task asks for, and what came of it so far; empty without one."""
+    """Text with the present step of the task and the results so far; empty without a task."""
     told = arm.get(TASK_STATE)
     if told is None or told[0] <= 0.0:
         return ""
@@ -162,7 +162,7 @@ def status_html(view: View, title: str, doing: str, step: str = "") -> str:
     said = [arm.operation_text for arm in view.arms.values() if arm.operation_text]
     news = [text for text in view.news if not any(known in text for known in said)]
     lines += [_news_line(text) for text in news[:_NEWS]]
-    # Of one height, so that what is below stays where it is when there is more to say.
+    # The height is constant, so that the elements below do not move when the text grows.
     return f'<div class="t-status">{"".join(f"<p>{line}</p>" for line in lines)}</div>'
 
 

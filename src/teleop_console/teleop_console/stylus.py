@@ -24,19 +24,19 @@ LINGER = 1.0
 """Time for which the stylus is held after a small step, so that the next step can follow [s]."""
 GRIP = "grip"
 """Name of a gizmo's node below that of its master."""
-_SIZE = 0.08  # of a gizmo [m]
+_SIZE = 0.08  # size of a gizmo [m]
 
 
 @dataclass
 class _Hand:
-    """Who holds a stylus, and where it is wanted.
+    """Holder and wanted pose of one stylus.
 
     Attributes:
-        gizmo: What is dragged; its pose is in master_base.
-        measured: Where the stylus was last (7,); None before its first sample.
-        wanted: Where it is wanted (7,); None while nobody holds it.
-        client: Browser that drags; None where small steps hold it, or nobody does.
-        remaining: Time until a small step lets go [s].
+        gizmo: Element that a person drags; its pose is in master_base.
+        measured: Last measured pose of the stylus (7,); None before its first sample.
+        wanted: Wanted pose of the stylus (7,); None while no browser holds it.
+        client: Browser that drags the stylus; None if small steps or no browser hold it.
+        remaining: Time until a small step releases the stylus [s].
     """
 
     gizmo: viser.TransformControlsHandle
@@ -55,10 +55,10 @@ class Stylus:
 
     Args:
         server: The page.
-        scene: What it shows; gizmos stand among its masters.
+        scene: Scene of the page; the gizmos are added to its masters.
         may_drive: Whether a browser may command the arms, by its number.
-        on_hold: Told the arm and the pose (7,) in master_base that is wanted.
-        on_let_go: Told the arm that is let go of.
+        on_hold: Called with the arm and the wanted pose (7,) in master_base.
+        on_let_go: Called with the arm whose stylus is released.
     """
 
     def __init__(
@@ -98,7 +98,7 @@ class Stylus:
                 return
             is_taken = hand.client is not None and hand.client != client
             if client in hand.refused or is_taken or not self._may_drive(client):
-                hand.refused.add(client)  # for the whole gesture
+                hand.refused.add(client)  # the refusal lasts for the whole gesture
                 if hand.client == client:
                     self._let_go(arm, hand)
                 return
@@ -111,11 +111,11 @@ class Stylus:
         self._on_let_go(arm)
 
     def held(self, arm: str) -> bool:
-        """Whether somebody holds the stylus of an arm."""
+        """Whether a browser or a small step holds the stylus of an arm."""
         return self._hands[arm].wanted is not None
 
     def wanted(self, arm: str) -> Array | None:
-        """Pose (7,) at which the stylus is wanted, in master_base; None while nobody holds it."""
+        """Wanted pose (7,) of the stylus in master_base; None while nothing holds it."""
         wanted = self._hands[arm].wanted
         return None if wanted is None else wanted.copy()
 
@@ -128,9 +128,9 @@ class Stylus:
         self._time = view.time
 
     def follow(self, arm: str, pose: Array) -> None:
-        """Take where the stylus is (7,), in master_base; the gizmo goes there if nobody holds it.
+        """Store the measured pose (7,) of the stylus in master_base; the gizmo moves there while nothing holds it.
 
-        A pose that is not finite is none.
+        A pose that is not finite counts as unknown.
         """
         if not np.isfinite(pose).all():
             return
@@ -186,7 +186,7 @@ class Stylus:
             self._on_hold(arm, hand.wanted.copy())
 
     def let_go(self, arm: str) -> None:
-        """Let go of a stylus, whoever holds it; nothing happens if nobody does."""
+        """Release a stylus from any holder; has no effect if nothing holds it."""
         with self._lock:
             hand = self._hands[arm]
             if hand.client is not None:
@@ -232,7 +232,7 @@ class Steps:
 
     Args:
         server: The page.
-        stylus: What moves.
+        stylus: Stylus that moves.
         arms: Namespaces of the arms; keys move the chosen one.
         may_drive: Whether a browser may command the arms.
     """

@@ -12,7 +12,7 @@ PERIOD = 0.25
 """Time between two drawings of a tail [s]."""
 _POINTS = 160
 _GAP = 1.0  # gap between two drawings that counts as a jump of time [s]
-_SHORTEST = 1e-4  # between two points of it [m]
+_SHORTEST = 1e-4  # distance between two points of the tail [m]
 
 
 def is_jump(before: float, time: float) -> bool:
@@ -26,8 +26,8 @@ class Tail:
     Args:
         server: The page.
         name: Path of its node.
-        color: Where it is new.
-        thickness: Of the line [px].
+        color: Colour of the newest part.
+        thickness: Thickness of the line [px].
     """
 
     def __init__(self, server: viser.ViserServer, name: str, color: Color, thickness: float = 2.5) -> None:
@@ -52,14 +52,14 @@ class Tail:
         self._drawn = -np.inf
 
     def show(self, *, is_shown: bool) -> None:
-        """Show or hide it; it goes on remembering."""
+        """Show or hide the tail; a hidden tail still stores points."""
         self._is_hidden = not is_shown
         self._line.visible = is_shown and bool(np.isfinite(self._times[-1]))
 
     def draw(self, time: float, point: Array | None) -> None:
-        """Take the place of the point (3,) [m] at a time [s]; None where it is unknown.
+        """Add the position of the point (3,) [m] at a time [s]; None if it is unknown.
 
-        A time before the last one, or long after it, begins the tail anew.
+        A time before the last time, or long after it, starts a new tail.
         """
         if is_jump(self._last, time):
             self.fill(np.empty(0), np.empty((0, 3)))

@@ -1,4 +1,4 @@
-"""Timeline: one strip of time under the page: what happened when, and which time the scene shows.
+"""Timeline: a strip below the page that shows events over time and the time that the scene shows.
 
 Its answers are small: each contains no more than the pixels can show. Every page may look; only a page that drives
 moves time. A live session continues whatever is shown, so the scene shows the past only while a page repeats that it
@@ -28,9 +28,9 @@ CURVES = 6
 PIXELS = 4000
 """Widest strip."""
 FOUND = 40
-"""Columns that a search tells."""
+"""Largest number of columns that a search returns."""
 HELD = 2.5
-"""Time after which a live scene returns to the present, unless a page asks for the past again [s]."""
+"""Time after which a live scene returns to the present, unless a page requests the past again [s]."""
 _LONGEST = 200  # text of a word
 _ALIGNMENTS = ("start", "following")
 
@@ -75,7 +75,7 @@ class Timeline:
     # -- requests ----------------------------------------------------------------------------------
 
     def state(self, words: Mapping[str, str]) -> object:
-        """Where time is; with ``find`` the columns whose name or unit has all of its words, too."""
+        """The shown time; with ``find`` also the columns whose name or unit contains all words of the search."""
         link, seen = self._replay, self._seen
         begin, end = seen.span() if seen is not None else (0.0, link.duration if link else 0.0)
         told = {
@@ -118,7 +118,7 @@ class Timeline:
 
     def _curve(self, name: str, begin: float, end: float, pixels: int, shift: float | None) -> object:
         if name not in self._past.columns:
-            raise ParameterError("name", name, "a column of this session: /timeline?find= has them")
+            raise ParameterError("name", name, "a column of this session; /timeline?find= lists all columns")
         column, samples = self._past.columns[name], self._past.samples(name)
         told: dict[str, object] = {"name": name, "unit": column.unit, "is_held": column.is_held}
         told["waits"] = samples is None
@@ -170,7 +170,7 @@ class Timeline:
         return self._replay.recording.parent if self._replay else None
 
     def _others(self) -> list[str]:
-        """Recordings beside the one that is replayed."""
+        """Other recordings in the folder of the replayed one."""
         if self._folder is None:
             return []
         return [entry.name for entry in Recordings(self._folder).entries() if entry.name != self._link.title]
@@ -222,17 +222,17 @@ def _number(words: Mapping[str, str], name: str) -> float:
 
 
 class StripPage:
-    """Answers to what the strip of a page asks; methods may be called from any thread.
+    """Answers the requests of a page's strip; methods may be called from any thread.
 
     Args:
-        drivers: Who may move time.
+        drivers: Knows which page may change the shown time.
 
     Attributes:
-        shown: Times of what is shown; None while nothing is.
+        shown: Timeline of the shown session or recording; None while none is shown.
     """
 
     paths = frozenset({"/timeline", "/strip", "/time", "/over"})
-    """Paths of its requests."""
+    """Paths of the strip's requests."""
 
     def __init__(self, drivers: Drivers) -> None:
         self.shown: Timeline | None = None
@@ -243,9 +243,9 @@ class StripPage:
 
         Args:
             path: One of :attr:`paths`.
-            query: Its words; of all but ``name`` the first counts.
-            page: Page that asks.
-            body: Not asked for.
+            query: Query parameters of the request; of each except ``name`` only the first value counts.
+            page: Number of the page that sent the request.
+            body: Not used.
         """
         del body
         shown, names = self.shown, query.get("name", ())

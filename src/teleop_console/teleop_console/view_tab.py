@@ -34,8 +34,8 @@ class ViewTab:
 
     Args:
         server: The page.
-        scene: What they control.
-        visitors: Whose cameras are moved.
+        scene: Scene that they control.
+        visitors: Visitors whose cameras are moved.
     """
 
     def __init__(self, server: Server, scene: Scene, visitors: "Visitors") -> None:
@@ -78,7 +78,7 @@ def theme(server: viser.ViserServer, *, is_dark: bool) -> None:
 
 PERIOD = 0.5
 """Time between two pictures of an inset [s]."""
-_PATIENCE = 10.0  # for a browser that does not answer [s]
+_PATIENCE = 10.0  # longest wait for a browser that does not answer [s]
 
 
 class Insets:
@@ -86,7 +86,7 @@ class Insets:
 
     Args:
         server: The page.
-        scene: What is seen.
+        scene: Scene of the page.
     """
 
     def __init__(self, server: viser.ViserServer, scene: Scene) -> None:
@@ -145,21 +145,21 @@ class Insets:
                     self._images[name].image = picture
 
 
-_SETTLING = 4.0  # until a window has its panel beside it [s]
-_LOOK = 1.0  # between two checks whether the work has left the picture [s]
+_SETTLING = 4.0  # time until the panel of a new window has its final size [s]
+_LOOK = 1.0  # time between two checks whether the work has left the picture [s]
 _GROWN, _STILL = 0.08, 1e-4  # shares of its distance by which a camera has moved: for a new view, for a view that
 # follows
 
 
 @dataclass(frozen=True)
 class _Fit:
-    """What the camera of a browser shows.
+    """View of one browser's camera.
 
     Attributes:
-        since: When it came [s].
+        since: Time at which the page was opened [s].
         aspect: Width over height of its picture.
-        looked: When its picture was last compared with the work [s].
-        camera: What it was given.
+        looked: Time at which its picture was last compared with the work [s].
+        camera: Camera that was last set for it.
         is_own: Whether the person at the browser has chosen another view.
     """
 
@@ -178,12 +178,12 @@ def _is_moved(client: viser.ClientHandle, given: Camera) -> bool:
 
 
 class Visitors:
-    """What each browser gets for itself.
+    """Elements that each browser gets separately.
 
     Args:
         server: The page.
-        drivers: Who drives.
-        scene: What is seen.
+        drivers: Object that knows which page drives.
+        scene: Scene of the page.
         is_live: Whether it is a session, and not a recording.
     """
 
@@ -195,7 +195,7 @@ class Visitors:
         self._grips: dict[int, tuple[bool, float]] = {}
 
     def look(self) -> None:
-        """Welcome new pages, and tell every page whether it drives or watches."""
+        """Greet new pages, and show on every page whether it drives or watches."""
         clients = self._server.get_clients()
         for number, client in clients.items():
             text = f'<p class="t-role">{self._role(number)}</p>'
@@ -214,7 +214,7 @@ class Visitors:
 
         Args:
             client: The browser.
-            find: The camera; None for one that sees the work.
+            find: The camera; None for a camera that shows the whole work.
             is_riding: Whether the camera follows the body that it is attached to.
         """
         number, now = client.client_id, time.monotonic()
@@ -234,7 +234,7 @@ class Visitors:
     def _show_grips(self, number: int) -> None:
         """Show the handles of the styli on a page if it may drive; on other pages they are hidden each time.
 
-        All pages are told when the handles are shown again, those that watch too.
+        When the handles are shown again, viser informs all pages, including those that only watch.
         """
         may_drive, now = self._drivers.may_drive(number), time.monotonic()
         before, told = self._grips.setdefault(number, (True, -_LOOK))

@@ -18,11 +18,11 @@ from teleop_core.slave.world.contents import WorldParameters
 
 
 def object_outline(values: Mapping[str, Setting], robot: Robot) -> Array:
-    """Segments (N, 2, 3) [m] of the object in the slave's base; none where nothing is known.
+    """Segments (N, 2, 3) [m] of the object in the slave's base; empty if the object is unknown.
 
     Args:
-        values: Parameters of the world by name, without what is in front of them.
-        robot: The slave, below whose start an object without a place lies.
+        values: Parameters of the world by name, without the prefix of their names.
+        robot: The slave; an object without ``place`` lies below the slave's start.
     """
     nothing, kind = np.empty((0, 2, 3)), values.get("kind", "empty")
     of_object = ("tool_", f"{kind}.")

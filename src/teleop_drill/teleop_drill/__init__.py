@@ -1,7 +1,7 @@
-"""Drill and conformance for CRTK arms, those of teleop_core and any other.
+"""Drill and conformance tests for CRTK arms, of teleop_core or of other vendors.
 
-- :class:`Exercise`, :func:`register_exercise`, :func:`chosen`: what a drill breaks;
-- ``conformance``: what CRTK asks of an arm;
+- :class:`Exercise`, :func:`register_exercise`, :func:`chosen`: the faults of a drill;
+- ``conformance``: the requirements of CRTK on an arm;
 - ``nodes``: drills and tests of running nodes; these modules alone need ROS.
 """
 
@@ -9,5 +9,5 @@ import lazy_loader
 
 __version__ = "0.6.0"
 
-# The stub beside this file says what is where; a name is loaded on first use.
+# The stub beside this file lists the module of each name; a name is loaded on first use.
 __getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -77,7 +77,7 @@ class BagSource:
 
     def _pose_topic(self) -> str:
         found = [n for n, kind in self._types.items() if kind in POSES or kind in TRANSFORMS]
-        if not self._options.topic:  # static transforms belong to the other ones
+        if not self._options.topic:  # static transforms only complete other transforms
             found = [name for name in found if name not in self._static] or found
         if self._options.topic:
             wanted = _named(self._options.topic, self._types)
@@ -184,7 +184,7 @@ class BagSource:
         return found
 
     def blocks(self) -> Iterator[source.Block]:
-        """The same as for any source.
+        """All rows in the order of the file.
 
         Raises:
             RecordingError: The file is damaged.
@@ -201,7 +201,7 @@ class BagSource:
         parent, child = poses.taken or ("", "")
         if poses.taken is None:
             chosen = f"--frame {self._frame or '(any)'} in --parent {self._options.parent or '(any)'}"
-            raise RecordingError(self.path, f"{self._topic} holds no pose of {chosen}")
+            raise RecordingError(self.path, f"{self._topic} contains no pose of {chosen}")
         if child:
             self.told.append(f"poses of {child} in {parent or 'a frame without a name'}")
 
@@ -210,7 +210,7 @@ class BagSource:
         return source.Block(stamps, poses[:, :3], quaternions, log_ns=logs)
 
     def presses(self) -> source.Presses | None:
-        """The same as for any source."""
+        """Buttons with their own stream; None if there are none. Must be called after the blocks were read."""
         if not self._joy:
             return None
         with self._opened() as bag:
@@ -220,7 +220,7 @@ class BagSource:
         return source.Presses(stamps[order], logs[order], pressed[order])
 
     def check(self, finite: Array) -> None:
-        """The same as for any source."""
+        """Refuse columns without any number."""
         if not finite.all():
             names = np.array(["x", "y", "z", "orientation"])[finite == 0]
             raise RecordingError(self.path, f"{self._topic}: {', '.join(names)} holds no numbers")

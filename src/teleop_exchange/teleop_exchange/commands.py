@@ -42,7 +42,7 @@ def add_import(commands: Any) -> None:
         action="append",
         default=[],
         metavar=("NAME", "OPTIONS"),
-        help="one of several hands in the file, with options for it alone",
+        help="one of several arms in the file, with its own import options",
     )
     _options(parser)
 
@@ -56,14 +56,20 @@ def _options(parser: argparse.ArgumentParser) -> None:
     _changes(parser.add_argument_group("axes and place"))
     _damage(parser.add_argument_group("what is damaged"))
     bags = parser.add_argument_group("recordings of ROS")
-    bags.add_argument("--topic", metavar="TOPIC", help="topic of the poses, if there are several")
-    bags.add_argument("--frame", metavar="NAME", help="child frame, if a topic has several")
-    bags.add_argument("--parent", metavar="NAME", help="frame of the poses, if there are several")
-    bags.add_argument("--stamps", choices=("header", "log"), help="times of the messages (default: header)")
+    bags.add_argument("--topic", metavar="TOPIC", help="topic of the poses; needed if the file has several")
+    bags.add_argument("--frame", metavar="NAME", help="child frame; needed if the topic has several")
+    bags.add_argument("--parent", metavar="NAME", help="parent frame of the poses; needed if the file has several")
+    bags.add_argument(
+        "--stamps",
+        choices=("header", "log"),
+        help="timestamps to use: those of the headers (default), or the log times",
+    )
 
 
 def _time(group: Any) -> None:
-    group.add_argument("--time", nargs="+", metavar="COL", help="column of the time, or seconds and nanoseconds")
+    group.add_argument(
+        "--time", nargs="+", metavar="COL", help="column of the time, or the two columns of seconds and nanoseconds"
+    )
     group.add_argument("--rate", type=float, metavar="HZ", help="samples per second, for a file without times")
     group.add_argument("--time-unit", choices=("auto", *TIMES_NS), help="unit of the time (default: guessed)")
 
@@ -71,25 +77,33 @@ def _time(group: Any) -> None:
 def _place(group: Any) -> None:
     group.add_argument("--position", nargs="+", metavar="COL", help="columns of x, y, z")
     group.add_argument(
-        "--unit", choices=("auto", *LENGTHS), help="unit of the position (default: by the names, else m)"
+        "--unit", choices=("auto", *LENGTHS), help="unit of the position (default: by the column names, else m)"
     )
     group.add_argument("--quaternion", nargs="+", metavar="COL", help="four columns")
     group.add_argument(
         "--quaternion-order",
         choices=("auto", "wxyz", "xyzw"),
-        help="order of these columns (default: as their names say, else wxyz)",
+        help="order of the quaternion's columns (default: by their names, else wxyz)",
     )
-    group.add_argument("--matrix", nargs="+", metavar="COL", help="nine columns of a rotation")
-    group.add_argument("--matrix-order", choices=("row", "column"), help="row by row (default) or column by column")
+    group.add_argument("--matrix", nargs="+", metavar="COL", help="nine columns of a rotation matrix")
+    group.add_argument(
+        "--matrix-order",
+        choices=("row", "column"),
+        help="order of the columns of --rotation-matrix: row by row (default) or column by column",
+    )
     group.add_argument(
         "--euler",
         nargs="+",
         metavar="COL",
-        help="order and three columns: xyz about fixed axes, XYZ about axes that turn along",
+        help="order of the axes and three columns: xyz about fixed axes, XYZ about axes that turn with the body",
     )
     group.add_argument("--rotation-vector", nargs="+", metavar="COL", help="three columns")
     group.add_argument("--angles", choices=("auto", "rad", "deg"), help="unit of --euler and --rotation-vector")
-    group.add_argument("--orientation", choices=("auto", "none"), help="none: constant, nothing is guessed")
+    group.add_argument(
+        "--orientation",
+        choices=("auto", "none"),
+        help="none: the orientation is constant, and no columns are guessed for it",
+    )
 
 
 def _buttons(group: Any) -> None:
@@ -99,39 +113,46 @@ def _buttons(group: Any) -> None:
         "--threshold", type=float, metavar="X", help="a button is pressed above this value (default: 0.5)"
     )
     group.add_argument("--buttons-topic", metavar="TOPIC", help="topic of Joy messages in a bag")
-    group.add_argument("--buttons", metavar="MAP", help="buttons of the Joy, such as clutch=0,mode=2; or none")
+    group.add_argument(
+        "--buttons", metavar="MAP", help="indices of buttons in the Joy, such as clutch=0,mode=2; or none"
+    )
 
 
 def _changes(group: Any) -> None:
     group.add_argument(
-        "--axes", nargs=3, metavar=("X", "Y", "Z"), help="the master's x, y, z as axes of the file, such as +y -x +z"
+        "--axes",
+        nargs=3,
+        metavar=("X", "Y", "Z"),
+        help="axes of the file along x, y, z of the master, such as +y -x +z",
     )
     group.add_argument(
         "--handedness",
         choices=("right", "left"),
-        help="left: axes as in game engines; --axes must mirror then (default: right)",
+        help="handedness of the file's axes: right (default), or left as in game engines, for which --axes must mirror",
     )
-    group.add_argument("--scale", type=float, metavar="X", help="multiplies positions (default: 1)")
+    group.add_argument("--scale", type=float, metavar="X", help="factor for all positions (default: 1)")
     group.add_argument(
         "--center",
         choices=("keep", "mean", "middle", "start"),
-        help="point that becomes the origin: mean, middle of the range, or start (default: keep)",
+        help="point of the motion that becomes the origin: mean, middle of the range, or start "
+        "(default: keep the file's origin)",
     )
 
 
 def _damage(group: Any) -> None:
-    group.add_argument("--skip", type=int, metavar="N", help="lines to leave out at the beginning")
+    group.add_argument("--skip", type=int, metavar="N", help="number of lines to skip at the beginning")
     group.add_argument(
         "--episode",
         type=_episode,
         metavar="N|all",
-        help="which recording of a table that holds several; all: each, into a folder of them, of "
-        "the folder of a LeRobot data set too",
+        help="number of the episode, if the file contains several; all: import each into a directory "
+        "of recordings, also for the directory of a LeRobot data set",
     )
     group.add_argument(
         "--backwards",
         choices=("auto", "refuse", "drop", "sort"),
-        help="rows whose time goes back (default: drop up to 1 %%, refuse more)",
+        help="treatment of rows whose time goes back (default: drop them if they are at most 1 %%, "
+        "else refuse the file)",
     )
     group.add_argument("--gap", type=float, metavar="N", help="report gaps longer than N periods (default: 5)")
 
@@ -160,7 +181,7 @@ def add_export(commands: Any) -> None:
         type=Path,
         required=True,
         metavar="X",
-        help="file or directory to make: .csv, .csv.gz, .parquet, or no ending for a data set",
+        help="new file (.csv, .csv.gz or .parquet), or new directory without an ending for a data set",
     )
     parser.add_argument(
         "--format", choices=("csv", "parquet", "lerobot"), help="format (default: by the ending of --out)"
@@ -170,16 +191,16 @@ def add_export(commands: Any) -> None:
         "--rate",
         type=float,
         metavar="HZ",
-        help="rows per second, each with the newest values (default: every message; lerobot: 50)",
+        help="rows per second, each with the newest values (default: a row per message; lerobot: 50)",
     )
-    parser.add_argument("--units", action="store_true", help="put the unit behind each column: 'tip.x [m]'")
+    parser.add_argument("--units", action="store_true", help="add the unit to the name of each column: 'tip.x [m]'")
     parser.add_argument(
         "--action",
         choices=("joints", "tip"),
         default="joints",
-        help="lerobot: what the actions are, slave/servo_jp (default) or slave/servo_cp",
+        help="lerobot: topic of the actions, slave/servo_jp (default) or slave/servo_cp",
     )
-    parser.add_argument("--task", default="teleoperation", metavar="TEXT", help="lerobot: what is done, in words")
+    parser.add_argument("--task", default="teleoperation", metavar="TEXT", help="lerobot: description of the task")
 
 
 def _export(arguments: argparse.Namespace) -> int:

@@ -102,7 +102,7 @@ def files_of(path: Path, options: ImportOptions) -> dict[int, Path]:
     for file in files:
         for number in episodes.numbers_of(imported_motion.open_table(file, options)):
             if number in found:
-                raise RecordingError(path, f"holds episode {number} in {found[number]} and {file}")
+                raise RecordingError(path, f"contains episode {number} twice, in {found[number]} and {file}")
             found[number] = file
     return found
 

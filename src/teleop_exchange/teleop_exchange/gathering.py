@@ -164,11 +164,11 @@ def _stamps(
     if parts.logs and options.stamps == "log":
         told.append("stamps: time of recording")
         return np.concatenate(parts.logs), usable, True
-    is_bag = bool(parts.logs)  # where a stamp of zero means a missing stamp
+    is_bag = bool(parts.logs)  # in a bag, a stamp of zero means a missing stamp
     known = [part[np.isfinite(part) & ((part != 0) | (not is_bag))] for part in parts.times]
     first = next((float(part[0]) for part in known if len(part)), 0.0 if is_bag else math.nan)
     if math.isnan(first):
-        raise RecordingError(source.path, "the column of the time holds no numbers")
+        raise RecordingError(source.path, "the column of the time contains no numbers")
     if all((part == first).all() for part in known) and len(usable) > 1:
         return _without_stamps(source, parts, first, told), usable, True
     unit = source.time_unit

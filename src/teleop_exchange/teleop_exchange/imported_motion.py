@@ -117,7 +117,7 @@ class Motion:
         if c.doubled > MOST_DOUBLED * timed:
             share = 100.0 * c.doubled / timed
             hint = "it is too coarse; give --rate HZ, or --stamps log for a bag"
-            raise RecordingError(self._path, f"the time stands still in {share:.3g} % of the rows: {hint}")
+            raise RecordingError(self._path, f"the time does not change in {share:.3g} % of the rows: {hint}")
         if c.samples < 2:
             what = f"{c.samples} usable rows of {c.rows}; a motion needs two"
             raise RecordingError(self._path, f"holds {what}")

@@ -135,7 +135,7 @@ class Streams:
                 yield piece
 
     def _is_in_order(self) -> bool:
-        """Whether no chunk of the file begins long before the end of the one before it."""
+        """Whether each chunk of the file begins after, or shortly before, the end of the previous chunk."""
         newest = -(2**62)
         for block in () if isinstance(self._bag, memory.MemoryBag) else self._bag.blocks(self._names):
             logs = [series.log_ns for series in block.values() if len(series)]

@@ -154,7 +154,7 @@ def _series(names: Sequence[str], letters: str, without: str = "") -> dict[str, 
 
     Series that also have a column with the letter ``without`` are left out.
 
-    ``pose_position_x`` has the stem ``pose_position_``; ``qx`` has ``q_``, so that it is told from a bare ``x``.
+    ``pose_position_x`` has the stem ``pose_position_``; ``qx`` has ``q_``, which distinguishes it from a bare ``x``.
     """
     found: dict[str, dict[str, int]] = {}
     for column, name in enumerate(names):

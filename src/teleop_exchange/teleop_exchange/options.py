@@ -72,9 +72,9 @@ class ImportOptions:
         angles: Unit of Euler angles and rotation vectors: ``auto``, ``rad`` or ``deg``.
         orientation: ``auto``: guessed if no columns are given; ``none``: constant.
         clutch: Column of the button, pressed above ``threshold``; empty for none.
-        fixture: As ``clutch``.
-        mode: As ``clutch``.
-        threshold: Above it a button is pressed.
+        fixture: Column of the fixture button, as for ``clutch``.
+        mode: Column of the mode button, as for ``clutch``.
+        threshold: Value above which a button counts as pressed.
         skip: Lines to leave out at the beginning of a text.
         episode: Number of the recording in a table that contains several; None if it contains one.
         topic: Topic of the poses in a bag, or the end of its name; empty if there is only one.
@@ -156,7 +156,7 @@ class ImportOptions:
         x, *others = self.signed_axes
         if self.handedness == "right":
             return axis_map("--axes", (x, *others))
-        mirror = np.array([[-1.0], [1.0], [1.0]])  # of the first row
+        mirror = np.array([[-1.0], [1.0], [1.0]])  # mirrors the first row
         try:
             return np.asarray(mirror * axis_map("--axes", (x.translate(str.maketrans("+-", "-+")), *others)))
         except ParameterError:
@@ -171,7 +171,7 @@ class ImportOptions:
                 what = "an order and three columns" if name == "euler" else f"{needed} columns"
                 raise ParameterError(option(name), given, what)
         if several := [option(name) for name in ORIENTATIONS if getattr(self, name)][1:]:
-            raise ParameterError(several[0], "given", "the only one that says an orientation")
+            raise ParameterError(several[0], "given", "the only option that defines the orientation")
         order = self.euler[0] if self.euler else "xyz"
         if not is_euler_order(order):
             needed = "three of xyz or of XYZ, no axis twice in a row, such as xyz or ZYX"

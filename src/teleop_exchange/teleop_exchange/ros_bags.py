@@ -48,13 +48,13 @@ class OurBag:
         self._bag, self.is_ros2 = bag, not bag.is_ros1
         found = {name: info.type for name, info in bag.topics.items() if info.count}
         self.types, self.typestore = found, ros_types.typestore()
-        if bag.is_ros1:  # whose types are written geometry_msgs/PoseStamped
+        if bag.is_ros1:  # ROS 1 types are written geometry_msgs/PoseStamped
             self.types = {name: _SHORT.sub(r"\1/msg/\2", kind) for name, kind in found.items()}
             self.typestore = get_typestore(Stores.ROS1_NOETIC)
             self.typestore.register(get_types_from_msg(_TRANSFORMS, "tf2_msgs/msg/TFMessage"))
 
     def raw(self, topic: str) -> Iterator[Raw]:
-        """The same as for any recording."""
+        """Messages of a topic in the order of the file: time of recording [ns], bytes."""
         yield from self._bag.stored(topic)
 
 
@@ -67,7 +67,7 @@ class ForeignBag:
         self.types = {plain(name): str(info.msgtype) for name, info in topics if info.msgcount}
 
     def raw(self, topic: str) -> Iterator[Raw]:
-        """The same as for any recording."""
+        """Messages of a topic in the order of the file: time of recording [ns], bytes."""
         chosen = [c for c in self._reader.connections if plain(c.topic) == topic]
         count, listed = 0, sum(connection.msgcount for connection in chosen)
         # There is only one file, so its reader need not be merged with others.

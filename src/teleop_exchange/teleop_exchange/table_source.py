@@ -171,7 +171,7 @@ class TableSource:
         columns = tuple(range(width - 4, width))
         if width in {7, 8} and not self._options.position and self._are_unit(columns):
             wanted = self._options.quaternion_order
-            order = "xyzw" if wanted == "auto" else wanted  # as in that benchmark
+            order = "xyzw" if wanted == "auto" else wanted  # the order of that benchmark
             self._told(f"quaternion in the order {order}", columns)
             return Attitudes("quaternion", order), columns
         self.told.append("orientation: none found, constant")
@@ -252,7 +252,11 @@ class TableSource:
         if wanted == "auto":
             return named
         listed = ", ".join(repr(self._table.names[column]) for column in columns)
-        raise ParameterError(option(name), wanted, f"{named}, as {listed} say; else change these")
+        raise ParameterError(
+            option(name),
+            wanted,
+            f"{named}, because the columns {listed} name this unit; if it is wrong, rename the columns",
+        )
 
     # -- rows ------------------------------------------------------------------------------------
 
@@ -266,7 +270,7 @@ class TableSource:
         return None
 
     def blocks(self) -> Iterator[source.Block]:
-        """The same as for any source.
+        """All rows in the order of the file.
 
         Raises:
             RecordingError: A cell is no number, or the file is damaged.

@@ -110,18 +110,18 @@ class ParquetTable:
         raise RecordingError(self.path, "holds no rows")
 
     def sample(self, column: int) -> Numbers:
-        """The same as for any table."""
+        """The first values of a column; NaN for values that are not numbers."""
         try:
             return numbers(self._first.column(column))
         except (pa.ArrowInvalid, pa.ArrowNotImplementedError, ValueError, TypeError):
             return np.full(self._first.num_rows, np.nan)
 
     def is_clock(self, column: int) -> bool:
-        """The same as for any table."""
+        """Whether a column contains dates, which are read as nanoseconds since 1970."""
         return bool(pa.types.is_timestamp(self._first.schema.types[column]))
 
     def blocks(self, columns: Sequence[int]) -> Iterator[list[Numbers]]:
-        """The same as for any table."""
+        """Some columns, block by block."""
         wanted = {self._first.schema.names[column].partition(".")[0] for column in columns}
         kept = [name for name in self._file.schema_arrow.names if name.partition(".")[0] in wanted]
         names = [self._first.schema.names[column] for column in columns]

@@ -95,7 +95,7 @@ class TextTable:
             return data.decode("latin-1"), "latin-1"
 
     def sample(self, column: int) -> Numbers:
-        """The same as for any table."""
+        """The first values of a column; NaN for values that are not numbers."""
         cells = [row[column] if column < len(row) else "" for row in self._form.rows]
         if self._is_truth(column):
             return np.array([cell.strip().lower() == "true" for cell in cells], np.int64)
@@ -106,7 +106,7 @@ class TextTable:
         return np.array([number(cell, self._form.decimal) for cell in cells], np.float64)
 
     def is_clock(self, column: int) -> bool:
-        """The same as for any table."""
+        """Whether a column contains dates, which are read as nanoseconds since 1970."""
         return self._clock(column) is not None
 
     def _clock(self, column: int) -> re.Match[str] | None:
@@ -120,7 +120,7 @@ class TextTable:
         return bool(cells) and cells <= {"true", "false"}
 
     def blocks(self, columns: Sequence[int]) -> Iterator[list[Numbers]]:
-        """The same as for any table."""
+        """Some columns, block by block."""
         self.bad_rows = 0
         with damage_told(self.path):
             try:
@@ -197,7 +197,7 @@ def recognised(path: Path, text: str, skip: int = 0) -> Form:
         first += 1
     body = [line for line in lines[first:] if line.strip()][: SAMPLE + 2]
     if not body:
-        raise RecordingError(path, "holds no rows of numbers")
+        raise RecordingError(path, "contains no rows of numbers")
     separator = _separator(body)
     rows = [cells(line, separator) for line in body]
     with_numbers = [row for row in rows if _has_numbers(row)]
@@ -205,7 +205,7 @@ def recognised(path: Path, text: str, skip: int = 0) -> Form:
     # Lines before the table may contain numbers too, like `NO_OF_FRAMES 720`, but fewer numbers than a row.
     begin = next((i for i, row in enumerate(rows) if len(row) == width and _has_numbers(row)), None)
     if begin is None:
-        reason = "holds no rows of numbers" if len(rows) < 3 else "holds text, not numbers"
+        reason = "contains no rows of numbers" if len(rows) < 3 else "contains text, not numbers"
         raise RecordingError(path, reason)
     head = [comment_cells for comment_cells in [cells(comment, separator)] if not begin]
     head = rows[:begin] or head
@@ -216,7 +216,7 @@ def recognised(path: Path, text: str, skip: int = 0) -> Form:
 
 
 def _lines_before(lines: list[str], first: int, count: int) -> int:
-    """Lines before the line that follows ``count`` further ones that are not empty."""
+    """Number of lines before the next line that is not empty, after ``count`` such lines are skipped."""
     for number in range(first, len(lines)):
         if lines[number].strip():
             if not count:

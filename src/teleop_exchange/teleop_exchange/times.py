@@ -17,7 +17,7 @@ SECOND_NS = 1_000_000_000
 RATES_HZ = (5.0, 3000.0)
 """Smallest and largest plausible rate of a hand's recording; the unit of the times is guessed from them."""
 _EPOCH_S = 3e8  # 1979: later times are seconds since 1970
-_LONGEST_S = 60.0  # between two samples
+_LONGEST_S = 60.0  # longest time between two samples
 _STRETCH = 10  # rows; shorter parts do not count as a separate recording
 
 

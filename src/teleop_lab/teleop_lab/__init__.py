@@ -9,5 +9,5 @@ import lazy_loader
 
 __version__ = "0.6.0"
 
-# The stub beside this file says what is where; a name is loaded on first use.
+# The stub beside this file lists the module of each name; a name is loaded on first use.
 __getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

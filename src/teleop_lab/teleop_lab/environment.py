@@ -25,7 +25,7 @@ Observed = NDArray[np.float32]
 _ACT, _GOAL, _ATTEMPTS, _SUCCESSES, _STEP = (
     TASK_STATE.columns.index(name) for name in ("act", "goal_x", "attempts", "successes", "step")
 )
-_PERIOD = 0.02  # of a step [s]
+_PERIOD = 0.02  # duration of a step [s]
 _SCALE = 0.02
 """Length that is 1 in an observation [m]."""
 _BLOCKS = 3
@@ -49,7 +49,7 @@ class _TaskEnv(gymnasium.Env[Observed, Observed]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observed, dict[str, Any]]:
-        """Begin anew, with another goal if the task has some; see :meth:`gymnasium.Env.reset`."""
+        """Start a new episode, with another goal if the task has several; see :meth:`gymnasium.Env.reset`."""
         super().reset(seed=seed)
         session = self._session
         chosen = self._task | {"reach.first": int(self.np_random.integers(10**6))}
@@ -94,7 +94,7 @@ class _TaskEnv(gymnasium.Env[Observed, Observed]):
 
 
 class ReachEnv(_TaskEnv):
-    """Lead the slave's tip to a goal.
+    """Move the slave's tip to a goal.
 
     An action (3,) in -1 to 1 moves the hand by up to ``reach`` along the axes of the slave, over a step of 20 ms; as in
     :mod:`teleop_core`, the hand holds a device and the arm follows. The observation (9,) has the vector to the goal,
@@ -103,9 +103,9 @@ class ReachEnv(_TaskEnv):
     10 s.
 
     Args:
-        settings: Parameters of the session, such as ``{"display.latency": 0.2}`` or those of a
-            network; ``operator`` and the task are its own.
-        reach: Largest way of the hand in a step [m].
+        settings: Parameters of the session, such as ``{"display.latency": 0.2}`` or those of a network. The
+            environment itself sets the operator and the task.
+        reach: Largest displacement of the hand in one step [m].
 
     Raises:
         TeleopError: A setting is wrong.
@@ -123,18 +123,19 @@ class ReachEnv(_TaskEnv):
 
 
 class PegTransferEnv(_TaskEnv):
-    """Bring three blocks with the slave's jaw from their pegs to those of their colours.
+    """Carry three blocks with the slave's jaw from their pegs to the pegs of their colours.
 
     An action (4,) moves the hand as in :class:`ReachEnv`; a fourth number above 0 closes the jaw. The observation
     (12,) has the values of ``ReachEnv``, the jaw's angle [rad], whether it grips a block, and whether the task asks
     for a closed
-    jaw. The goal is that of the present step of the task: reach, grasp, lift, carry, place. The reward is minus the
-    distance in 20 mm, 5 for each step that is done, 20 for each block on its peg and -20 for one that is elsewhere. The
+    jaw. The goal belongs to the present step of the task: reach, grasp, lift, carry, place. The reward is minus the
+    distance in units of 20 mm, plus 5 for each finished step, 20 for each block on its peg, and -20 for each block at
+    rest elsewhere. The
     episode ends with the third block, and is truncated after 90 s.
 
     Args:
-        settings: As of :class:`ReachEnv`.
-        reach: Largest way of the hand in a step [m].
+        settings: As in :class:`ReachEnv`.
+        reach: Largest displacement of the hand in one step [m].
 
     Raises:
         TeleopError: A setting is wrong.
@@ -145,7 +146,7 @@ class PegTransferEnv(_TaskEnv):
         given: dict[str, Setting] = {
             "teleop.stages": stages,
             "task.kind": "peg_transfer",
-            "coarse_gain": 2.0,  # the board is wider than the device's room
+            "coarse_gain": 2.0,  # the board is wider than the device's workspace
             # The nearest block first: on its way to another one the jaw would push it over.
             "jaw_sim.object.place": [0.281, -0.2357, -0.0911, 0.256, -0.2357, -0.0911, 0.231, -0.2357, -0.0911],
         }

@@ -44,8 +44,8 @@ def grade(
     Args:
         data: Folder of a LeRobot data set, or a table with a column of episodes.
         figures: Keys below ``motion.hand`` of a score.
-        options: As of :func:`teleop_exchange.import_recording`: columns, units, frames.
-        recordings: Folder in which a recording of each episode is kept; None to keep none.
+        options: As in :func:`teleop_exchange.import_recording`: columns, units, frames.
+        recordings: Folder for a recording of each episode; None for no recordings.
         say: Called with a line after each episode.
 
     Returns:
@@ -54,7 +54,7 @@ def grade(
 
     Raises:
         RecordingError: The data cannot be read, or no episode can.
-        ParameterError: No figures are asked for, or an option is wrong.
+        ParameterError: ``figures`` is empty, or an option is wrong.
         UnknownNameError: There is no such figure.
     """
     import pandas

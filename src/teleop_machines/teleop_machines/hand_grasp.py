@@ -102,7 +102,7 @@ class Grasp(IntEnum):
     """Whether six actuated joints hold the object."""
 
     HELD = 0  # the contacts keep their distances
-    CANNOT_HOLD = 1  # from the seed no solution was found; the joints of least error are returned
+    CANNOT_HOLD = 1  # no solution was found from the seed; the joints of least error are returned
 
 
 class GraspResult(NamedTuple):

@@ -19,7 +19,7 @@ from teleop_core.kinematics.branches import bounded
 from teleop_machines import mma_branches, mma_forward
 
 LENGTH = 0.1  # distance [m] that weighs as much as one radian
-_ROUNDS, _PATH_ROUNDS = 60, 12  # of the local search
+_ROUNDS, _PATH_ROUNDS = 60, 12  # largest numbers of rounds of the local search
 _STALLED = 1e-5  # share of the squared error by which a round must reduce it
 # Damping per squared error: at the start, at least, and where no step helps any more.
 _DAMPING, _LEAST_DAMPING, _HOPELESS = 1e-2, 1e-6, 1e10

@@ -137,7 +137,7 @@ def frames(table: DhTable, joints: object) -> dict[str, Array]:
     """Transforms (4, 4) from the base to every frame of a model's table, by :data:`FRAMES`.
 
     Args:
-        table: From :func:`model_table`.
+        table: Result of :func:`model_table`.
         joints: Joint vector in the order of the model [rad].
 
     Raises:

@@ -12,7 +12,7 @@ from teleop_core.kernels import Array, inner, kernel
 
 _ITERATIONS = 100
 _ROUNDING = 1e-28  # squared relative error that more iterations cannot improve
-_LARGEST_TURN = 0.5  # rad, of one iteration
+_LARGEST_TURN = 0.5  # largest turn in one iteration [rad]
 # Of 0, 120 and 240 degrees, where the legs stand.
 COSINES = (1.0, -0.5, -0.5)
 SINES = (0.0, math.sqrt(0.75), -math.sqrt(0.75))

@@ -37,7 +37,7 @@ HEADINGS = ("fixed", "carried")
 _L1, _L2, _H1, _E, _LEGS, _W, _CARRIED = 0, 1, 2, 3, 4, 6, 9
 # Limits, strokes and home are not published: assumed.
 _TURN = math.radians(175.0)
-_STROKES = 0.45, 1.6  # of the leg length on a level platform
+_STROKES = 0.45, 1.6  # smallest and largest leg length, divided by that of a level platform
 HOME_JOINTS = -math.pi / 4.0, math.pi / 2.0, 0.25
 # Result of :func:`teleop_core.robots.freedom.start_posture` for the published lengths, rounded.
 START = np.array([-0.0032, 2.145, 0.2651, 0.2327, 0.3012, 0.1801, 0.1219, 0.1221, 0.1767])

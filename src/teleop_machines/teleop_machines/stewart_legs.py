@@ -18,7 +18,7 @@ from teleop_core.kinematics.damped import eliminate
 CLOSED = 1e-11
 _ITERATIONS = 100
 _ROUNDING = 1e-26  # squared relative error that more iterations cannot improve
-_LARGEST_TURN = 0.5  # rad, of one iteration
+_LARGEST_TURN = 0.5  # largest turn in one iteration [rad]
 
 
 @kernel

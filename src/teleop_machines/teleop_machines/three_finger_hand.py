@@ -38,7 +38,7 @@ from teleop_machines.hand_grasp import (
 
 __all__ = ["GEOMETRY", "Grasp", "GraspResult", "Hand", "make"]
 
-_LIMITS = np.radians([80.0, 110.0, 150.0])  # assumed, either way
+_LIMITS = np.radians([80.0, 110.0, 150.0])  # limits in both directions; assumed
 _NEAR = 0.02  # limits of a near-singular finger: sine of phi, and reach divided by full reach
 _CLOSED, _NOT_CLOSED = int(kinematics.FkStatus.CLOSED), int(kinematics.FkStatus.NOT_CLOSED)
 _FOLLOWED, _LIMITED = int(kinematics.IkStatus.FOLLOWED), int(kinematics.IkStatus.LIMITED)

@@ -17,7 +17,7 @@ class Arrays:
     """Arrays of a page, each packed once."""
 
     def __init__(self) -> None:
-        self._packed: dict[bytes, tuple[int, str]] = {}  # by contents
+        self._packed: dict[bytes, tuple[int, str]] = {}  # packed arrays by their contents
 
     def named(self, tree: Any) -> Any:
         """A trace or layout with places in the list instead of arrays of numbers."""

@@ -75,7 +75,7 @@ def _kept_s(score: Score) -> float:
 
 
 def _note(scores: Sequence[Score]) -> str:
-    """What the marks mean, where published figures stand beside ours."""
+    """Explanation of the marks, if published figures are shown beside ours."""
     if not is_compared(side_by_side(scores)):
         return ""
     return (
@@ -99,7 +99,7 @@ def _section(number: int, study: Study, plots: list[Figure], places: list[str]) 
 
 
 def _legend(bands: Sequence[Band]) -> str:
-    """What the bands mean; how much of the time it was stands in the table."""
+    """Legend of the coloured bands; the table contains the share of time of each."""
     entries = "".join(
         f'<span><i style="background:{escape(band.color)}"></i>{escape(band.cause)}</span>' for band in bands
     )

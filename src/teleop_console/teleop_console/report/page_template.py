@@ -1,4 +1,4 @@
-"""Page template: the report page is one file; its style and scripts stand beside this file."""
+"""Page template: the report page is one file; its style and scripts are files beside this module."""
 
 from functools import cache
 from importlib.resources import files
@@ -19,7 +19,7 @@ def style() -> str:
 
 @cache
 def script() -> str:
-    """All scripts as one, in an order in which each knows those before it."""
+    """All scripts joined; each script may use those before it."""
     parts = "\n".join(_text(f"{name}.js") for name in _SCRIPTS)
     return f'"use strict";\n(function () {{\n{parts}}})();\n'
 

@@ -74,7 +74,7 @@ class Stretch(NamedTuple):
     """Samples of one stream that will be written into a chunk."""
 
     channel: int
-    sequence: int  # of the first sample
+    sequence: int  # sequence number of the first sample
     layout: Layout
     stamp_ns: Stamps
     values: Values

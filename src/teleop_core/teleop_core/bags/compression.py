@@ -1,4 +1,4 @@
-"""Compression of MCAP chunks: the three kinds the format knows, by their names in it."""
+"""Compression of MCAP chunks: the three kinds of the format, by their names in files."""
 
 from collections.abc import Callable
 
@@ -29,7 +29,7 @@ def decompress(name: str, data: bytes, size: int) -> bytes:
     A chunk larger than :data:`LARGEST` is not unpacked, whatever size its record states.
 
     Args:
-        name: As in the chunk's record; empty for none.
+        name: Name in the chunk's record; empty for none.
         data: Compressed bytes.
         size: Size that the unpacked chunk must have, [bytes].
 
@@ -51,7 +51,7 @@ def _unzstd(data: bytes, size: int) -> bytes:
     """Unpack at most ``size`` bytes. The size that a frame states is checked first, since the library trusts it."""
     told = zstandard.frame_content_size(data)
     if told not in {-1, size}:  # -1: not told
-        raise ValueError(f"a frame of {told} bytes, must be {size}")
+        raise ValueError(f"a frame states {told} bytes, must state {size}")
     return zstandard.ZstdDecompressor().decompress(data, max_output_size=size)
 
 

@@ -27,20 +27,23 @@ def end(path: Path, file: McapFile, start_ns: int, stopped: OSError | None, give
     else:
         seconds = max(0, found.message_end_time - start_ns) / SECOND_NS
         what = f"the first {seconds:.1f} s ({found.message_count} of {given} messages)"
-    said = f"cannot be written any further ({stopped.strerror}); " if stopped else ""
+    said = f"cannot be written any more ({stopped.strerror}); " if stopped else ""
     try:
         home = _finished(path, file, start_ns)
     except OSError as error:
         kept = file.place
         if kept is None:
-            reason = f"was removed and cannot be made again ({error.strerror}); nothing is left"
+            reason = (
+                f"was removed during the recording and cannot be created again ({error.strerror}); all "
+                "its messages are lost"
+            )
             return RecordingError(path, said + reason)
-        reason = f"cannot be finished ({error.strerror}), but holds {what}; "
+        reason = f"cannot be finished ({error.strerror}), but contains {what}; "
         return RecordingError(kept.parent, f"{said}{reason}`teleop recover {kept}` completes it")
     if home == path:
-        return RecordingError(path, f"{said}was removed meanwhile, and is there again with {what}")
+        return RecordingError(path, f"{said}was removed during the recording and is created again with {what}")
     if home is not None:
-        return RecordingError(path, f"{said}was moved or removed meanwhile; {what} are in {home}")
+        return RecordingError(path, f"{said}was moved or removed during the recording; {what} are in {home}")
     return RecordingError(path, f"{said}{what} are safe") if stopped else None
 
 

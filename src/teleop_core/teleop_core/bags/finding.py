@@ -34,11 +34,11 @@ def mcap_files(path: Path) -> list[Path]:
     mcaps, others = sorted(path.glob("*.mcap")), sorted(path.glob("*.db3"))
     index = path / METADATA
     if not mcaps and others:
-        raise RecordingError(path, "has the storage sqlite3, must be mcap: `ros2 bag convert` it")
+        raise RecordingError(path, "is stored as sqlite3, must be mcap; convert it with `ros2 bag convert`")
     if not mcaps:
-        raise RecordingError(path, "is no recording: it holds no .mcap file")
+        raise RecordingError(path, "is no recording: it contains no .mcap file")
     if not index.exists():
-        reason = f"was not finished (no {METADATA}); `teleop recover {path}` saves what is there"
+        reason = f"was not finished (no {METADATA}); `teleop recover {path}` saves its intact messages"
         raise RecordingError(path, reason)
     return _listed(path, index)
 
@@ -47,7 +47,7 @@ def _listed(path: Path, index: Path) -> list[Path]:
     """Files that the index lists. They are searched beside the index; folders in the listed names are ignored."""
     information, mode = _information(index), compression_mode(index)
     if mode != "none":
-        reason = f"is compressed by {shown(mode)}; `ros2 bag convert` it to plain mcap"
+        reason = f"is compressed by {shown(mode)}; convert it to plain mcap with `ros2 bag convert`"
         raise RecordingError(path, reason)
     names = information.get("relative_file_paths")
     if not isinstance(names, list) or not names or not all(isinstance(n, str) for n in names):
@@ -62,7 +62,7 @@ def _listed(path: Path, index: Path) -> list[Path]:
 
 
 def compression_mode(index: Path) -> str:
-    """What a recording's metadata says is compressed: ``none``, ``file`` or ``message``.
+    """Compressed part of a recording according to its metadata: ``none``, ``file`` or ``message``.
 
     Raises:
         RecordingError: The metadata is malformed.
@@ -73,7 +73,7 @@ def compression_mode(index: Path) -> str:
 def _is_file(path: Path) -> bool:
     try:
         return path.is_file()
-    except OSError:  # its name is too long
+    except OSError:  # the file name is too long
         return False
 
 
@@ -86,9 +86,9 @@ def _information(index: Path) -> Mapping[str, object]:
         raise _damaged(index, f"it cannot be read: {error.strerror}") from error
     found = content.get("rosbag2_bagfile_information") if isinstance(content, Mapping) else None
     if not isinstance(found, Mapping):
-        raise _damaged(index, "it must hold rosbag2_bagfile_information with its entries")
+        raise _damaged(index, "it must contain rosbag2_bagfile_information with its entries")
     return found
 
 
 def _damaged(index: Path, reason: str) -> RecordingError:
-    return RecordingError(index, f"is damaged: {reason}; give the .mcap file beside it instead")
+    return RecordingError(index, f"is damaged: {reason}; give the .mcap file of the recording instead")

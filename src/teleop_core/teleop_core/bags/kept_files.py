@@ -28,7 +28,7 @@ from teleop_core.robots.files import visuals, xacro_files
 from teleop_core.robots.parts import DESCRIPTION, arguments_of, file_of
 
 TOUCHED, FIXTURE = "mesh", "fixture_mesh"
-_PLACES = range(8)  # of a shape that is made of several: they are called mesh, mesh1, mesh2
+_PLACES = range(8)  # parts of a combined shape: their meshes are called mesh, mesh1, mesh2
 _ROBOT, _DRIVES, _FILE, _MESHES = "robot", "drives", "_file", "_meshes"
 _PACKED, _DIGEST = "zlib, base64: ", "sha256:"
 _LEVEL = 4  # 27 MB of an arm's meshes take 0.4 s; level 6 takes 1.5 s for 5 % less size
@@ -50,8 +50,8 @@ class KeptFiles:
         """Add a mesh or a height field; a file that cannot be read is ignored.
 
         Args:
-            name: Its path.
-            prefix: What stands before the names of its arm.
+            name: Path of the file.
+            prefix: Prefix of the names of its arm.
             kind: :data:`TOUCHED` or :data:`FIXTURE`; from the second mesh of a kind on with its number appended.
         """
         self._name(f"{prefix}{kind}", name)
@@ -63,7 +63,7 @@ class KeptFiles:
             name: The robot's name or path.
             settings: Its geometry. If the file is a xacro, it is expanded with the arguments in it, and the URDF is
                 stored.
-            prefix: What stands before the names of its arm.
+            prefix: Prefix of the names of its arm.
         """
         found = file_of(name)
         if found is None:
@@ -88,7 +88,7 @@ class KeptFiles:
         if self._left_out:
             names = ", ".join(path.name for path in self._left_out.values())
             limit = f"keeps {_MOST / 2**20:g} MiB of files"
-            warnings.warn(f"the recording {limit}, and only digests of {names}", TeleopWarning, stacklevel=3)
+            warnings.warn(f"the recording {limit}; of {names} it keeps only digests", TeleopWarning, stacklevel=3)
         return dict(self._texts)
 
     def _name(self, key: str, name: str) -> None:

@@ -1,4 +1,4 @@
-"""Layouts: where each number of a fixed-size message stands in its CDR bytes.
+"""Layouts: the position of each number of a fixed-size message in its CDR bytes.
 
 All messages of a stream have the same frame and the same joint names, hence the same size: their
 bytes are one constant template with a stamp and some numbers in it. Batches are therefore built
@@ -29,7 +29,7 @@ class Layout:
     """Bytes of every message of one stream.
 
     Attributes:
-        kind: What the values are.
+        kind: Kind of the values.
         joint_names: Names in the order of the columns; empty without joints.
         frame_id: Frame in the header.
         size: Bytes of one message.
@@ -77,7 +77,7 @@ class Layout:
         self._pack, self._unpack = single.pack, single.unpack_from
         self._head, self._frame = fixed[0][1], fixed[1][1]
         self._fixed = fixed
-        # Strings between or after the numbers: each one's index among the arguments that follow the frame.
+        # Strings between or after the numbers: the index of each among the arguments after the frame.
         self._inner = [(at - 4, data) for at, data, _ in fixed[2:]]
 
     # -- batches ---------------------------------------------------------------------------------
@@ -197,7 +197,7 @@ def discover(kind: Kind, data: bytes) -> Layout | None:
     """Layout of the stream that a message comes from; None if the message fits no layout.
 
     Args:
-        kind: What the values are. For joints, the message itself decides whether it has velocity and effort.
+        kind: Kind of the values. For joints, the message itself decides whether it has velocity and effort.
         data: CDR of the stream's first message.
     """
     try:

@@ -62,7 +62,7 @@ def marker_message(stamp_ns: int, markers: Iterable[Marker]) -> bytes:
     """Message of ``visualization_msgs/MarkerArray``.
 
     Args:
-        stamp_ns: Stamp of all of them [ns].
+        stamp_ns: Stamp of all markers [ns].
         markers: The shapes.
     """
     shapes, cdr = list(markers), Template()

@@ -1,4 +1,4 @@
-"""MCAP file being written: whole chunks behind each other, an index at the end.
+"""Writing of an MCAP file: complete chunks one after the other, and an index at the end.
 
 Nothing is buffered: when :meth:`McapFile.append` returns, the operating system has the data. A chunk that could not be
 written completely is cut off again; complete chunks are always kept.

@@ -18,7 +18,7 @@ from mcap.records import Channel, Chunk, ChunkIndex, Footer, Metadata, MetadataI
 from teleop_core.bags import compression, layouts, mcap_file, walk
 from teleop_core.base import RecordingError, damage_told
 
-CUT_OFF = "was cut off while being recorded; `teleop recover {path}` saves what is there"
+CUT_OFF = "was cut off while being recorded; `teleop recover {path}` saves its intact messages"
 _FOOTER_SIZE = 9 + 20
 _WINDOW = 4 << 20
 _LOOK_AHEAD = 3
@@ -82,7 +82,7 @@ class McapSource:
         if begin != mcap_file.MAGIC:
             kind = "an SQLite file, no MCAP" if begin == b"SQLite f" else "no MCAP file"
             hint = f"`teleop import {self.path} --out DIR` makes a recording of tables and bags"
-            raise RecordingError(self.path, f"is {kind}, as recordings must be; {hint}")
+            raise RecordingError(self.path, f"is {kind}; recordings must be MCAP files; {hint}")
         size = file.seek(0, 2)
         file.seek(max(0, size - len(mcap_file.MAGIC)))
         has_end = size > 2 * len(mcap_file.MAGIC) + _FOOTER_SIZE and file.read() == mcap_file.MAGIC

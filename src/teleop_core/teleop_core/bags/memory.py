@@ -62,9 +62,9 @@ class MemoryBag(reader.Bag):
         self.require(wanted)
         for name in wanted:
             if name in self._left_out:
-                raise LeftOutError(self.path, f"{name} was not kept")
+                raise LeftOutError(self.path, f"{name} was not kept in memory in memory")
             if name not in self._series:
-                raise RecordingError(self.path, f"{name} is a report, which is not read as numbers")
+                raise RecordingError(self.path, f"{name} contains reports, which cannot be read as numbers")
         kinds = {topic.name: topic.kind for topic in self.streams}
         return {name: _ordered(self._series[name], joint_names if kinds[name].has_joints else None) for name in wanted}
 

@@ -1,4 +1,4 @@
-"""Messages: the one place that knows what a message's fields and bytes mean.
+"""Messages: the only module that defines the meaning of a message's fields and bytes.
 
 Inside the package a message is a stamp and a row of numbers
 (:class:`~teleop_core.graph.topics.Kind` defines the numbers). Three groups of functions convert between both:
@@ -35,13 +35,13 @@ class Refusal(Enum):
     NOT_FINITE = "holds NaN or infinite numbers"
     NOT_UNIT = "its quaternion is not of unit length"
     NOT_NEWER = "its stamp is not newer than the last one"
-    WRONG_NAMES = "lacks a name that it must have, as of a joint of the robot"
+    WRONG_NAMES = "lacks a required name, such as that of a joint of the robot"
     WRONG_LENGTH = "has too few or too many numbers"
     FEW_BUTTONS = (
-        "has fewer buttons than joy_buttons names; where it has a clutch and a mode button only, "
-        "set joy_buttons=[0, -1, 1]"
+        "has fewer buttons than joy_buttons names; if it has only a clutch and a mode button, set "
+        "joy_buttons=[0, -1, 1]"
     )
-    MALFORMED = "has bytes that are no message of its type"
+    MALFORMED = "has bytes that are no valid message of its type"
     SECOND_PUBLISHER = "is from a second publisher, while the first one sends"
     FLOOD = "came faster than flood_rate allows"
 
@@ -50,7 +50,7 @@ def check(kind: Kind, stamp_ns: int, values: Values, last_stamp_ns: int | None) 
     """Reason to refuse a live message; None if the message is valid.
 
     Args:
-        kind: What the values are.
+        kind: Kind of the values.
         stamp_ns: Stamp of the message, [ns].
         values: Its numbers, shape (width,).
         last_stamp_ns: Stamp of the last message used; None before the first.
@@ -73,8 +73,8 @@ def read_values(
     """Stamp [ns] and values of any message of a kind, read by attribute.
 
     Args:
-        kind: What the values are.
-        message: From rclpy, or deserialised by rosbags.
+        kind: Kind of the values.
+        message: Message of rclpy, or deserialised by rosbags.
         joint_names: Wanted order of the joints; other joints in the message are left out. If empty, all joints are
             returned in the order of the message.
         buttons: Indices of clutch, fixture and mode among the message's buttons; -1 if the message lacks a button.
@@ -97,10 +97,10 @@ def read_any(
     """Stamp [ns] and values of any message of a kind, from its bytes; or the reason to refuse it.
 
     Args:
-        kind: What the values are.
+        kind: Kind of the values.
         data: Bytes from any sender.
-        joint_names: As of :func:`read_values`.
-        buttons: As of :func:`read_values`.
+        joint_names: As in :func:`read_values`.
+        buttons: As in :func:`read_values`.
     """
     try:
         message = deserialise(data, kind.ros_type)
@@ -163,7 +163,7 @@ def read_joints(message: Any, part: str, joint_names: tuple[str, ...]) -> Values
     """Numbers (n,) of the joints in a JointState, in the order of their names.
 
     Args:
-        message: From rclpy, or deserialised by rosbags. If the message contains no names, its numbers must be in the
+        message: Message of rclpy, or deserialised by rosbags. If it contains no names, its numbers must be in the
             order of ``joint_names``; clients of CRTK send such messages.
         part: ``position``, ``velocity`` or ``effort``.
         joint_names: Wanted order; other joints in the message are left out. If empty, all joints are returned in the

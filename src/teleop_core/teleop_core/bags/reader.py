@@ -134,7 +134,7 @@ class Bag:
         self.start_ns = min(place.start_ns for place in places)
         self.end_ns = max(place.end_ns for place in places)
         if self.start_ns < 0 or self.end_ns >= _LATEST_NS:
-            reason = "is damaged: it says that messages came in another century"
+            reason = "is damaged: the log times of its messages are in another century"
             raise RecordingError(self.path, reason)
 
     def require(self, topics: Iterable[Topic | str]) -> None:
@@ -196,7 +196,7 @@ class Bag:
         for name in map(_name, wanted):
             kind = kind_of(name, self.topics[name].type)
             if kind is None or kind is Kind.REPORT:
-                reason = f"{name} is a {self.topics[name].type}, which is not read as numbers"
+                reason = f"{name} contains {self.topics[name].type}, which cannot be read as numbers"
                 raise RecordingError(self.path, reason)
             wanted_names = joint_names if joint_names and kind.has_joints else ()
             columns[name] = Column(name, kind, wanted_names)
@@ -220,7 +220,7 @@ class Bag:
             yield block
         for column in columns.values():
             if column.total and column.left_out.total() == column.total:
-                raise RecordingError(self.path, f"has nothing to read: {column.notes()[0]}")
+                raise RecordingError(self.path, f"has no readable messages: {column.notes()[0]}")
             for note in column.notes():
                 warnings.warn(f"{self.path.name}: {note}", TeleopWarning, stacklevel=4)
 
@@ -250,7 +250,7 @@ class Bag:
         if left_out:
             note = f"{_name(topic)}: {left_out} messages, each {messages.Refusal.MALFORMED.value}"
             if not out:
-                raise RecordingError(self.path, f"has nothing to read: {note}")
+                raise RecordingError(self.path, f"has no readable messages: {note}")
             warnings.warn(f"{self.path.name}: left out of {note}", TeleopWarning, stacklevel=2)
         return out
 

@@ -14,16 +14,18 @@ class RecordingParameters:
     """Parameters of :class:`~teleop_core.bags.writer.BagWriter`."""
 
     compression: str = parameter("zstd", doc="compression of the bag", choices=compression.NAMES, fixed=True)
-    compression_level: int = parameter(1, Within(1, 16), "effort of the compression: more is slower", fixed=True)
+    compression_level: int = parameter(
+        1, Within(1, 16), "compression level; a higher level gives smaller files and is slower", fixed=True
+    )
     topics: tuple[str, ...] = parameter((), doc="topics to record; empty for all", fixed=True)
-    every: int = parameter(1, Within(1, 1_000_000), "record every n-th sample of the streams", fixed=True)
+    every: int = parameter(1, Within(1, 1_000_000), "n: only every n-th sample of each stream is recorded", fixed=True)
     every_of: tuple[str, ...] = parameter(
-        (), doc="exceptions from every, as topic=n, e.g. slave/measured_js=10", fixed=True
+        (), doc="topics with another n than `every`, as topic=n, e.g. slave/measured_js=10", fixed=True
     )
     tf_rate: float = parameter(
         50.0,
         Within(0.0, 1000.0, "1/s"),
-        "messages of /tf a second, with the robot's model beside them; 0: neither",
+        "messages of /tf per second; the robot's model is recorded too; 0: neither is recorded",
         fixed=True,
     )
 

@@ -26,7 +26,7 @@ def recover(path: Path | str, out: Path | str | None = None) -> tuple[Path, int]
     source = mcap_source.McapSource(_only_file(path), is_whole=False)
     found = source.contents
     if not found.places:
-        raise RecordingError(path, "holds no whole chunk of messages; nothing can be recovered")
+        raise RecordingError(path, "contains no complete chunk of messages; nothing can be recovered")
     target = Path(out) if out else path.with_name((path.stem if path.is_file() else path.name) + "_recovered")
     with rosbag2.new_directory(target) as file:
         return target, _copy(source, file)
@@ -37,7 +37,7 @@ def _only_file(path: Path) -> Path:
         raise RecordingError(path, "does not exist; give a recording's directory or .mcap file")
     files = [path] if path.is_file() else sorted(path.glob("*.mcap"))
     if len(files) != 1:
-        reason = f"holds {len(files)} .mcap files; give the one to recover"
+        reason = f"contains {len(files)} .mcap files; give the one to recover"
         raise RecordingError(path, reason)
     return files[0]
 

@@ -45,7 +45,7 @@ def deserialise(data: bytes, ros_type: str) -> Any:
             return typestore().deserialize_cdr(data[:size], ros_type)
         except _UNREADABLE as error:
             said = said or error
-    raise ValueError(f"{len(data)} bytes are no {ros_type}: {said}") from said
+    raise ValueError(f"a message of {len(data)} bytes is no valid {ros_type}: {said}") from said
 
 
 def serialise(message: Any) -> bytes:

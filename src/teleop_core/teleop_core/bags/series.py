@@ -69,7 +69,7 @@ class Column:
 
     Args:
         name: Topic.
-        kind: What its values are. For joints of a topic that this package does not define, the first message decides.
+        kind: Kind of the values. For joints of a topic that this package does not define, the first message decides.
         joint_names: Wanted order of the joints; empty for the order in the first message.
 
     Attributes:
@@ -101,12 +101,12 @@ class Column:
         return Series(stamps, log_ns[kept], values, self.names, self.frame_id)
 
     def notes(self) -> list[str]:
-        """Notes for the user: how many messages were left out and why, and which stand in another frame."""
+        """Notes for the user on messages that were left out, with the reason, and on messages in another frame."""
         return [
             f"{self.name}: {count} of {self.total} messages are left out: each {reason.value}"
             for reason, count in self.left_out.items()
         ] + [
-            f"{self.name}: {count} messages stand in the frame {frame!r}, the first in {self.frame_id!r}"
+            f"{self.name}: {count} messages are in the frame {frame!r}, but the first is in {self.frame_id!r}"
             for frame, count in self._frames.items()
             if frame != self.frame_id and not self.kind.has_names
         ]

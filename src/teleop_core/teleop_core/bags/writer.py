@@ -51,7 +51,7 @@ class BagWriter:
         topics: Topics that may be written; topics that the parameters deselect are ignored.
         joint_names: Joints of the robot, in the order of the columns. For several arms: the joints of each arm, by its
             namespace.
-        parameters: Which topics are recorded, at what rate and how compressed.
+        parameters: Recorded topics, their rates and the compression.
         compression: Replaces ``parameters.compression``.
         metadata: Names and texts stored with the recording: configuration, seed.
         start_ns: Log time at which the session starts, [ns].
@@ -210,7 +210,7 @@ class BagWriter:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         if error is not None and error is self._failure:
-            self._failure = None  # on its way already
+            self._failure = None  # the failure is being raised
         self.close()
 
     # -- between the threads ---------------------------------------------------------------------

@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from teleop_core.base.parameters import *  # noqa: F403
     from teleop_core.base.registry import *  # noqa: F403
     from teleop_core.base.texts import *  # noqa: F403
-else:  # imported when they are first used
+else:  # imported at the first use
     _NAMES = {
         "errors": ("ClosureError", "EvaluationError", "KernelError", "ParameterError", "PartError", "RecordingError",
             "SessionError", "ShapeError", "TeleopError", "TeleopWarning", "UnknownNameError"),

@@ -37,8 +37,8 @@ def damage_told(path: Path | str, said: str = "cannot be read: {}") -> Iterator[
         reason = error.strerror or " ".join(str(error).split())
         raise RecordingError(path, f"cannot be read: {reason}") from error
     except MemoryError as error:
-        raise RecordingError(path, said.format("it asks for more memory than there is")) from error
-    except KeyError as error:  # says the name alone
+        raise RecordingError(path, said.format("it needs more memory than is available")) from error
+    except KeyError as error:  # the error contains only the missing name
         raise RecordingError(path, said.format(f"it lacks {error}")) from error
     except Exception as error:  # foreign readers do not document which exceptions they raise
         words = " ".join(str(error).split())[:200] or type(error).__name__

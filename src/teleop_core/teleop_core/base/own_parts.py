@@ -74,7 +74,7 @@ def _load(path: Path) -> None:
         _forget(name)
     module = module_from_spec(spec)
     sys.modules[name], _texts[name], count = module, text, len(ADDED)
-    if str(path.parent) not in sys.path:  # as for any script, so that it can import modules in its folder
+    if str(path.parent) not in sys.path:  # like any script, the file can then import modules in its folder
         sys.path.append(str(path.parent))
     try:
         exec(compile(text[1], path, "exec"), module.__dict__)  # a cached compilation may be from an earlier version

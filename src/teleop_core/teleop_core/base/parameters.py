@@ -236,7 +236,7 @@ def _spec(group: type, name: str, prefix: str) -> Spec:
     if kind is UnionType or kind not in {bool, int, float, str, tuple}:
         raise TypeError(f"{group.__name__}.{name}: a parameter cannot be a {hint}")
     if "doc" not in entry.metadata:
-        text = f"one whose fields are made by parameter(...); {name} is not"
+        text = f"a dataclass whose fields are all made by parameter(...); {name} is not"
         raise PartError("parameter group", group.__name__, text)
     element = get_args(hint)[0] if kind is tuple else kind
     default: Any = entry.default

@@ -122,7 +122,7 @@ def _count(node: yaml.Node, known: dict[int, int], within: set[int]) -> int:
     total = 1 + sum(_count(entry, known, within) for entry in entries)
     within.discard(id(node))
     if total > MOST_VALUES:
-        raise UnreadableError(f"stands for more than {MOST_VALUES} values, by aliases perhaps")
+        raise UnreadableError(f"expands to more than {MOST_VALUES} values, perhaps by aliases")
     known[id(node)] = total
     return total
 
@@ -173,7 +173,7 @@ def check_regular(path: Path) -> None:
     """
     try:
         mode = path.stat().st_mode
-    except ValueError as error:  # a zero byte in its name
-        raise UnreadableError(f"is no name of a file: {error}") from error
+    except ValueError as error:  # the file name contains a zero byte
+        raise UnreadableError(f"is no valid file name: {error}") from error
     if not stat.S_ISREG(mode) and not stat.S_ISDIR(mode):  # reading a directory raises a clear error itself
         raise UnreadableError("is a pipe or a device, must be a file")

@@ -109,14 +109,14 @@ class Registry(Generic[Part]):
             PartError: The name is already used, or the part is not valid.
         """
         if not (isinstance(name, str) and _NAME.fullmatch(name)):
-            text = "named by letters, digits, _ and -, for it stands in keys and files"
+            text = "named with letters, digits, _ and - only, because keys and file names contain the name"
             raise PartError(self.kind, name, text)
         checked = self._check(name, part)
         if self._parts.get(name) is checked:
             return checked
         is_ours = replace and name in self._own
         if not is_ours and name in self.names():
-            raise PartError(self.kind, name, "a name that is free; this one is used already")
+            raise PartError(self.kind, name, "given another name; this one is used already")
         if self._trial is not None:
             self._trial(checked)
         self._own.add(name)
@@ -157,7 +157,7 @@ class Registry(Generic[Part]):
             return getattr(import_module(module), attribute)
         if (entry := self._entries().get(name)) is None:
             if (distribution := self.elsewhere.get(name)) is not None:
-                text = f"one that is installed: install {distribution}, which has it"
+                text = f"installed; it is in the distribution {distribution}"
                 raise PartError(self.kind, name, text)
             raise UnknownNameError(self.kind, name, (*self.names(), *self._others))
         try:
@@ -183,7 +183,7 @@ def part_check(kind: str, form: type[Part], *calls: str) -> Callable[[str, objec
     """Check of a registry whose parts are dataclasses with ``parameters`` and functions.
 
     Args:
-        kind: As the registry's.
+        kind: Kind of the registry's parts.
         form: Class of its parts.
         calls: Names of the attributes that must be callable.
     """
@@ -198,7 +198,7 @@ def part_check(kind: str, form: type[Part], *calls: str) -> Callable[[str, objec
             raise PartError(kind, name, text)
         for field in calls:
             if not callable(getattr(part, field)):
-                raise PartError(kind, name, f"one whose {field} can be called")
+                raise PartError(kind, name, f"one with a callable {field}")
         return part
 
     return check
@@ -209,7 +209,7 @@ def tried(kind: str, name: str, needs: str) -> Iterator[None]:
     """Convert exceptions of a part inside this ``with`` into a :class:`PartError`.
 
     Args:
-        kind: As the registry's.
+        kind: Kind of the registry's parts.
         name: Name of the part.
         needs: Requirement on the part: "one with ...".
 

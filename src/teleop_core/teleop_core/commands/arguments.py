@@ -18,7 +18,7 @@ def geometry_argument(parser: argparse.ArgumentParser) -> None:
         nargs="+",
         default=[],
         metavar="SYMBOL=VALUE",
-        help="lengths and options in place of the published ones [m, rad]",
+        help="lengths and options that replace the published ones [m, rad]",
     )
 
 
@@ -27,7 +27,7 @@ def command(
 ) -> argparse.ArgumentParser:
     """Parser of a command, which calls ``run``; its help contains ``text``, then the examples."""
     parser: argparse.ArgumentParser = commands.add_parser(name, help=text, description=text, epilog=examples)
-    if examples is not None:  # with the line breaks of the source
+    if examples is not None:  # keep the line breaks of the source
         parser.formatter_class = argparse.RawDescriptionHelpFormatter
     parser.set_defaults(run=run)
     parser.add_argument(
@@ -55,16 +55,16 @@ def without_argument(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="NODE",
-        help="start no such node: another stands in its place, as arm_bridge in that of slave_sim, "
-        "on the same ROS_DOMAIN_ID; may be repeated",
+        help="do not start this node, because another node replaces it on the same ROS_DOMAIN_ID, as "
+        "arm_bridge replaces slave_sim; may be repeated",
     )
 
 
 def session_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments that configure a session, beginning with the scenario."""
-    parser.add_argument("--scenario", help="one of `teleop scenarios`")
+    parser.add_argument("--scenario", help="scenario, one of `teleop scenarios`")
     parser.add_argument(
-        "--duration", type=float, metavar="S", help="time that the hand moves [s] (default: the scenario's)"
+        "--duration", type=float, metavar="S", help="duration of the hand's motion [s] (default: the scenario's)"
     )
     out_argument(parser)
     setting_arguments(parser)
@@ -87,7 +87,7 @@ def setting_arguments(parser: argparse.ArgumentParser) -> None:
         default=[],
         metavar="KEY=VALUE",
         dest="settings",
-        help="set a parameter, over all files, e.g. fine_gain=0.2 or slave.command_timeout=0.2",
+        help="set a parameter; it overrides all files, e.g. fine_gain=0.2 or slave.command_timeout=0.2",
     )
 
 

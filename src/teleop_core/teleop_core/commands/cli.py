@@ -157,8 +157,9 @@ def _add_live(commands: Any) -> None:
         "--processes",
         choices=("sides", "nodes", "one"),
         default="sides",
-        help="the hand's side and the slave's side (default), a process for each node, to replace "
-        "or kill one, or one for all, which is fastest; the recorder is always apart",
+        help="sides: one process for the hand's side and one for the slave's side (default); nodes: "
+        "one for each node, so that you can replace or kill a node; one: one for all nodes, the "
+        "fastest. The recorder always has its own process",
     )
     live.add_argument(
         "--composed", action="store_const", dest="processes", const="one", help="the same as --processes one"
@@ -175,8 +176,8 @@ def _add_replay(commands: Any) -> None:
         dest="begin",
         choices=("device", "hand"),
         default="device",
-        help="play what the device measured (default), or where the hand wanted it: the device is "
-        "simulated again, and feels the forces of the new session",
+        help="device: replay the measured pose of the device (default); hand: replay the pose that "
+        "the hand wanted; the device is simulated again with the forces of the new session",
     )
     out_argument(again)
     setting_arguments(again)
@@ -185,7 +186,7 @@ def _add_replay(commands: Any) -> None:
 def _add_play(commands: Any) -> None:
     play = command(commands, "play", _play, "publish a recording on live ROS 2 topics")
     play.add_argument("bag", type=Path, help="recording to publish")
-    play.add_argument("--topics", nargs="+", metavar="TOPIC", help="only these (default: all)")
+    play.add_argument("--topics", nargs="+", metavar="TOPIC", help="publish only these topics (default: all)")
     play.add_argument("--rate", type=float, default=1.0, help="speed, as a multiple of real time (default: 1)")
 
 
@@ -199,7 +200,7 @@ def _add_evaluate(commands: Any) -> None:
         type=float,
         nargs=2,
         metavar=("FROM", "TO"),
-        help="score only what was recorded between two times [s] since the first message",
+        help="score only the messages recorded between these two times [s], counted from the first message",
     )
 
 
@@ -212,19 +213,21 @@ def _add_lookups(commands: Any) -> None:
     command(commands, "parts", _parts, text)
     text = "list every parameter with unit, bounds and meaning"
     parameters = command(commands, "parameters", _parameters, text)
-    parameters.add_argument("stage", nargs="?", help="only this stage")
-    parameters.add_argument("--markdown", action="store_true", help="as a table for documents")
+    parameters.add_argument("stage", nargs="?", help="print only the parameters of this stage")
+    parameters.add_argument("--markdown", action="store_true", help="print a Markdown table for documents")
     robot = command(commands, "robot", _robot, "show a robot: joints, limits, home, tip pose")
-    robot.add_argument("name", nargs="?", help="robot; without one, all are listed")
+    robot.add_argument("name", nargs="?", help="name or file of a robot; without it, all robots are listed")
     geometry_argument(robot)
     robot.add_argument(
         "--from",
         type=Path,
         dest="table",
         metavar="TABLE.yaml",
-        help="chain from a Denavit-Hartenberg table, as in config/robots",
+        help="file with a Denavit-Hartenberg table of a robot, as in config/robots",
     )
-    robot.add_argument("--urdf", type=Path, metavar="FILE", help="write its links and joints for other tools")
+    robot.add_argument(
+        "--urdf", type=Path, metavar="FILE", help="write the robot's links and joints to a URDF, for other tools"
+    )
     text = "draw where a robot's tip can be"
     space = command(commands, "workspace", _workspace, text)
     space.add_argument("name", metavar="ROBOT", help="one of `teleop robot`")

@@ -27,7 +27,7 @@ def add(commands: argparse._SubParsersAction) -> None:  # type: ignore[type-arg]
     """Add the command's parser."""
     text = "compile the kernels of built-in parts now, on all processors"
     parser = command(commands, "compile", _run, text, _EPILOG)
-    parser.add_argument("--all", action="store_true", help="also those that no scenario needs")
+    parser.add_argument("--all", action="store_true", help="also compile kernels that no scenario needs")
 
 
 def _run(arguments: argparse.Namespace) -> int:
@@ -67,7 +67,7 @@ def phases_of(*, is_all: bool) -> Iterator[Sequence[Job]]:
     yield [(scenario, "", "") for scenario in list_scenarios() if scenario != _FIRST]
     if is_all:
         named = [name for name in SHAPES if find_spec("trimesh") or not _reads_a_file(name)]
-        shapes = {SHAPES.find(name).distance: name for name in named}.values()  # one per kernel
+        shapes = {SHAPES.find(name).distance: name for name in named}.values()  # one shape per kernel
         for key, parts in (("robot", ROBOTS), ("controller", CONTROLLERS), ("plant", PLANTS), ("fixture", shapes)):
             yield [(_FIRST, f"{key}={name}", "") for name in parts]
 

@@ -34,7 +34,7 @@ def _gamepads() -> Iterator[str]:
     from teleop_core.hand.devices.gamepad import Sdl
 
     for _, name, is_known in Sdl().names():
-        yield (name if is_known else f"{name}: of unknown layout, SDL_GAMECONTROLLERCONFIG may say it")
+        yield (name if is_known else f"{name}: its layout is unknown; SDL_GAMECONTROLLERCONFIG can describe it")
 
 
 def _space_mice() -> Iterator[str]:

@@ -59,7 +59,9 @@ def _domains(arguments: argparse.Namespace) -> tuple[int, ...]:
 
     found = domains()
     if not found:
-        raise SessionError("no `teleop live` runs on this machine; name a ROS domain: --domain N")
+        raise SessionError(
+            "no `teleop live` runs on this machine; give the ROS domain of a session elsewhere: --domain N"
+        )
     return found
 
 
@@ -89,8 +91,9 @@ def _stop(arguments: argparse.Namespace) -> int:
 def _stopped(arm: "ArmState") -> str:
     values = arm.values
     return (
-        f"stopped, confirmed after {1e3 * arm.stopped_after:.0f} ms; at rest "
-        f"{1e3 * values['rest_time']:.0f} ms after the message, {1e3 * values['travel']:.2f} mm on"
+        f"stopped, confirmed after {1000.0 * arm.stopped_after:.0f} ms; at rest "
+        f"{1000.0 * values['rest_time']:.0f} ms after the stop message; stopping distance "
+        f"{1000.0 * values['travel']:.2f} mm"
     )
 
 

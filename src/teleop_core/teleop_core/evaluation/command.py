@@ -69,7 +69,7 @@ def page_maker(name: str) -> Callable[..., str]:
     for entry in entry_points(group=PAGES, name=name):
         maker: Callable[..., str] = entry.load()
         return maker
-    raise EvaluationError("--html: install teleop_console, which makes pages")
+    raise EvaluationError("--html needs the distribution teleop_console: install it")
 
 
 def check_places(*files: Path | None) -> None:

@@ -78,7 +78,7 @@ class Context:
         """
         for topic in topics:
             if self._has_begun:
-                raise EvaluationError(f"{topic.name} is asked for too late, must be in __init__")
+                raise EvaluationError(f"{topic.name} is requested too late, must be requested in __init__")
             if self.expected(topic):
                 self._read.setdefault(topic.name, topic)
 
@@ -102,7 +102,7 @@ class Context:
         if kind not in self._parts:
             if self._has_begun:
                 name = getattr(kind, "__name__", str(kind))
-                raise EvaluationError(f"{name} is asked for too late, must be in __init__")
+                raise EvaluationError(f"{name} is requested too late, must be requested in __init__")
             self._parts[kind] = kind(self)
         return cast(Shared, self._parts[kind])
 

@@ -60,7 +60,7 @@ def keys_of(path: str, values: type[Any] | Sequence[Field[Any]], said: str = "")
     Args:
         path: Prefix of the fields' names, without the dot.
         values: The dataclass, or some of its fields.
-        said: Text before the meaning of each key.
+        said: Prefix of the meaning of each key.
     """
     found = fields(values) if isinstance(values, type) else values
     return tuple(

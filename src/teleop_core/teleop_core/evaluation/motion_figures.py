@@ -19,22 +19,30 @@ Mask = NDArray[np.bool_]
 class MotionFigures:
     """Figures of a motion; None if there is too little motion for a figure."""
 
-    time_s: float = figure("s", "time without the approach; in_fixture: hand while a fixture was on")
-    path_mm: float = figure("mm", "way of the tip")
-    speed_median_mm_s: float | None = figure("mm/s", "median speed, at 30 Hz as all but the tremor", default=None)
+    time_s: float = figure("s", "duration without the approach; in_fixture: duration with a fixture on")
+    path_mm: float = figure("mm", "length of the tip's path")
+    speed_median_mm_s: float | None = figure(
+        "mm/s", "median speed; like all figures but the tremor it comes from samples at 30 Hz", default=None
+    )
     speed_p95_mm_s: float | None = figure("mm/s", "speed that is exceeded for 5 % of the time", default=None)
     acceleration_p95_m_s2: float | None = figure(
         "m/s^2", "acceleration that is exceeded for 5 % of the time", default=None
     )
     idle_share: float | None = figure("1", "share of the time below 5 mm/s", default=None)
-    submovements: int = figure("1", "peaks of speed with a prominence of 10 mm/s or more", default=0)
-    peaks_per_s: float | None = figure("1/s", "the same per second", default=None)
-    reversals: int = figure("1", "turning points of x, y and z with 2 mm or more on both sides", default=0)
-    frequency_50_hz: float | None = figure(
-        "Hz", "half of the velocity's power is below (Welch, bins of 0.12 Hz)", default=None
+    submovements: int = figure("1", "number of speed peaks with a prominence of 10 mm/s or more", default=0)
+    peaks_per_s: float | None = figure(
+        "1/s", "number of speed peaks per second, with a prominence of 10 mm/s or more", default=None
     )
-    frequency_95_hz: float | None = figure("Hz", "95 % of the velocity's power are below", default=None)
-    power_1_3: float | None = figure("1", "share of the velocity's power in 1 to 3 Hz", default=None)
+    reversals: int = figure(
+        "1", "number of turning points of x, y and z with 2 mm of motion or more on both sides", default=0
+    )
+    frequency_50_hz: float | None = figure(
+        "Hz", "frequency below which half of the velocity's power lies (Welch, bins of 0.12 Hz)", default=None
+    )
+    frequency_95_hz: float | None = figure(
+        "Hz", "frequency below which 95 % of the velocity's power lies", default=None
+    )
+    power_1_3: float | None = figure("1", "share of the velocity's power from 1 to 3 Hz", default=None)
     sparc: float | None = figure(
         "1", "spectral arc length of speed, median of windows of 5 s (Balasubramanian 2015)", default=None
     )
@@ -42,13 +50,13 @@ class MotionFigures:
         "1", "log dimensionless jerk, median of windows of 5 s (Balasubramanian 2015)", default=None
     )
     tremor_um: float | None = figure(
-        "um", "RMS of the motion in 8 to 12 Hz over three axes; null below 60 Hz", default=None
+        "um", "RMS motion from 8 to 12 Hz over three axes; null for sample rates below 60 Hz", default=None
     )
     tremor_at_rest_um: float | None = figure(
-        "um", "the same of the seconds in which the tip stays within 1 mm", default=None
+        "um", "RMS motion from 8 to 12 Hz in the seconds in which the tip stays within 1 mm", default=None
     )
     turn_median_deg_s: float | None = figure(
-        "deg/s", "median angular speed, with the noise of the device's gimbal", default=None
+        "deg/s", "median angular speed; it includes the noise of the device's gimbal", default=None
     )
     turn_p95_deg_s: float | None = figure("deg/s", "angular speed that is exceeded for 5 % of the time", default=None)
 

@@ -28,7 +28,7 @@ def plain(values: Values) -> dict[str, Plain]:
     elif is_dataclass(values) and not isinstance(values, type):
         entries = ((field.name, getattr(values, field.name)) for field in fields(values))
     else:
-        raise TypeError(f"a {type(values).__name__} stands where names and values must")
+        raise TypeError(f"values are a {type(values).__name__}, must be a mapping of names to values")
     return {str(name): _plain(str(name), value) for name, value in entries}
 
 

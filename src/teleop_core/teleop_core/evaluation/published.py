@@ -37,7 +37,7 @@ COARSE = Published("coarse", 1.0, (0.338, 0.702), (0.112, 0.537), (0.092, 0.828)
 FINE = Published("fine", 0.1, (0.293, 0.791), (0.153, 0.811), (0.105, 0.832), (0.077, 0.628))
 
 BOX_OVERSHOOT_MM = 1.0
-"""Approximate distance by which the source's paths went beyond each wall [mm] (section 7.6)."""
+"""Approximate distance by which the source's paths exceed each wall [mm] (section 7.6)."""
 
 
 def published_for(gain: float | None, robot: str | None = "rcrt1", plant: str | None = "hardware") -> Published | None:

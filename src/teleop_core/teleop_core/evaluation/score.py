@@ -23,19 +23,19 @@ VERDICT = "verdict"
 
 SESSION_KEYS = (
     Key("session.name", "1", "name of the recording"),
-    Key("session.scenario", "1", "scenario it was made with; null if unknown"),
-    Key("session.robot", "1", "robot; null if unknown"),
+    Key("session.scenario", "1", "scenario of the recording; null if unknown"),
+    Key("session.robot", "1", "name of the robot; null if unknown"),
     Key("session.seed", "1", "random seed; null if unknown"),
-    Key("session.duration_s", "s", "first to last message"),
-    Key("session.gain", "m/m", "gain that was in force most of the time; null if unknown"),
+    Key("session.duration_s", "s", "duration from the first to the last message"),
+    Key("session.gain", "m/m", "gain that was used most of the time; null if unknown"),
     Key("session.arm", "1", "arm that was scored; empty if the recording names no arms"),
-    Key("session.plant", "1", "what the simulated slave was; null if no simulator is told of"),
-    Key("session.controller", "1", "its control law; null if unknown"),
-    Key("session.from_s|to_s", "s", "what was scored, since the first message"),
-    Key("session.missing", "1", "parts it names that are not known here; null if all are known"),
-    Key("verdict.text", "1", "one line that names the worst first"),
-    Key("verdict.worst", "1", "key of the worst; null if nothing is beyond what is fine"),
-    Key("verdict.advice", "1", "what the worst means and what to do; null if nothing is wrong"),
+    Key("session.plant", "1", "plant of the simulated slave; null if no simulator was recorded"),
+    Key("session.controller", "1", "control law of the simulated slave; null if unknown"),
+    Key("session.from_s|to_s", "s", "begin and end of the scored span, since the first message"),
+    Key("session.missing", "1", "parts named in the recording that are not installed here; null if all are"),
+    Key("verdict.text", "1", "one line that summarizes the score, the worst finding first"),
+    Key("verdict.worst", "1", "key of the worst finding; null if all values are within their bounds"),
+    Key("verdict.advice", "1", "meaning of the worst finding and what to do; null if nothing is wrong"),
 )
 """Keys of the data about a recording, in addition to the keys of its metrics."""
 Record = TypeVar("Record")
@@ -58,7 +58,7 @@ def key_table() -> str:
 
 @dataclass(frozen=True)
 class Session:
-    """Which recording was scored; texts as in its metadata, None if it has none.
+    """The scored recording; texts as in its metadata, None if the metadata lack them.
 
     ``arm`` is empty for the default arm of a recording that names no arms. ``from_s`` and ``to_s`` are the begin and
     end of the scored part, since the first message; None means the last message. ``missing`` lists the parts that the
@@ -197,7 +197,7 @@ class Score:
 
     def __getattr__(self, name: str) -> NoReturn:
         """Raise an error that explains how to read the values of a user's metrics."""
-        hint = f"{name!r} is none; values of any metric: score.value({name + '.rms'!r})"
+        hint = f"{name!r} does not exist; read a metric's value with score.value({name + '.rms'!r})"
         raise AttributeError(f"attribute of a Score: {hint}")
 
     @property
@@ -238,7 +238,7 @@ class Score:
     # -- the metrics of this package, typed ------------------------------------------------------
 
     samples = _Found(Samples)
-    """How many slave poses were scored."""
+    """Number of scored slave poses."""
     reach = _Found(ReachScore)
     """Share of the time in which the slave followed, and the causes of the rest."""
     asked_error_mm = _Found(Spread)

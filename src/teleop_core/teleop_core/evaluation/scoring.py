@@ -252,7 +252,7 @@ def _checked(metric: Metric, tree: dict[str, Plain]) -> dict[str, Plain]:
     if foreign or names - given:
         fault = f"gives {min(foreign)}" if foreign else f"lacks {min(names - given)}"
         expected = ", ".join(key.path for key in metric.keys) or "none"
-        raise PartError("metric", metric.name, f"true to its keys ({expected}), {fault}")
+        raise PartError("metric", metric.name, f"consistent with its keys ({expected}); it {fault}")
     return tree
 
 

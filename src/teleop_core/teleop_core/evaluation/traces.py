@@ -70,7 +70,7 @@ class Envelope:
             return np.empty(0), np.empty((0, self._columns), np.float32)
         if len(self._parts) > 1 or self._times is None:
             times_ns, rows = (np.concatenate(column) for column in zip(*self._parts, strict=True))
-            self._parts = [(times_ns, rows)]  # not a second copy
+            self._parts = [(times_ns, rows)]  # replace the parts, to free the second copy
             self._times = (times_ns - self._start_ns) / _SECOND_NS
         return self._times, self._parts[0][1]
 

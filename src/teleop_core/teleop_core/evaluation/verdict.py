@@ -25,18 +25,19 @@ _CAUSES = {
 }
 _BUSY = "the machine was busy: close other programs, or give the session real-time priority"
 _ADVICE = {
-    SHARE: "the slave could not go where the hand led: keep to its reach, or lead it more slowly",
-    "task.successes": "its goals are out of reach, too small or too hasty for who works at it: look at `task.errors`",
-    "asked_error_mm.max": "the tip fell behind the hand: lead it more slowly, or lower the gain",
-    "position_error_mm.rms": "the drives do not hold the setpoint: lead it more slowly, or give "
-    "the controller other gains",
-    "topics": "stages or the recorder were too late to take them: the machine or the network was busy",
+    SHARE: "the slave could not follow the hand: stay within its reach, or move the hand more slowly",
+    "task.successes": (
+        "the task's goals are out of reach, too small or too short in time for the operator: see `task.errors`"
+    ),
+    "asked_error_mm.max": "the tip lagged behind the hand: move the hand more slowly, or lower the gain",
+    "position_error_mm.rms": "the drives lag behind the setpoint: move the hand more slowly, or change the gains",
+    "topics": "stages or the recorder were too late to receive messages: the machine or the network was busy",
     "ticks.made_up": _BUSY,
     "ticks.dropped": _BUSY,
     "latency_ms.total.p99": "commands came late: the table of latencies names the stage",
-    "passivity.slave.out_mj": "delayed forces gave energy, which makes touches bounce: choose reflection.passivity",
-    "contact.feeding": "a wall pushed the hand harder on its way out than in: lower its stiffness "
-    "or the delay, or choose reflection.passivity",
+    "passivity.slave.out_mj": "delayed forces added energy, which makes contacts bounce: choose reflection.passivity",
+    "contact.feeding": "a wall pushed the hand harder on the way out than on the way in: lower the wall's "
+    "stiffness or the delay, or choose reflection.passivity",
     "fixture.penetration_max_mm": "the hand pushed through the fixture: raise its stiffness, or push less",
 }
 Values = Mapping[str, Leaf]

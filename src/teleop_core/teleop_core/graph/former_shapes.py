@@ -14,7 +14,7 @@ _OF_WORLD = {
     "world.cylinder.height": "world.cylinder.length",
     "world.button.height": "world.button.length",
 }
-_OF_FIXTURE = ("place", "keep_out")  # not of its shape
+_OF_FIXTURE = ("place", "keep_out")  # parameters of the fixture, not of its shape
 _DIAMETER = re.compile(r"\bdiameter\s*=\s*([^\s,]+)")
 
 

@@ -112,7 +112,7 @@ class Graph:
         for kind, names in (("arm", self.arms), ("stage", [s.name for s in self.stages])):
             for name in names:
                 if list(names).count(name) > 1:
-                    raise PartError(kind, name, "named once; two have this name")
+                    raise PartError(kind, name, "named once; two of them have this name")
         for arm in self.arms[1:]:
             if not (arm.isidentifier() and arm.isascii()):
                 text = "a name of letters, digits and _ that does not begin with a digit"
@@ -139,7 +139,7 @@ class Graph:
         for stage in self.stages:
             for topic in stage.writes:
                 if topic.name in writers:
-                    text = f"the only one that writes {topic.name}; {writers[topic.name].name} does"
+                    text = f"the only one that writes {topic.name}; {writers[topic.name].name} writes it too"
                     raise PartError("stage", stage.name, text)
                 writers[topic.name] = stage
         for stage in self.stages:
@@ -147,7 +147,7 @@ class Graph:
             for topic in stage.reads:
                 if topic.name not in {*writers, *optional} and not self._adding(topic):
                     have = ", ".join(sorted(writers)) or "nothing"
-                    text = f"given {topic.name}, which no stage writes; there is {have}"
+                    text = f"given {topic.name}, but no stage writes it; stages write {have}"
                     raise PartError("stage", stage.name, text)
 
     def _check_fields(self) -> None:
@@ -267,7 +267,7 @@ class Graph:
             ready = next((m for m in waiting if needs[m.name] <= done), None)
             if ready is None:
                 circle = ", ".join(member.name for member in waiting)
-                text = f"given one of its inputs late or delayed: {circle} wait for each other"
+                text = f"given one of its inputs as late or delayed, because {circle} wait for each other"
                 raise PartError("stage", waiting[0].stage.name, text)
             waiting.remove(ready)
             ordered.append(ready)
@@ -294,8 +294,8 @@ class Graph:
                 is_lost = is_lost and topic.name not in BY_NAME
                 if is_lost and alike and stage.name not in BUILT_IN:
                     found.append(
-                        f"stage {stage.name!r} writes {topic.name}, which no stage reads; "
-                        f"replaces= would lead it to the readers of {alike[0]}"
+                        f"stage {stage.name!r} writes {topic.name}, which no stage reads; with replaces= it would "
+                        f"reach the readers of {alike[0]}"
                     )
         return tuple(found)
 

@@ -19,44 +19,52 @@ class RealTimeParameters:
     priority: int = parameter(
         -1,
         Within(-1, 98),
-        "SCHED_FIFO priority of the loop, and 1 for the threads beside it; 0: fair shares; -1: "
-        "20 in sessions by side or in one process where the system grants it, else fair shares",
+        "SCHED_FIFO priority of the loop; its helper threads get 1. 0: ordinary scheduling; -1: 20 "
+        "for sessions by side or in one process if the system permits it, else ordinary scheduling",
         fixed=True,
     )
     cpus: tuple[int, ...] = parameter((), Within(0), "processors that the loop may use; empty: all", fixed=True)
     patience: float = parameter(
         0.8,
         Within(0.01, 60.0, "s"),
-        "a loop of which nothing came for longer hangs, and ends its process; time for which "
-        "it waited for a processor does not count; 0: never",
+        "if the loop makes no progress for this time, it counts as hung and its process ends; time "
+        "without a processor does not count; 0: never",
         off=0.0,
         fixed=True,
         source="assumed",
     )
-    lock_memory: bool = parameter(False, fixed=True, doc="keep all memory out of swap")
-    freeze_gc: bool = parameter(True, fixed=True, doc="keep what exists at the start out of garbage collections")
+    lock_memory: bool = parameter(
+        False, fixed=True, doc="whether all memory of the process is locked, so that it is never swapped out"
+    )
+    freeze_gc: bool = parameter(
+        True, fixed=True, doc="whether garbage collections skip the objects that exist at the start"
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
 class SessionParameters:
     """Parameters of a session as a whole."""
 
-    description: str = parameter("", doc="what happens in it, in one sentence")
-    duration: float = parameter(10.0, Within(0.001, 86400.0, "s"), "simulated or live time")
+    description: str = parameter("", doc="one sentence that describes the session")
+    duration: float = parameter(10.0, Within(0.001, 86400.0, "s"), "duration of the session, in simulated or live time")
     ends_with_task: bool = parameter(
-        False, fixed=True, doc="end it within a second after no arm's task has a goal left"
+        False, fixed=True, doc="whether the session ends within 1 s after the tasks of all arms are finished"
     )
     arms: tuple[str, ...] = parameter(
-        (), fixed=True, doc="names of the arms, the first of which keeps the plain topics; empty: one without name"
+        (), fixed=True, doc="names of the arms; the first arm's topics have no namespace; empty: one arm without a name"
     )
-    stages: tuple[str, ...] = parameter((), fixed=True, doc="further stages of every arm, beside the built-in ones")
-    delays: tuple[str, ...] = parameter((), fixed=True, doc="delays on links, topic=seconds or topic@reader=seconds")
+    stages: tuple[str, ...] = parameter(
+        (), fixed=True, doc="additional stages of every arm, besides the built-in stages"
+    )
+    delays: tuple[str, ...] = parameter(
+        (), fixed=True, doc="delays of topics, as topic=seconds, or topic@reader=seconds for one reader"
+    )
     real_time: RealTimeParameters = field(default_factory=RealTimeParameters)
 
 
 SESSION = "teleop"
 """Name of the group of the session as a whole."""
-_EVERY = "/**"  # in ROS 2 parameter files, every node
+_EVERY = "/**"  # name for every node in ROS 2 parameter files
 RENAMED = {
     "haptic_master.path.": "operator.",
     "haptic_master.operator.": "operator.",
@@ -82,7 +90,7 @@ RENAMED = {
     },
 }
 """Former names, or their prefixes, which recordings and files may still contain, with the present names."""
-_READER = ("slave/servo_jp@slave_sim=", "slave/servo_jp@slave=")  # of commands, before and now
+_READER = ("slave/servo_jp@slave_sim=", "slave/servo_jp@slave=")  # reader of commands: former and present name
 _OF_ROBOT = ("robot", "geometry")
 
 Layer = dict[str, dict[str, object]]
@@ -156,14 +164,14 @@ def parse_layer(content: object, where: str) -> Layer:
     """
     layer: Layer = {}
     if not isinstance(content, Mapping):
-        raise TeleopError(f"{where}: must hold stages, each with ros__parameters")
+        raise TeleopError(f"{where}: must contain stages, each with ros__parameters")
     for key, inner in sorted(content.items(), key=lambda item: item[0] != _EVERY):
         name = str(key).removeprefix("/").removeprefix("**/")
         stage = name.rpartition("/")[2]
         if key != _EVERY and stage != SESSION and stage not in STAGES.names():
             raise UnknownNameError(f"{where}: stage", key, (SESSION, *STAGES))
         if not isinstance(inner, Mapping) or not isinstance(inner.get("ros__parameters"), Mapping):
-            raise TeleopError(f"{where}: {key} must hold ros__parameters with names and values")
+            raise TeleopError(f"{where}: {key} must contain ros__parameters with names and values")
         if key == _EVERY:
             for own, value in _flat(inner["ros__parameters"]):
                 for stage in _owners(own, where):
@@ -267,7 +275,7 @@ def _hits(key: str) -> list[tuple[str, Spec]]:
     for wanted in (key, f"{key}.kind"):
         if hits := [e for full, e in declared.items() if wanted in {full, e[1].name}]:
             return hits
-    known = dict(declared)  # by former names too
+    known = dict(declared)  # includes former names
     for full, entry in declared.items():
         for old, new in RENAMED.items():
             if full == new or (new.endswith(".") and full.startswith(new)):

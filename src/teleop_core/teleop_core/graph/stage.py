@@ -131,35 +131,35 @@ class Stage:
         for word in ("reads", "writes", "late", "optional", "needs"):
             found = getattr(self, word)
             is_right = isinstance(found, tuple) and all(isinstance(t, Topic) for t in found)
-            text = f"with {word} as a tuple of Topic, such as (topics.SLAVE_SERVO_CP,), not {found!r}"
+            text = f"one whose {word} is a tuple of Topic, such as (topics.SLAVE_SERVO_CP,), not {found!r}"
             self._insist(is_right, text)
         for word in ("spares", "serves"):
             found = getattr(self, word)
             is_right = isinstance(found, tuple) and all(isinstance(name, str) for name in found)
-            self._insist(is_right, f"with {word} as a tuple of names, not {found!r}")
+            self._insist(is_right, f"one whose {word} is a tuple of names, not {found!r}")
         known = {topic.name for topic in self.reads}
         for word in ("late", "optional", "needs"):
             for topic in getattr(self, word):
-                self._insist(topic.name in known, f"with {topic.name} ({word}) among its reads")
+                self._insist(topic.name in known, f"one one with {topic.name} ({word}) among its reads")
         if self.trigger is not None:
-            text = f"with its trigger {self.trigger.name} among its reads"
+            text = f"one one with its trigger {self.trigger.name} among its reads"
             self._insist(self.trigger.name in known, text)
         for topic in self.writes:
             is_known = topic.stamp.is_in_force or topic.stamp.of in {"", *known}
-            text = f"with {topic.stamp.of}, whose stamp {topic.name} passes on, among its reads"
+            text = f"one one with {topic.stamp.of}, whose stamp {topic.name} passes on, among its reads"
             self._insist(is_known, text)
         for i, topic in enumerate(self.replaced):
             is_like = i < len(self.writes) and self.writes[i].kind is topic.kind
-            place = "first" if i == 0 else f"at place {i + 1}"
-            text = f"one that reads {topic.name} and writes its like {place}"
+            place = "first" if i == 0 else f"at position {i + 1}"
+            text = f"one that reads {topic.name} and writes a topic of the same type {place}"
             self._insist(topic.name in known and is_like, text)
         if self.reads or self.writes:
-            text = "with a step, step(parameters, state, signals, dt), or a make"
+            text = "one with a step(parameters, state, signals, dt) or a make"
             self._insist(callable(self.step) is not callable(self.make), text)
         self._check_parts()
         names = {spec.name for spec in specs(self.parameters)}
         has_joints = any(topic.kind.has_joints for topic in (*self.reads, *self.writes))
-        text = "one whose parameters inherit RobotParameters, for it has topics with joints"
+        text = "one whose parameters inherit RobotParameters, because it has topics with joints"
         self._insist("robot" in names or not has_joints, text)
 
     def _check_parts(self) -> None:

@@ -31,7 +31,7 @@ class Quality(Enum):
 class Limit(IntEnum):
     """Limit that keeps the slave from following the hand completely."""
 
-    NONE = 0  # it follows
+    NONE = 0  # the slave follows
     JOINT = 1  # a joint is at the end of its range
     WORKSPACE = 2  # no joint vector brings the tip to the commanded pose
     SINGULARITY = 3  # joints would have to turn faster than they can, because the arm is near a singularity
@@ -179,9 +179,9 @@ class Topic:
     Attributes:
         name: Name below the arm's namespace, such as ``slave/servo_cp``.
         kind: Kind of its values.
-        stamp: Which time its header carries.
+        stamp: Meaning of the stamp in its header.
         frame_id: Frame of the header, below the arm's namespace.
-        quality: How it is transported.
+        quality: QoS of the topic.
         columns: Names of the numbers, of reports and of :attr:`Kind.NUMBERS`; else empty.
         adds_to: Name of a topic whose readers get the sum of both, such as ``master/servo_cf`` for
             another source of force; empty for a topic of its own.

@@ -191,7 +191,7 @@ def records(fields: Any, count: int = 1) -> Any:
     """Zeroed records (count,) whose fields are attributes, for kernels and for plain Python.
 
     Args:
-        fields: What :class:`numpy.dtype` takes: pairs of name and type, or a dtype.
+        fields: Pairs of name and type, or a dtype, as for :class:`numpy.dtype`.
         count: Number of records.
 
     Returns:
@@ -345,7 +345,7 @@ def record_dtype(fields: Any) -> np.dtype[Any]:
     """Type of records whose fields are attributes.
 
     Args:
-        fields: What :class:`numpy.dtype` takes: pairs of name and type, or a dtype.
+        fields: Pairs of name and type, or a dtype, as for :class:`numpy.dtype`.
     """
     return np.dtype((Record, np.dtype(fields)))
 

@@ -37,7 +37,7 @@ class _Borrowing(AnalysisPass):
         if _is_held(state, state.return_type) and _takes_room(state):
             raise TypingError("its scratch memory is free again when it returns: it must return no array")
         if state.targetctx.enable_nrt and _borrows(state):
-            state.targetctx.enable_nrt = False  # in the context of this function only
+            state.targetctx.enable_nrt = False  # applies only to the context of this function
         return False
 
 

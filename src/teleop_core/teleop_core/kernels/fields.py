@@ -57,7 +57,7 @@ class Cells:
     """
 
     def __init__(self, record: Any) -> None:
-        whole = np.asarray(record)  # over the same memory
+        whole = np.asarray(record)  # array over the same memory
         self._own: dict[str, Any] = {name: whole[name] for name in whole.dtype.names or ()}
 
     def __getitem__(self, name: str) -> Any:

@@ -277,7 +277,7 @@ class _Cache(FunctionCache):
             with store.locked(folder):
                 try:
                     super().save_overload(sig, data)
-                except _BROKEN:  # by another version of the package, after this version checked
+                except _BROKEN:  # written by another version of the package after this version checked the file
                     self.flush()
                     super().save_overload(sig, data)
 
@@ -298,7 +298,7 @@ def _cache(function: Any) -> Any:
     versions = (numba.__version__, np.__version__, __version__)
     stamp = (*versions, checked, *own, digest(function))
     if function in _generated:
-        cache: Any = _Cache(_cache)  # beside this package's own
+        cache: Any = _Cache(_cache)  # cache in addition to this package's own
         name = f"generated.{function.__qualname__}-py{sys.version_info[0]}{sys.version_info[1]}"
         cache._py_func = function
         return cache.keep(function, name, stamp)

@@ -47,7 +47,7 @@ class IkStatus(IntEnum):
     FOLLOWED = 0  # the joint vector reaches the pose
     LIMITED = 1  # a joint or speed limit keeps the tip off the pose
     NEAR_SINGULAR = 2  # the pose is reached, but small moves need large joint moves here
-    UNREACHABLE = 3  # no joint vector reaches the position; the nearest one is returned
+    UNREACHABLE = 3  # no joint vector reaches the position; the nearest joint vector is returned
 
 
 class FkStatus(IntEnum):

@@ -20,8 +20,8 @@ from teleop_core.kernels.room import room
 from teleop_core.kinematics import REACHED, IkStatus, is_askable, pose_residual
 from teleop_core.kinematics.damped import ZERO, damped_move, free_joints, pose_error
 
-_ROUNDS, _PATH_ROUNDS = 60, 12  # of one search
-_DAMPING, _HOPELESS = 1e-2, 1e10  # per squared error: at the start, and where no step helps
+_ROUNDS, _PATH_ROUNDS = 60, 12  # largest numbers of rounds of one search
+_DAMPING, _HOPELESS = 1e-2, 1e10  # damping per squared error: at the start, and where no step improves the result
 _STARTS, _MOST_STARTS = 24, 120  # further searches if the search from the seed fails; and if all fail
 _CLOSE, _LONG_ROUNDS = 1e-8, 1000  # squared error in a flat valley, where the descent needs more rounds
 _ALL_STARTS = 200  # searches for all branches

@@ -144,7 +144,7 @@ class _Own(LifecycleNode):  # type: ignore[misc]
         """Answer a service that requests a transition; refuse a transition that does not exist in the current state."""
         try:
             return change(request, response)
-        except rclpy_implementation.RCLError:  # it would end the process
+        except rclpy_implementation.RCLError:  # the error would end the process
             self._hooks.on_no_transition(request.transition.label or str(request.transition.id))
             response.success = False
             return response

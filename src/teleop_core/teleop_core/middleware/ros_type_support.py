@@ -19,7 +19,7 @@ def spare_generator() -> None:
     if _GENERATOR in sys.modules:
         return
     modules: dict[str, object] = sys.modules  # type: ignore[assignment]
-    modules[_GENERATOR] = None  # its import fails, for example if the parsers are not installed
+    modules[_GENERATOR] = None  # makes the import fail, as if the parsers were not installed
     try:
         import_module("rosidl_generator_py")
     finally:

@@ -55,8 +55,8 @@ class Endpoint(NamedTuple):
         node: Name of its node, with the namespace and a leading slash.
         sender: As in :class:`Taken`; for a reader, its own number.
         ros_type: Type of its messages, such as ``sensor_msgs/msg/JointState``.
-        is_reliable: As of :class:`Qos`.
-        is_latched: As of :class:`Qos`.
+        is_reliable: As in :class:`Qos`.
+        is_latched: As in :class:`Qos`.
     """
 
     node: str
@@ -247,13 +247,13 @@ class Node(Protocol):
     """A node; names of topics are below its namespace unless they begin with a slash."""
 
     def get_name(self) -> str:
-        """Its name."""
+        """Name of the node."""
 
     def get_namespace(self) -> str:
-        """Its namespace, with a slash before it."""
+        """Namespace of the node, with a leading slash."""
 
     def get_logger(self) -> Log:
-        """Its log."""
+        """Log of the node."""
 
     def resolve_topic_name(self, name: str) -> str:
         """Full name of a topic."""
@@ -437,7 +437,7 @@ class World(Protocol):
         """Executor of the nodes of this process, or guest."""
 
     def guest(self, domain: int | None = None) -> "World":
-        """The same world for a guest that does not belong to the session; it has its own context."""
+        """This world for a guest that does not belong to the session and has its own context."""
 
     def shutdown(self) -> None:
         """Shut the middleware down."""
@@ -452,4 +452,4 @@ class Owner(Protocol):
 
     @property
     def ros(self) -> Node:
-        """Its node."""
+        """Node of the guest."""

@@ -39,7 +39,7 @@ class AnsweringNode(CoreNode):
         self.work(self.send_report)
 
     def tick(self, tick_ns: int) -> None:
-        """Answer the messages that have come. Used within a session, which calls :meth:`tell` later."""
+        """Answer the received messages. Used within a session, which calls :meth:`tell` later."""
         self.work()
 
     def tell(self) -> None:

@@ -23,7 +23,8 @@ from teleop_core.nodes.streams import Input, message_type
 from teleop_core.nodes.tuned import TunedNode
 from teleop_core.session.reports import report_of
 
-_GATE_PATIENCE = 1.0  # on a busy machine, a tick of a whole session takes a hundredth of this time
+# longest wait for the gate; even on a busy machine, a session's tick takes a hundredth of this time
+_GATE_PATIENCE = 1.0
 _NEWS = {"active": "at work", "finalized": "ended"}  # others: the state itself
 
 
@@ -111,7 +112,7 @@ class CoreNode(TunedNode):
         return []
 
     def values(self) -> dict[str, str]:
-        """Names and texts to report in addition to the common ones."""
+        """Names and texts of the node's own values in its report, in addition to those of all nodes."""
         return {}
 
     def news(self, word: str) -> str:
@@ -216,7 +217,7 @@ class CoreNode(TunedNode):
         return self._guard("deactivate", self._halt, "inactive")
 
     def on_cleanup(self) -> Outcome:
-        """Close everything: the node can be configured anew."""
+        """Close everything; afterwards the node can be configured again."""
         return self._guard("cleanup", self._clear, "unconfigured")
 
     def on_shutdown(self) -> Outcome:
@@ -228,7 +229,7 @@ class CoreNode(TunedNode):
         return result
 
     def on_error(self) -> Outcome:
-        """After a crash: close everything, so that a supervisor can configure the node anew."""
+        """After a crash: close everything, so that a supervisor can configure the node again."""
         return self._guard("recovery", self._clear, "unconfigured")
 
     def _begin(self) -> None:
@@ -253,7 +254,7 @@ class CoreNode(TunedNode):
         for name, output in outputs.items():
             output.tap = self._feed.channels[name].give
             self._feed.channels[name].join(True)
-        self._feed.flush()  # before the middleware publishes the first message
+        self._feed.flush()  # send fed messages before the middleware publishes the first message
 
     def _fed_turn(self) -> None:
         self.turn()
@@ -272,7 +273,7 @@ class CoreNode(TunedNode):
         if self._feed is not None and has_stopped:
             self._feed.close()
             self._feed = None
-        if not (has_stopped and is_free):  # its outputs are silent because the sending thread hangs
+        if not (has_stopped and is_free):  # the outputs are silent because the sending thread hangs
             raise SessionError(f"{self.member_name} does not answer and is left running")
         self.stop()
 
@@ -377,7 +378,7 @@ class CoreNode(TunedNode):
         values |= input_values(inputs) | self._reporter.rates(inputs)
         values |= {f"sent.{t.name}": str(o.sent) for t, o in self.ports.outputs.items()}
         if step := self._reporter.clock_step():
-            concerns.append(f"the clock was stepped by {step:+.3f} s: ages begin anew")
+            concerns.append(f"the system clock was stepped by {step:+.3f} s: all ages of messages are reset")
             for entry in inputs:
                 entry.sender.clear_ages()
             self.delay.clear()

@@ -10,7 +10,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 _LONGEST = 0.2
-"""Largest time between two looks that counts [s]. If more time has passed, the caller itself had no processor, or was
+"""Largest time between two calls of :meth:`Chances.look` that counts [s]. If more time has passed, the caller itself
+had no processor, or was
 stopped together with the process."""
 
 
@@ -24,7 +25,7 @@ class _Account:
 
 
 class Chances:
-    """Time that a process had for its work between two looks.
+    """Measures the time that a process had for its work between two calls of :meth:`look`.
 
     Args:
         pid: The process.
@@ -38,7 +39,7 @@ class Chances:
         self._accounts: dict[int, _Account] = {}
 
     def look(self, threads: Iterable[int] | None = None) -> float:
-        """Time since the last look for which no thread waited for a processor [s].
+        """Time since the last call in which no thread waited for a processor [s].
 
         Args:
             threads: Threads to consider; None for all threads of the process.

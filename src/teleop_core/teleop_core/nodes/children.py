@@ -1,4 +1,4 @@
-"""Children: the processes of a live session, each one node, from start to end."""
+"""Children: starts, watches and ends the processes of a live session."""
 
 import atexit
 import os
@@ -22,7 +22,8 @@ from teleop_core.nodes.starter import NODE, Starter
 
 # Not SIGINT: a process that a shell started in the background ignores it, and so do its children.
 _PATIENCE = ((signal.SIGTERM, 30.0), (signal.SIGKILL, 5.0))
-_STILL_PATIENCE = ((signal.SIGTERM, 2.0), (signal.SIGKILL, 5.0))  # of one that stands still
+# signals to a process that does not run, with the wait after each [s]
+_STILL_PATIENCE = ((signal.SIGTERM, 2.0), (signal.SIGKILL, 5.0))
 _TROUBLE = ("[ERROR]", "[FATAL]", "Traceback")
 _STILL = 3.0  # a separate thread reports ten times a second, whatever the process is doing
 _STILL_STARTING = 60.0  # the interpreter loads, perhaps from a cold disk
@@ -34,7 +35,7 @@ def environment(domain: int | None = None) -> dict[str, str]:
     Variables that this process also needs are set in it too, except the domain: one process may run several sessions.
 
     Args:
-        domain: ROS domain; None for that of ``ROS_DOMAIN_ID``, or else a free one.
+        domain: ROS domain; None for the domain in ``ROS_DOMAIN_ID``, or for a free domain if this is not set.
     """
     os.environ.setdefault("AMENT_PREFIX_PATH", sys.prefix)
     choose_transport()
@@ -85,7 +86,7 @@ class Child:
     Args:
         name: Stage with its namespace, or a whole session.
         parameters: Open parameter file.
-        env: Its environment.
+        env: Environment variables of the process.
         starter: Starter that starts it.
         command: Command that it runs instead of the node with that name.
         nodes: Nodes in the process. If there are several, or one with another name, the process is one side of a
@@ -93,8 +94,8 @@ class Child:
 
     Attributes:
         name: As given.
-        doing: Activity that it reports: starting, compiling kernels, at work, ending.
-        is_told: Whether its end has already been reported.
+        doing: Activity that the process reports: starting, compiling kernels, at work, ending.
+        is_told: Whether the end of the process has already been reported.
     """
 
     def __init__(
@@ -147,7 +148,7 @@ class Child:
             self.is_told = True
             raise SessionError(f"{self.name} ended with {_in_words(code)}{self.last_words()}")
         if silence := self._silence():
-            text = f"{self.name} stands still: nothing heard of its process for {silence:.0f} s"
+            text = f"{self.name} does not run: no sign of life from its process for {silence:.0f} s"
             raise SessionError(text + self.last_words())
 
     def _silence(self) -> float:

@@ -92,7 +92,7 @@ class CrtkSlave:
             (
                 "servo_jr",
                 _JOINTS,
-                False,  # each counts
+                False,  # not streamed: each command counts
                 lambda m: self._locked(motion.servo_by, self._of(m), now()),
             ),
             ("servo_jv", _JOINTS, True, lambda m: self._locked(motion.drive_joints, self._of(m, "velocity"), now())),

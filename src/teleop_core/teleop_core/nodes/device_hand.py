@@ -57,10 +57,10 @@ class DeviceHand:
             raise SessionError(f"the device does not open within {_OPENING:g} s") from error
 
     def concerns(self) -> list[str]:
-        """Texts about a lost device, and about a stylus that nobody holds."""
+        """Texts about a lost device, and about a stylus that no person holds."""
         if self._lost:
             return [f"{self._lost}; waits for it"]
-        return [] if self._hand.is_held else ["waits for a hand: nobody holds the stylus"]
+        return [] if self._hand.is_held else ["waits for a hand: no person holds the stylus"]
 
     def values(self) -> dict[str, str]:
         """The device, and whether the stylus is held."""

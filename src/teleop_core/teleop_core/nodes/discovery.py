@@ -75,6 +75,6 @@ def beyond_this_machine(environment: Mapping[str, str] = os.environ) -> str:
         return f"the transport is that of your profile {profile}"
     peers = f" and {_PEERS}={environment[_PEERS]}" if environment.get(_PEERS) else ""
     return (
-        f"open to other machines: {RANGE}={said}{peers}; anybody there can read and command. "
-        f"{RANGE}=LOCALHOST keeps to this one"
+        f"open to other machines: {RANGE}={said}{peers}; their users can read and command. "
+        f"{RANGE}=LOCALHOST limits ROS to this machine"
     )

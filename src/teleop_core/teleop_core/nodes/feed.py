@@ -109,7 +109,7 @@ class Feed:
     def _connect(self) -> None:
         try:
             line = self.world.connect(self.world.feed_place())
-        except OSError:  # nobody listens
+        except OSError:  # no recorder listens
             return
         self._line, self.is_open = line, True
         self.put(0, _NAMES, json.dumps(self._names).encode())

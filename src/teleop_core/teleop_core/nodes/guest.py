@@ -6,7 +6,7 @@ from teleop_core.middleware.ros import ROS
 from teleop_core.middleware.ros_type_support import spare_generator
 from teleop_core.middleware.world import World
 
-spare_generator()  # before the first node
+spare_generator()  # must be called before the first node is made
 
 
 class Guest:

@@ -117,8 +117,8 @@ class HapticMasterNode(TickingNode):
             found.append(f"waits for {HAND_SERVO_CP.name}: nobody holds the stylus")
         if doubted := self.stage.doubted_force:
             bound = self.parameters.force_range
-            found.append(f"no force: {doubted:.3g} N came, at most {bound:g}: a broken sensor")
+            found.append(f"gives no force: received {doubted:.3g} N, allowed are {bound:g} N: a force sensor is faulty")
         most = float(self.stage.signals[MASTER_CONTACT.field][_MOST])
         if 0.0 < most < self.parameters.device.peak_force:
-            found.append(f"its motors are warm: {most:.2f} N at most")
+            found.append(f"the device's motors are warm: the force is limited to {most:.2f} N")
         return found

@@ -38,7 +38,8 @@ Whether its process or its loop hangs is detected within seconds by :mod:`teleop
 :mod:`teleop_core.nodes.watch`.
 """
 _LOOK = 0.5
-"""A sender of setpoints that is found this soon after the processes were started is not one of them [s]."""
+"""A sender of setpoints that is discovered sooner than this after the start of the processes belongs to another
+session [s]."""
 _ALONE = 1.0
 """A session that has been alone in its domain for this time, with all nodes at work, owns the domain; later sessions
 end [s]."""
@@ -113,8 +114,8 @@ def live(
 
 
 _UNGRANTED = (
-    "the system grants no SCHED_FIFO, so loops share processors fairly and are late more often; "
-    "grant it with an rtprio line in /etc/security/limits.conf"
+    "the system grants no SCHED_FIFO, so loops are scheduled as ordinary threads and are late more "
+    "often; grant it with an rtprio line in /etc/security/limits.conf"
 )
 
 
@@ -178,7 +179,7 @@ class _Session:
             for crew in self.crews:
                 self._start(crew)
             if self._keys.is_there:
-                self.say("space stops all arms; e lets them go on")
+                self.say("press space to stop all arms, and e to let them continue")
             self._await_operator()
             is_begun = True
             self._watch()
@@ -207,7 +208,7 @@ class _Session:
             if not self._ready and progress.since_begin() < _LOOK:
                 self._insist_on_one_owner(0)
             for name in [name for name in waiting if self._observer.is_active(name)]:
-                if self._children[home[name]].doing != "at work":  # another session's node
+                if self._children[home[name]].doing != "at work":  # the sender is a node of another session
                     continue
                 waiting.remove(name)
                 self.say(f"{name} is ready")
@@ -215,7 +216,7 @@ class _Session:
                 self.say(line)
             if waiting and progress.age() > START_TIMEOUT:
                 child = self._children[home[waiting[0]]]
-                reason = f"{waiting[0]} is not ready and got no further for {START_TIMEOUT:g} s"
+                reason = f"{waiting[0]} is not ready and made no progress for {START_TIMEOUT:g} s"
                 raise SessionError(reason + child.last_words())
         self._ready = time.monotonic()
 
@@ -251,7 +252,7 @@ class _Session:
             self._observer.listen(min(0.1, self._duration - elapsed))
             self._check()
             if self._task_end is not None and self._task_end.is_there():
-                self.say("the task has no goal left")
+                self.say("the task is finished")
                 return
             if int(elapsed) > shown:
                 shown = int(elapsed)

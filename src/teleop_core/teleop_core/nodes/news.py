@@ -7,7 +7,7 @@ from teleop_core.graph.stage import Stage
 from teleop_core.middleware.world import Owner
 from teleop_core.nodes.streams import Input
 
-_CALM_NS = 1_000_000_000  # the same trouble is logged again after this [ns]
+_CALM_NS = 1_000_000_000  # time after which the same trouble is logged again [ns]
 _COMMANDS = ("servo_", "move_", "interpolate_")
 
 
@@ -50,7 +50,7 @@ class Commanders:
             senders = sorted(end.node for end in self._owner.ros.publishers(name))
             before, self._known[name] = self._known.get(name, []), senders
             if senders != before:
-                found.append(f"{name} comes from {' and '.join(senders) or 'nobody any more'}")
+                found.append(f"{name} now comes from {' and '.join(senders) or 'no node'}")
         return found
 
     def _is_command(self, name: str) -> bool:
@@ -60,7 +60,7 @@ class Commanders:
 class Trouble:
     """Log of the reasons why a bridge holds.
 
-    Each reason is logged once, even if numbers in it change, and again when it is over.
+    Each reason is logged once, even if numbers in it change. When all reasons are gone, this is logged too.
 
     Args:
         owner: The node.

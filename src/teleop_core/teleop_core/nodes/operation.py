@@ -123,7 +123,7 @@ class StopInput:
                     found += presses.overhear(taken.sender, now_ns, is_pressed=is_pressed)
                 else:
                     found += presses.take(taken.sender, taken.number, now_ns, is_pressed=is_pressed, is_idle=is_idle)
-        if looks_at_all and self._silent:  # after all their messages are read
+        if looks_at_all and self._silent:  # look for silent buttons after all messages are read
             found += [said for one in self._silent for said in presses.doubt(one)]
         return [*presses.lose(self._takers[0].lost), *found]
 

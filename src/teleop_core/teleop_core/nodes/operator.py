@@ -58,13 +58,13 @@ class HandInput:
             self._hand.close(float(self._closing[0]))
 
     def concerns(self) -> list[str]:
-        """A stylus that nobody holds."""
+        """Text about a stylus that no hand holds."""
         if self._poses is None or self._hand.is_held:
             return []
         return [f"waits for {topics.OPERATOR_SERVO_CP.name}: nobody holds the stylus"]
 
     def values(self) -> dict[str, str]:
-        """Whether somebody holds the stylus, and the sender of the poses."""
+        """Whether a hand holds the stylus, and the sender of the poses."""
         if self._poses is None:
             return {}
         found = self._node.ros.publishers(f"/{self._poses.topic.name}")

@@ -151,7 +151,7 @@ class Ports:
 
     def concerns(self) -> list[str]:
         """Texts about problems of the stage's outputs."""
-        lost = f"{self.refused} steps wrote NaN or infinity: not sent"
+        lost = f"{self.refused} steps wrote NaN or infinity; their outputs are not sent"
         return [lost] if self.refused else []
 
     def close(self) -> None:

@@ -48,7 +48,7 @@ def run(make_crew: Callable[[], Crew]) -> int:
     watch = Watch(crew, signals, parent)
     code = serve(crew, watch, ROS)
     if not code:
-        watch.word = "leaving"  # all that matters is done
+        watch.word = "leaving"  # all important work is done
         for node in crew.nodes:
             node.ros.destroy_node()
         _finish(code)
@@ -60,7 +60,7 @@ class Watching(Protocol):
     """Watcher that ends a process.
 
     Attributes:
-        word: What the process is doing: starting, at work, ending, leaving.
+        word: Activity of the process: starting, at work, ending, leaving.
     """
 
     word: str
@@ -74,10 +74,10 @@ def serve(crew: Crew, watch: Watching, world: World) -> int:
         executor.add_node(node.ros)
         node.ended, node.ending = first.ended, first.ending
     first.ended.add_done_callback(lambda _: executor.wake())
-    with ExitStack() as end:  # in reverse order, and each node even if another one fails
+    with ExitStack() as end:  # end the nodes in reverse order, and each node even if another one fails
         end.callback(executor.shutdown)
         for node in reversed(nodes):
-            end.callback(node.flush)  # this blocks all threads of the process
+            end.callback(node.flush)  # flush blocks all threads of the process
         for node in nodes:  # the node that was started first ends last
             end.callback(node.finish)
         end.callback(_begin_end, crew, watch)
@@ -94,7 +94,7 @@ def _spin_once(executor: Executor, node: CoreNode) -> None:
         executor.spin_once()
     except WorldEndedError:
         node.end(1)
-    except Exception:  # for a request that cannot be read, such as a forged one
+    except Exception:  # a request cannot be read, such as a forged one
         node.ros.get_logger().error(f"a request failed:\n{traceback.format_exc()}", throttle_duration_sec=10.0)
 
 

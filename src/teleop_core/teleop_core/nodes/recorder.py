@@ -49,12 +49,14 @@ _RECENT = 1000
 class RecorderParameters(RecordingParameters):
     """Parameters of the recorder as a node."""
 
-    out: str = parameter("", fixed=True, doc="directory to make; empty: bags/ and the time")
-    configuration: str = parameter(
-        "", fixed=True, doc="parameter file of the session, as text, kept with the recording"
+    out: str = parameter(
+        "", fixed=True, doc="directory of the new recording; empty: a directory in bags/ named after the current time"
     )
-    scenario: str = parameter("", fixed=True, doc="name of the session, kept with the recording")
-    mark: str = parameter("", doc="text of the next marks; empty: their number")
+    configuration: str = parameter(
+        "", fixed=True, doc="text of the session's parameter file; it is stored in the recording"
+    )
+    scenario: str = parameter("", fixed=True, doc="name of the session; it is stored in the recording")
+    mark: str = parameter("", doc="text of the next marks; empty: each mark gets its number as text")
 
 
 class _Channel:
@@ -64,7 +66,7 @@ class _Channel:
         self.topic, self._node, self._world = topic, node, node.world
         self.received = self.lost = 0
         self._numbers: dict[bytes, int] = {}  # last number of each publisher
-        self._since_ns = 0  # since when it listens
+        self._since_ns = 0  # time since which the topic is read [ns]
         self._given: deque[Arrival] = deque()
         self._subscription: Subscription | None = None
         self._inside_ns: int | None = None
@@ -308,7 +310,7 @@ class RecorderNode(CoreNode):
         if self.stage is None:
             for transition in ("configure", "activate"):
                 if self.ros.trigger(transition) is not Outcome.SUCCESS:
-                    raise SessionError("did not start; its log says why")
+                    raise SessionError("did not start; see its log")
             return f"records to {self._writer.path}"
         self._insist(is_recording=False)
         with self._writing:
@@ -329,7 +331,7 @@ class RecorderNode(CoreNode):
             closed = self._writer.path
             self._end_recording()
             self._begin_recording(self._next_path())
-        return f"{closed} is closed; goes on in {self._writer.path}"
+        return f"{closed} is closed; the recording continues in {self._writer.path}"
 
     def mark_recording(self) -> str:
         """Record a mark with the current time. Raises the errors of :class:`Recorder`."""
@@ -345,7 +347,7 @@ class RecorderNode(CoreNode):
 
     def _insist(self, *, is_recording: bool) -> None:
         if self.stage is None or not self.is_at_work:
-            raise SessionError("is not active, so that it does not record")
+            raise SessionError("is not active, and therefore does not record")
         if self._is_recording is not is_recording:
             text = "records already to" if self._is_recording else "is stopped; the last one is"
             raise SessionError(f"{text} {self._writer.path}")
@@ -375,7 +377,7 @@ class RecorderNode(CoreNode):
         lost, cut = sum(channel.lost for channel in self.channels.values()), self._cut
         found = [f"the middleware lost {lost} messages on the way here"] if lost else []
         if cut:
-            found.append(f"{cut} processes ended without a word: what they had not sent on is lost")
+            found.append(f"{cut} processes ended abnormally; messages that they had not sent yet are lost")
         return found
 
     @property

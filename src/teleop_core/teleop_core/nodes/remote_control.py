@@ -75,8 +75,8 @@ class RemoteControl(Guest):
         self._until(lambda: bool(self.arms) and all(arm.values for arm in self.arms.values()), must=False)
         if not self.arms:
             raise SessionError(
-                f"no arm answers on ROS domain {self.domain}; `teleop live` says which is its own, "
-                "--domain N names another"
+                f"no arm answers on ROS domain {self.domain}; `teleop live` prints the domain of its "
+                "session; give it with --domain N"
             )
         return self.arms
 

@@ -71,7 +71,7 @@ class SlaveNode(TickingNode):
         """Update the signals, and answer every sample of the arm.
 
         The next step answers the newest sample. If several samples came meanwhile, the older ones are answered here.
-        After a standstill the stop comes first: only the last of the samples that came then are answered.
+        After a standstill of the loop, the stop has priority: only the last of the queued samples are answered.
         """
         measured, *others = self.ports.inputs[SLAVE_MEASURED_JS.name]
         if others or not self._is_told:
@@ -176,17 +176,17 @@ class SlaveNode(TickingNode):
         unheard = self._stop.unheard()
         if not unheard:
             return []
-        return [f"{unheard} has not said whether it is pressed, and counts as pressed: press and release it"]
+        return [f"{unheard} has not sent its state and counts as pressed: press and release it"]
 
     def _standstills(self) -> list[str]:
         if not self._is_told:
-            return ["waits for slave/measured_js: nobody says where the arm is"]
+            return ["waits for slave/measured_js: the position of the arm is unknown"]
         status, values = CommandStatus(self.row["command_status"]), self.stage.operation
         if status is CommandStatus.CLOSED or values["fault"] > 0.0:
             return [operation_text(values, self.stage.robot.joint_names)]
         if status is CommandStatus.MOVING:
             is_homing = self.stage.motion.source == "home"
-            return ["moves to where it starts, and follows then"] if is_homing else []
+            return ["moves to its start position, then follows"] if is_homing else []
         return self._silences(status)
 
     def _silences(self, status: CommandStatus) -> list[str]:

@@ -11,9 +11,9 @@ class SlaveSimNode(TickingNode):
         """Text about an arm that gets no setpoints."""
         setpoint = self.input(SLAVE_SETPOINT_JS)
         if setpoint.stamp_ns is None:
-            return ["waits for slave/setpoint_js and stands"]
+            return ["waits for slave/setpoint_js; the arm stands still"]
         is_silent = setpoint.age() > _SILENCE
-        return [f"no slave/setpoint_js for {setpoint.age():.1f} s: stands"] if is_silent else []
+        return [f"no slave/setpoint_js for {setpoint.age():.1f} s: the arm stands still"] if is_silent else []
 
     def values(self) -> dict[str, str]:
         """Presses of a button; punctures and depth of the needle, if the world can be punctured."""

@@ -49,7 +49,7 @@ def _start() -> int:
 
         sys.argv[:], given = taken_names(sys.argv)
         if "__node" in given:
-            text = "its nodes keep the names of their stages"
+            text = "the nodes of a session have the names of their stages"
             print(f"{SESSION}: not named {given['__node']}: {text}", file=sys.stderr)
         names = list(takewhile(lambda word: word[:1] != "-", sys.argv[1:]))
         del sys.argv[1 : 1 + len(names)]

@@ -142,7 +142,7 @@ class Starter:
     def close(self) -> None:
         """End the starter; the processes that it started continue."""
         self._line.close()
-        self._process.terminate()  # it may be loading
+        self._process.terminate()  # the starter may be loading
         self._process.wait()
         self._log.close()
 
@@ -190,7 +190,7 @@ class Started:
     def send_signal(self, number: int) -> None:
         """Send a signal, unless it has ended."""
         if self.poll() is None:
-            with suppress(ProcessLookupError):  # it has ended, and the starter will report this soon
+            with suppress(ProcessLookupError):  # the process has ended, and the starter will report this soon
                 os.kill(self.pid, number)
 
     def terminate(self) -> None:

@@ -101,7 +101,7 @@ class TeleopSession:
     def _turn(self) -> None:
         """Run all stages for each tick that is due."""
         if not self._loop.is_ready and self._are_all_there():
-            self._stages[-1].prepare()  # after all kernels are compiled
+            self._stages[-1].prepare()  # give the loop its priority after all kernels are compiled
             self._schedule.start()  # ticks that passed meanwhile must not be caught up
             self._loop.is_ready = True
         with self._gate:
@@ -131,7 +131,8 @@ class TeleopSession:
             for node in self._stages:
                 if node.is_at_work:
                     node.tick(tick_ns)
-                    # Messages with the longest way are sent first: the slave's setpoint, the master's sample
+                    # Messages with the longest path to their reader are sent first: the slave's setpoint, the master's
+                    # sample
                     # last.
                     waiting[:0] = self._pending
                     self._pending.clear()
@@ -145,7 +146,7 @@ class TeleopSession:
     def _link(self) -> None:
         """Connect every stage's output to its readers in this process, if both are at work."""
         active = [node for node in self._stages if node.is_at_work]
-        for node in self._stages:  # if a tick is late for one of them, it is late for all that tick
+        for node in self._stages:  # if one ticking node is late in a tick, all ticking nodes are late in it
             if node.description.trigger is None:
                 node.schedule = self._schedule
         outputs = {topic.name: out for node in active for topic, out in node.ports.outputs.items()}
@@ -161,7 +162,7 @@ class TeleopSession:
             entry.join(entry.topic.name in outputs)
         for name, channel in channels.items():
             channel.join(name in outputs)
-        self._feed.flush()  # before the middleware publishes the first message
+        self._feed.flush()  # send fed messages before the middleware publishes the first message
 
 
 def _fed(stages: Sequence[CoreNode]) -> list[str]:

@@ -16,30 +16,32 @@ from teleop_core.nodes.quality import PREFIX, QualityOverrides
 from teleop_core.nodes.sender import Sender
 
 _LOCK_PATIENCE = 1.0
-spare_generator()  # before the first node
+spare_generator()  # must be called before the first node is made
 
 
 @dataclass(frozen=True, kw_only=True)
 class NodeParameters:
     """Parameters that every node has in addition to the parameters of its stage."""
 
-    autostart: bool = parameter(True, fixed=True, doc="node configures and activates itself; false: a supervisor does")
+    autostart: bool = parameter(
+        True, fixed=True, doc="true: the node configures and activates itself; false: a supervisor does it"
+    )
     max_catch_up: int = parameter(
         1000,
         Within(0, 10_000, "ticks"),
-        "missed ticks that one late wake-up makes up for; beyond them time is dropped",
+        "largest number of missed ticks that the loop makes up after a late wake-up; it skips the others",
         fixed=True,
     )
     links: tuple[str, ...] = parameter(
         (),
         fixed=True,
-        doc="what feeds a port in place of the topic of its name, port=topic or port=topic@delay, "
-        "with the delay in seconds; topics of one port are added",
+        doc="other topics that feed a port, as port=topic or port=topic@delay, with the delay in "
+        "seconds; the values of several topics of one port are added",
     )
     joy_buttons: tuple[int, ...] = parameter(
         BUTTONS,
         Within(-1, 255),
-        "which buttons of an incoming Joy are clutch, fixture and mode, counted from 0; -1: it has none",
+        "indices of the clutch, fixture and mode buttons in an incoming Joy, from 0; -1: no such button",
         length=3,
         fixed=True,
     )
@@ -47,20 +49,20 @@ class NodeParameters:
         "refuse",
         choices=("refuse", "fault"),
         fixed=True,
-        doc="when a second publisher sends on a topic that is read: its messages are refused and "
-        "counted, or that is a fault too",
+        doc="reaction to a second publisher on a topic that the node reads: refuse: its messages are "
+        "refused and counted; fault: it is also a fault",
     )
     owner_silence: float = parameter(
         0.5,
         Within(0.0, 60.0, "s"),
-        "who owns a topic must be silent for longer before another publisher may take it",
+        "time without messages from a topic's publisher after which another publisher is accepted",
         fixed=True,
         source="assumed",
     )
     flood_rate: int = parameter(
         5000,
         Within(1, 1_000_000, "1/s"),
-        "messages of one topic beyond so many a second are refused",
+        "largest number of messages per second on one topic; messages beyond it are refused",
         fixed=True,
         source="assumed",
     )

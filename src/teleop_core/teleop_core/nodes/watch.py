@@ -22,9 +22,9 @@ from teleop_core.nodes.parent import Parent
 ENDS = tuple(number for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT))
 """Signals that ask for an orderly end: Ctrl-C, a supervisor, a closed terminal, Ctrl-\\."""
 _PERIOD = 0.1
-_END_PATIENCE = 4.0  # until the main thread begins the end
-_LEAVE_PATIENCE = 5.0  # until the middleware is closed
-_FLUSH_PATIENCE = 20.0  # until the main thread has finished it; a slow disk needs time
+_END_PATIENCE = 4.0  # longest time until the main thread begins the end [s]
+_LEAVE_PATIENCE = 5.0  # longest time until the middleware is closed [s]
+_FLUSH_PATIENCE = 20.0  # longest time until the recording is closed; a slow disk needs time [s]
 
 
 class Crew(Protocol):
@@ -78,7 +78,7 @@ class Watch:
         parent: Line to the parent, if there is one.
 
     Attributes:
-        word: What the process is doing: starting, at work, ending, leaving.
+        word: Activity of the process: starting, at work, ending, leaving.
     """
 
     def __init__(self, crew: Crew, signals: int, parent: Parent | None) -> None:
@@ -102,7 +102,9 @@ class Watch:
                 self._ask(0)
             if self._parent in ready and self._parent is not None and self._parent.has_gone():
                 files.remove(self._parent)
-                self._first.ros.get_logger().error("the session that started this is gone: ends")
+                self._first.ros.get_logger().error(
+                    "the session that started this process has ended; this process ends too"
+                )
                 self._ask(0)
             if not ready:
                 self._look()
@@ -149,7 +151,7 @@ class Watch:
 
     def _give_up(self, loop: Loop) -> None:
         loop.is_hung = True
-        text = f"{loop.name} hangs: nothing came of it for {loop.patience:g} s in which it could "
+        text = f"{loop.name} hangs: it made no progress for {loop.patience:g} s in which it could "
         text += "work; it is here:"
         self._first.ros.get_logger().fatal(f"{text}\n{loop.place()}")
         self._ask(1)
@@ -162,7 +164,7 @@ class Watch:
     def _leave(self) -> None:
         """End the process without the main thread, which hangs or compiles."""
         code = max(node.exit_code for node in self._crew.nodes)
-        self._first.ros.get_logger().error(f"cannot end in order ({self._doing()}): leaves at once")
+        self._first.ros.get_logger().error(f"cannot shut down in order ({self._doing()}): the process ends at once")
         is_starting = self.word == "starting"
         try:
             for node in self._crew.nodes:

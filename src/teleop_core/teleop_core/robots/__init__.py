@@ -99,8 +99,8 @@ def load_robot(name: str, **geometry: float | str) -> Robot:
     Args:
         name: One of :func:`list_robots`, or the path of a URDF, which ends in ``.urdf`` or
             ``.xacro``, or of a Denavit-Hartenberg table, which ends in ``.yaml`` or ``.yml``.
-        **geometry: Lengths and angles in place of the published ones [m, rad], by the symbols of
-            the robot's file; a robot may take named options too, such as ``heading="carried"``.
+        **geometry: Lengths and angles that replace the published ones [m, rad], by the symbols of the robot's file; a
+            robot may have named options too, such as ``heading="carried"``.
             A URDF takes ``tip="tool0"`` and ``task="x y z"``
             (:func:`teleop_core.robots.files.from_urdf.load_urdf`), and a xacro its own arguments,
             as ``**{"xacro.prefix": "left_"}``. Tables and robots that were registered ready-made
@@ -116,7 +116,7 @@ def load_robot(name: str, **geometry: float | str) -> Robot:
         OSError: A table cannot be read.
 
     Warns:
-        TeleopWarning: A URDF may mean another unit, or its tip cannot move in all directions.
+        TeleopWarning: A URDF may use another unit, or its tip cannot move in all directions.
     """
     robot = _loaded(name, geometry)
     if is_urdf(name):
@@ -135,7 +135,7 @@ def load_robot_set(name: str, settings: Iterable[str]) -> Robot:
     """Robot by name, with its geometry as texts ``symbol=value``; gives no warnings.
 
     Args:
-        name: As for :func:`load_robot`.
+        name: As in :func:`load_robot`.
         settings: Lengths and angles [m, rad] such as ``L6=0.04``, options such as
             ``heading=carried``, or arguments of a xacro such as ``xacro.prefix=left_``.
 

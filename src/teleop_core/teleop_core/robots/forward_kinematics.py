@@ -115,8 +115,8 @@ def _seeds(seed: object, count: int) -> Array:
 
 def _refusal(name: str, q: Array, status: FkStatus, residual: float) -> ClosureError:
     requirement = (
-        f"joints with which the loops close; {1e3 * residual:.3g} mm are left open at best"
-        " (solve_fk gives that pose with its status)"
+        f"joints with which the loops close; a gap of at least {1000.0 * residual:.3g} mm remains "
+        "(solve_fk returns the nearest pose with its status)"
     )
     if status == FkStatus.UNDETERMINED:
         requirement = "joints of a layout that fixes a pose; this one is architecturally singular"

@@ -1,8 +1,8 @@
-"""Freedom: how far the tip can go in every direction, and the posture a slave starts from.
+"""Freedom: the distance by which the tip can move in every direction, and the posture at which a slave starts.
 
 The tip is moved away from a posture along 26 directions, and rotated about as many axes, in small steps, as a hand
 would move it. A direction ends at a joint limit or near a singularity, where a joint has to move :data:`SWIFT` times
-as far as the tool. The room of the posture is the distance in the worst direction.
+as far as the tool. The *room* of the posture is the distance in the worst direction.
 """
 
 import itertools

@@ -28,16 +28,16 @@ class LinkInertia:
     """Inertia of one link in the axes of a frame fixed to it; the arrays are read-only copies.
 
     Args:
-        name: What errors call the link.
+        name: Name of the link in errors.
         mass: Mass [kg].
         center: Centre of mass (3,) in the frame [m].
-        inertia: Symmetric tensor (3, 3) about the frame's *origin* [kg·m²], with the products as in
-            mechanics: off the diagonal stands -∫xy dm. :meth:`about_origin` takes either sign.
+        inertia: Symmetric tensor (3, 3) about the frame's *origin* [kg·m²], with the products as in mechanics: the
+            off-diagonal elements are -∫xy dm. :meth:`about_origin` accepts either sign.
 
     Raises:
         ShapeError: Centre or tensor of another shape.
-        ParameterError: Values that are not finite, or a tensor that is not symmetric. Whether a
-            body can have them is asked by :func:`check_possible` alone.
+        ParameterError: Values that are not finite, or a tensor that is not symmetric. Only :func:`check_possible`
+            checks whether a body can have these values.
     """
 
     name: str
@@ -72,7 +72,7 @@ class LinkInertia:
         """Inertia from moments about the frame's origin, as CAD programs print them.
 
         Args:
-            name: What errors call the link.
+            name: Name of the link in errors.
             mass: Mass [kg].
             center: Centre of mass (3,) [m].
             moments: Ixx, Iyy, Izz [kg·m²].

@@ -2,8 +2,8 @@
 
 Link i of a chain is T_i = Rz(theta) Tz(d) Tx(a) Rx(alpha), the standard convention. A built arm has theta + its error
 of theta and so on; joint offsets are errors of theta on turning and of d on sliding joints.
-:func:`~teleop_core.robots.arms.as_chain.true_chain` gives the geometry row of the arm as built, on which
-:func:`teleop_core.kinematics.dh_kernels.fk` says where its tip really is::
+:func:`~teleop_core.robots.arms.as_chain.true_chain` returns the geometry row of the arm as built, for which
+:func:`teleop_core.kinematics.dh_kernels.fk` computes the true pose of the tip::
 
     errors = LinkErrors.of(robot, {"d3": 5.5e-3})
     dh_kernels.fk(q, true_chain(robot, errors), T_base_tip)
@@ -41,7 +41,7 @@ class LinkErrors:
 
     Args:
         a: Along the common normal, (n,) [m].
-        alpha: Of the twist about it, (n,) [rad].
+        alpha: Errors of the twist about the common normal, (n,) [rad].
         d: Along the joint's axis, (n,) [m]; the offset of a sliding joint.
         theta: About the joint's axis, (n,) [rad]; the offset of a turning joint.
 
@@ -110,7 +110,7 @@ class Chain:
     """A serial arm T_base_tip = F0 J1 F1 J2 ... Jn Fn, Ji about or along the local z axis.
 
     Args:
-        kinds: Of each joint as in :mod:`~teleop_core.kinematics.dh_kernels`, (n,).
+        kinds: Kind of each joint as in :mod:`~teleop_core.kinematics.dh_kernels`, (n,).
         fixed: Transforms F0 ... Fn, (n + 1, 4, 4).
         row: Geometry row of the kernels.
     """
@@ -165,7 +165,7 @@ def next_axis_motion(F: Array) -> Array:
         turn = total - theta if R[2, 2] > 0.0 else theta - total
         return transform(rotation("z", turn), np.zeros(3))
     turn = math.atan2(R[2, 0], R[2, 1])
-    if abs(turn) > 0.5 * math.pi + _PARALLEL:  # the normal the other way round
+    if abs(turn) > 0.5 * math.pi + _PARALLEL:  # the normal in the opposite direction
         turn, sine = turn - math.copysign(math.pi, turn), -sine
     # The first column of Rz(theta) is that of R turned back.
     normal = product(R, rotation("z", -turn)[:, 0])

@@ -83,7 +83,7 @@ def file_of(name: str) -> tuple[Path, dict[str, str]] | None:
     """File of a robot's name, and arguments that come with it for a xacro; None of other names.
 
     Raises:
-        TeleopError: As :func:`~teleop_core.robots.files.descriptions.description_file`.
+        TeleopError: As in :func:`~teleop_core.robots.files.descriptions.description_file`.
     """
     if name.endswith(DESCRIPTION) and name not in ROBOTS.names():
         from teleop_core.robots.files.descriptions import description_file
@@ -147,7 +147,7 @@ def _try(part: RobotPart) -> None:
         _try_dynamics(robot)
     except TeleopError:
         raise
-    except Exception as error:  # whatever a user's kernel raises, one line names the kernel
+    except Exception as error:  # one line names the kernel for any exception that a user's kernel raises
         reason = " ".join(str(error).split())[:_MOST_CHARACTERS]
         raise PartError("robot", name, f"one whose kernels run at home; {type(error).__name__}: {reason}") from error
 

@@ -1,6 +1,6 @@
-"""Rank: in how many directions a tip can move at once, and which of them to control.
+"""Rank: the number of directions in which a tip can move at once, and the choice of the controlled directions.
 
-An arm of five joints cannot hold every pose. If it has to control all six directions, it follows none of them well. Of
+An arm of five joints cannot reach every pose. If it has to control all six directions, it follows none of them well. Of
 the sets of directions in which it can move at once, those with the most position directions are candidates. The chosen
 set needs the least joint motion in its worst direction, in the median over postures spread evenly within the limits.
 """
@@ -62,5 +62,5 @@ def _jacobians(robot: arm.Arm, postures: Array, lever: float) -> Array:
     found, row = np.empty((len(postures), 6, robot.n)), robot.geometry_row
     for q, jacobian in zip(postures, found, strict=True):
         robot.kernels.jacobian(q.copy(), row, jacobian)
-    found[:, :3] /= lever or 1.0  # of a tip that only turns
+    found[:, :3] /= lever or 1.0  # 1 for a tip that only turns
     return found

@@ -71,18 +71,18 @@ class Robot:
         home: Joint vector (n,) of the published or natural zero, inside the limits.
         home_is_assumed: Whether home is not known to be a working posture, such as the zero of a URDF, at which many
             arms are stretched out. No session starts there.
-        start: Joint vector (n,) at which a session starts, inside the limits; None for one with room in all directions
-            (:func:`teleop_core.robots.freedom.start_posture`), looked for when it is first asked for.
+        start: Joint vector (n,) at which a session starts, inside the limits; None for a posture with room in all
+            directions (:func:`teleop_core.robots.freedom.start_posture`), which is computed at its first use.
         geometry: Symbols and their values [m, rad], in the order the kernels expect if there is no row.
         kernels: Compiled functions.
-        row: Numbers that the kernels take (k,); None for the values of the geometry.
+        row: Numbers for the kernels (k,); None for the values of the geometry.
         drives: Drive table, None for robots that are not used as slaves.
         dynamics: Rigid-body model; None for independent axes.
-        hardware: How the real arm differs from its model; None if unknown.
+        hardware: Differences between the real arm and its model; None if unknown.
         task_mask: Directions that the robot controls: x, y, z, then rotations about x, y, z.
-        solution: How inverse kinematics are solved, in words; empty if unknown.
+        solution: Text about the method of inverse kinematics; empty if unknown.
         visuals: Shapes of its links, if its file has them; nothing is read before it is drawn.
-        notes: What may have been read differently from what the author of its file meant, in words.
+        notes: Texts about content of its file that may have been read differently from the author's intention.
         describe: Draws its bodies (:func:`teleop_core.robots.bodies.bodies_of`), for joints that are not a chain; None
             for a chain, or if unknown.
 
@@ -160,7 +160,7 @@ class Robot:
 
     @property
     def drives_are_assumed(self) -> bool:
-        """Whether some entry of the drive table is assumed; ``drives.assumed`` says which."""
+        """Whether some entry of the drive table is assumed; ``drives.assumed`` lists these entries."""
         return self.drives is not None and bool(self.drives.assumed)
 
     @property
@@ -341,7 +341,7 @@ class Robot:
             ClosureError: No assembly has these joints.
         """
         if self.dynamics is None:
-            raise ParameterError("dynamics", None, f"that of a slave: {self.name} has no drives")
+            raise ParameterError("dynamics", None, f"that of a robot with drives; {self.name} has none")
         given = {"q": q, "dq": dq, "effort": effort}
         place, speed, net = (read_only(n, row, (self.n,)).copy() for n, row in given.items())
         if wrench is not None:  # the transposed Jacobian maps it to efforts (Craig 2005, 5.10)
@@ -409,8 +409,8 @@ class Robot:
             dt: Time between poses [s].
 
         Returns:
-            :class:`IkResult` with a leading axis; where the speed limit holds the arm back the
-            status is LIMITED and the residual says by how much.
+            :class:`IkResult` with a leading axis; if the speed limit holds the arm back, the status is LIMITED and the
+            residual is the remaining error.
 
         Raises:
             ShapeError: Another shape.

@@ -1,4 +1,4 @@
-"""Notes on a robot of a URDF: what its author may not have meant, one line each."""
+"""Notes on a robot of a URDF: one line for each property that its author may not have intended."""
 
 from teleop_core.kinematics import DIRECTIONS
 from teleop_core.robots.freedom import lever
@@ -10,9 +10,9 @@ def notes_on_robot(robot: Robot, file: str, has_task: bool) -> list[str]:
     """Notes on ambiguous content of the file, and on directions in which the tip cannot move.
 
     Args:
-        robot: As it was loaded from the file.
-        file: Its path, for the text.
-        has_task: Whether the directions that it controls were asked for.
+        robot: The robot as loaded from the file.
+        file: Path of the file, for the text.
+        has_task: Whether the user chose the controlled directions.
     """
     notes = [f"{file}: {note}" for note in robot.notes]
     return [*notes, *filter(None, [rank_note(robot, file, has_task)])]
@@ -22,9 +22,9 @@ def rank_note(robot: Robot, file: str, has_task: bool) -> str:
     """Note on the directions that an arm does not control because it cannot move in all at once; else empty.
 
     Args:
-        robot: As it was loaded from the file.
-        file: Its path, for the text.
-        has_task: Whether the directions that it controls were asked for; then only too many count.
+        robot: The robot as loaded from the file.
+        file: Path of the file, for the text.
+        has_task: Whether the user chose the controlled directions; then only too many of them are noted.
     """
     rank, best = directions_of(robot, lever(robot))
     pairs = list(zip(DIRECTIONS, robot.task_mask, strict=True))
@@ -35,9 +35,9 @@ def rank_note(robot: Robot, file: str, has_task: bool) -> str:
     if len(held) > rank:
         does = f'it is asked for {" ".join(held)}; "task={" ".join(best)}" it can follow'
     return (
-        f"{file}: its tip moves in {rank} of 6 directions at once, so it cannot reach every pose: "
-        f'{does}. geometry=[..., "task=x y z"] chooses what it controls, and teleop reach says '
-        "how far a hand can go with that"
+        f"{file}: the tip moves in only {rank} of 6 directions at once, so it cannot reach every "
+        f'pose: {does}. geometry=[..., "task=x y z"] chooses the controlled directions, and teleop '
+        "reach prints how far a hand can go with them"
     )
 
 

@@ -12,7 +12,7 @@ class RobotParameters:
 
     robot: str = parameter("rcrt1", fixed=True, doc="slave robot, one of `teleop robot`")
     geometry: tuple[str, ...] = parameter(
-        (), fixed=True, doc="symbol=value in place of the robot's lengths and options [m, rad]"
+        (), fixed=True, doc="symbol=value for each length or option of the robot that differs from its default [m, rad]"
     )
 
     @property

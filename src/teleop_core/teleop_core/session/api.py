@@ -74,7 +74,7 @@ def configuration(
         settings: Parameters by name, which override all files: ``{"motion_scaling.fine_gain": 0.2}``. A name without a
             stage sets every stage that has this parameter; ``left/...`` sets the arm ``left`` only.
         texts: Parameters as texts ``key=value``, as on the command line. They override ``settings``.
-        operator: Who moves the hand; see :data:`OperatorLike`.
+        operator: Operator that moves the hand; see :data:`OperatorLike`.
         fixture: Shape around the hand: a name, or a part of your own.
         controller: Control law of the slave's joints: a name, or a part of your own.
         plant: Plant that the slave simulator moves: a name, or a part of your own.
@@ -177,7 +177,9 @@ def run(
     if isinstance(scenario, Configuration):
         made = scenario
         if given:
-            raise ParameterError("settings", sorted(given), "left out where a configuration is given: put them into it")
+            raise ParameterError(
+                "settings", sorted(given), "left out if a configuration is given; put them into the configuration"
+            )
     else:
         made = configuration(
             scenario, files=files, settings=given, texts=(), operator=operator, fixture=fixture,

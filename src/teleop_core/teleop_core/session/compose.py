@@ -221,7 +221,7 @@ def _say_link(
     source, stamp = f"r{writer}.{plain}", f"r{writer}.{plain}_ns"
     if link.writer.name in played:
         source, stamp = f"row.{link.topic.field}", f"row.{link.topic.field}_ns"
-    is_after = writer > places[link.reader.name]  # its value is one tick old
+    is_after = writer > places[link.reader.name]  # the value is one tick old
     ticks = round(link.delay / dt) + link.is_late - is_after
     how = "add" if link.adds else "copy"
     if ticks <= 0:

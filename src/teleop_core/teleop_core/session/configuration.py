@@ -172,18 +172,20 @@ def _check_sides(graph: Graph, groups: Mapping[str, Any], arm: str) -> None:
         passivity, law = group.reflection.passivity.kind, group.reflection.architecture.kind
         is_whole = PASSIVITIES.find(passivity).needs_slave
         if is_whole and PASSIVITY.name not in names:
-            needed = f"a session with the stage {PASSIVITY.name}: teleop.stages=[{PASSIVITY.name}]"
+            needed = f"used in a session with the stage {PASSIVITY.name}: teleop.stages=[{PASSIVITY.name}]"
             raise ParameterError("reflection.passivity", passivity, needed)
         if is_whole and impedance.IMPEDANCE.name in names:
             kinds = [PASSIVITIES.find(name) for name in PASSIVITIES]
             others = ", ".join(kind.name for kind in kinds if not kind.needs_slave)
-            needed = f"one of {others} with the stage {impedance.IMPEDANCE.name}, for it leads the tip itself"
+            needed = (
+                f"one of {others} with the stage {impedance.IMPEDANCE.name}, because that stage moves the tip itself"
+            )
             raise ParameterError("reflection.passivity", passivity, needed)
         if ARCHITECTURES.find(law).needs_impedance and impedance.IMPEDANCE.name not in names:
             parts = [ARCHITECTURES.find(name) for name in ARCHITECTURES]
             others = ", ".join(part.name for part in parts if not part.needs_impedance)
             stages = f"teleop.stages=[{impedance.IMPEDANCE.name}]"
-            needed = f"in a session with the stage {impedance.IMPEDANCE.name}, {stages}, or one of {others}"
+            needed = f"used in a session with the stage {impedance.IMPEDANCE.name}, {stages}, or be one of {others}"
             raise ParameterError("reflection.architecture", law, needed)
 
 
@@ -196,7 +198,7 @@ def _check_operator(graph: Graph, groups: Mapping[str, Any], arm: str) -> None:
     kind = groups[Member(STAGES.find(HAND), arm).name].kind.kind
     names = [stage.name for stage in graph.stages]
     if missing := [name for name in OPERATORS.find(kind).needs if name not in names]:
-        needed = f"in a session with a {missing[0]}: teleop.stages=[{', '.join(missing)}]"
+        needed = f"used in a session with a stage {missing[0]}: teleop.stages=[{', '.join(missing)}]"
         raise ParameterError("operator.kind", kind, needed)
 
 

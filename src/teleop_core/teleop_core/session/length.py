@@ -14,7 +14,7 @@ from teleop_core.session.configuration import Configuration
 
 
 def as_long_as_followed(made: Configuration, given: Iterable[Layer]) -> Configuration:
-    """The same session, as long as the recordings that its operators follow.
+    """Session with the duration of the recordings that its operators follow.
 
     If the scenario itself chooses such an operator, the session lasts at least the scenario's duration. The slave then
     has time to arrive where the hand ends.

@@ -1,4 +1,4 @@
-"""Links as texts: they tell a node in another process which topics feed its ports."""
+"""Links as texts: they define, for a node in another process, the topics that feed its ports."""
 
 from teleop_core.graph.graph import Graph, Member
 

@@ -43,7 +43,7 @@ def as_master_bag(recording: Path | str | reader.Bag) -> reader.Bag:
     for entry in entry_points(group=READERS):
         found: reader.Bag = entry.load()(path, ours, prefixes)
         return found
-    reason = "holds no sound motion of a master; install teleop_exchange, which reads others"
+    reason = "contains no valid motion of a master; install teleop_exchange, which reads other recordings"
     raise RecordingError(path, reason)
 
 
@@ -95,6 +95,6 @@ def _are_sound(bag: reader.Bag, name: str) -> bool:
         return False
     try:
         stamps = bag.read(name).stamp_ns
-    except RecordingError:  # more or fewer buttons
+    except RecordingError:  # messages have another number of buttons
         return False
     return not (len(stamps) > 1 and (stamps == stamps[0]).all()) and bool((np.diff(stamps) >= 0).all())

@@ -62,10 +62,10 @@ def passive_note(device: DeviceParameters, fixture: gains.FixtureParameters, del
     most = walls.passive_stiffness(damping, DT, delay, device.friction, device.position_resolution)
     if stiffness <= most * (1.0 + 1e-9) or not fixture.pushes:
         return ""
-    until = f"with {1e3 * (DT + delay):.3g} ms from sample to force it is passive up to {most:.0f} N/m"
+    until = f"with {1000.0 * (DT + delay):.3g} ms from sample to force, the wall is passive up to {most:.0f} N/m"
     if not wall.is_damped:
-        until = "it is not damped"
-    return f"the {fixture.wall} wall of {stiffness:.0f} N/m may give back more energy than it took: {until}"
+        until = "the wall has no damping"
+    return f"the {fixture.wall} wall of {stiffness:.0f} N/m may return more energy than it absorbs: {until}"
 
 
 def rendered_note(device: DeviceParameters, fixture: gains.FixtureParameters) -> str:
@@ -89,6 +89,6 @@ def rendered_note(device: DeviceParameters, fixture: gains.FixtureParameters) ->
         )
     )
     return (
-        f"the {fixture.wall} wall has {stiffness:.0f} N/m, more than the device renders on {axes} "
-        f"({own} N/m): the hand feels {both} N/m"
+        f"the {fixture.wall} wall has {stiffness:.0f} N/m, more than the device's own stiffness along "
+        f"{axes} ({own} N/m): the hand feels {both} N/m"
     )

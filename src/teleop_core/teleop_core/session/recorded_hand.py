@@ -36,8 +36,8 @@ class FileParameters:
     path: str = parameter(
         "",
         fixed=True,
-        doc="CSV or Parquet file, best with a head of t, x, y, z and, if wanted, rx, ry, rz, "
-        "clutch, fixture, mode [s, m, rad]",
+        doc="CSV or Parquet file with a header of t, x, y, z and optionally rx, ry, rz, clutch, "
+        "fixture, mode [s, m, rad]",
     )
 
 
@@ -85,7 +85,9 @@ def _file(parameters: FileParameters, setting: Setting) -> Motion:
 
 def _named(parameters: FileParameters) -> Path:
     if not parameters.path:
-        raise ParameterError("operator.file.path", "", "a CSV file, for operator.kind file")
+        raise ParameterError(
+            "operator.file.path", "", "the path of a CSV or Parquet file, because operator.kind is file"
+        )
     return Path(parameters.path)
 
 
@@ -216,7 +218,7 @@ def _tell_stops(path: Path, samples: Samples, setting: Setting) -> None:
     """Warn of a motion that leaves the device's workspace, with a hint how to keep it inside."""
     device = setting.common.device
     size, start = np.array(device.workspace), np.array(device.start)
-    places = samples.moves + np.array(setting.common.center) + start  # from the middle
+    places = samples.moves + np.array(setting.common.center) + start  # positions relative to the middle
     beyond = np.abs(places) - 0.5 * size
     is_beyond = (beyond > 0.0).any(axis=1)
     if not is_beyond.any():

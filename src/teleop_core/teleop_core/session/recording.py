@@ -126,7 +126,7 @@ class Recording:
 
     @property
     def metadata(self) -> dict[str, str]:
-        """Texts stored with it: version, scenario, robot, seed, configuration."""
+        """Texts stored with the recording: version, scenario, robot, seed, configuration."""
         return dict(self._bag.metadata)
 
     @property
@@ -169,7 +169,7 @@ class Recording:
         plain = next((t for n, t in BY_NAME.items() if name == n or name.endswith(f"/{n}")), None)
         columns = plain.columns if plain is not None else ()
         if not columns:
-            raise RecordingError(self._bag.path, f"{name} holds texts, which are not columns")
+            raise RecordingError(self._bag.path, f"{name} contains texts, which cannot be read as columns")
         reports = self._bag.reports(name)
         rows = [[float(report.values.get(c, "nan")) for c in columns] for report in reports]
         stamps = np.array([report.stamp_ns for report in reports], np.int64)
@@ -254,7 +254,7 @@ class Recording:
         try:
             shutil.copytree(self._bag.path, path)
         except FileExistsError as error:
-            raise RecordingError(path, "exists already; choose another place") from error
+            raise RecordingError(path, "exists already; choose another path") from error
         except OSError as error:
             raise RecordingError(path, f"cannot be written: {error.strerror}") from error
         return open_recording(path)
@@ -285,7 +285,7 @@ def _model_of(bag: reader.Bag) -> "Model":
     try:
         layer, scenario = recorded_configuration(bag)
         return Model(Configuration.from_layers([layer], scenario), None if is_ours else 0.0)
-    except TeleopError:  # made with parts that are not installed: numbers are kept, nothing is drawn
+    except TeleopError:  # made with parts that are not installed: the numbers can be read, but nothing can be drawn
         return Model(Configuration.from_layers([]), 0.0)
 
 

@@ -44,8 +44,8 @@ def replayed_span(path: Path, name: str, stamp_ns: NDArray[np.int64]) -> tuple[i
     if left_out := len(stamp_ns) - len(longest):
         seconds = (int(longest[-1]) - int(longest[0])) * 1e-9
         warnings.warn(
-            f"{path.name}: replayed are {seconds:.3g} s of {name}; its {left_out} samples more than"
-            f" {LONGEST_GAP_NS * 1e-9:g} s apart from them are left out",
+            f"{path.name}: the replay uses {seconds:.3g} s of {name}; it leaves out {left_out} "
+            f"samples beyond gaps of more than {LONGEST_GAP_NS * 1e-09:g} s",
             TeleopWarning,
             stacklevel=2,
         )

@@ -36,7 +36,7 @@ def simulate(configuration: Configuration, out: Path, progress: Progress = silen
     """Run a session in virtual time and record it.
 
     Args:
-        configuration: What runs.
+        configuration: Configuration of the session.
         out: Directory of the recording, made here.
         progress: Called with ticks done and ticks in all, after every simulated second.
 
@@ -251,7 +251,7 @@ def describe(configuration: Configuration) -> dict[str, str]:
     about = {"version": __version__, "scenario": configuration.scenario}
     if graph.arms != ("",):
         about["arms"] = " ".join(graph.arms)
-    for arm, prefix in prefixes.items():  # before the robots' meshes, which are only drawn
+    for arm, prefix in prefixes.items():  # store these files before the robots' meshes, which are only drawn
         for name, kind in (("world", kept_files.TOUCHED), ("fixture", kept_files.FIXTURE)):
             part = configuration.value(name, arm)
             for place, file in enumerate(files_of(part.kind.parameters) if part else ()):

@@ -133,7 +133,7 @@ class Session:
             clutch: Whether the clutch is pressed, so that the slave stays where it is.
             fixture: Whether the button of the fixture is pressed.
             mode: Whether the button of coarse and fine is pressed.
-            jaw: How far the jaw is closed, 0 to 1.
+            jaw: Closing of the jaw, 0 open to 1 closed.
 
         Raises:
             ShapeError: ``place`` or ``turn`` does not have the shape (3,).
@@ -173,7 +173,7 @@ class Session:
         self.step(-(-self.runner.lead // self._ticks))
         while not (found := self.step()).is_following:
             if found.time > _PATIENCE:
-                raise SessionError(f"the arm does not follow: it says {found.state.name}")
+                raise SessionError(f"the arm does not follow: its state is {found.state.name}")
         return found
 
     def observe(self) -> Observation:

@@ -53,7 +53,7 @@ class Shape:
     """The distance as an argument for kernels."""
 
 
-_FILE = re.compile(r"""\bfile\s*=\s*['"]([^'"]*)['"]""")  # in the text of a part
+_FILE = re.compile(r"""\bfile\s*=\s*['"]([^'"]*)['"]""")  # file name in the text of a part
 
 
 def files_of(parameters: object) -> list[str]:
@@ -111,7 +111,7 @@ def _fault_at(part: Shape, numbers: Array, offset: Array) -> str:
     farther = float(part.distance(offset + _STEP / size * out, given, np.zeros(3)))
     if not abs(farther - distance - _STEP) <= 1e-2 * _STEP:
         growth = (farther - distance) / _STEP
-        return f"a distance that grows as one goes along out; {place} by {growth:.3g} times that"
+        return f"a distance that grows along out at the same rate; {place} it grows by {growth:.3g} times that"
     return ""
 
 

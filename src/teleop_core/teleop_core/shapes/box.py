@@ -16,7 +16,7 @@ class BoxParameters:
     size: tuple[float, ...] = parameter(
         (0.03, 0.03, 0.03),
         Within(1e-4, 2.0, "m"),
-        "wall to wall along x, y, z",
+        "distance between opposite walls along x, y, z",
         length=3,
         source="published: Vongbunyong 2008, section 6.3: 30 mm on the slave at gain 1",
     )

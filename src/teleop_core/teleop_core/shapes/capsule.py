@@ -15,16 +15,18 @@ from teleop_core.shapes.basis import directions, drawing
 class CapsuleParameters:
     """A rod with round ends."""
 
-    radius: float = parameter(0.01, Within(5e-5, 1.0, "m"), "of rod and ends")
-    length: float = parameter(0.06, Within(0.0, 2.0, "m"), "between the ends' middles")
-    direction: tuple[float, ...] = parameter((0.0, 1.0, 0.0), Within(-1.0, 1.0), "of the rod, of any length", length=3)
+    radius: float = parameter(0.01, Within(5e-5, 1.0, "m"), "radius of the rod and of its round ends")
+    length: float = parameter(0.06, Within(0.0, 2.0, "m"), "distance between the centres of both round ends")
+    direction: tuple[float, ...] = parameter(
+        (0.0, 1.0, 0.0), Within(-1.0, 1.0), "axis of the rod; its length does not matter", length=3
+    )
 
     def __post_init__(self) -> None:
         directions.require_direction("capsule.direction", self.direction)
 
 
 def capsule_outline(parameters: CapsuleParameters) -> Array:
-    """Its silhouette from two sides, (N, 3) [m] around the middle."""
+    """Silhouette of the capsule from two sides, (N, 3) [m] around the middle."""
     axis, angle = drawing.unit_vector(parameters.direction), np.linspace(0.0, math.pi, 21)[:, None]
     end = 0.5 * parameters.length * axis
     loops = []

@@ -20,18 +20,18 @@ class ConeParameters:
     apex: tuple[float, ...] = parameter(
         (0.0, -0.03, 0.0),
         Within(-0.5, 0.5, "m"),
-        "from the middle to the tip",
+        "distance from the middle of the cone to its tip",
         length=3,
-        source="assumed: as far as the published box is wide",
+        source="assumed: the width of the published box",
     )
     axis: tuple[float, ...] = parameter(
-        (0.0, 1.0, 0.0), Within(-1.0, 1.0), "from the tip into the cone, of any length", length=3
+        (0.0, 1.0, 0.0), Within(-1.0, 1.0), "axis, from the tip into the cone; its length does not matter", length=3
     )
     half_angle: float = parameter(
         0.4,
         Within(0.01, 1.5, "rad"),
-        "from the axis to the wall",
-        source="assumed: so that the funnel is nearly as wide as the published box at the middle",
+        "angle from the axis to the wall of the cone",
+        source="assumed: with it, the cone at its middle is nearly as wide as the published box",
     )
 
     def __post_init__(self) -> None:

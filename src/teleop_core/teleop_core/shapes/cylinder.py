@@ -16,12 +16,17 @@ class CylinderParameters:
     """A tube or a post."""
 
     radius: float = parameter(
-        0.015, Within(5e-5, 1.0, "m"), "from the axis to the wall", source="assumed: as wide as the published box"
+        0.015, Within(5e-5, 1.0, "m"), "radius of the cylinder", source="assumed: as wide as the published box"
     )
     length: float = parameter(
-        0.03, Within(0.0, 2.0, "m"), "from end to end; 0: without ends", source="assumed: as long as the published box"
+        0.03,
+        Within(0.0, 2.0, "m"),
+        "length of the cylinder; 0: infinite, without ends",
+        source="assumed: as long as the published box",
     )
-    direction: tuple[float, ...] = parameter((0.0, 1.0, 0.0), Within(-1.0, 1.0), "of its axis, of any length", length=3)
+    direction: tuple[float, ...] = parameter(
+        (0.0, 1.0, 0.0), Within(-1.0, 1.0), "axis of the cylinder; its length does not matter", length=3
+    )
 
     def __post_init__(self) -> None:
         directions.require_direction("cylinder.direction", self.direction)

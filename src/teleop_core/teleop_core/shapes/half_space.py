@@ -15,12 +15,15 @@ class HalfSpaceParameters:
     """Everything in front of a plane."""
 
     normal: tuple[float, ...] = parameter(
-        (0.0, 1.0, 0.0), Within(-1.0, 1.0), "from the plane into the half-space, of any length", length=3
+        (0.0, 1.0, 0.0),
+        Within(-1.0, 1.0),
+        "normal of the plane, pointing into the half-space; its length does not matter",
+        length=3,
     )
     room: float = parameter(
         0.01,
         Within(0.0, 0.5, "m"),
-        "from the middle down to the plane",
+        "distance of the plane below the middle",
         source="assumed: less than half of the published box",
     )
 

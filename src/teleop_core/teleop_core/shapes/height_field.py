@@ -13,13 +13,12 @@ from teleop_core.shapes.mesh import mesh_distance
 class HeightFieldParameters:
     """A table of heights above the middle."""
 
-    file: str = parameter("", fixed=True, doc="CSV or .npy: heights [m], a row for each x, a column for each y")
-    spacing: float = parameter(2e-3, Within(1e-5, 0.1, "m"), "between heights", fixed=True)
+    file: str = parameter(
+        "", fixed=True, doc="CSV or .npy file of heights [m], with a row for each x and a column for each y"
+    )
+    spacing: float = parameter(2e-3, Within(1e-5, 0.1, "m"), "distance between neighbouring heights", fixed=True)
     step: float = parameter(
-        1e-3,
-        Within(5e-5, 5e-3, "m"),
-        "between nodes of the grid of distances: what is smaller than that is rounded off",
-        fixed=True,
+        1e-3, Within(5e-5, 5e-3, "m"), "spacing of the grid of distances; smaller details are rounded off", fixed=True
     )
 
 
@@ -33,7 +32,7 @@ def height_field_numbers(parameters: HeightFieldParameters) -> Array:
 
 
 def height_field_outline(parameters: HeightFieldParameters) -> Array:
-    """Its edges and three sections through its middle, (N, 3) [m]; raises as the numbers."""
+    """Edges of the field and three sections through its middle, (N, 3) [m]; raises the errors of the numbers."""
     return _grid(parameters).outline
 
 

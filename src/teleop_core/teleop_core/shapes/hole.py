@@ -15,12 +15,17 @@ from teleop_core.shapes.basis import directions, drawing
 class HoleParameters:
     """A round plate and a hole through it; its middle is that of the hole's mouth."""
 
-    radius: float = parameter(0.0055, Within(1e-4, 1.0, "m"), "of the hole")
-    thickness: float = parameter(0.03, Within(1e-3, 1.0, "m"), "of the plate")
-    plate_radius: float = parameter(0.025, Within(1e-3, 2.0, "m"), "of the plate")
-    chamfer: float = parameter(0.002, Within(0.0, 0.5, "m"), "width and depth of the chamfer of 45° around the mouth")
+    radius: float = parameter(0.0055, Within(1e-4, 1.0, "m"), "radius of the hole")
+    thickness: float = parameter(0.03, Within(1e-3, 1.0, "m"), "thickness of the plate")
+    plate_radius: float = parameter(0.025, Within(1e-3, 2.0, "m"), "radius of the plate")
+    chamfer: float = parameter(
+        0.002, Within(0.0, 0.5, "m"), "width and depth of the 45° chamfer around the hole's mouth"
+    )
     axis: tuple[float, ...] = parameter(
-        (0.0, 0.0, 1.0), Within(-1.0, 1.0), "of the hole, out of its mouth, of any length", length=3
+        (0.0, 0.0, 1.0),
+        Within(-1.0, 1.0),
+        "axis of the hole, pointing out of its mouth; its length does not matter",
+        length=3,
     )
 
     def __post_init__(self) -> None:
@@ -99,7 +104,7 @@ def _section_distance(out: float, up: float, shape: Array) -> tuple[float, float
         else:
             x, z = out - rim, up - min(max(up, -thickness), 0.0)
         beyond = math.sqrt(x * x + z * z)
-        if beyond <= directions.MIDDLE:  # on a face, up to rounding
+        if beyond <= directions.MIDDLE:  # the point is on a face, up to rounding
             return _section_depth(out, up, shape)
         if beyond < distance:
             distance, way_out, way_up = beyond, x / beyond, z / beyond

@@ -8,7 +8,7 @@ from teleop_core.kernels import Array, inner, kernel
 from teleop_core.shapes import Shape
 from teleop_core.shapes.basis import combined, directions
 
-_ROUNDS = 200  # at most
+_ROUNDS = 200  # largest number of rounds
 _STILL = 1e-12  # moves that count [m]
 _INSIDE = 1e-8  # distance that counts as zero [m]
 
@@ -18,7 +18,8 @@ class IntersectionParameters:
     """Shapes whose common part it is."""
 
     parts: tuple[str, ...] = combined.parts_parameter(
-        ("box size=[0.03, 0.03, 0.03]", "not sphere radius=0.01 at=[0.0, 0.02, 0.0]"), "shapes whose common part it is"
+        ("box size=[0.03, 0.03, 0.03]", "not sphere radius=0.01 at=[0.0, 0.02, 0.0]"),
+        "parts whose common volume is the shape",
     )
 
     def __post_init__(self) -> None:

@@ -18,11 +18,15 @@ class LineParameters:
     radius: float = parameter(
         0.001,
         Within(0.0, 0.1, "m"),
-        "distance from the line that is inside",
-        source="assumed: what a hand at ease strays without a push",
+        "points up to this distance from the line are inside the shape",
+        source="assumed: deviation of a relaxed hand without a guiding force",
     )
-    length: float = parameter(0.0, Within(0.0, 2.0, "m"), "from end to end, the middle halfway; 0: without ends")
-    direction: tuple[float, ...] = parameter((1.0, 0.0, 0.0), Within(-1.0, 1.0), "of the line, of any length", length=3)
+    length: float = parameter(
+        0.0, Within(0.0, 2.0, "m"), "length of the line, with the middle at half of it; 0: infinite, without ends"
+    )
+    direction: tuple[float, ...] = parameter(
+        (1.0, 0.0, 0.0), Within(-1.0, 1.0), "direction of the line; its length does not matter", length=3
+    )
 
     def __post_init__(self) -> None:
         directions.require_direction("line.direction", self.direction)

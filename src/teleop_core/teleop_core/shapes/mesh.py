@@ -17,20 +17,19 @@ from teleop_core.shapes.basis import directions, distance_grid, spline
 class MeshParameters:
     """A mesh from a file."""
 
-    file: str = parameter("", fixed=True, doc="STL, OBJ, PLY, OFF, or what else trimesh reads")
-    scale: float = parameter(1e-3, Within(1e-6, 1e3, "m"), "length of the file's unit", fixed=True)
+    file: str = parameter(
+        "", fixed=True, doc="file of the mesh: STL, OBJ, PLY, OFF, or another format that trimesh reads"
+    )
+    scale: float = parameter(1e-3, Within(1e-6, 1e3, "m"), "length unit of the file; 0.001 for millimetres", fixed=True)
     angles: tuple[float, ...] = parameter(
         (0.0, 0.0, 0.0),
         Within(-2.0 * math.pi, 2.0 * math.pi, "rad"),
-        "turns of the mesh about its middle: about x, then y, then z of the base",
+        "rotation of the mesh about its middle: about x, then y, then z of the base",
         length=3,
         fixed=True,
     )
     step: float = parameter(
-        1e-3,
-        Within(5e-5, 0.05, "m"),
-        "between nodes of the grid of distances: what is smaller than that is rounded off",
-        fixed=True,
+        1e-3, Within(5e-5, 0.05, "m"), "spacing of the grid of distances; smaller details are rounded off", fixed=True
     )
 
 
@@ -109,7 +108,7 @@ def mesh_numbers(parameters: MeshParameters) -> Array:
 
 
 def mesh_outline(parameters: MeshParameters) -> Array:
-    """Its sharp edges and three sections through its middle, (N, 3) [m]; raises as the numbers."""
+    """Sharp edges of the mesh and three sections through its middle, (N, 3) [m]; raises the errors of the numbers."""
     return _grid(parameters).outline
 
 

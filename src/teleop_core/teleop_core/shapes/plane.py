@@ -15,7 +15,10 @@ class PlaneParameters:
     """A flat surface."""
 
     normal: tuple[float, ...] = parameter(
-        (0.0, 0.0, 1.0), Within(-1.0, 1.0), "out of the shape, of any length", length=3
+        (0.0, 0.0, 1.0),
+        Within(-1.0, 1.0),
+        "normal of the plane, pointing out of the shape; its length does not matter",
+        length=3,
     )
 
     def __post_init__(self) -> None:

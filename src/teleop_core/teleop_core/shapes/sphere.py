@@ -14,7 +14,7 @@ class SphereParameters:
     """A ball."""
 
     radius: float = parameter(
-        0.015, Within(5e-5, 1.0, "m"), "from the middle to the surface", source="assumed: as wide as the published box"
+        0.015, Within(5e-5, 1.0, "m"), "radius of the sphere", source="assumed: as wide as the published box"
     )
 
 

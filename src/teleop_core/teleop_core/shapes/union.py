@@ -13,7 +13,7 @@ class UnionParameters:
 
     parts: tuple[str, ...] = combined.parts_parameter(
         ("sphere radius=0.015", "cylinder radius=0.005 length=0.05 direction=[1.0, 0.0, 0.0]"),
-        "shapes that belong to it",
+        "parts that together form the shape",
     )
 
     def __post_init__(self) -> None:

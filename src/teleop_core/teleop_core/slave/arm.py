@@ -22,9 +22,9 @@ class ArmModel(NamedTuple):
 class Arm(NamedTuple):
     """Model, control law and motion of the arm: pointers and plain arrays, which kernels take."""
 
-    tip_fk: Any  # of the links as they were made
-    jacobian: Any  # of the same
-    distance: Any  # of the object that the tool can touch
+    tip_fk: Any  # forward kinematics of the links as built
+    jacobian: Any  # Jacobian of the links as built
+    distance: Any  # distance of the object that the tool can touch
     acceleration: Any
     gravity: Any
     control: Any
@@ -33,7 +33,7 @@ class Arm(NamedTuple):
     dynamics: Array
     model: Array  # the dynamics that the control law knows
     gains: Array
-    memory: Array  # of the control law
+    memory: Array  # memory of the control law
     q: Array  # joint positions (n,) at the encoders, unrounded
     dq: Array
     effort: Array
@@ -49,4 +49,4 @@ class Arm(NamedTuple):
     offset: Array  # scratch arrays for the force on the tool: (3,), (3,) and (6, n)
     normal: Array
     J: Array
-    noises: Array  # of the force sensor in the coming ticks (N, 6)
+    noises: Array  # noise of the force sensor in the coming ticks (N, 6)

@@ -21,7 +21,7 @@ class CommandStatus(IntEnum):
     REFUSED = 2  # too far from the command in force to be the same motion: the last command is held
     MOVING = 3  # moves to a goal, such as the start position, or at a wanted speed: no servo_jp is followed
     CLOSED = 4  # not enabled, or not homed: no command is followed
-    BLIND = 5  # no recent measured position of the arm: it holds
+    BLIND = 5  # no recent measured position of the arm: the arm holds
 
 
 class SlaveRow(Row):
@@ -34,7 +34,7 @@ class SlaveNumbers(ServerParameters, WayParameters):
     """Parameter record of an arm's server."""
 
     start: PerJoint  # position from which it starts to follow commands [rad or m]
-    braking: PerJoint  # deceleration of which its drives are capable [rad/s² or m/s²]
+    braking: PerJoint  # deceleration of the drives [rad/s² or m/s²]
     acceleration: PerJoint
     rest_speed: PerJoint
     near: PerJoint
@@ -51,7 +51,7 @@ class SlaveState(ServerState, WayState):
     """State record of an arm's server."""
 
     filtered: PerJoint
-    step: PerJoint  # of the setpoint in the last tick [rad or m]
+    step: PerJoint  # step of the setpoint in the last tick [rad or m]
     move_from: PerJoint
     move_to: PerJoint
     drive: PerJoint  # wanted speeds of the joints [rad/s or m/s]
@@ -202,7 +202,7 @@ def take_command(p: SlaveNumbers, s: SlaveState, row: SlaveRow, dt: float) -> in
     half a second for the first message.
     """
     stamp, now_ns = row.slave_servo_jp_ns, row.now_ns
-    if stamp > now_ns + _FUTURE_NS:  # if it were taken, every later command would count as old
+    if stamp > now_ns + _FUTURE_NS:  # if such a stamp were accepted, every later command would count as old
         s.refused += 1
         return _REFUSED
     if stamp < s.seen_ns - _FUTURE_NS:  # stamps of another clock after a silence: a new stream

@@ -130,7 +130,7 @@ def force_of_efforts(J: Array, efforts: Array, scale: Array, force: Array) -> No
 
 @inner
 def forget(s: ObserverState, wrench: Array) -> None:
-    """Begin anew with the next estimate; until then there is no estimate, and the wrench (6,) is zero."""
+    """Restart at the next estimate; until then there is no estimate, and the wrench (6,) is zero."""
     s.is_observed = 0
     for i in range(s.residual.shape[0]):
         s.residual[i] = s.lagged[i] = 0.0
@@ -158,7 +158,7 @@ def estimate(p: ObserverNumbers, s: ObserverState, arm: Arm, lag: float, dt: flo
     copy(s.measured, arm.measured)
     copy(s.speed, arm.joints)
     write_model(arm.acceleration, arm.model, arm.measured, arm.joints, model)
-    if not s.is_observed:  # until now the arm was held, in balance or by its brakes
+    if not s.is_observed:  # until now the arm was held in balance or by its brakes
         copy(model[:n], s.last_effort)
         copy(s.speed, s.last_speed)
     _observe(p, s, model, dt)

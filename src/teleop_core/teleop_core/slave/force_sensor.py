@@ -1,7 +1,7 @@
-"""Force sensor: simulates what a real sensor measures of the force on the tip.
+"""Force sensor: simulates the measurement of the force on the tip by a real sensor.
 
 The contact force passes a low-pass with the bandwidth of the sensor's electronics. Then the weight of the tool behind
-the sensor, the sensor's bias, and noise are added. The noise is drawn anew for each sample.
+the sensor, the sensor's bias, and noise are added. Each sample has new random noise.
 """
 
 import math
@@ -44,49 +44,49 @@ class ForceSensorParameters:
     force_noise: float = parameter(
         0.0,
         Within(0.0, 100.0, "N"),
-        "standard deviation of each sample, of every axis",
+        "standard deviation of the noise of a sample, the same for each axis",
         source="assumed: none, an ideal sensor",
     )
     torque_noise: float = parameter(
         0.0,
         Within(0.0, 10.0, "N·m"),
-        "standard deviation of each sample, of every axis",
+        "standard deviation of the noise of a sample, the same for each axis",
         source="assumed: none, an ideal sensor",
     )
     force_bias: tuple[float, ...] = parameter(
         (0.0, 0.0, 0.0),
         Within(-100.0, 100.0, "N"),
-        "what it tells of no force, along the slave's base",
+        "force that the sensor reports without contact, in axes of the slave's base",
         length=3,
         source="assumed: none, an ideal sensor",
     )
     torque_bias: tuple[float, ...] = parameter(
         (0.0, 0.0, 0.0),
         Within(-10.0, 10.0, "N·m"),
-        "what it tells of no torque, along the slave's base",
+        "torque that the sensor reports without contact, in axes of the slave's base",
         length=3,
         source="assumed: none, an ideal sensor",
     )
     force_bandwidth: float = parameter(
         0.0,
         Within(0.0, 500.0, "Hz"),
-        "of its low-pass of first order, before the noise; 0: it passes everything at once",
+        "cutoff frequency of the sensor's first-order low-pass, which acts before the noise is added; 0: no low-pass",
         source="assumed: none, an ideal sensor",
     )
     tool_mass: float = parameter(
         0.0,
         Within(0.0, 10.0, "kg"),
-        "of what hangs behind the sensor, at the tip: its weight is measured, its inertia not",
+        "mass between sensor and tip; the sensor measures its weight, but not its inertial force",
         source="assumed: none, an ideal sensor",
     )
     estimate: bool = parameter(
-        False, doc="whether slave/estimated_cf tells what drive efforts and joint motion say of the force"
+        False, doc="whether slave/estimated_cf contains the force estimated from drive efforts and joint motion"
     )
     estimate_bandwidth: float = parameter(
         10.0,
         Within(0.1, 200.0, "Hz"),
-        "of the estimate",
-        source="assumed: faster than a hand moves, slower than what steps of encoders blur",
+        "bandwidth of the force estimate",
+        source="assumed: above the frequencies of a hand, and below those that encoder steps disturb",
     )
 
     def write(self, p: SensorNumbers, dt: float) -> None:

@@ -22,7 +22,7 @@ _TICKS = 20  # ticks after which a derivative's filter has forgotten the noise o
 def missing_effort(arm: Arm, speed: Array, before: Array, dt: float, ticks: int = _TICKS) -> Array:
     """Effort (n,) of the gains ``before``, less that of the present gains [N·m or N].
 
-    Both efforts are computed for an arm that goes on at its present, constant speed. The arm itself is not changed.
+    Both efforts are computed for an arm that continues at its present, constant speed. The arm itself is not changed.
 
     Args:
         arm: The arm; its gains are the new ones.

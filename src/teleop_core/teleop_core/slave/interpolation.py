@@ -6,7 +6,7 @@ _LINEAR, _MINIMUM_JERK = 1, 2
 
 
 class WayParameters(Fields):
-    """Fields of a parameter record that say how commands are joined."""
+    """Fields of a parameter record that define the interpolation between commands."""
 
     lower: PerJoint
     upper: PerJoint
@@ -22,7 +22,7 @@ class WayState(Fields):
     slope: PerJoint  # first slope at the beginning
     bend: PerJoint  # second slope there
     end_slope: PerJoint
-    ticks: int  # that are done
+    ticks: int  # number of finished ticks
     span: int  # ticks in all
 
 

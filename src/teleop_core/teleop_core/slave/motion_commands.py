@@ -24,11 +24,11 @@ _REACHED = (IkStatus.FOLLOWED, IkStatus.NEAR_SINGULAR)
 # A goal may exceed a limit by this rounding, such as that of a setpoint at the limit [rad or m].
 _SLACK = 1e-6
 Told = tuple[Answer, str]
-"""Answer to a command, and the same in words."""
+"""Answer to a command, and its text."""
 
 
 class Commanded(Protocol):
-    """What motion commands need of a slave."""
+    """Parts of a slave that motion commands need."""
 
     robot: Robot
     parameters: Any
@@ -55,7 +55,7 @@ class MotionCommands:
 
     @property
     def goal(self) -> Array:
-        """Joints (n,) where the arm goes or holds [rad or m]: the goal of a move, or the last reference."""
+        """Joint positions (n,) of the goal of a move, or of the last reference, at which the arm holds [rad or m]."""
         s = self._slave.state
         return np.array(s["move_to"] if s["is_busy"] else s["target"], dtype=np.float64)
 
@@ -166,7 +166,7 @@ class MotionCommands:
         return self.servo(last + self._joints(step), now_ns)
 
     def hold(self) -> Told:
-        """Brake to rest and stay there until the next command; an active stream goes on moving the arm.
+        """Brake to rest and stay there until the next command; an active stream continues to move the arm.
 
         To stop a stream, pause the arm.
         """

@@ -47,7 +47,7 @@ class SimulatedArm(RunningStage):
         simulated: The simulated arm; its signals are those of the pair.
 
     Raises:
-        ParameterError: As of :class:`~teleop_core.slave.slave.Slave` and
+        ParameterError: As in :class:`~teleop_core.slave.slave.Slave` and
             :class:`~teleop_core.slave.slave_sim.SlaveSim`.
     """
 

@@ -26,7 +26,7 @@ class SimulationNumbers(ElasticNumbers, DriveNumbers, SensorNumbers, ObserverNum
 
     encoder_step: PerJoint  # [rad or m]
     compensated: PerJoint  # share of gravity that is fed forward
-    braking: PerJoint  # of the brakes [rad/s² or m/s²]
+    braking: PerJoint  # deceleration by the brakes [rad/s² or m/s²]
     steps: int
     has_gears: int
 

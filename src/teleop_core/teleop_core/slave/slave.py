@@ -38,10 +38,12 @@ INTERPOLATIONS = ("none", "linear", "minimum_jerk")
 class ReferenceFilterParameters:
     """First-order lag on every joint reference; at rest its output is its input."""
 
-    is_on: bool = parameter(True, doc="whether references pass the filter")
-    gain: float = parameter(0.1, Within(0.0, 1.0), "gain for fast motion", source=_FILTER_SOURCE)
-    zero: float = parameter(100.0, Within(0.0, 1000.0, "rad/s"), "zero", source=_FILTER_SOURCE)
-    pole: float = parameter(10.0, Within(0.01, 1000.0, "rad/s"), "pole", source=_FILTER_SOURCE)
+    is_on: bool = parameter(True, doc="whether joint references pass through the reference filter")
+    gain: float = parameter(
+        0.1, Within(0.0, 1.0), "gain of the reference filter at high frequencies", source=_FILTER_SOURCE
+    )
+    zero: float = parameter(100.0, Within(0.0, 1000.0, "rad/s"), "zero of the reference filter", source=_FILTER_SOURCE)
+    pole: float = parameter(10.0, Within(0.01, 1000.0, "rad/s"), "pole of the reference filter", source=_FILTER_SOURCE)
 
     def __post_init__(self) -> None:
         if not math.isclose(self.gain * self.zero, self.pole, rel_tol=1e-9):
@@ -54,22 +56,31 @@ class SlaveParameters(RobotParameters):
     """Parameters of :class:`Slave`."""
 
     command_timeout: float = parameter(
-        0.1, Within(0.002, 5.0, "s"), "the last reference is held when no command came for longer than this"
+        0.1, Within(0.002, 5.0, "s"), "if no command arrives for this time, the slave holds the last reference"
     )
     start: tuple[float, ...] = parameter(
         (),
         Within(unit="rad or m"),
-        "joints to which the slave moves from home before it follows; empty: the robot's start",
+        "joint positions to which the slave moves from home before it follows; empty: the robot's start",
         fixed=True,
     )
     starts_at_home: bool = parameter(
-        False, fixed=True, doc="whether it starts where it is, at home, if no start is given; a URDF states no home"
+        False,
+        fixed=True,
+        doc="whether the slave stays at home before it follows, if start is empty; no effect for a "
+        "robot from a URDF, which states no home",
     )
-    start_speed: float = parameter(0.5, Within(0.01, 1.0), "share of the speed limits used on that move", fixed=True)
+    start_speed: float = parameter(
+        0.5,
+        Within(0.01, 1.0),
+        "share of the joints' speed limits that the move from home to the start uses",
+        fixed=True,
+    )
     interpolation: str = parameter(
         "linear",
         choices=INTERPOLATIONS,
-        doc="way between commands that come slower than the ticks, which takes one period of them",
+        doc="interpolation between commands that arrive less often than once a tick; it delays the "
+        "motion by one period of the commands",
     )
     reference_filter: ReferenceFilterParameters = field(default_factory=ReferenceFilterParameters)
     operation: OperationParameters = field(default_factory=OperationParameters)

@@ -34,7 +34,7 @@ class ControllerParameters:
 class PlantParameters:
     """The plant, which the simulator moves."""
 
-    kind: Choice = choice(PLANTS, "ideal", fixed=True, doc="what the simulator moves")
+    kind: Choice = choice(PLANTS, "ideal", fixed=True, doc="model of the arm that the simulator moves")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,11 +46,11 @@ class SlaveSimParameters(RobotParameters):
     gravity_compensation: str = parameter(
         "published",
         choices=("published", "all", "none"),
-        doc="axes whose gravity is fed forward: those of the source (axis 2), all, none",
+        doc="axes with gravity feed-forward: source: as published (axis 2), all, or none",
     )
-    integration_steps: int = parameter(2, Within(1, 50), "Runge-Kutta steps in each control tick")
+    integration_steps: int = parameter(2, Within(1, 50), "number of Runge-Kutta steps in each control tick")
     viscous: tuple[float, ...] = parameter(
-        (), Within(0.0, None, "N·m·s/rad or N·s/m"), "friction of each joint; empty: the plant's"
+        (), Within(0.0, None, "N·m·s/rad or N·s/m"), "viscous friction of each joint; empty: the plant's"
     )
     coulomb: tuple[float, ...] = parameter(
         (), Within(0.0, None, "N·m or N"), "dry friction of each joint; empty: the plant's"
@@ -62,8 +62,9 @@ class SlaveSimParameters(RobotParameters):
     trials: str = parameter(
         "all",
         choices=("all", "small"),
-        doc="errors that the loop must let die before it is used: small ones and those after a "
-        "dash at full speed, or small ones alone, as for experiments with bad laws",
+        doc="errors that must decay in the stability check before a session: all: small errors and "
+        "those after a move at full speed; small: small errors only, for experiments with bad "
+        "control laws",
     )
 
 
@@ -128,7 +129,7 @@ class SlaveSim(RunningStage):
         self._check_world(parameters.world)
         self._check_loop(parameters)
         self._examined, self._gains_in_force = parameters, self.arm.gains.copy()
-        handover.missing_effort(self.arm, np.zeros(n), self.arm.gains, dt, ticks=0)  # compiles it
+        handover.missing_effort(self.arm, np.zeros(n), self.arm.gains, dt, ticks=0)  # compiles the kernels
 
     def reset(self) -> None:
         """Go back to home, at rest."""
@@ -159,12 +160,12 @@ class SlaveSim(RunningStage):
 
     @property
     def punctures(self) -> int:
-        """How often the tip has punctured the object so far."""
+        """Number of punctures of the object so far."""
         return int(self.arm.contacts[0]["punctures"])
 
     @property
     def presses(self) -> int:
-        """How often the tip has pressed a button down to its stop so far."""
+        """Number of presses of a button down to its stop so far."""
         return int(self.arm.contacts[0]["presses"])
 
     @property
@@ -198,7 +199,7 @@ class SlaveSim(RunningStage):
         """Take new parameters from the next tick on; a law with ``shift`` keeps the effort continuous.
 
         Raises:
-            ParameterError: As :meth:`examine`, unless these parameters were examined before; nothing has changed then.
+            ParameterError: As in :meth:`examine`, which runs first if it did not yet; nothing has changed then.
         """
         if parameters is not self._examined:
             self.examine(parameters)
@@ -254,7 +255,7 @@ class SlaveSim(RunningStage):
         try:
             return self.robot.fk(self.robot.start)
         except ClosureError as error:
-            text = f"given for {self.robot.name}, whose tip is not known where it starts"
+            text = f"given for {self.robot.name}, because the position of its tip at the start is unknown"
             raise ParameterError("world.place", (), text) from error
 
     def _check_world(self, world: WorldParameters) -> None:
@@ -266,7 +267,9 @@ class SlaveSim(RunningStage):
         center, tool = self.parameters["world_center"], world.tool(self.robot.fk(self.robot.home))
         inside = -world.distance(tool, center) if self.parameters["has_world"] else 0.0
         if inside > 0.0:
-            text = f"outside of the tip at home, which is {1e3 * inside:.1f} mm inside the object"
+            text = (
+                f"chosen so that the object does not contain the tip at home, which is {1000.0 * inside:.1f} mm inside"
+            )
             raise ParameterError("world.place", tuple(center.tolist()), text)
 
     def _check_loop(self, parameters: SlaveSimParameters) -> None:
@@ -280,7 +283,7 @@ class SlaveSim(RunningStage):
         """Move the effort that the new gains no longer give into the integrators, once these gains are in force."""
         if np.array_equal(self.arm.gains, self._gains_in_force):
             return
-        if self.signals["now_ns"] > 0:  # before the first tick nothing moves, and nothing must be handed over
+        if self.signals["now_ns"] > 0:  # before the first tick nothing moves, so no effort must be handed over
             speed = np.array(self.state["speed"])
             missing = handover.missing_effort(self.arm, speed, self._gains_in_force, self.dt)
             self._law.shift(self.arm.memory, missing)

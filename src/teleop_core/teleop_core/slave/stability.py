@@ -56,7 +56,7 @@ def check_friction(p: SimulationNumbers, inertia: Array, dt: float) -> None:
     if (held >= p["effort_limit"]).any():
         i = int(np.argmax(held >= p["effort_limit"]))
         needed = f"below {p['effort_limit'][i] - abs(p['bias'][i]):.3g} for joint {i + 1}, "
-        needed += "the effort of its drive less its bias: else it never moves"
+        needed += "the effort of its drive minus its bias; otherwise the joint never moves"
         raise ParameterError("slave_sim.coulomb", p["coulomb"].tolist(), needed)
     smooth = p["coulomb"] / np.maximum(p["friction_speed"], 1e-300) / inertia
     sticking = np.sqrt(p["bristle"] / inertia)
@@ -65,8 +65,8 @@ def check_friction(p: SimulationNumbers, inertia: Array, dt: float) -> None:
     if (pole * step > _STABLE).any():
         i = int(np.argmax(pole))
         needed = (
-            f"soft enough for steps of {1e3 * step:g} ms: that of joint {i + 1} has a time "
-            f"constant of {1e3 / pole[i]:.2g} ms; lower it, or raise integration_steps"
+            f"small enough for steps of {1000.0 * step:g} ms: the friction of joint {i + 1} has a "
+            f"time constant of {1000.0 / pole[i]:.2g} ms; lower it, or raise integration_steps"
         )
         raise ParameterError("slave_sim.coulomb", p["coulomb"].tolist(), needed)
 
@@ -179,9 +179,9 @@ def _check_large(name: str, robot: Robot, loop: ClosedLoop) -> None:
         left = _left(robot, loop, joint)
         if not left <= _LEFT:  # NaN is left as well
             needed = (
-                f"one that lets the arm come back: {_LONGEST * loop.dt:g} s after a stop from full "
-                f"speed joint {joint + 1} is off by {left:.2g} of its largest error on the way; "
-                "raise its gains, or bound its integral"
+                f"one that settles: {_LONGEST * loop.dt:g} s after a stop from full speed, joint "
+                f"{joint + 1} still has {left:.2g} of its largest error; raise its gains, or limit its "
+                "integral"
             )
             raise ParameterError("slave_sim.controller.kind", name, needed)
 

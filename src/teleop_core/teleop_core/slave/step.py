@@ -56,7 +56,7 @@ def _begin_where_it_is(p: commands.SlaveNumbers, s: commands.SlaveState, arm: Ar
 def _take_measured(p: commands.SlaveNumbers, s: commands.SlaveState, arm: ArmModel, row: commands.SlaveRow) -> None:
     """Take a new sample of the arm, and look for faults in it.
 
-    The sample was taken together with the setpoint that is still in force.
+    The sample was measured at the time of the present setpoint.
     """
     stamp_ns, n = row.slave_measured_js_ns, s.setpoint.shape[0]
     if stamp_ns == s.sampled_ns:
@@ -126,7 +126,7 @@ def slave_step(
     joints = arm.joints
     _take_measured(p, s, arm, row)
     watch.begin_tick(p, s, row.now_ns)
-    if s.asked_ns != 0:  # as a message of servo_jp would
+    if s.asked_ns != 0:  # the same as a message of servo_jp
         copy(s.asked, row.slave_servo_jp)
         row.slave_servo_jp_ns, s.asked_ns = s.asked_ns, 0
     row.command_status = commands.take_command(p, s, row, dt)

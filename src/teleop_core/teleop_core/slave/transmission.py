@@ -60,7 +60,7 @@ def drive(p: DriveNumbers, s: DriveState, arm: Arm) -> None:
         s: State; written.
         arm: Its ``effort`` is written.
     """
-    if p.delay_ticks > 0:  # in the first ticks it is the first effort, which holds the arm
+    if p.delay_ticks > 0:  # in the first ticks the delayed effort is the first effort, which holds the arm
         count = s.late.shape[0]
         late = s.driven - min(p.delay_ticks, s.driven)
         for i in range(arm.q.shape[0]):

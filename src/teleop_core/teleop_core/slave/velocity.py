@@ -12,11 +12,11 @@ from teleop_core.slave.commands import SlaveNumbers, SlaveState
 
 
 class Motion(IntEnum):
-    """What moves the setpoint of an enabled slave that is not moving to a goal."""
+    """Source of the setpoint's motion while an enabled slave does not move to a goal."""
 
-    FOLLOWING = 0  # references of its joints
-    JOINTS = 1  # a speed of its joints
-    TIP = 2  # a twist of its tip
+    FOLLOWING = 0  # the setpoint follows joint references
+    JOINTS = 1  # the setpoint moves with a joint velocity
+    TIP = 2  # the setpoint moves with a twist of the tip
 
 
 _FOLLOWING, _TIP = int(Motion.FOLLOWING), int(Motion.TIP)

@@ -28,17 +28,17 @@ def add(commands: Any) -> None:
     """Add the command's parser."""
     text = "test a CRTK arm, row by row: topics, stamps, states, small motions"
     parser = command(commands, "conformance", _run, text, _EPILOG)
-    parser.add_argument("namespace", help="where its topics are, such as slave, or /PSM1")
+    parser.add_argument("namespace", help="namespace of the arm's topics, such as slave, or /PSM1")
     choice = parser.add_mutually_exclusive_group()
     choice.add_argument("--read-only", action="store_true", help="command nothing")
-    choice.add_argument("--yes", action="store_true", help="move it without asking")
+    choice.add_argument("--yes", action="store_true", help="move the arm without asking first")
     parser.add_argument("--json", action="store_true", help="print JSON in place of the table")
     parser.add_argument("--domain", type=int, metavar="N", help="ROS domain (default: ROS_DOMAIN_ID)")
     parser.add_argument(
         "--robot",
         metavar="NAME",
-        help="what it is, one of `teleop robot` or a Denavit-Hartenberg table: its forward "
-        "kinematics are held against measured_cp",
+        help="robot model of the arm, one of `teleop robot` or a Denavit-Hartenberg table; its "
+        "forward kinematics are compared with measured_cp",
     )
     parser.add_argument(
         "--wait", type=float, default=5.0, metavar="S", help="longest time to wait for the arm [s] (default: 5)"
@@ -72,7 +72,7 @@ def _run(arguments: argparse.Namespace) -> int:
             with arm.interrupt.caught(), progress.status("looking") as status:
                 findings = examine(arm, may_move=may_move, report=status.update, robot=robot)
         except KeyboardInterrupt:
-            arm.interrupt = Interrupt()  # for the look at what is left
+            arm.interrupt = Interrupt()  # time to look for topics that remain
             left = left_behind(arm, may_move=may_move)
             print(f"teleop conformance: interrupted; {left}", file=sys.stderr)
             return 130

@@ -1,4 +1,4 @@
-"""``teleop drill``: break a running session in every known way, and measure what it does."""
+"""``teleop drill``: injects every known fault into a running session, and measures the reaction of the arm."""
 
 import argparse
 import json
@@ -38,28 +38,28 @@ def add(commands: Any) -> None:
     parser = command(commands, "drill", _run, text, _EPILOG)
     parser.add_argument("names", nargs="*", metavar="NAME", help="faults (default: all)")
     parser.add_argument("--composed", action="store_true", help="all nodes in one process")
-    parser.add_argument("--short", action="store_true", help="the most telling five faults")
+    parser.add_argument("--short", action="store_true", help="run only five faults that show the most")
     parser.add_argument(
         "--simulated",
         action="store_true",
-        help="processes, clocks, disk and middleware are simulated, drawn from --seed",
+        help="simulate processes, clocks, disk and middleware, with random numbers from --seed",
     )
-    parser.add_argument("--seed", type=int, default=0, metavar="N", help="of the simulated machine (default 0)")
+    parser.add_argument("--seed", type=int, default=0, metavar="N", help="seed of the simulated machine (default: 0)")
     parser.add_argument(
         "--seeds",
         type=int,
         default=0,
         metavar="N",
-        help="run so many random schedules of faults, simulated, from --seed on",
+        help="run this number of random schedules of faults on the simulated machine; their seeds begin at --seed",
     )
     parser.add_argument(
         "--breaks",
         type=float,
         default=0.0,
         metavar="SHARE",
-        help="share of the looks at a clock at which another thread goes on, in schedules (default 0; try 0.0005)",
+        help="in schedules, share of clock readings after which another thread runs (default: 0; try 0.0005)",
     )
-    parser.add_argument("--faults", metavar="I,K", help="of one schedule, these faults alone; -: none")
+    parser.add_argument("--faults", metavar="I,K", help="run only these faults of one schedule; -: none")
     parser.add_argument("--list", action="store_true", dest="is_list", help="list the faults")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write all numbers as JSON")
     parser.add_argument("--markdown", type=Path, metavar="FILE", help="write the table as Markdown")
@@ -68,16 +68,18 @@ def add(commands: Any) -> None:
         metavar="COMMAND",
         type=shlex.split,
         default=(),
-        help="command that starts drives in place of the simulated ones",
+        help="command that starts drives; they replace the simulated ones",
     )
     parser.add_argument(
         "--arm",
         metavar="COMMAND",
         type=shlex.split,
         default=(),
-        help="command that starts what these lead; nothing is done to it",
+        help="command that starts the arm that the drives of --drives move; the drill does not disturb it",
     )
-    parser.add_argument("--out", type=Path, metavar="DIR", help="keep the recordings here; must not exist")
+    parser.add_argument(
+        "--out", type=Path, metavar="DIR", help="directory that keeps the recordings; it must not exist yet"
+    )
     setting_arguments(parser)
 
 
@@ -96,13 +98,13 @@ def _run(arguments: argparse.Namespace) -> int:
             print(f"{one.name:24} {one.text}")
         return 0
     if arguments.drives and arguments.composed:
-        raise ParameterError("--drives", shlex.join(arguments.drives), "without --composed")
+        raise ParameterError("--drives", shlex.join(arguments.drives), "given without --composed")
     if arguments.simulated and arguments.drives:
-        raise ParameterError("--drives", shlex.join(arguments.drives), "without --simulated")
+        raise ParameterError("--drives", shlex.join(arguments.drives), "given without --simulated")
     if arguments.seed and not arguments.simulated:
-        raise ParameterError("--seed", arguments.seed, "with --simulated")
+        raise ParameterError("--seed", arguments.seed, "given with --simulated only")
     if arguments.arm and not arguments.drives:
-        raise ParameterError("--arm", shlex.join(arguments.arm), "with --drives, which lead it")
+        raise ParameterError("--arm", shlex.join(arguments.arm), "given with --drives only, whose drives move the arm")
     check_places(arguments.json, arguments.markdown)
     check_new(arguments.out)
     outcomes = _outcomes(exercises, arguments)

@@ -19,7 +19,7 @@ def run_schedules(arguments: argparse.Namespace) -> int:
     """
     count, first, out = arguments.seeds or 1, arguments.seed, arguments.out
     if arguments.names or arguments.short or arguments.drives:
-        raise ParameterError("--seeds", count, "without names, --short and --drives")
+        raise ParameterError("--seeds", count, "given without names, --short and --drives")
     if (arguments.faults is not None or out is not None) and count != 1:
         raise ParameterError("--seeds", count, "1 with --faults and --out")
     if not 0.0 <= arguments.breaks <= 0.1:

@@ -1,4 +1,4 @@
-"""Conformance: what CRTK asks of an arm, row by row, and what was found."""
+"""Conformance: the requirements of CRTK on an arm, row by row, with the result of each test."""
 
 from teleop_drill.conformance.crtk_topics import CRTK_TOPICS, CrtkTopic, Finding, Group, Verdict
 from teleop_drill.conformance.findings_table import findings_json, findings_table

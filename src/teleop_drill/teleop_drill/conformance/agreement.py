@@ -18,12 +18,12 @@ second remains for networks and slow laws; assumed."""
 SHARE = 0.15
 """Share of the displacement by which two trails may differ; assumed: larger than the effect of friction, smaller than
 that of a wrong scale."""
-_GRID = 0.01  # time from one place of a comparison to the next [s]
+_GRID = 0.01  # time between two points of a comparison [s]
 _FARTHEST = 1.0  # largest lag that is searched [s]
 _GAP = 0.05  # if messages are farther apart, some were lost in transport, or no reader existed [s]
 _SPAN = 0.25  # time over which positions are averaged: longer than the settling time of a loop [s]
 _SAMPLES = 20  # least number of messages of a motion for which its speeds can be integrated
-_FEW = 10  # with no more messages than this nothing can be compared
+_FEW = 10  # with this number of messages or fewer, nothing can be compared
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,7 +31,7 @@ class Trail:
     """Messages of one topic during a motion.
 
     Attributes:
-        sent: When each was sent, shape (N,) [s].
+        sent: Time of sending of each sample, shape (N,) [s].
         stamp: Time of its sample, shape (N,) [s].
         place: Joint positions or position of the tip, shape (N, k).
         rate: Velocities, shape (N, k); empty if the topic has none.

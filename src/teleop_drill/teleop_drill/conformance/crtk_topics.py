@@ -10,7 +10,7 @@ from enum import Enum
 
 
 class Group(Enum):
-    """What a topic is for."""
+    """Purpose of a topic."""
 
     STATE = "state"
     QUERY = "query"
@@ -21,7 +21,7 @@ class Verdict(Enum):
     """Result of a row."""
 
     OK = "ok"
-    ABSENT = "absent"  # and not required
+    ABSENT = "absent"  # absent and not required
     SKIPPED = "not tried"
     NOTED = "noted"  # works, but with a weakness
     FAILED = "FAILED"
@@ -37,7 +37,7 @@ class CrtkTopic:
 
     Attributes:
         name: Name below the arm's namespace.
-        group: What it is for.
+        group: Purpose of the topic.
         ros_type: Type of its messages.
         is_required: Whether every CRTK arm must have the topic. This is true for the operating state and for one of
             ``measured_js`` and ``measured_cp``. CRTK allows an arm to leave out commands that it cannot do.
@@ -78,12 +78,12 @@ STATES = ("DISABLED", "ENABLED", "PAUSED", "FAULT")
 
 @dataclass(frozen=True)
 class Finding:
-    """What was found in one row.
+    """Result of one row.
 
     Attributes:
         row: The row, or the trial that concerns several rows.
         verdict: Result of the row.
-        found: What the arm has, in a few words.
+        found: Short description of the arm's topic.
         note: Error, or the reason why the row was not tested.
     """
 

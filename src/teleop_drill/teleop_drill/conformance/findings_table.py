@@ -33,7 +33,7 @@ def findings_table(namespace: str, findings: Iterable[Finding]) -> Table:
 
 
 def findings_json(namespace: str, findings: Iterable[Finding]) -> str:
-    """The same as JSON: ``{"namespace": ..., "rows": [{"topic": ..., "verdict": ...}, ...]}``."""
+    """The table as JSON: ``{"namespace": ..., "rows": [{"topic": ..., "verdict": ...}, ...]}``."""
     rows = [
         {
             "topic": finding.row.name,

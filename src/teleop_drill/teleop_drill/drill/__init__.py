@@ -1,4 +1,4 @@
-"""Drill: breaks a running session in every known way, and measures what the arm does."""
+"""Drill: injects every known fault into a running session, and measures the reaction of the arm."""
 
 from teleop_core.base.errors import PartError, UnknownNameError
 from teleop_core.base.registry import Registry
@@ -14,7 +14,7 @@ __all__ = [
 ]  # fmt: skip
 
 EXERCISES = (*STOPS, *PROCESSES, *SAMPLES)
-"""Built-in exercises; some of them once for each way of running."""
+"""Built-in exercises; some exist twice, for composed sessions and for sessions of processes."""
 SHORT = ("stop_topic", "kill_motion_scaling", "teleport", "second_commander", "kill_bystander")
 """A short selection that finds gross errors."""
 
@@ -23,7 +23,7 @@ def _checked(name: str, part: object) -> Exercise:
     if not isinstance(part, Exercise):
         raise PartError("exercise", name, f"an Exercise, not a {type(part).__name__}")
     if part.name != name or any(one.name == name for one in EXERCISES):
-        raise PartError("exercise", name, "registered under its own name, which must be free")
+        raise PartError("exercise", name, "registered under its own name, which no other exercise has")
     return part
 
 
@@ -37,14 +37,14 @@ def register_exercise(exercise: Exercise, *, replace: bool = False) -> Exercise:
 
 
 def chosen(names: tuple[str, ...], *, is_composed: bool) -> tuple[Exercise, ...]:
-    """Exercises of a way of running, in the order of the table, further ones last.
+    """Exercises for composed sessions or for sessions of processes, in the order of the table, added ones last.
 
     Args:
         names: Names of the exercises; empty for all.
         is_composed: Whether all nodes share one process.
 
     Raises:
-        UnknownNameError: An exercise does not exist in this way of running.
+        UnknownNameError: An exercise does not exist for this kind of session.
     """
     further = map(FURTHER.find, FURTHER)
     fitting = [one for one in (*EXERCISES, *further) if is_composed in one.ways]

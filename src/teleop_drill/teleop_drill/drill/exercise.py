@@ -14,14 +14,14 @@ from teleop_drill.drill.numbers import Numbers
 
 
 class Master(Enum):
-    """What moves the hand."""
+    """Kind of operator that moves the hand."""
 
     DEVICE = "the simulated device of the session, a stage like all others"
     DRILL = "the drill itself, which publishes what a device would"
 
 
 class Motion(Enum):
-    """What the arm does under a fault."""
+    """Allowed motion of the arm under a fault."""
 
     RESTS = "it comes to rest by itself"
     HOLDS = "it goes to the last sound command, and stays there as if clutched"
@@ -30,7 +30,7 @@ class Motion(Enum):
 
 
 class Cure(Enum):
-    """What the arm needs to move again."""
+    """Action that the arm needs to move again."""
 
     NOTHING = "by itself"
     RESUME = "resume"
@@ -111,7 +111,7 @@ class Rig(Protocol):
         """Call a service of the slave; returns whether the command was done."""
 
     def commands(self, *names: str) -> list[bool]:
-        """As :meth:`command`, but several commands at once, without waiting for the answers in between."""
+        """Like :meth:`command`, for several commands, without waiting for the answers in between."""
 
     def set(self, node: str, name: str, value: object) -> bool:
         """Set a parameter of a running node; returns whether it was accepted."""
@@ -173,26 +173,26 @@ class Exercise:
         text: Description of the fault.
         inject: Causes the fault; returns when the fault has begun, or is over.
         undo: Removes a fault that lasts.
-        motion: What the arm does during the fault.
+        motion: Allowed motion of the arm during the fault.
         states: Operating states that may follow; None among them: the slave is gone.
         faults: Faults that may be reported; empty for any or none.
-        cures: What the arm may need to move again.
-        master: What moves the hand.
+        cures: Actions that the arm may need before it moves again.
+        master: Kind of operator that moves the hand.
         allowed: Time for which the arm may continue its motion [s] before it must brake.
         stands: Time for which an arm that is expected to keep moving may stand still [s].
-        gap: Time for which commands may be missing that the arm makes up for [s].
-        by_drives: Whether it is the drives that were missing, and make up for what came meanwhile.
-        said: What the arm must have answered, as :meth:`Rig.note` took it; empty: anything.
-        told: Time after which ``slave/operation`` tells the state or the fault [s]; None: never.
-        warns: Whether a node must warn of it in ``diagnostics``.
-        hand_speed: Largest speed of the hand, or of what leads the tip in its place [m/s].
+        gap: Longest gap in the commands after which the arm catches up [s].
+        by_drives: Whether the drives stood still during the gap, and catch up with the setpoints sent meanwhile.
+        said: Text that the arm must have answered, as noted by :meth:`Rig.note`; empty: any.
+        told: Time within which ``slave/operation`` reports the state or the fault [s]; None: never.
+        warns: Whether a node must warn of the fault in ``diagnostics``.
+        hand_speed: Largest speed of the hand, or of the commands that replace it [m/s].
         tool_speed: Largest speed of the tip's setpoint that the exercise sets [m/s].
-        lost: How much of the recording it may cost [s].
-        watch: Time for which it is watched after the injection [s].
-        ways: Which ways of running it makes sense in: True for composed.
-        cuts_recording: Whether its recorder cannot close it.
-        breaks_simulator: Whether it needs the simulated arm, which it breaks.
-        repeats: How often it is done; the worst of all is told.
+        lost: Largest duration that may be missing in the recording [s].
+        watch: Time for which the session is observed after the injection [s].
+        ways: Kinds of sessions to which the exercise applies: True for composed, False for processes.
+        cuts_recording: Whether the fault keeps the recorder from closing the recording.
+        breaks_simulator: Whether the exercise breaks the simulated arm, and so needs it.
+        repeats: Number of repetitions; the worst result is reported.
     """
 
     name: str

@@ -1,6 +1,6 @@
-"""Hand of a drill: a circle at constant speed, and distortions of its samples on the way.
+"""Hand of a drill: moves in a circle at constant speed; its samples can be distorted before they are sent.
 
-The speed is constant, so that what may move legally in a time is known exactly.
+The speed is constant, so that the allowed motion in a given time is known exactly.
 """
 
 import itertools
@@ -20,17 +20,17 @@ RADIUS, ROUND = 0.02, 2.0
 """Radius [m] and time of one round [s] of the circle."""
 SPEED = 2.0 * math.pi * RADIUS / ROUND
 """Speed of the stylus [m/s]."""
-_EASE = 1.0  # it sets in within this time [s]
-_SEED = 1  # of what is lost or scattered at random
+_EASE = 1.0  # time within which the motion reaches full speed [s]
+_SEED = 1  # seed of random losses and scatter
 
 
 @dataclass(frozen=True, eq=False)
 class Sample:
-    """What a master sends.
+    """Samples that a master sends.
 
     Attributes:
         stamp_ns: Stamp [ns].
-        pose: Place [m] in the master's base and quaternion w, x, y, z, shape (7,).
+        pose: Position [m] in the master's base and quaternion w, x, y, z, shape (7,).
     """
 
     stamp_ns: int
@@ -38,7 +38,7 @@ class Sample:
 
 
 class Distortion(Protocol):
-    """What becomes of a sample: the samples that are sent in its place, in their order."""
+    """Function that returns the samples that are sent instead of a sample, in their order."""
 
     def __call__(self, sample: Sample, /) -> list[Sample]:
         """Take one sample."""
@@ -97,7 +97,7 @@ def reordered(count: int) -> Distortion:
 
 
 def replayed(samples: int) -> Distortion:
-    """Send each sample, and after it the one that came a number of samples before, as it was."""
+    """Send each sample, and after it an unchanged copy of the sample that came a fixed number of samples earlier."""
     past: list[Sample] = []
 
     def send(sample: Sample) -> list[Sample]:
@@ -156,7 +156,7 @@ def stamped(change: Callable[[int], int]) -> Distortion:
 
 
 def frozen_stamps() -> Distortion:
-    """Send all samples under the stamp of the first, as a driver whose clock stands still."""
+    """Send all samples with the stamp of the first, like a driver whose clock stands still."""
     first: list[int] = []
 
     def change(stamp_ns: int) -> int:

@@ -1,4 +1,4 @@
-"""Parts of a drill inside the processes under test: a stage that breaks, a clock that is stepped.
+"""Parts of a drill inside the processes under test: a stage that can fail, and a clock that can be stepped.
 
 The processes load this file as a file with own parts, so nodes that no drill has started contain nothing of it. The
 numbers in a file that both sides read control what it does.
@@ -51,12 +51,12 @@ class Control:
 
     @property
     def word(self) -> int:
-        """What the stage does."""
+        """Present order to the stage."""
         return int(_FORM.unpack(self._map)[0])
 
     @property
     def offset_ns(self) -> int:
-        """By how much the clock is off [ns]."""
+        """Offset of the stepped clock [ns]."""
         return int(_FORM.unpack(self._map)[1])
 
     def write(self, word: int = WORKS, offset_ns: int = 0) -> None:
@@ -72,15 +72,15 @@ class Steered(Protocol):
 
     @property
     def word(self) -> int:
-        """What it does."""
+        """Present order to the stage, as a number."""
 
 
 class Passing(RunningStage):
-    """Stage that passes every command on, until it is told to hang or to raise.
+    """Stage that passes on every command, until the control source orders it to hang or to raise an exception.
 
     Attributes:
-        control: Source that decides what it does.
-        sleep: How it waits while it hangs [s].
+        control: Source of the orders to this stage.
+        sleep: Function that waits for some seconds while the stage hangs.
     """
 
     control: Steered | None = None
@@ -120,7 +120,7 @@ class Joints:
         self._before: WeakKeyDictionary[SlaveSim, Array] = WeakKeyDictionary()
 
     def obey(self, slave: SlaveSim, word: int) -> None:
-        """Do what a word says."""
+        """Execute an order, given as a word."""
         friction = slave.parameters["coulomb"]
         if word == STICKS:
             self._before.setdefault(slave, friction.copy())
@@ -181,7 +181,7 @@ def register() -> None:
 
 
 def install() -> None:
-    """Register the stage in a process that a drill has started, and start what the control file asks for."""
+    """Register the stage in a process of the drill, and start the functions that the control file requests."""
     register()
     file = os.environ.get(VARIABLE)
     if file is None:

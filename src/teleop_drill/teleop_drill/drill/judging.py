@@ -68,15 +68,15 @@ class Seen:
     """Messages of one fault that an independent tap received.
 
     Attributes:
-        begin_ns: When the fault began [ns].
-        end_ns: When the fault was removed [ns].
+        begin_ns: Begin of the fault [ns].
+        end_ns: End of the fault [ns].
         setpoint_js: Joint setpoints.
         measured_js: Joints that the slave measures: position, speed, effort.
         true_cp: True pose of the tip, from the plant.
-        told_ns: When ``slave/operation`` first reported a state or a fault [ns]; None if it did not.
-        warned_ns: When a node first warned of something new [ns]; None if none did.
-        scheduling: How late this machine woke the drill during the fault.
-        deaf: For how long the slave's process stood still [s].
+        told_ns: Time at which ``slave/operation`` first reported a state or a fault [ns]; None if it did not.
+        warned_ns: Time of a node's first new warning [ns]; None if none did.
+        scheduling: Lateness of the drill's wake-ups during the fault.
+        deaf: Time for which the slave's process was stopped [s].
     """
 
     begin_ns: int
@@ -90,7 +90,7 @@ class Seen:
     deaf: float = 0.0
 
     def since(self, time_ns: int | None) -> float:
-        """Time from the fault to a moment [s]; infinite to one that never came."""
+        """Time from the fault to another event [s]; infinite if the event never happened."""
         return math.inf if time_ns is None else 1e-9 * (time_ns - self.begin_ns)
 
 
@@ -152,7 +152,7 @@ def _tool(exercise: Exercise, seen: Seen, numbers: Numbers) -> Measured:
 
 
 def _told(exercise: Exercise, seen: Seen, numbers: Numbers) -> Iterator[Measured]:
-    """When the slave reported the fault, and when ``diagnostics`` warned of it."""
+    """Check the times at which the slave reported the fault and ``diagnostics`` warned of it."""
     if exercise.told is not None:
         most = seen.deaf + exercise.told(numbers) + late(seen, numbers)
         text = "slave/operation told after {0:.0f} ms, at most {1:.0f}"
@@ -164,7 +164,7 @@ def _told(exercise: Exercise, seen: Seen, numbers: Numbers) -> Iterator[Measured
 
 
 def _stops(exercise: Exercise, seen: Seen, numbers: Numbers) -> Iterator[Measured]:
-    """The distance to rest, the speed on it, and what follows: rest, or a tip that is held."""
+    """Check the stopping distance, the speed until rest, and that the tip then stays at rest."""
     going = exercise.allowed(numbers) + late(seen, numbers)
     yield _travel_to_rest(exercise, seen, numbers, going)
     yield _speed(exercise, seen, numbers)
@@ -195,7 +195,7 @@ def _travel_to_rest(exercise: Exercise, seen: Seen, numbers: Numbers, going: flo
 
 
 def _rests(exercise: Exercise, seen: Seen, numbers: Numbers, going: float) -> Iterator[Measured]:
-    """When setpoints stand still, and when the tip itself is at rest.
+    """Check the times at which the setpoints stop and the tip is at rest.
 
     Setpoints do not brake if an arm is in FAULT, but its drives must.
     """
@@ -231,7 +231,7 @@ def _held(exercise: Exercise, seen: Seen, numbers: Numbers) -> Measured:
 
 
 def _speed(exercise: Exercise, seen: Seen, numbers: Numbers) -> Measured:
-    """Speed of the tip, which must never exceed the speed that the hand asks for."""
+    """Check the speed of the tip, which must never exceed the speed that the hand commands."""
     moving = seen.true_cp.within(seen.begin_ns, seen.end_ns)
     gap = exercise.gap(numbers) + late(seen, numbers)
     times = numbers.catching_up(gap, by_drives=exercise.by_drives)

@@ -17,7 +17,7 @@ JUST_BEFORE_NS = 11_000_000
 """Time before a given moment in which the present speed is measured [ns]."""
 _SILENT_NS = 100_000_000  # longer than the period of any publisher of the tip
 _SHORT = 10  # samples of which the present speed is taken
-_ROUNDING = 1e-12  # of a step [rad or m]
+_ROUNDING = 1e-12  # rounding error of a step [rad or m]
 _ENOUGH = 41  # samples that decide whether an arm follows
 _MOVING = 0.3  # least share of ticks in which a circling setpoint moves
 _FOLLOWED = 0.1  # least share of the setpoint's path; encoder noise is far less, and a lag does not shorten the path
@@ -28,7 +28,7 @@ class Trace:
     """Messages of one topic as they were sent.
 
     Attributes:
-        sent_ns: When each was sent, shape (N,) [ns].
+        sent_ns: Time of sending of each sample, shape (N,) [ns].
         number: Its number in the sequence of its publisher, shape (N,).
         values: Shape (N, width).
         stamp_ns: Stamp of its header, shape (N,) [ns].
@@ -45,7 +45,7 @@ class Trace:
         return self.only(chosen)
 
     def only(self, chosen: NDArray[np.bool_]) -> "Trace":
-        """Some of them; ``chosen`` has the shape (N,)."""
+        """The samples of the trace that ``chosen`` (N,) selects."""
         return Trace(self.sent_ns[chosen], self.number[chosen], self.values[chosen], self.stamp_ns[chosen])
 
     def __len__(self) -> int:
@@ -60,7 +60,7 @@ def step_ratio(setpoints: Trace, speed_limit: Array, dt: float) -> float:
 
     Args:
         setpoints: Joint setpoints, values (N, n) [rad or m].
-        speed_limit: Of each drive, shape (n,) [rad/s or m/s].
+        speed_limit: Speed limit of each drive, shape (n,) [rad/s or m/s].
         dt: Time from one message to the next [s].
     """
     ticks = np.diff(setpoints.number)
@@ -72,11 +72,11 @@ def step_ratio(setpoints: Trace, speed_limit: Array, dt: float) -> float:
 
 
 def stop_delay(setpoints: Trace, since_ns: int) -> float:
-    """Time from a moment until the setpoint stands still for good [s]; NaN if it never does.
+    """Time from ``since_ns`` until the setpoint has stopped and does not move again [s]; NaN if it never stops.
 
     Args:
         setpoints: Joint setpoints, values (N, n).
-        since_ns: The moment [ns].
+        since_ns: Begin of the measured time [ns].
     """
     after = setpoints.within(since_ns - 20_000_000, np.iinfo(np.int64).max)
     moves = np.any(np.diff(after.values, axis=0) != 0.0, axis=1)
@@ -91,8 +91,8 @@ def travel(places: Trace, since_ns: int, until_ns: int) -> float:
     """Largest distance of the tip from its position at one moment, up to another moment [m]; NaN if unknown.
 
     Args:
-        places: Of the tip, values (N, 3 or more) [m].
-        since_ns: The moment [ns].
+        places: Positions of the tip, values (N, 3 or more) [m].
+        since_ns: Begin of the measured time [ns].
         until_ns: The other [ns].
     """
     before = places.within(since_ns - _BEFORE_NS, since_ns)
@@ -124,7 +124,7 @@ def tip_speed(places: Trace) -> float:
     """Largest speed of the tip over ten samples, by their stamps [m/s]; 0 with fewer samples.
 
     Args:
-        places: Of the tip, values (N, 3 or more) [m].
+        places: Positions of the tip, values (N, 3 or more) [m].
     """
     speeds, _ = _speeds(places)
     return float(np.max(speeds, initial=0.0))
@@ -145,8 +145,8 @@ def rest_delay(places: Trace, since_ns: int, slow: float, until_ns: int) -> floa
     If the pose of the tip is no longer published, it is the time of the last sample.
 
     Args:
-        places: Of the tip.
-        since_ns: The moment [ns].
+        places: Positions of the tip.
+        since_ns: Begin of the measured time [ns].
         slow: The speed [m/s].
         until_ns: End of the observation [ns].
     """
@@ -181,7 +181,7 @@ def ramp(setpoints: Trace, braking: Array, dt: float) -> float:
 
     Args:
         setpoints: Joint setpoints up to rest, values (N, n) [rad or m].
-        braking: Of each drive, shape (n,) [rad/s² or m/s²].
+        braking: Deceleration of each drive, shape (n,) [rad/s² or m/s²].
         dt: Tick [s].
     """
     steps = np.abs(np.diff(setpoints.values, axis=0))
@@ -268,7 +268,7 @@ def braking_way(setpoints: Trace, moment_ns: int, jacobian: Array, braking: Arra
     Args:
         setpoints: Joint setpoints, values (N, n) [rad or m].
         moment_ns: The moment [ns].
-        jacobian: Of the tip, shape (6, n).
+        jacobian: Jacobian of the tip, shape (6, n).
         braking: Deceleration of the drives, shape (n,) [rad/s² or m/s²].
     """
     speeds = joint_speeds(setpoints, moment_ns - JUST_BEFORE_NS, moment_ns)

@@ -51,20 +51,20 @@ class Numbers:
     Attributes:
         robot: The slave.
         gain: Motion of the tip per motion of the hand.
-        speed_limit: Of each joint's drive, shape (n,) [rad/s or m/s].
+        speed_limit: Speed limit of each joint's drive, shape (n,) [rad/s or m/s].
         braking: Deceleration of each drive, shape (n,) [rad/s² or m/s²].
         tool_speed: Largest speed of the tip's setpoint [m/s].
         command_timeout: Silence of commands after which the setpoint brakes [s].
         longest_outage: Silence after which the arm is PAUSED [s].
         longest_silence: Silence of the arm itself that is a fault [s].
-        longest_pause: Silence of the hand after which it is aligned anew [s].
-        hand_timeout: Silence of the hand that lets go of the stylus [s].
+        longest_pause: Silence of the hand after which hand and slave are aligned again [s].
+        hand_timeout: Silence of the hand after which the stylus counts as released [s].
         button_silence: Silence of the buttons that counts as a pressed clutch [s].
         effort_time: Time at the effort limit that is a fault [s].
         pressing_time: Time beyond a joint's limit after which it is reported [s].
         filter_time: Time constant of the reference filter [s]; 0 without.
         coast: Time for which the arm continues at its speed after its setpoint has stopped [s].
-        bandwidth: Of the fastest drive [rad/s].
+        bandwidth: Bandwidth of the fastest drive [rad/s].
     """
 
     robot: Robot
@@ -94,7 +94,7 @@ class Numbers:
         """Speed at which the arm catches up after a gap [s], as a multiple of the hand's speed.
 
         The hand's motion during the gap arrives at once as a step. The filter follows it at an initial speed of step
-        over time constant; after a longer pause hand and slave are aligned anew. If the drives themselves stood still,
+        over time constant; after a longer pause hand and slave are aligned again. If the drives themselves stood still,
         the setpoint moved on without them, and they follow the difference as a step. With a triple pole w and no
         derivative of the setpoint, their speed is at most 0.8 w times the step.
         """
@@ -105,7 +105,7 @@ class Numbers:
 
     @staticmethod
     def of(configuration: Configuration) -> "Numbers":
-        """Those of a session."""
+        """Numbers of a session."""
         given, scaling = configuration.group("slave"), configuration.group("motion_scaling")
         slave, lag = Slave(given), given.reference_filter
         drives = slave.robot.drives

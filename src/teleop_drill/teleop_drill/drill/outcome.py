@@ -12,7 +12,7 @@ _SHORT = 20  # notes that fit beside the state
 
 @dataclass(kw_only=True)
 class Outcome:
-    """One fault and what followed.
+    """One fault and the reaction of the session.
 
     Attributes:
         exercise: The exercise that was run.
@@ -25,7 +25,7 @@ class Outcome:
         recording: State of the recording in words; empty before it has been checked.
         is_recorded: Whether the recording is as expected.
         recovered: Time from the end of the fault until the arm followed again [s]; NaN if never.
-        cure: What the arm needed to follow again.
+        cure: Actions that the arm needed to follow again.
         note: Further remarks.
         load: Load of the machine over its cores, as the fault began.
     """
@@ -84,7 +84,7 @@ class Outcome:
         return f"{text} ({self.note})" if 0 < len(self.note) < _SHORT else text
 
     def to_json(self) -> dict[str, object]:
-        """All of it, in SI units, for a file."""
+        """The whole outcome in SI units, for a file."""
         asked = self.exercise
         return {
             "fault": asked.name, "text": asked.text, "is_passed": not self.failures(),

@@ -33,7 +33,7 @@ class Verdict:
     """State of a recording.
 
     Attributes:
-        text: In words.
+        text: State of the recording in words.
         is_good: Whether the state is as expected.
         is_saved: Whether the recording can be read up to its end, possibly only after ``recover``.
         bag: The recording, or the result of ``recover``, if it can be read.
@@ -50,7 +50,7 @@ def check_recording(path: Path, killed_ns: int | None = None) -> Verdict:
 
     Args:
         path: Its directory.
-        killed_ns: When its writer lost its process or its disk [ns]; None if it was to close it.
+        killed_ns: Time at which the recorder was killed or its disk failed [ns]; None if it could close the file.
     """
     try:
         if killed_ns is None:
@@ -87,12 +87,12 @@ def _saved(path: Path, killed_ns: int) -> Verdict:
 
 
 def missing(bag: Bag, name: str, heard: tuple[Stamps, Stamps]) -> Stamps:
-    """Times [ns] of messages that the drill's tap heard and that are not in the recording.
+    """Times [ns] of messages that the drill's tap received and that are missing in the recording.
 
     Args:
         bag: The recording.
         name: Topic.
-        heard: When each message was sent, and its stamp, both (N,) [ns]; a stamp may come again.
+        heard: Time of sending and stamp of each received message, both (N,) [ns]; stamps may repeat.
     """
     sent_ns, stamps = heard
     if name not in bag.topics or not bag.topics[name].count:
@@ -127,8 +127,8 @@ class Recorded:
         path: Its directory.
         outcomes: Faults during it, each with its begin [ns].
         heard: Messages that the drill's own tap received.
-        until_ns: When it was to end [ns].
-        killed_ns: When its writer lost its process or its disk [ns]; None if it was to close it.
+        until_ns: Planned end of the recording [ns].
+        killed_ns: Time at which the recorder was killed or its disk failed [ns]; None if it could close the file.
     """
 
     path: Path

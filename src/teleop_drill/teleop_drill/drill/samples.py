@@ -18,7 +18,7 @@ from teleop_drill.drill import hand
 from teleop_drill.drill.exercise import Cure, Exercise, Motion, Rig, Time, after, never, outage
 from teleop_drill.drill.hand import Distortion
 
-_FOR = 1.0  # how long a stream is disturbed [s]
+_FOR = 1.0  # duration of the disturbance of a stream [s]
 _AHEAD_NS = 2_000_000_000
 _WATCH = 0.5  # time for which an arm that keeps moving is observed afterwards [s]
 _SLOW = 0.05  # tool speed under which the hand shakes [m/s]

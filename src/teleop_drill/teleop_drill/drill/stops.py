@@ -14,8 +14,8 @@ _SERVICE = 0.02
 """Time in which a service call must reach the arm's loop, through the executors of both sides [s]."""
 _RACE = 0.1
 """Time in which the slave must detect a joint at twice its speed [s]; the drill pushes the joint every 5 ms."""
-_STILL = 0.3  # less than what pauses the arm [s]
-_BEAT = 0.02  # from one message of a stop button to the next [s]
+_STILL = 0.3  # shorter than the silence that pauses the arm [s]
+_BEAT = 0.02  # time between two messages of a stop button [s]
 _REFUSED = "refused"
 _ROUNDS = 2.0  # within this time [s] the circle of the hand has pulled in every direction
 
@@ -26,7 +26,7 @@ def _press(rig: Rig) -> None:
 
 
 def _press_briefly(rig: Rig) -> None:
-    """A press that a short queue would lose: one message, then many that say released.
+    """A press that a short queue would lose: one message with a press, then many with a release.
 
     The process of the slave stands still during this time, so that all these messages wait for it.
     """
@@ -40,7 +40,7 @@ def _press_briefly(rig: Rig) -> None:
 
 
 def _release(rig: Rig) -> None:
-    for _ in range(5):  # a reader on a bad line may miss one
+    for _ in range(5):  # a reader on a bad line may miss a message
         rig.press(is_pressed=False)
         rig.wait(0.01)
 
@@ -56,7 +56,7 @@ def _disable(rig: Rig) -> None:
 
 
 def _miss_heartbeat(rig: Rig) -> None:
-    """Two buttons beat; then one of them alone."""
+    """Two buttons send heartbeats; then only one of them does."""
     for count in range(20):
         for button in (1, 0):
             rig.press(is_pressed=False, button=button)
@@ -82,7 +82,7 @@ def _note_answer(rig: Rig, *, is_taken: bool) -> None:
 def _press_while_masked(rig: Rig) -> None:
     """Press and ask for a reset; then release, and ask for motion without a reset."""
     rig.press(is_pressed=True)
-    rig.wait(0.5)  # until the arm is at rest: before that, enable is refused anyway
+    rig.wait(0.5)  # wait until the arm is at rest, because enable is refused before
     is_taken = rig.command("reset")
     rig.press(is_pressed=False)
     is_taken = rig.command("enable") or rig.command("resume") or is_taken
@@ -90,8 +90,8 @@ def _press_while_masked(rig: Rig) -> None:
 
 
 def _press_two(rig: Rig) -> None:
-    """Press one button, and say with another one that it is released."""
-    rig.press(is_pressed=False, button=1)  # it is known before
+    """Press one button, and publish with a second button that this one is released."""
+    rig.press(is_pressed=False, button=1)  # the slave knows the second button before the press
     rig.press(is_pressed=True)
     rig.wait(0.5)
     rig.press(is_pressed=False, button=1)

@@ -1,4 +1,4 @@
-"""An arm as a stock CRTK client sees it: taps on its topics, and commands to it."""
+"""An arm from the view of an ordinary CRTK client: subscriptions to its topics, and commands to it."""
 
 from collections.abc import Callable
 from typing import Any
@@ -55,7 +55,7 @@ class Tap:
         return count
 
     def drain(self) -> bool:
-        """Keep all waiting messages undecoded; returns whether any message is kept."""
+        """Store all waiting messages undecoded; return whether any message is stored."""
         while (taken := self._taker.take()) is not None:
             self._kept.append((taken.sent_ns, taken.data))
         return bool(self._kept)
@@ -69,7 +69,7 @@ class Arm(Guest):
     """Client of one arm.
 
     Args:
-        namespace: Where its topics are, such as ``/PSM1`` or ``slave``.
+        namespace: Namespace of the arm's topics, such as ``/PSM1`` or ``slave``.
         domain: ROS domain; None for that of the environment.
     world: Middleware and time of the client.
 
@@ -81,7 +81,7 @@ class Arm(Guest):
     """
 
     def __init__(self, namespace: str, domain: int | None = None, world: World = ROS) -> None:
-        for row in CRTK_TOPICS:  # before anything moves
+        for row in CRTK_TOPICS:  # subscribe before the arm moves
             message_type(row.ros_type)
         super().__init__("teleop_conformance", domain, world)
         self._own = f"/{self.ros.get_name()}"
@@ -175,7 +175,7 @@ class Arm(Guest):
         """Publisher of a command, once the arm reads it."""
         row = _BY_NAME[name]
         if row.name not in self._publishers:
-            quality = Qos(is_latched=row.name == "state_command")  # as in the stock client
+            quality = Qos(is_latched=row.name == "state_command")  # the same QoS as in the stock client
             own = self.ros.create_publisher(message_type(row.ros_type), self.path(row.name), quality)
             self._publishers[row.name] = own
             self.wait(lambda: own.get_subscription_count() > 0, 3.0)

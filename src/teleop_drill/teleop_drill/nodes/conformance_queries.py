@@ -33,7 +33,7 @@ def look(arm: Arm, row: CrtkTopic) -> Finding:
 
 
 def _listen(arm: Arm, row: CrtkTopic, ends: list[Endpoint]) -> Finding:
-    """What comes on a topic with publishers of the right type."""
+    """Result for a topic with publishers of the right type."""
     messages: list[Any] = []
     tap = arm.tap(row.name)
     arm.wait(lambda: tap.read(messages.append) > 0, _FIRST)
@@ -58,7 +58,7 @@ def _listen(arm: Arm, row: CrtkTopic, ends: list[Endpoint]) -> Finding:
 
 
 def _stamps(row: CrtkTopic, messages: list[Any], now_ns: int) -> list[str]:
-    """What is wrong with the stamps."""
+    """Text about faults of the stamps."""
     if not hasattr(messages[0], "header"):
         return []
     stamps = [stamp_of(message) for message in messages]
@@ -75,7 +75,7 @@ def _stamps(row: CrtkTopic, messages: list[Any], now_ns: int) -> list[str]:
 
 
 def _content(row: CrtkTopic, messages: list[Any]) -> list[str]:
-    """What is wrong with the numbers, names and words."""
+    """Text about faults of numbers, names and texts."""
     newest = messages[-1]
     if row.name == "operating_state":
         known = ", ".join(STATES)

@@ -14,15 +14,15 @@ from teleop_drill.conformance.crtk_topics import Verdict
 from teleop_drill.nodes.conformance_arm import Arm, numbers_of
 
 TURN = 0.01
-"""How far a joint is moved [rad or m]."""
+"""Distance by which a joint is moved [rad or m]."""
 WAY = 0.003
-"""How far the tip is moved [m]."""
+"""Distance by which the tip is moved [m]."""
 _NEAR = 0.05  # share of the displacement that may be missing at the end
 _MOVED = 0.3  # least share of the displacement that counts as a motion
-_PATIENCE = 10.0  # of a move [s]
+_PATIENCE = 10.0  # longest duration of a move [s]
 _NOTHING = 1.5  # after this time without any motion, none is expected [s]
-_STATE = 3.0  # of a change of state [s]
-_STILL = 1e-4  # joints that moved by less stand still [rad or m]
+_STATE = 3.0  # longest duration of a change of state [s]
+_STILL = 1e-4  # a joint that moved by less counts as at rest [rad or m]
 Outcome = tuple[Verdict, str]
 _OK: Outcome = (Verdict.OK, "")
 
@@ -58,7 +58,7 @@ class Trials:
     # -- where it is -----------------------------------------------------------------------------
 
     def joints(self) -> Array:
-        """Its joints: the setpoint, or the measurement if there is no setpoint."""
+        """Joint positions of the arm: the setpoint, or the measurement if there is no setpoint."""
         name = "setpoint_js" if self.arm.publishers("setpoint_js") else "measured_js"
         return self._fresh(name)["position"]
 
@@ -72,7 +72,7 @@ class Trials:
         tap = self.arm.tap(name)
         self.arm.wait(lambda: tap.read() > 0, 0.5)
         if tap.newest is None and self.arm.newest(name) is None:
-            raise SessionError(f"{self.arm.path(name)} fell silent in the middle: is the arm gone?")
+            raise SessionError(f"{self.arm.path(name)} stopped during the test: has the arm been switched off?")
         return numbers_of(tap.newest)
 
     def go_back(self) -> None:
@@ -175,7 +175,7 @@ class Trials:
         return (Verdict.FAILED, "still busy at its goal") if tap.newest.is_busy else _OK
 
     def _candidates(self, known: tuple[int, float], count: int) -> list[tuple[int, float]]:
-        """Directions to try: only the one that is known to be free, or all."""
+        """Directions to try: the direction that is known to be free, or all if none is known."""
         return [known] if known[0] >= 0 else list(product(range(count), (1.0, -1.0)))
 
     def stream_joints(self, name: str, rate: float, *, is_relative: bool = False) -> Outcome:
@@ -317,4 +317,4 @@ TRIALS: Mapping[str, Callable[[Trials], Outcome]] = {
     "servo_cv": lambda t: t.run_tip("servo_cv"),
     "hold": Trials.hold,
 }
-"""What is tried with each command."""
+"""Trial of each command."""

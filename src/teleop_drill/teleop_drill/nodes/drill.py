@@ -1,4 +1,4 @@
-"""Drill: breaks a running session in one way after the other, and measures what the arm does."""
+"""Drill: injects one fault after the other into running sessions, and measures the reaction of the arm."""
 
 import math
 import sys
@@ -26,7 +26,7 @@ from teleop_drill.nodes.drill_site import Session, Site
 
 _PRIORITY = 30
 _BEFORE = 0.2  # motion that is seen before a fault [s]
-_FOLLOWS = 90.0  # until it follows after the start [s]
+_FOLLOWS = 90.0  # longest time from the start until the arm follows [s]
 _CIRCLE = (
     "operator.kind=circle",
     f"operator.size=[{2 * hand.RADIUS}, 0.0, {2 * hand.RADIUS}]",
@@ -37,7 +37,7 @@ _CIRCLE = (
 )
 _MEASURED = 2.0  # time in which the wake-up delay of this machine is measured [s]
 _STOOD_STILL = 0.5  # share of the command timeout: if the machine stands still that long, a result is not valid
-_MORE = 2  # how often an exercise is repeated for that reason
+_MORE = 2  # number of repetitions of an exercise for that reason
 _STEADY = 4  # checks, a tenth of a second apart, that the arm follows
 Say = Callable[[str], None]
 
@@ -59,9 +59,9 @@ def drill(
     processes on two cores are late even without a fault.
 
     Args:
-        exercises: What is done, as of :func:`teleop_drill.drill.chosen`.
-        folder: Where recordings go.
-        say: Told a line about each.
+        exercises: Exercises to run, from :func:`teleop_drill.drill.chosen`.
+        folder: Folder of the recordings.
+        say: Called with one line about each exercise.
         is_composed: Whether all nodes share one process.
         files: Parameter files over the scenario ``free_motion``.
         texts: Parameters ``key=value`` over all files.
@@ -75,7 +75,7 @@ def drill(
     """
     if is_priority_granted(_PRIORITY):
         texts = (f"real_time.priority={_PRIORITY}", *texts)
-    sys.setswitchinterval(2e-4)  # the drill's own hand must not wait 5 ms for its turn
+    sys.setswitchinterval(2e-4)  # the drill's own hand must not wait 5 ms for the interpreter
     foreign = {SIMULATOR: drives, ARM: arm}
 
     def site(master: Master, made: Configuration, place: Path, interrupt: Interrupt) -> Site:
@@ -98,13 +98,13 @@ def drill_at(
     files: Sequence[Path] = (),
     texts: Sequence[str] = (),
 ) -> list[Outcome]:
-    """As :func:`drill`, at any site.
+    """Run exercises like :func:`drill`, but in sessions of any site.
 
     Args:
         site: Makes the site of each session.
-        exercises: What is done.
-        folder: Where recordings go.
-        say: Told a line about each.
+        exercises: Exercises to run.
+        folder: Folder of the recordings.
+        say: Called with one line about each exercise.
         files: Parameter files over the scenario ``free_motion``.
         texts: Parameters ``key=value`` over all files.
     """
@@ -137,7 +137,7 @@ class _Drill:
         self._counted: dict[Path, Counted] = {}
         self._sessions_of: dict[Path, Session] = {}
         self.interrupt = Interrupt()
-        """What ends a wait of this drill with KeyboardInterrupt."""
+        """Object that ends a wait of this drill with KeyboardInterrupt."""
         self.is_over = False
         """Whether it was stopped before its end."""
 
@@ -172,7 +172,7 @@ class _Drill:
     # -- sessions --------------------------------------------------------------------------------
 
     def _prepared(self) -> LiveRig:
-        """As :meth:`_ready`; if a session cannot continue, a new one is tried once."""
+        """Like :meth:`_ready`; if a session cannot continue, a new one is tried once."""
         if self._rig is None:
             return self._ready()
         try:
@@ -199,7 +199,7 @@ class _Drill:
         return self._rig
 
     def _measure_scheduling(self, rig: LiveRig) -> None:
-        """How late this machine wakes the drill's own thread while the session works."""
+        """Lateness of the wake-ups of the drill's own thread while the session works."""
         since_ns = rig.now_ns()
         rig.wait(_MEASURED)
         found = self._scheduling = rig.tap.scheduling(since_ns)
@@ -216,7 +216,7 @@ class _Drill:
             else:
                 steady = 0
                 rig.session.check()
-                help_on(rig)  # a busy machine may have paused it already
+                help_on(rig)  # a busy machine may already have paused the arm
             rig.wait(0.1)
             if rig.now() > deadline:
                 raise SessionError(f"the slave does not follow: {rig.complaints()}")
@@ -242,7 +242,7 @@ class _Drill:
             try:
                 self._ready()
             except SessionError:
-                break  # what was found stands
+                break  # keep the results so far
             outcome = self._repeated(exercise, rig)
         return outcome
 

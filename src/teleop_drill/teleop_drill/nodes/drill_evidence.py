@@ -8,8 +8,8 @@ from teleop_drill.drill.numbers import Scheduling
 from teleop_drill.drill.outcome import Outcome
 from teleop_drill.nodes.drill_rig import LiveRig
 
-_PATIENCE = 1.0  # for an arm that goes on by itself [s]
-_LONGEST = 60.0  # until an arm follows again, whatever it takes [s]
+_PATIENCE = 1.0  # waiting time for an arm that resumes by itself [s]
+_LONGEST = 60.0  # longest time until an arm follows again [s]
 _STRENGTH = (Cure.NOTHING, Cure.RESUME, Cure.RESET, Cure.RESTART)
 
 
@@ -43,7 +43,7 @@ def seen_of(outcome: Outcome, rig: LiveRig, time_ns: tuple[int, int], scheduling
         outcome: Outcome with the reports.
         rig: The session.
         time_ns: Begin and end of the fault [ns].
-        scheduling: How late this machine was at the start.
+        scheduling: Lateness of this machine at the start.
     """
     begin_ns, end_ns = time_ns
     true_cp, measured_cp, setpoints, joints = rig.tap.traces(
@@ -63,7 +63,7 @@ def _differs(report: dict[str, float], before: dict[str, float]) -> bool:
 
 
 def _is_expected(report: dict[str, float], exercise: Exercise) -> bool:
-    """Whether a report tells the state that an exercise expects."""
+    """Whether a report contains the state that an exercise expects."""
     is_fault = not exercise.faults or Fault(int(report["fault"])) in exercise.faults
     return is_fault and State(int(report["state"])) in exercise.states
 
@@ -83,7 +83,7 @@ def recover(outcome: Outcome, rig: LiveRig) -> None:
 
 
 def help_on(rig: LiveRig) -> Cure:
-    """Do what the arm's state asks for."""
+    """Send the commands that the arm needs in its state."""
     if rig.session.dead():
         rig.session.start()
         return Cure.RESTART

@@ -45,8 +45,8 @@ class LiveRig:
     """A session of processes with the drill's own nodes beside them.
 
     Args:
-        site: Where it is.
-        configuration: What runs.
+        site: Site of the session.
+        configuration: Configuration of the session.
         robot: The slave.
     """
 
@@ -293,7 +293,7 @@ class LiveRig:
         return self.commands(name)[0]
 
     def commands(self, *names: str) -> list[bool]:
-        """As :meth:`command`, but several commands at once, without waiting for the answers in between."""
+        """Like :meth:`command`, for several commands, without waiting for the answers in between."""
         if not all(self._services[name].wait_for_service(_FOUND) for name in names):
             return [False] * len(names)
         asked = [self._services[name].call_async(Trigger.Request()) for name in names]
@@ -315,7 +315,7 @@ class LiveRig:
         return self._answer(client.call_async(request))
 
     def _answer(self, future: Any) -> Any:
-        """What a service answered; None if it did not in time."""
+        """Answer of a service; None if it did not answer in time."""
         deadline = self.now() + _ANSWER
         while not future.done() and (left := deadline - self.now()) > 0.0:
             self._executor.spin_once(left)

@@ -44,12 +44,12 @@ class DrillSession:
     """The nodes of a session in processes that this process has started; it affects no other processes.
 
     Args:
-        configuration: What runs.
-        folder: Where the recordings go.
+        configuration: Configuration of the session.
+        folder: Folder of the recordings.
         env: Environment of the processes.
         observer: Receives the reports of the nodes.
         is_composed: Whether all nodes share one process.
-        master: Who moves the hand.
+        master: Kind of operator that moves the hand.
         foreign: Commands of processes that are none of ours, by name: of drives in the place of
             the simulator, and of the arm that these lead.
 
@@ -232,10 +232,10 @@ class LiveSite:
     """This machine, on a ROS domain of its own.
 
     Args:
-        configuration: What runs.
-        folder: Where recordings and the drill's own file go.
-        master: Who moves the hand.
-        interrupt: What ends a wait of the drill with KeyboardInterrupt.
+        configuration: Configuration of the session.
+        folder: Folder of the recordings and of the drill's own file.
+        master: Kind of operator that moves the hand.
+        interrupt: Object that ends a wait of the drill with KeyboardInterrupt.
         is_composed: Whether all nodes share one process.
         foreign: Commands of processes that are none of ours, by name.
     """

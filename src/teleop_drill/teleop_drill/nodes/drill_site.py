@@ -70,12 +70,12 @@ class Site(Protocol):
     """Where a session is drilled: this machine, or a simulated one.
 
     Attributes:
-        world: As the drill itself sees it.
+        world: World of the drill itself.
         domain: ROS domain.
         is_composed: Whether all nodes share one process.
-        master: Who moves the hand.
-        control: What breaks inside of processes.
-        interrupt: What ends a wait of the drill with KeyboardInterrupt.
+        master: Kind of operator that moves the hand.
+        control: Control of the faults inside the processes.
+        interrupt: Object that ends a wait of the drill with KeyboardInterrupt.
     """
 
     world: World

@@ -34,7 +34,7 @@ STREAMS_HEARD = (SLAVE_SETPOINT_JS, SLAVE_MEASURED_JS, SLAVE_MEASURED_CP, SLAVE_
 _HEARD = (*STREAMS_HEARD, SLAVE_OPERATION, TELEOP_STATE)
 _STAMP = struct.Struct("<iI")
 _DAY_NS = 86_400 * SECOND_NS
-_STAMP_AT = 4  # behind the encapsulation
+_STAMP_AT = 4  # offset of the stamp behind the encapsulation
 _QUEUE = 4000
 _BUTTONS_EVERY = 5
 _FAR_BEHIND = 0.1
@@ -46,7 +46,7 @@ class Tap:
 
     Args:
         owner: Node that owns its topics; no executor serves it.
-        joint_names: Of the slave.
+        joint_names: Joint names of the slave.
         real_time: Priority and other settings of its thread.
         has_hand: Whether it is the master.
 
@@ -64,7 +64,7 @@ class Tap:
         self._heard: dict[str, Heard] = {topic.name: [] for topic in _HEARD}
         self._counted = {topic.name: (array("q"), array("q")) for topic in STREAMS_HEARD}
         self._late: list[tuple[int, float]] = []
-        self._listened_ns = 0  # when it last began to take waiting messages
+        self._listened_ns = 0  # time at which it last began to take waiting messages
         self._subscriptions = [Subscription(owner, t, f"/{t.name}", _QUEUE) for t in _HEARD]
         self._hand = _Hand(owner, self) if has_hand else None
         self._is_running, self._lock = True, self._world.lock()
@@ -111,13 +111,13 @@ class Tap:
         )
 
     def counted(self) -> Counted:
-        """Of every stream: when each message since the start was sent, and its stamp [ns]."""
+        """Time of sending and stamp of each message since the start [ns], by stream."""
         with self._lock:
             both = {n: [np.array(a, np.int64) for a in two] for n, two in self._counted.items()}
         return {name: (sent, stamps) for name, (sent, stamps) in both.items()}
 
     def scheduling(self, since_ns: int) -> Scheduling:
-        """How late this thread was woken since a time [ns]."""
+        """Lateness of this thread's wake-ups since a time [ns]."""
         with self._lock:
             late = [seconds for at_ns, seconds in self._late if at_ns >= since_ns]
         return Scheduling(float(np.median(late)), max(late)) if late else Scheduling()
@@ -170,7 +170,8 @@ class Tap:
             self._listen()
             due += hand.PERIOD
             now = self._now()
-            if due <= now:  # its own work took longer than a period, so the delay says nothing about the machine
+            if due <= now:  # the tap's own work took longer than a period, so its delay does not show the load of the
+                # machine
                 due = now if due < now - _FAR_BEHIND else due
                 continue
             self._world.sleep(due - now)
@@ -186,7 +187,7 @@ class Tap:
                         heard.append((taken.sent_ns, taken.number, taken.data))
 
     def _count(self, name: str, sent_ns: int, data: bytes) -> bool:
-        """Count a message of a stream; False for one that the drill itself has forged."""
+        """Count a message of a stream; return False for a message that the drill itself has forged."""
         if name not in self._counted:
             return True
         if len(data) < _STAMP_AT + _STAMP.size:

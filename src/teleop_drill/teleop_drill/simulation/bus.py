@@ -15,7 +15,7 @@ from teleop_drill.simulation.machine import Process
 from teleop_drill.simulation.scheduler import Scheduler
 
 _SOCKET = 4 << 20
-"""Bytes that can wait for a process that stands still, as in the middleware's profile."""
+"""Bytes that can wait for a process that does not run, as in the middleware's profile."""
 _LEASE_NS = 20_000_000_000
 """Time after which a process that was killed counts as gone [ns]."""
 _GID = 16
@@ -132,7 +132,7 @@ class Bus:
         return self.found_ns(process, entity) <= self.scheduler.now_ns
 
     def found_ns(self, process: Process, entity: Writer | Reader | Service) -> int:
-        """When a process has found an entity of another process, or will find it [ns].
+        """Time at which a process discovers an entity of another process [ns].
 
         Processes first discover each other, which takes long; then they exchange their topics quickly.
         """
@@ -144,7 +144,7 @@ class Bus:
         return self._known[key]
 
     def _met(self, one: Process, other: Process) -> int:
-        """When one process has found another, or will have [ns]."""
+        """Time at which one process discovers another [ns]."""
         pair = one, other
         if pair not in self._meetings:
             both_ns = max(self._born_ns.get(process, 0) for process in pair)

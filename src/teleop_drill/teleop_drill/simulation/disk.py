@@ -1,4 +1,4 @@
-"""Disk: where a simulated process writes its recording, and the thread that does it."""
+"""Disk: the disk to which a simulated process writes its recording, and the thread that writes."""
 
 import errno
 import os
@@ -11,11 +11,11 @@ from teleop_drill.simulation.machine import Process
 from teleop_drill.simulation.scheduler import Strand
 
 _BYTE_NS = 2
-"""What writing a byte takes [ns]."""
+"""Time to write a byte [ns]."""
 
 
 class Jobs:
-    """As of :class:`~teleop_core.bags.background.Jobs`."""
+    """Simulated form of :class:`~teleop_core.bags.background.Jobs`."""
 
     def __init__(self, process: Process, size: int) -> None:
         self._scheduler, self._size = process.machine.scheduler, size
@@ -23,7 +23,7 @@ class Jobs:
         self._waiting: list[Strand] = []
 
     def put(self, job: Any) -> None:
-        """Append, as soon as there is room."""
+        """Append a job as soon as the queue has a free place."""
         while len(self._jobs) >= self._size:
             self._wait()
         self._jobs.append(job)
@@ -52,10 +52,10 @@ class Jobs:
 
 
 class Disk:
-    """As of :class:`~teleop_core.bags.background.Background`, of one process.
+    """Simulated form of :class:`~teleop_core.bags.background.Background`, of one process.
 
     Args:
-        process: Who writes.
+        process: Process that writes.
     """
 
     def __init__(self, process: Process) -> None:
@@ -84,7 +84,7 @@ class Disk:
         return taken
 
     def cut(self, file: BinaryIO, size: int) -> None:
-        """Let a file end after so many bytes, if the disk lets it; raises OSError."""
+        """Truncate a file to ``size`` bytes; raise OSError if the disk has failed."""
         self._insist()
         SYSTEM.cut(file, size)
 

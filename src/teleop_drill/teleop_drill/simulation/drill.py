@@ -30,11 +30,11 @@ class SimulatedSite:
     Args:
         bus: Its middleware.
         owner: Process of the drill.
-        configuration: What runs.
-        folder: Where recordings go.
-        master: Who moves the hand.
-        interrupt: What ends a wait of the drill with KeyboardInterrupt.
-        processes: How the nodes are shared out.
+        configuration: Configuration of the session.
+        folder: Folder of the recordings.
+        master: Kind of operator that moves the hand.
+        interrupt: Object that ends a wait of the drill with KeyboardInterrupt.
+        processes: Distribution of the nodes over processes.
         foreign: Processes that are none of ours, by name.
     """
 
@@ -58,7 +58,7 @@ class SimulatedSite:
         return 0.0
 
     def session(self, observer: Observer) -> SimulatedSession:
-        """Processes of a session, of which an observer hears."""
+        """Processes of a session whose topics an observer receives."""
         graph = self._configuration.graph
         shared = {n: nodes for crew in crews(graph, self._processes) for n, nodes in crew.items()}
         if self.is_composed:  # the recorder too, as of `ros2 run teleop_core teleop_session`
@@ -82,30 +82,30 @@ def simulated_drill(
     drives: Work | None = None,
     arm: Work | None = None,
 ) -> list[Outcome]:
-    """Do exercises on a simulated machine.
+    """Run exercises on a simulated machine.
 
     Args:
-        exercises: What is done, as of :func:`teleop_drill.drill.chosen`.
-        folder: Where recordings go.
-        say: Told a line about each.
-        seed: What everything is drawn from.
-        processes: How the nodes are shared out.
+        exercises: Exercises to run, from :func:`teleop_drill.drill.chosen`.
+        folder: Folder of the recordings.
+        say: Called with one line about each exercise.
+        seed: Seed of everything random.
+        processes: Distribution of the nodes over processes.
         files: Parameter files over the scenario ``free_motion``.
         texts: Parameters ``key=value`` over all files.
-        drives: Drives that the slave leads in place of the simulated ones, such as a bridge;
-            exercises that break the simulator are left out.
-        arm: What the drives lead, such as a model of a controller. It is started before them, and
-            nothing is done to it.
+        drives: Drives that replace the simulated ones, such as a bridge; exercises that break the simulator are left
+            out.
+        arm: Process that the drives command, such as the model of a controller. It is started before the drives, and
+            the drill does not break it.
 
     Raises:
-        ParameterError: There are ``drives`` where all nodes share one process, or an ``arm``
-            without drives.
+        ParameterError: ``drives`` are given although all nodes share one process, or an ``arm`` is given without
+            drives.
         TeleopError: A parameter is wrong, or a session cannot be started.
     """
     if drives is not None and processes is not Processes.NODES:
         raise ParameterError("processes", processes, f"{Processes.NODES} with drives")
     if arm is not None and drives is None:
-        raise ParameterError("arm", arm, "with drives, which lead it")
+        raise ParameterError("arm", arm, "given with drives only, which move the arm")
     both = {"slave_sim": drives, ARM: arm}
     foreign = {name: work for name, work in both.items() if work is not None}
     own = [one for one in exercises if not (drives and one.breaks_simulator)]

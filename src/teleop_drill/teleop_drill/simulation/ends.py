@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from teleop_drill.simulation.bus import Bus
 
 _PUBLISH_NS, _TAKE_NS = 12_000, 900
-"""What the middleware needs to hand a message over, measured with rclpy."""
+"""Time that the middleware needs to hand over a message, measured with rclpy."""
 
 
 def _name_of(kind: Any) -> str:
@@ -37,11 +37,11 @@ class Match:
 
 
 class Writer:
-    """One end of a topic; as of :class:`~teleop_core.middleware.world.Publisher`.
+    """One end of a topic, with the interface of :class:`~teleop_core.middleware.world.Publisher`.
 
     Args:
-        bus: Where it is.
-        process: Whose it is.
+        bus: The simulated middleware.
+        process: Process that owns it.
         node: Name of its node, with the namespace.
         topic: Full name.
         kind: Class of its messages.
@@ -67,7 +67,7 @@ class Writer:
         bus = self._bus
         bus.scheduler.now_ns = now_ns = bus.scheduler.now_ns + _PUBLISH_NS
         self.number += 1
-        # The middleware reads the machine's clock: one that the drill steps is Python's alone.
+        # The middleware reads the machine's clock; the clock that the drill steps is used only by Python code.
         taken = Taken(data, self.sender, self.number, now_ns + self._clock.ahead_ns(now_ns), 0)
         self.history.append(taken)
         if self.topic in bus.seen:
@@ -90,8 +90,8 @@ class Reader:
     """Other end of a topic; as of :class:`~teleop_core.middleware.world.Taker`.
 
     Args:
-        bus: Where it is.
-        process: Whose it is.
+        bus: The simulated middleware.
+        process: Process that owns it.
         kind: Class of its messages.
         topic: Full name.
         qos: Its quality.
@@ -166,14 +166,14 @@ class Reader:
             self._bus.scheduler.at(came_ns, self.tell)
 
     def wake_up(self, since_ns: int, room: int) -> int:
-        """Keep of what came to a process that stood still what its socket took.
+        """Keep, of the messages that arrived while the process did not run, only those for which its socket had room.
 
         Args:
-            since_ns: Since when it stood still [ns].
-            room: Bytes that the socket still takes.
+            since_ns: Time from which on the process did not run [ns].
+            room: Free bytes of the socket.
 
         Returns:
-            The room that is left.
+            The remaining free bytes.
         """
         now_ns, kept, lost = self._bus.scheduler.now_ns, deque[tuple[int, int, Taken]](), []
         for entry in self.coming:
@@ -195,9 +195,9 @@ class Service:
     """Service of a node.
 
     Args:
-        process: Whose it is.
-        answer: Told a request; has the answer sent.
-        born_ns: When it was made [ns].
+        process: Process that owns it.
+        answer: Called with a request; sends the answer.
+        born_ns: Time at which it was made [ns].
     """
 
     def __init__(self, process: Process, answer: Callable[[Any, Callable[[Any], None]], object], born_ns: int) -> None:

@@ -13,10 +13,10 @@ if TYPE_CHECKING:
 
 
 class SimulatedSteering:
-    """As of :class:`~teleop_drill.nodes.drill_site.Steering`.
+    """Simulated form of :class:`~teleop_drill.nodes.drill_site.Steering`.
 
     Args:
-        machine: Where the processes are.
+        machine: Machine of the processes.
 
     Attributes:
         session: The processes.
@@ -49,7 +49,7 @@ class SimulatedSteering:
                 process.clock = replace(self._machine.clock, offset_ns=offset_ns)
 
     def _look(self) -> None:
-        """Let the joints of the simulated arm do what they are told."""
+        """Pass the drill's orders on to the joints of the simulated arm."""
         scheduler = self._machine.scheduler
         node = None if self.session is None else self.session.node("slave_sim")
         if node is not None and node.stage is not None:

@@ -1,4 +1,4 @@
-"""Laws: conditions that must be true whatever goes wrong, checked by an observer of the whole machine."""
+"""Laws: conditions that must hold under any faults, checked by an observer of the whole machine."""
 
 import math
 import re
@@ -29,7 +29,7 @@ _NO_DISK = "cannot be written"
 _SAFE = re.compile(r"the first [\d.]+ s \((\d+) of \d+ messages\)")
 _SLACK = 1e-6
 _CURVED = 1e-2
-"""Share by which the tip's way in a tick exceeds that of joints whose steps were shortened."""
+"""Share by which the tip's displacement in a tick may exceed the one computed from shortened joint steps."""
 _TELL = 0.3
 """Time within which a new state is reported to the operator [s]; only time in which the arm works counts."""
 _OBEY = 0.1
@@ -57,7 +57,7 @@ class Broken:
     Attributes:
         law: Its name.
         at: When, from the time at which the arm followed [s].
-        text: What happened.
+        text: Description of the breach.
     """
 
     law: str
@@ -80,9 +80,9 @@ class Laws:
 
     Attributes:
         broken: First breach of each law.
-        looks: How often each law was looked at.
-        in_force: Kinds of the faults that are in force.
-        under: How often each law was looked at while a fault met a state of the arm.
+        looks: Number of checks of each law.
+        in_force: Kinds of the present faults.
+        under: Number of checks of each law by present fault and state of the arm.
     """
 
     def __init__(self, stage: Stage, numbers: Numbers) -> None:
@@ -102,7 +102,7 @@ class Laws:
         self._slave: Any = None
         self._process: Process | None = None
         self._worked = 0.0
-        """Time for which the slave has worked [s]: it does nothing while it stands still."""
+        """Time for which the slave's process has run [s], without the time in which it was stopped."""
         self._seen_state, self._since = -1, 0.0
         self._offset_ns = self._stepped_ns = self._old = 0
         self._resting_since: float | None = None
@@ -111,8 +111,8 @@ class Laws:
         """Newest press that is not in force: its button, and whether it was sent to the slave."""
         self._obey_by, self._was_idle = 0.0, False
         self._presses = 0
-        self._sent_ns: dict[bytes, list[int]] = {}  # of each publisher
-        """When setpoints were sent, by the system's clock [ns]."""
+        self._sent_ns: dict[bytes, list[int]] = {}  # times of sending, by publisher
+        """Times at which setpoints were sent, by the system's clock [ns]."""
         stage.bus.seen[f"/{SLAVE_SETPOINT_JS.name}"] = self._judge_setpoint
         self._scheduler.at(0, self._look)
 
@@ -140,7 +140,7 @@ class Laws:
         if self._last is not None and self._last[2] is process:
             step = np.abs(q - self._last[0])
             self._judge_speed(step, math.dist(tip, self._last[1]))
-            if slave.row["command_status"] == CommandStatus.FRESH:  # else it may brake still
+            if slave.row["command_status"] == CommandStatus.FRESH:  # otherwise the slave may still brake
                 self._judge_age(found[0], bool(step.any()))
         self._last, self._stage.setpoint = (q, tip, process), q
 
@@ -170,7 +170,7 @@ class Laws:
             self._moved_at = self._worked
 
     def _judge_age(self, stamp_ns: int, moves: bool) -> None:
-        """No command is followed long after it was given, such as one that waited in a queue."""
+        """Check that the slave does not follow old commands, such as commands that waited in a queue."""
         offset_ns = self._stage.machine.clock.ahead_ns(self._scheduler.now_ns)
         if abs(offset_ns - self._offset_ns) > _LOOK_NS:
             self._offset_ns, self._stepped_ns = offset_ns, self._scheduler.now_ns
@@ -181,7 +181,7 @@ class Laws:
             return
         self._count("age")
         master: Any = self._stage.session.node("haptic_master")
-        # A process that started with another clock keeps stamping by it.
+        # A process that started with another clock continues to use it for its stamps.
         epoch_ns = getattr(master, "epoch_ns", offset_ns)
         age = 1e-9 * (self._scheduler.now_ns + epoch_ns - stamp_ns)
         self._old = self._old + 1 if age > _OLD + self._late() else 0
@@ -199,7 +199,7 @@ class Laws:
         if slave is not self._slave:
             self._slave, self._seen_state, self._press = slave, -1, None
             self._presses = len(stage.presses)
-            for button in stage.held:  # this slave has never heard of it
+            for button in stage.held:  # this slave never received a message of the button
                 self._press, self._obey_by = (button, False), math.inf
         works = slave is not None and slave.stage is not None and slave.is_at_work
         if works and process is not None and not process.is_stopped:
@@ -256,21 +256,21 @@ class Laws:
             self._break("stop", f"no stop is in force, although {since} long enough ago")
 
     def _late(self) -> float:
-        """What the machine itself may add [s]: bad lines, and processors that are busy with other work."""
+        """Delay that the machine itself may add [s]: bad lines, and busy processors."""
         lines = self._stage.bus.lines.values()
         on_the_way = max((line.delay + 20.0 * line.jitter for line in lines), default=0.0)
         lost = 0.2 * any(line.loss for line in lines)
         return on_the_way + lost + 20e-9 * self._scheduler.costs.crowd_ns + 0.05
 
     def _judge_ends(self) -> None:
-        """No process ends that was not told to."""
+        """Check that no process ends without an order to end."""
         self._count("ends")
         for process in self._stage.session.running.values():
             if process.is_dead and process not in self._stage.killed:
                 self._stage.killed.add(process)
                 said = [one.text for one in self._stage.machine.log if one.level in _BAD]
                 if process in self._stage.lost_disk and _NO_DISK in "".join(said[-1:]):
-                    continue  # what it has saved is judged at the end
+                    continue  # the end of the session checks what the recorder has saved
                 self._break("ends", f"{process.name} has ended: {' '.join(said[-1:])[-300:]}")
 
     def _judge_queues(self) -> None:
@@ -289,7 +289,7 @@ class Laws:
     # -- at the end ------------------------------------------------------------------------------
 
     def judge_recording(self, path: Path, told: Mapping[str, str]) -> None:
-        """Sent messages are recorded or counted as lost; if the disk failed, this applies to saved messages.
+        """Check that all sent messages (all saved ones if the disk failed) are recorded or counted as lost.
 
         Args:
             path: A recording whose recorder was not killed, while no clock was stepped.
@@ -302,14 +302,14 @@ class Laws:
             return
         if saved is not None:
             path, count = recover(path)
-            if count < saved:  # a last chunk, whole but for its index, is found as well
+            if count < saved:  # a last chunk that lacks only its index is found as well
                 self._break("recorded", f"{saved} messages were said to be safe, {count} are")
         kept_ns = Bag(path).read(SLAVE_SETPOINT_JS).log_ns
         parts = [np.array(times) for times in self._sent_ns.values()]
         if self._stage.kills:
             if told.get("cut_feeds") == "0":
                 self._break("recorded", "a process was killed, and the recorder does not say so")
-            for k, part in enumerate(parts[:-1]):  # what waited in it is lost with it
+            for k, part in enumerate(parts[:-1]):  # messages in its queue are lost with the process
                 last_ns = np.max(kept_ns[kept_ns <= part[-1]], initial=0)
                 parts[k] = part[part <= last_ns]
         sent_ns = np.concatenate(parts)

@@ -39,16 +39,16 @@ _WORDS = {
 
 
 class SimulatedLifecycleNode(SimulatedNode):
-    """As of :class:`~teleop_core.middleware.world.LifecycleNode`.
+    """Simulated form of :class:`~teleop_core.middleware.world.LifecycleNode`.
 
     Args:
-        bus: Where it is.
-        process: Whose it is.
-        name: What it is called.
-        hooks: What it does in its transitions.
+        bus: The simulated middleware.
+        process: Process that owns it.
+        name: Name of the node.
+        hooks: Functions that its transitions call.
         given: Parameters of its file.
         values: Parameters over those.
-        namespace: Where its names are.
+        namespace: Namespace of the node.
     """
 
     def __init__(

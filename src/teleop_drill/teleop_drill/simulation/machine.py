@@ -18,7 +18,7 @@ class Clock:
 
     Attributes:
         offset_ns: Error of the clock [ns].
-        drift: How much faster the clock runs than real time, as a share.
+        drift: Rate of the clock minus that of real time, as a share.
     """
 
     offset_ns: int = 0
@@ -44,8 +44,8 @@ class Process(Turns):
     """Process of a machine.
 
     Args:
-        machine: Where it is.
-        name: What it is called.
+        machine: Machine of the process.
+        name: Name of the process.
         work: Its main thread; what it returns is the exit code.
 
     Attributes:
@@ -60,11 +60,11 @@ class Process(Turns):
         self.room: int | None = None
         """Bytes that it may still write; None for no limit."""
         self.disk_delay = 0.0
-        """What each of its writes waits for the disk [s]."""
+        """Time that each write of the process waits for the disk [s]."""
         self.disk_error = 0
         """Number of the error that its writes meet; 0: none."""
         self.due: list[deque[Callable[[], object]]] = []
-        """What waits for each of its executors."""
+        """Requests that wait for each executor of the process."""
         self.lines: list[SocketEnd] = []
         self.listeners: list[Listener] = []
         self.on_end: list[Callable[[bool], None]] = []
@@ -112,7 +112,7 @@ class Process(Turns):
 
 
 class Listener:
-    """As of :class:`~teleop_core.middleware.world.Listener`."""
+    """Simulated form of :class:`~teleop_core.middleware.world.Listener`."""
 
     def __init__(self, machine: "Machine", place: str) -> None:
         self._machine, self._place = machine, place
@@ -128,7 +128,7 @@ class Listener:
 
 
 class SocketEnd:
-    """As of :class:`~teleop_core.middleware.world.Line`."""
+    """Simulated form of :class:`~teleop_core.middleware.world.Line`."""
 
     def __init__(self) -> None:
         self.came = bytearray()
@@ -166,11 +166,11 @@ class Machine:
     """One computer.
 
     Attributes:
-        scheduler: Its time.
-        clock: Its system's clock, of the processes that do not have one of their own.
-        processes: All that ever were, in their order.
+        scheduler: Simulated time of the machine.
+        clock: System clock, for all processes without their own clock.
+        processes: All processes that were ever started, in their order.
         places: Listeners by address.
-        log: What nodes have said.
+        log: Log lines of the nodes.
     """
 
     scheduler: Scheduler
@@ -207,13 +207,13 @@ class Machine:
         return found[0]
 
     def outsider(self, name: str) -> Process:
-        """Process of an outside caller that lets time pass, such as a test."""
+        """Process of a caller outside of the simulation that advances the time, such as a test."""
         process = Process(self, name, lambda: 0)
         self.processes.append(process)
         return process
 
     def fail(self, process: Process, error: BaseException) -> None:
-        """Note what has ended a process that nobody expected."""
+        """Note the unexpected error that has ended a process."""
         text = "".join(traceback.format_exception(error))
         self.log.append(Said(self.scheduler.now_ns, process.name, "fatal", text))
 
@@ -229,7 +229,7 @@ class Machine:
         return near
 
     def listen(self, process: Process, place: str) -> Listener:
-        """Listen at a place; raises OSError if another one does."""
+        """Listen at an address; raise OSError if another process already listens there."""
         if place in self.places:
             raise OSError(place)
         self.places[place] = listener = Listener(self, place)

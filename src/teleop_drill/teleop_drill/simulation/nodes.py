@@ -14,7 +14,7 @@ from teleop_drill.simulation.scheduler import Strand
 
 
 class SimulatedExecutor:
-    """As of :class:`~teleop_core.middleware.world.Executor`."""
+    """Simulated form of :class:`~teleop_core.middleware.world.Executor`."""
 
     def __init__(self, process: Process) -> None:
         self._scheduler = process.machine.scheduler
@@ -32,7 +32,7 @@ class SimulatedExecutor:
         self.wake()
 
     def spin_once(self, timeout_sec: float | None = None) -> None:
-        """Serve one thing, or none within the time [s]."""
+        """Serve one request, or none if none comes within the time [s]."""
         if not self._due:
             self._waiting = self._scheduler.current
             self._scheduler.wait(timeout_sec)
@@ -51,7 +51,7 @@ class SimulatedExecutor:
 
 
 class Timer:
-    """As of :class:`~teleop_core.middleware.world.Timer`."""
+    """Simulated form of :class:`~teleop_core.middleware.world.Timer`."""
 
     def __init__(self, node: "SimulatedNode", period: float, callback: Callable[[], None]) -> None:
         self._node, self._callback = node, callback
@@ -83,7 +83,7 @@ class Timer:
 
 
 class Guard:
-    """As of :class:`~teleop_core.middleware.world.Guard`."""
+    """Simulated form of :class:`~teleop_core.middleware.world.Guard`."""
 
     def __init__(self, node: "SimulatedNode", callback: Callable[[], None]) -> None:
         self._node, self._callback, self._is_due = node, callback, False
@@ -102,7 +102,7 @@ class Guard:
 
 
 class Answer:
-    """What a service will have answered: the part of a future that callers use."""
+    """Future answer of a service, with the methods of a future that callers use."""
 
     def __init__(self) -> None:
         self._told: list[Callable[[Answer], None]] = []
@@ -114,22 +114,22 @@ class Answer:
         return self._is_done
 
     def result(self) -> Any:
-        """What it was."""
+        """The answer."""
         return self._value
 
     def add_done_callback(self, told: Callable[["Answer"], None]) -> None:
-        """Have somebody told when it is there."""
+        """Call a function when the answer has arrived."""
         self._told.append(told)
 
     def set(self, value: Any) -> None:
-        """It is there."""
+        """Set the answer, and call the waiting functions."""
         self._value, self._is_done = value, True
         for told in self._told:
             told(self)
 
 
 class Client:
-    """As of :class:`~teleop_core.middleware.world.Client`."""
+    """Simulated form of :class:`~teleop_core.middleware.world.Client`."""
 
     def __init__(self, node: "SimulatedNode", name: str) -> None:
         self._node, self.srv_name = node, name
@@ -169,7 +169,7 @@ class Client:
 
 
 class Log:
-    """As of :class:`~teleop_core.middleware.world.Log`; kept by the machine."""
+    """Log with the interface of :class:`~teleop_core.middleware.world.Log`; the machine stores its lines."""
 
     def __init__(self, node: "SimulatedNode") -> None:
         self._node = node
@@ -184,13 +184,13 @@ class Log:
 
 
 class SimulatedNode:
-    """As of :class:`~teleop_core.middleware.world.Node`.
+    """Simulated form of :class:`~teleop_core.middleware.world.Node`.
 
     Args:
-        bus: Where it is.
-        process: Whose it is.
-        name: What it is called.
-        namespace: Where its names are.
+        bus: The simulated middleware.
+        process: Process that owns it.
+        name: Name of the node.
+        namespace: Namespace of the node.
     """
 
     def __init__(self, bus: Bus, process: Process, name: str, namespace: str = "", **_: object) -> None:
@@ -205,15 +205,15 @@ class SimulatedNode:
         return f"{self._namespace.rstrip('/')}/{self._name}"
 
     def get_name(self) -> str:
-        """Its name."""
+        """Name of the node."""
         return self._name
 
     def get_namespace(self) -> str:
-        """Its namespace, with a slash before it."""
+        """Namespace of the node, with a leading slash."""
         return self._namespace
 
     def get_logger(self) -> Log:
-        """Its log."""
+        """Log of the node."""
         return self._log
 
     def resolve_topic_name(self, name: str) -> str:
@@ -244,7 +244,7 @@ class SimulatedNode:
 
         def told() -> None:
             nonlocal turns
-            if qos.keeps_all or turns < qos.depth:  # no turn for what the queue has lost
+            if qos.keeps_all or turns < qos.depth:  # messages that the queue has lost need no turn
                 turns += 1
                 self.post(hand_over)
 

@@ -12,9 +12,9 @@ from teleop_drill.simulation.machine import Process
 _TOPIC, _SLAVE = f"/{SLAVE_SERVO_JP.name}", "/slave"
 _STAMP = struct.Struct("<4xiI")
 _SLACK_NS = 10_000_000
-"""By how much two looks at a clock, or two turns, may differ [ns]."""
+"""Tolerance for the time between two readings of a clock, or between two turns of a loop [ns]."""
 _SILENCE_NS = round(1e9 * NodeParameters().owner_silence) - _SLACK_NS
-"""Silence of the commanding sender after which another one may command."""
+"""Silence of the commanding sender after which another sender may command."""
 _STREAM = 3
 """Commands in a row that nothing else may interrupt."""
 
@@ -23,17 +23,17 @@ class Owner:
     """Detects whether two senders command an arm at the same time.
 
     Args:
-        bus: The middleware, whose commands it notes.
+        bus: The middleware, whose commands are observed.
         timeout: Silence after which a stream no longer commands the arm [s].
 
     Attributes:
-        followed_ns: When a setpoint followed another command than the one before [ns].
+        followed_ns: Time at which a setpoint last followed a new command [ns].
     """
 
     def __init__(self, bus: Bus, timeout: float) -> None:
         self._bus, self._timeout_ns = bus, round(1e9 * timeout) - _SLACK_NS
-        self._senders: dict[int, bytes] = {}  # who sent the command of a stamp
-        self._silences: dict[int, int] = {}  # for how long the leader was silent before it [ns]
+        self._senders: dict[int, bytes] = {}  # sender of the command with a stamp
+        self._silences: dict[int, int] = {}  # silence of the leader before each change of the leader [ns]
         self._heard_ns: dict[bytes, int] = {}
         self._process: Process | None = None
         self._forget(None)
@@ -44,10 +44,10 @@ class Owner:
         self._stamp_ns = self._new_ns = self.followed_ns = self._in_row = 0
 
     def judge(self, process: Process | None, stamp_ns: int, *, is_driven: bool) -> str:
-        """Error in who commands the arm, in words; empty if there is none.
+        """Text about an error in the ownership of the arm; empty if there is none.
 
         Args:
-            process: Whose setpoint it is.
+            process: Process of the setpoint.
             stamp_ns: Stamp of the command that it follows [ns].
             is_driven: Whether a speed command moves the arm.
         """

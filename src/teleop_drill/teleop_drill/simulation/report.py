@@ -13,15 +13,15 @@ from teleop_drill.simulation.stage import NO_STATE
 
 @dataclass
 class Coverage:
-    """Schedules that were run so far.
+    """Counts of the schedules that were run so far.
 
     Attributes:
-        sessions: How many schedules were run.
+        sessions: Number of schedules that were run.
         seconds: Simulated time [s].
-        met: How often each fault met each state of the arm.
-        looks: How often each law was looked at.
-        under: The same while a fault met a state of the arm.
-        broken: How many schedules broke each law.
+        met: Number of times that each fault happened in each state of the arm.
+        looks: Number of checks of each law.
+        under: Number of checks of each law by present fault and state of the arm.
+        broken: Number of schedules that broke each law.
     """
 
     sessions: int = 0
@@ -67,7 +67,7 @@ class Coverage:
         }
 
     def lines(self) -> list[str]:
-        """What was found, in a few lines."""
+        """Result in a few lines."""
         laws = [f"{law}: {self.looks[law]} looks, {self.broken[law]} broken" for law in self.looks]
         return [f"{self.sessions} sessions of {self.seconds:.0f} s in all", *sorted(laws)]
 
@@ -78,7 +78,7 @@ def told(found: Found, shortest: Found, law: str) -> list[str]:
     Args:
         found: The schedule as it was drawn.
         shortest: The faults that are needed to break the law.
-        law: Which law.
+        law: Name of the law.
     """
     (one,) = (broken for broken in shortest.broken if broken.law == law)
     kept = ",".join(str(found.faults.index(fault)) for fault in shortest.faults)

@@ -1,4 +1,4 @@
-"""Scheduler: simulated time, and the strands that take turns in it.
+"""Scheduler: simulated time, and the strands that run in it, one at a time.
 
 A strand is a thread of a simulated process. One runs at a time, until it waits: for time, for a
 lock, for a message. Strands of one process share its interpreter, so that they exclude each other;
@@ -14,9 +14,9 @@ from typing import Any
 from greenlet import GreenletExit, getcurrent, greenlet
 
 BEGIN_NS = 1_000_000_000_000
-"""Where monotonic clocks begin [ns]."""
+"""First value of monotonic clocks [ns]."""
 EPOCH_NS = 1_800_000_000_000_000_000
-"""How far the system's clocks are ahead of the monotonic clocks [ns]."""
+"""Offset of the system's clocks from the monotonic clocks [ns]."""
 _LOOK_NS = 60
 """Cost of reading a clock [ns], so that time passes in a loop that only reads the clock."""
 _BREAK_NS = 1_000_000
@@ -28,10 +28,10 @@ class Deadlock(Exception):  # noqa: N818
 
 
 class Costs:
-    """How long things take, in nanoseconds.
+    """Durations of all operations [ns].
 
     Args:
-        random: Where it is drawn from.
+        random: Random generator of the durations.
     """
 
     def __init__(self, random: Random) -> None:
@@ -61,13 +61,13 @@ class Strand:
     """Thread of a process.
 
     Args:
-        scheduler: Who lets it run.
-        process: Whose it is.
-        name: Of the thread.
-        work: What it does.
+        scheduler: Scheduler of the strand.
+        process: Process that owns the strand.
+        name: Name of the thread.
+        work: Function that the strand runs.
 
     Attributes:
-        error: What ended it, if that was an error.
+        error: Error that ended the strand; None if it ended without an error.
     """
 
     _numbers = count(1)
@@ -110,16 +110,16 @@ class Strand:
 
 
 class Turns:
-    """What the scheduler knows of a process."""
+    """The scheduler's data about a process."""
 
     def __init__(self) -> None:
-        self.busy_ns = 0  # until when its interpreter works
+        self.busy_ns = 0  # time until which its interpreter is busy
         self.is_dead = self.is_stopped = False
         self.parked: list[tuple[Strand, int, bool]] = []
 
 
 class Lock:
-    """As of :class:`~teleop_core.middleware.world.Lock`."""
+    """Simulated form of :class:`~teleop_core.middleware.world.Lock`."""
 
     def __init__(self, scheduler: "Scheduler") -> None:
         self._scheduler, self._waiting = scheduler, list[Strand]()
@@ -155,14 +155,14 @@ class Scheduler:
     """Simulated time.
 
     Args:
-        seed: What everything is drawn from.
-        breaks: Share of the looks at a clock at which the interpreter passes to another thread.
+        seed: Seed of everything random.
+        breaks: Share of the clock readings after which the interpreter switches to another thread.
 
     Attributes:
-        now_ns: Time, as monotonic clocks have it [ns].
+        now_ns: Monotonic time [ns].
         hub: Greenlet in which the scheduler decides.
-        current: What runs now: a strand, or the creator of the scheduler outside of the simulation.
-        costs: How long things take.
+        current: The running strand, or the creator of the scheduler outside of the simulation.
+        costs: Durations of all operations.
     """
 
     def __init__(self, seed: int, breaks: float = 0.0) -> None:
@@ -187,7 +187,7 @@ class Scheduler:
         return self.now_ns
 
     def look_and_pass(self) -> int:
-        """As :meth:`look_ns`; now and then other threads of the process work before it returns."""
+        """Like :meth:`look_ns`; sometimes other threads of the process run before it returns."""
         if self._breaking.random() < self.breaks and getcurrent() is self.current.greenlet:
             self._switch(self.now_ns + round(_BREAK_NS * self._breaking.random()))
         return self.look_ns()
@@ -204,7 +204,7 @@ class Scheduler:
     def _switch(self, until_ns: int | None) -> bool:
         strand, here = self.current, getcurrent()
         if here is not (self.hub if strand is self._outside else strand.greenlet):
-            raise GreenletExit  # of a simulation that is over, whose strands are thrown away
+            raise GreenletExit  # ends a strand of a simulation that is over
         if until_ns is not None:
             self._push(until_ns, strand, strand.token, False)
         return self._pump() if strand is self._outside else bool(self.hub.switch())
@@ -246,7 +246,7 @@ class Scheduler:
             raise strand.error
 
     def _pump(self) -> bool:
-        """Run the simulation until the thread outside of it goes on; returns whether somebody woke that."""
+        """Run the simulation until the thread outside of it continues; return whether a strand woke that thread."""
         queue, pop = self._queue, heapq.heappop
         while queue:
             time_ns, _, what, token, value = pop(queue)
@@ -269,7 +269,7 @@ class Scheduler:
                 return value
             what.greenlet.switch(value)
             process.busy_ns = self.now_ns + self.costs.turn()
-        raise Deadlock("everything waits for something else")
+        raise Deadlock("deadlock: every process waits for another one")
 
     def _push(self, time_ns: int, what: Any, token: int, value: bool) -> None:
         heapq.heappush(self._queue, (time_ns, next(self._orders), what, token, value))

@@ -15,7 +15,7 @@ from teleop_drill.simulation.stage import Stage
 
 BEGIN, END = 1.0, 9.0
 """Within this time of a session all faults begin [s]."""
-_LONGEST = 3.0  # that one lasts [s]
+_LONGEST = 3.0  # longest duration of a fault [s]
 _NAMES = sorted((*COMMANDS, "release"))
 _LEADS = {"": 8, "disable": 2, "kill": 3, "pause": 4, "press": 2}
 """Commands before a fault, with their weights; states that faults met rarely have larger weights."""
@@ -27,11 +27,11 @@ class Fault:
     """A fault, or an action of a person.
 
     Attributes:
-        at: When it begins, from the time at which the arm follows [s].
-        kind: What it is.
+        at: Begin, relative to the time at which the arm follows [s].
+        kind: Kind of fault.
         where: Process that it affects; empty for all.
-        seconds: How long it lasts.
-        amount: How much of it, from 0 to 1.
+        seconds: Duration [s].
+        amount: Strength of the fault, from 0 to 1.
     """
 
     at: float
@@ -41,7 +41,7 @@ class Fault:
     amount: float
 
     def text(self) -> str:
-        """The same in words."""
+        """Description of the fault in words."""
         where = f" of {self.where}" if self.where else ""
         return f"at {self.at:.3f} s {self.kind}{where} for {self.seconds:.3f} s ({self.amount:.2f})"
 
@@ -57,7 +57,7 @@ def draw(seed: int, processes: tuple[str, ...]) -> tuple[Fault, ...]:
     would meet an ENABLED arm.
 
     Args:
-        seed: What they are drawn from.
+        seed: Seed of the random faults.
         processes: Names of the processes that they may befall.
     """
     random = Random(f"{seed}/schedule")
@@ -73,7 +73,7 @@ def draw(seed: int, processes: tuple[str, ...]) -> tuple[Fault, ...]:
 
 
 def _led(lead: str, at: float, processes: tuple[str, ...]) -> list[Fault]:
-    """What brings the arm into another state."""
+    """Commands that bring the arm into another state."""
     if lead in COMMANDS:
         return [Fault(at, "command", "", 0.1, (_NAMES.index(lead) + 0.5) / len(_NAMES))]
     where = processes[-2] if lead == "kill" else ""  # the slave's: the recorder's is the last
@@ -172,7 +172,7 @@ def _drive(stage: Stage, fault: Fault) -> Callable[[], None]:
 
 
 def _intrude(stage: Stage, fault: Fault) -> Callable[[], None]:
-    """Command joints near the present ones, as another publisher of the same topic."""
+    """Publish joint commands near the present ones, as a second publisher of the same topic."""
     form, drives = layout(SLAVE_SERVO_JP, stage.robot.joint_names), stage.robot.drives
     assert drives is not None
     off = 0.05 * np.sin(np.arange(stage.robot.n) + 10.0 * fault.amount)

@@ -48,14 +48,14 @@ class Found:
     """Result of one schedule.
 
     Attributes:
-        seed: Of everything.
+        seed: Seed of everything random.
         faults: The faults that were injected.
-        processes: How the nodes were shared out.
-        breaks: Share of the looks at a clock at which another thread of the process went on.
+        processes: Distribution of the nodes over processes.
+        breaks: Share of the clock readings after which another thread of the process runs.
         broken: Laws that did not hold.
-        met: How often each fault met each state of the arm.
-        looks: How often each law was looked at.
-        under: The same while a fault of a kind met a state of the arm.
+        met: Number of times that each fault happened in each state of the arm.
+        looks: Number of checks of each law.
+        under: Number of checks of each law by present fault and state of the arm.
         seconds: Simulated time [s].
     """
 
@@ -80,11 +80,11 @@ def run_seed(
     """Run one schedule.
 
     Args:
-        seed: Of the machine, and of the schedule if none is given.
-        faults: The schedule.
-        folder: Where its recording goes; None: nowhere.
-        processes: How the nodes are shared out: by side, or all but the recorder in one.
-        breaks: Share of the looks at a clock at which another thread of the process goes on.
+        seed: Seed of the machine, and of the schedule if no faults are given.
+        faults: Faults of the schedule; None to draw them.
+        folder: Folder of the recording; None for no recording.
+        processes: Distribution of the nodes over processes: by side, or all except the recorder in one.
+        breaks: Share of the clock readings after which another thread of the process runs.
     """
     planned = draw(seed, PROCESSES[processes]) if faults is None else tuple(faults)
     with tempfile.TemporaryDirectory(prefix="drill_") as place:
@@ -94,7 +94,7 @@ def run_seed(
             found: Found = machine.run(
                 lambda owner: _Run(bus, owner, Found(seed, planned, processes, breaks), folder or Path(place)).run()
             )
-        except Exception as error:  # of one schedule, which must not end all others
+        except Exception as error:  # an error in one schedule must not end all others
             at = 1e-9 * (machine.scheduler.now_ns - BEGIN_NS)
             text = "".join(traceback.format_exception(error)[-2:])
             found = Found(seed, planned, processes, breaks, (Broken("runs", at, text),), seconds=at)
@@ -102,7 +102,7 @@ def run_seed(
 
 
 class _Run:
-    """One schedule."""
+    """One running schedule."""
 
     def __init__(self, bus: Bus, owner: Process, found: Found, folder: Path) -> None:
         bus.watch(owner)
@@ -130,7 +130,7 @@ class _Run:
         self._laws.judge_recovery(self._await(_CURED), _CURED)
         self._found.seconds = 1e-9 * (self._scheduler.now_ns - begin_ns)
         for process in self._stage.session.running.values():
-            self._stage.killed.add(process)  # from now on they are told to
+            self._stage.killed.add(process)  # from now on the processes are told to end
         (first, *more), was_killed = self._stage.session.recordings, self._was("kill", "recorder")
         recorder = None if more else self._stage.session.node(RECORDER_NAME)
         self._stage.session.close()
@@ -197,11 +197,11 @@ def run_seeds(
     The choice is made after every :data:`_ROUND` schedules, so that the same call runs the same seeds.
 
     Args:
-        first: Seed of the first schedule, which is run whatever it is.
-        count: How many are run.
-        workers: How many at once; None: one for each core.
-        processes: How the nodes are shared out.
-        breaks: As of :func:`run_seed`.
+        first: Seed of the first schedule, which is always run.
+        count: Number of schedules to run.
+        workers: Number of processes; None: one for each core.
+        processes: Distribution of the nodes over processes.
+        breaks: As in :func:`run_seed`.
     """
     workers = workers or os.cpu_count() or 1
     met: Counter[tuple[str, str]] = Counter()

@@ -23,7 +23,7 @@ from teleop_drill.simulation.machine import Process
 from teleop_drill.simulation.stand_ins import SimulatedWatch, Work, stand_by
 from teleop_drill.simulation.world import SimulatedWorld
 
-_START = 0.4  # of a process, until its node is made [s]
+_START = 0.4  # time from the start of a process until its node is made [s]
 _STARTED = 60.0  # patience with the start [s]
 _ENDED = 10.0  # patience with the end [s]
 _NEVER_NS = 2**62
@@ -36,16 +36,16 @@ Processes = Mapping[str, tuple[str, ...]]
 
 
 class SimulatedSession:
-    """As of :class:`~teleop_drill.nodes.drill_site.Session`.
+    """Simulated form of :class:`~teleop_drill.nodes.drill_site.Session`.
 
     Args:
         bus: The middleware.
         owner: Process of the drill.
-        configuration: What runs.
-        processes: How the nodes are shared out.
-        folder: Where the recordings go.
+        configuration: Configuration of the session.
+        processes: Distribution of the nodes over processes.
+        folder: Folder of the recordings.
         observer: Receives the reports of the nodes.
-        master: Who moves the hand.
+        master: Kind of operator that moves the hand.
         foreign: Processes that are none of ours, by name: drives in the place of the simulator, and
             the arm that these lead.
     """
@@ -68,7 +68,7 @@ class SimulatedSession:
         self.running: dict[str, Process] = {}
         """Newest process of each name."""
         self.crews: dict[Process, Crew] = {}
-        """What works in each process."""
+        """Nodes of each process."""
         self.recordings: list[Path] = []
         self._begun_ns: list[int] = []
         self._bystander: Process | None = None
@@ -238,7 +238,7 @@ def parameters_of(configuration: Configuration, out: str, namespace: str = "") -
     Args:
         configuration: The session.
         out: Directory of the recording.
-        namespace: Where all nodes are, without slashes before and after it.
+        namespace: Namespace of all nodes, without leading and trailing slash.
     """
     content = session_parameters(configuration, out, namespace)
     content.pop(SESSION, None)

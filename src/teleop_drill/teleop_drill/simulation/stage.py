@@ -1,4 +1,4 @@
-"""Stage: a session by side on a simulated machine, with all that a schedule does to it."""
+"""Stage: a session by side on a simulated machine, and the faults and commands that a schedule applies to it."""
 
 from collections.abc import Callable
 from contextlib import suppress
@@ -41,10 +41,10 @@ class Stage:
     Args:
         bus: The middleware.
         owner: Process of the drill.
-        configuration: What runs.
+        configuration: Configuration of the session.
         robot: The slave.
-        folder: Where recordings go.
-        processes: How the nodes are shared out.
+        folder: Folder of the recordings.
+        processes: Distribution of the nodes over processes.
     """
 
     def __init__(
@@ -69,7 +69,7 @@ class Stage:
         self.killed: set[Process] = set()
         """Processes that were told to end."""
         self.kills = 0
-        """How many processes of nodes were killed."""
+        """Number of killed node processes."""
         self.lost_disk: set[Process] = set()
         """Processes that may end because their disk failed, if they report what they have saved."""
         self.stopped: list[tuple[Process, int]] = []
@@ -90,7 +90,7 @@ class Stage:
         self.setpoint: Array = robot.home
         """Newest setpoint of the joints (n,) [rad or m]."""
         self.commanded_ns = 0
-        """When a setpoint followed another command than the one before [ns]."""
+        """Time at which a setpoint last followed a new command [ns]."""
         bus.seen[f"/{SLAVE_OPERATION.name}"] = self._note_operation
         bus.seen[f"/{TELEOP_STATE.name}"] = self._note_state
 
@@ -115,7 +115,7 @@ class Stage:
         return self.session.running[name]
 
     def note_stop(self, process: Process) -> None:
-        """Note that a process stands still from now on."""
+        """Note that a process does not run from now on."""
         self.stopped.append((process, self.machine.scheduler.now_ns))
 
     def fail_disk(self, error: int) -> Callable[[], None]:
@@ -147,7 +147,7 @@ class Stage:
         self._buttons[button].publish(Bool(data=is_pressed))
 
     def found(self, button: int, slave: Process) -> tuple[int, int] | None:
-        """When a button finds a slave, and is found by it [ns]; None before the slave listens."""
+        """Time at which a button and a slave have discovered each other [ns]; None before the slave listens."""
         links = self._buttons[button].links
         times = [(link.writer_knows_ns, link.reader_knows_ns) for link in links if link.reader.process is slave]
         return max(times, default=None)
@@ -167,7 +167,7 @@ class Stage:
         self._speeds.publish(JointState(velocity=speeds.tolist()))
 
     def publish(self, topic: Topic, data: bytes) -> None:
-        """Send bytes on a topic, as another publisher of it."""
+        """Send bytes on a topic, as an additional publisher."""
         if topic.name not in self._publishers:
             kind = message_type(topic.kind.ros_type)
             self._publishers[topic.name] = self._node.create_publisher(kind, f"/{topic.name}", Qos(depth=1))
@@ -181,9 +181,9 @@ class Stage:
     # -- how it goes on --------------------------------------------------------------------------
 
     def help(self) -> None:
-        """Do what the arm's state asks an operator for."""
+        """Send the commands that an operator would send in the arm's state."""
         if self.session.dead():
-            with suppress(SessionError):  # killed again meanwhile: the next help starts it
+            with suppress(SessionError):  # the slave was killed again meanwhile; the next call starts it
                 self.session.start()
             return
         told = self.operation

@@ -22,12 +22,12 @@ class SimulatedWatch:
     """Finds loops that hang, and ends a process that does not end by itself.
 
     Args:
-        world: Where it is.
-        crew: What is watched.
-        process: What ends.
+        world: World of the process.
+        crew: Nodes that are watched.
+        process: Process that is ended.
 
     Attributes:
-        word: What the process is doing.
+        word: Activity of the process.
     """
 
     def __init__(self, world: SimulatedWorld, crew: Crew, process: Process) -> None:
@@ -65,16 +65,16 @@ class SimulatedWatch:
 
 
 Work = Callable[[SimulatedWorld], int]
-"""What a simulated process does: told its world, it returns the exit code."""
+"""Program of a simulated process: gets the process's world, and returns the exit code."""
 
 
 def run_node(world: SimulatedWorld, stage: str, **values: Any) -> int:
-    """Be a process that holds one node, until it is told to end; returns the exit code.
+    """Run one node as the program of a process until it is told to end; return the exit code.
 
     Args:
-        world: Of the process.
+        world: World of the process.
         stage: Name of the node's stage.
-        values: Its parameters, as a parameter file has them.
+        values: Parameters of the node, as in a parameter file.
 
     Raises:
         TeleopError: There is no such stage, or a parameter is wrong.

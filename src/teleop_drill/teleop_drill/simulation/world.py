@@ -17,7 +17,7 @@ _PLACE = "recorder"
 
 
 class SimulatedWorld:
-    """As of :class:`~teleop_core.middleware.world.World`.
+    """Simulated form of :class:`~teleop_core.middleware.world.World`.
 
     Args:
         bus: The middleware.
@@ -70,7 +70,7 @@ class SimulatedWorld:
         return self.process.machine.listen(self.process, place)
 
     def feed_place(self) -> str:
-        """Where the recorder of this machine listens."""
+        """Address at which the recorder of this machine listens."""
         return _PLACE
 
     def node(self, name: str, **options: Any) -> SimulatedNode:
@@ -87,8 +87,8 @@ class SimulatedWorld:
         return SimulatedExecutor(self.process)
 
     def guest(self, domain: int | None = None) -> "SimulatedWorld":
-        """The same world: there is one domain."""
+        """This world, because the simulation has a single domain."""
         return self
 
     def shutdown(self) -> None:
-        """Leave the middleware: the end of the process does it."""
+        """Does nothing: the simulated process leaves the middleware when it ends."""

@@ -102,11 +102,11 @@ def calibrate(
         measured: Points or distances of the tip, as of :func:`read_measured`.
         fit: "all" link errors, joint "offsets", or names such as ["d3", "theta2"].
         finds_frame: Whether points are in a frame with an unknown pose, like those of a tracker.
-        keeps_all: Whether errors stay that are not told from zero.
+        keeps_all: Whether errors are kept that do not differ significantly from zero.
 
     Raises:
         ParameterError: The robot is no chain.
-        UnknownNameError: ``fit`` names what is no link error.
+        UnknownNameError: ``fit`` contains a name that is no link error.
         CalibrationError: Too few poses, errors that cannot be distinguished, or no convergence.
     """
     model = Model.of(robot)
@@ -133,12 +133,12 @@ def simulate(
         poses: Number of measured poses.
         noise: Standard deviation of a tracker on each axis [m], or "ruler" for a ruler with 0.5 mm divisions that
             measures along one axis after the other.
-        errors: Tolerances and values as of :func:`~teleop_lab.calibration.simulate.true_errors`;
-            None for "cnc", of the rcrt1 with the published offset of d3.
+        errors: Tolerances and values for :func:`~teleop_lab.calibration.simulate.true_errors`; None for "cnc", and for
+            the rcrt1 also the published offset of d3.
         fit: As in :func:`calibrate`; None for "all", or for "offsets" with a ruler.
         choose: "optimal" or "random" poses of a tracker.
         finds_frame: Whether the tracker has an unknown frame, which is estimated too.
-        keeps_all: Whether errors stay that are not told from zero.
+        keeps_all: Whether errors are kept that do not differ significantly from zero.
         seed: Seed of poses, errors and noise.
 
     Raises:

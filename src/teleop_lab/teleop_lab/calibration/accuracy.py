@@ -37,7 +37,7 @@ class Accuracy:
     """Errors of the tip before and after a calibration, by axis and in total.
 
     Attributes:
-        where: At which poses, in words.
+        where: Text with the poses at which it was measured.
         before: Spread with the nominal arm.
         after: Spread with the found errors.
     """
@@ -64,7 +64,7 @@ def of_points(errors: Array) -> dict[str, Spread]:
 
 
 def of_distances(errors: Array, labels: tuple[str, ...]) -> dict[str, Spread]:
-    """Spreads of errors (N,) by their labels; the total is of all of them."""
+    """Spreads of errors (N,) for each label, and the total spread of all errors."""
     names = np.array(labels)
     return {name: spread(errors[names == name]) for name in dict.fromkeys(labels)} | {TOTAL: spread(errors)}
 
@@ -124,10 +124,10 @@ class Misread(NamedTuple):
 
 
 def misread(found: Found, measured: Measured) -> Misread | None:
-    """The pose that fits the others least, if it looks misread.
+    """The pose with the largest residual relative to the other poses, if its reading is probably wrong.
 
     Source:
-        Median of magnitudes over 0.6745 in place of a deviation: Hampel 1974.
+        Median of the magnitudes divided by 0.6745, instead of a standard deviation: Hampel 1974.
     """
     rest = np.abs(residuals(found.model, measured, found.vector))
     typical = float(np.median(rest)) / 0.6745

@@ -2,8 +2,8 @@
 
 Ten targets along each axis, 10 mm apart, with the orientation of the tool at home. Along x and z the moves begin at
 home. Along y home lies on the edge of the workspace, so these moves begin 30 mm away from home; the ruler still
-measures from home to the tip. The source does not print directions: -x, +y and +z are those that are reachable (±y
-mirror each other).
+measures from home to the tip. The source does not print the directions; only -x, +y (or its mirror image -y) and +z
+are reachable.
 
 Source:
     Vongbunyong 2008, appendix E.1, tables E.1-E.3.

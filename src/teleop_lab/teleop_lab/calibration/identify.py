@@ -14,7 +14,7 @@ from teleop_lab.calibration.measured import CalibrationError, Measured
 from teleop_lab.calibration.model import FRAME, Model, aligned
 
 LEVEL = 0.95
-"""Of the confidence intervals."""
+"""Level of the confidence intervals."""
 NOT_SURE = "is not told from zero"
 # Largest plausible error of an angle [rad], and of a length as a share of the arm's length.
 _ABSURD = 0.35
@@ -129,7 +129,7 @@ def identify(
         worst_condition: Ratio of singular values above which entries are left out, > 1.
 
     Raises:
-        UnknownNameError: ``fit`` names what is no link error.
+        UnknownNameError: ``fit`` contains a name that is no link error.
         CalibrationError: Too few readings, named entries that cannot be distinguished, or a search that does not end
             near the nominal arm.
     """
@@ -146,7 +146,7 @@ def identify(
         told = "; ".join(f"{entry.name} {entry.reason}" for entry in left)
         raise CalibrationError(f"not identifiable from these {len(measured)} poses: {told}")
     if not kept:
-        raise CalibrationError(f"not identifiable from these {len(measured)} poses: none of {', '.join(names)}")
+        raise CalibrationError(f"none of {', '.join(names)} is identifiable from these {len(measured)} poses")
     _check_count(measured, len(kept))
     found = _solved(model, measured, kept, left)
     return found if is_named or keeps_all else _pruned(found, measured)

@@ -87,7 +87,7 @@ class Measured:
         return len(self)
 
     def part(self, rows: Array) -> "Measured":
-        """Some of the poses, by a mask or by their places."""
+        """A part of the poses, selected by a mask or by indices."""
         at = np.arange(len(self))[rows]
         return Measured(
             joints=self.joints[at],
@@ -174,5 +174,5 @@ def _check_joints(path: Path, joints: Array, robot: Robot) -> None:
     name, low, high = robot.joint_names[i], robot.lower[i], robot.upper[i]
     raise CalibrationError(
         f"{path}: row {row + 1}: {name} is {joints[row, i]:g}, far from its limits {low:.4g} to "
-        f"{high:.4g}; say its unit in the head, such as '{name}_deg' or '{name} [mm]'"
+        f"{high:.4g}; give its unit in the header, such as '{name}_deg' or '{name} [mm]'"
     )

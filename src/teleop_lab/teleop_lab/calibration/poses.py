@@ -22,7 +22,7 @@ def optimal_poses(model: Model, count: int, names: Sequence[str], rng: np.random
     """Joint vectors (count, n) at which points of the tip are most informative about some entries.
 
     Each pose is the one of :data:`CANDIDATES` random poses that raises the determinant of the information matrix JᵀJ
-    most. No pose is taken twice before all were taken.
+    most. A pose is chosen again only after all others were chosen.
 
     Args:
         model: The arm as drawn.

@@ -81,7 +81,7 @@ def chosen_poses(model: Model, count: int, choose: str, fit: str | Sequence[str]
     if choose not in CHOICES:
         raise UnknownNameError("choose", choose, CHOICES)
     if count < 1:
-        raise CalibrationError(f"{count} poses tell nothing; ask for at least 2")
+        raise CalibrationError(f"{count} poses are too few; choose at least 2")
     if choose == "random":
         return random_poses(model.robot, count, rng)
     names, pool = wanted_names(model, fit), random_poses(model.robot, 100, rng)

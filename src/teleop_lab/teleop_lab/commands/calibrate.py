@@ -33,48 +33,55 @@ def add(commands: Any) -> None:
     """Add the command's parser."""
     text = "find joint offsets and link errors of an arm from measured places of its tip"
     parser = command(commands, "calibrate", _run, text, _EPILOG)
-    parser.add_argument("--robot", default="rcrt1", help="a chain of links (default: rcrt1)")
+    parser.add_argument("--robot", default="rcrt1", help="robot whose links form one chain (default: rcrt1)")
     geometry_argument(parser)
     parser.add_argument(
-        "--data", metavar="FILE.csv", help=f"measured poses in place of simulated ones, or {PUBLISHED!r}"
+        "--data", metavar="FILE.csv", help=f"table of measured poses instead of simulated poses, or {PUBLISHED!r}"
     )
     _add_simulation(parser)
     parser.add_argument(
         "--fit",
         nargs="+",
         metavar="NAME",
-        help="`all` link errors, joint `offsets`, or names such as d3 theta2 (default: all; with a ruler offsets)",
+        help="errors to identify: `all` link errors, joint `offsets`, or names such as d3 theta2 "
+        "(default: all; with a ruler: offsets)",
     )
     parser.add_argument(
         "--frame",
         choices=("known", "unknown"),
         default="known",
-        help="whether x, y, z are in the robot's base, or its place is to be found too",
+        help="known: x, y, z are in the robot's base frame; unknown: the pose of this frame is identified too",
     )
-    parser.add_argument("--keep-all", action="store_true", help="keep errors that cannot be told from zero")
+    parser.add_argument(
+        "--keep-all", action="store_true", help="also keep errors that do not differ significantly from zero"
+    )
     parser.add_argument("--json", type=Path, metavar="FILE", help="write all numbers as JSON")
     parser.add_argument(
-        "--out", type=Path, metavar="FILE.yaml", help="the arm as found, as a table for --set robot=FILE.yaml"
+        "--out", type=Path, metavar="FILE.yaml", help="write the identified arm as a table for --set robot=FILE.yaml"
     )
 
 
 def _add_simulation(parser: argparse.ArgumentParser) -> None:
     """Options of a simulated measurement; None where not given."""
-    parser.add_argument("--poses", type=int, metavar="N", help="poses to measure (default: 40)")
+    parser.add_argument("--poses", type=int, metavar="N", help="number of poses to measure (default: 40)")
     parser.add_argument(
-        "--noise", metavar="M|ruler", help="standard deviation of a tracker [m], or a ruler of 0.5 mm (default: 0.1e-3)"
+        "--noise",
+        metavar="M|ruler",
+        help="standard deviation of a tracker's noise [m] (default: 0.1e-3), or ruler: a ruler of 0.5 mm",
     )
     parser.add_argument(
         "--errors",
         nargs="+",
         metavar="NAME=VALUE",
-        help="how the arm was built: cnc (±20 µm), prototype (±100 µm), and errors [m, rad] such "
-        "as d3=5.5e-3 (default: cnc, of the rcrt1 with d3=5.5e-3)",
+        help="simulated errors of the arm: tolerances cnc (±20 µm) or prototype (±100 µm), and single "
+        "errors [m, rad] such as d3=5.5e-3 (default: cnc; for the rcrt1 with d3=5.5e-3)",
     )
     parser.add_argument(
-        "--choose", metavar="optimal|random", help="poses that tell most, or random ones (default: optimal)"
+        "--choose",
+        metavar="optimal|random",
+        help="choice of the poses: optimal for the identification (default), or random",
     )
-    parser.add_argument("--seed", type=int, metavar="N", help="of poses, errors, noise (default: 1)")
+    parser.add_argument("--seed", type=int, metavar="N", help="seed of poses, errors and noise (default: 1)")
 
 
 def _run(arguments: argparse.Namespace) -> int:
@@ -124,7 +131,7 @@ def _real(robot: "Robot", arguments: argparse.Namespace) -> "Calibration":
 
     given = [f"--{name}" for name in _OF_SIMULATION if getattr(arguments, name) is not None]
     if given:
-        raise TeleopError(f"--data has measured poses; {', '.join(given)} are of simulated ones")
+        raise TeleopError(f"--data gives measured poses; leave out {', '.join(given)}, which are for simulated poses")
     is_published = arguments.data == PUBLISHED
     measured = appendix_e.published(robot) if is_published else read_measured(Path(arguments.data), robot)
     fit = _fit(arguments) or ("offsets" if is_published else "all")

@@ -29,10 +29,12 @@ def add(commands: Any) -> None:
     """Add the command's parser."""
     text = "repeat what the sources did, and print predicted beside published figures"
     parser = command(commands, "experiment", _run, text, _EPILOG)
-    parser.add_argument("names", nargs="*", metavar="NAME", help="experiments, or `all`; none: they are listed")
+    parser.add_argument(
+        "names", nargs="*", metavar="NAME", help="names of experiments, or `all`; without a name, all are listed"
+    )
     parser.add_argument("--json", type=Path, metavar="FILE", help="write all numbers as JSON")
     parser.add_argument("--html", type=Path, metavar="FILE", help="write one page with figures")
-    parser.add_argument("--seed", type=int, default=1, help="first seed of the hands (default: 1)")
+    parser.add_argument("--seed", type=int, default=1, help="seed of the first simulated hand (default: 1)")
 
 
 def _run(arguments: argparse.Namespace) -> int:
@@ -68,7 +70,7 @@ def _outcomes(names: tuple[str, ...], seed: int) -> "list[Outcome]":
             bench.progress = progress
             outcomes.append(experiment.run(bench))
             progress(1, 1)
-        if len(found) > 1 and not sys.stderr.isatty():  # where there is no bar
+        if len(found) > 1 and not sys.stderr.isatty():  # there is no progress bar
             took = time.monotonic() - begin
             print(f"{number} of {len(found)}, {experiment.name}: {took:.0f} s", file=sys.stderr)
     return outcomes

@@ -23,17 +23,21 @@ def add(commands: Any) -> None:
     """Add the command's parser."""
     text = "fit friction, bias and weights of the hardware plant to where a machine came to rest"
     parser = command(commands, "fit", _run, text, _EPILOG)
-    parser.add_argument("table", nargs="?", type=Path, help="CSV of rests (default: the published ones)")
+    parser.add_argument("table", nargs="?", type=Path, help="CSV file of rest positions (default: the published ones)")
     parser.add_argument("--robot", default="rcrt1", help="robot of the table (default: rcrt1)")
-    parser.add_argument("--free", nargs="+", metavar="NAME", help="what to fit (default: what the table can tell)")
+    parser.add_argument(
+        "--free", nargs="+", metavar="NAME", help="parameters to fit (default: all that the table can identify)"
+    )
     parser.add_argument(
         "--loss",
         default="cauchy",
         metavar="NAME",
-        help="cauchy, huber, soft_l1 or linear: how little weight an outlier gets",
+        help="loss function, which limits the weight of outliers: cauchy, huber, soft_l1 or linear",
     )
     parser.add_argument("--json", type=Path, metavar="FILE", help="write all numbers as JSON")
-    parser.add_argument("--out", type=Path, metavar="FILE.yaml", help="write the plant as parameters, for --config")
+    parser.add_argument(
+        "--out", type=Path, metavar="FILE.yaml", help="write the fitted plant as a parameter file, for --config"
+    )
     setting_arguments(parser)
 
 

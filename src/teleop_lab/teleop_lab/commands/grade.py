@@ -22,13 +22,22 @@ def add(commands: Any) -> None:
     """Add the command's parser."""
     text = "figures of motion of every episode of a data set, the oddest first"
     parser = command(commands, "grade", _run, text, _EPILOG)
-    parser.add_argument("data", type=Path, metavar="DATASET", help="folder or table")
-    parser.add_argument("--position", nargs=3, metavar=("X", "Y", "Z"), help="columns of the place, if not x, y, z")
-    parser.add_argument("--unit", default="auto", help="of the place: m, cm, mm, in, or auto")
+    parser.add_argument("data", type=Path, metavar="DATASET", help="directory or table with the episodes")
+    parser.add_argument(
+        "--position", nargs=3, metavar=("X", "Y", "Z"), help="columns of the position, if they are not x, y, z"
+    )
+    parser.add_argument("--unit", default="auto", help="unit of the position: m, cm, mm, in, or auto (default: auto)")
     add_files(parser, "episode")
-    parser.add_argument("--usual", type=Path, metavar="FILE", help="write which are not too odd")
-    parser.add_argument("--most", type=float, default=3.5, help="how odd those are (default: 3.5)")
-    parser.add_argument("--recordings", type=Path, metavar="DIR", help="keep a recording of each")
+    parser.add_argument("--usual", type=Path, metavar="FILE", help="write a list of the episodes that are not outliers")
+    parser.add_argument(
+        "--most",
+        type=float,
+        default=3.5,
+        help="largest deviation of these episodes, in standard deviations (default: 3.5)",
+    )
+    parser.add_argument(
+        "--recordings", type=Path, metavar="DIR", help="directory that keeps a recording of each episode"
+    )
 
 
 def _run(arguments: argparse.Namespace) -> int:

@@ -13,23 +13,27 @@ def add_study(
     """Add the file of a study, its store, ``--jobs``, and the arguments of :func:`add_files`.
 
     Args:
-        parser: Of the command.
+        parser: Parser of the command.
         what: Description of the file.
-        line: What each line of the table is for.
-        only: When the outputs count, such as ``, of --compare``.
+        line: Content of each line of the table.
+        only: Suffix for outputs that need an option, such as ``, of --compare``.
         must_keep: Whether a store has to be given.
     """
-    keeps = "where recordings and answers are kept" if must_keep else "keep results there, and run only what is not"
+    keeps = (
+        "directory that keeps recordings and answers"
+        if must_keep
+        else "directory that keeps results; sessions whose result is there are not run again"
+    )
     parser.add_argument("file", type=Path, metavar="FILE.yaml", help=what)
     parser.add_argument("--store", type=Path, metavar="DIR", required=must_keep, help=keeps)
-    parser.add_argument("--jobs", type=int, metavar="N", help=f"processes{only} (default: processors)")
+    parser.add_argument("--jobs", type=int, metavar="N", help=f"number of processes{only} (default: one per processor)")
     add_files(parser, line, only)
 
 
 def add_files(parser: argparse.ArgumentParser, line: str, only: str = "") -> None:
     """Add ``--html`` and ``--csv``, which has a line for each ``line``; ``only`` is when they count."""
-    parser.add_argument("--html", type=Path, metavar="FILE", help=f"write a page{only}")
-    parser.add_argument("--csv", type=Path, metavar="FILE", help=f"write a line for each {line}{only}")
+    parser.add_argument("--html", type=Path, metavar="FILE", help=f"write a page with the results{only}")
+    parser.add_argument("--csv", type=Path, metavar="FILE", help=f"write a table with a line for each {line}{only}")
 
 
 def check_outputs(arguments: argparse.Namespace) -> None:

@@ -22,13 +22,25 @@ def add(commands: Any) -> None:
     """Add the command's parser."""
     text = "conduct a study with people in the browser, and compare them with the simulated operator"
     parser = command(commands, "people", _run, text, _EPILOG)
-    add_study(parser, "what is done, and by how many", "trial", ", of --compare", must_keep=True)
+    add_study(
+        parser,
+        "YAML file of the study: its conditions, trials and participants",
+        "trial",
+        ", of --compare",
+        must_keep=True,
+    )
     parser.add_argument("--port", type=int, default=8080, help="port of the pages (default: 8080)")
-    parser.add_argument("--host", default="127.0.0.1", help="address to serve at (default: this machine alone)")
-    parser.add_argument("--token", default="", help="secret of the pages (default: made for --host)")
+    parser.add_argument(
+        "--host", default="127.0.0.1", help="network address of the pages (default: reachable from this machine only)"
+    )
+    parser.add_argument(
+        "--token", default="", help="secret that opens the pages (default: a new one with --host, else none)"
+    )
     parser.add_argument("--no-browser", action="store_true", help="open no browser")
     parser.add_argument(
-        "--compare", action="store_true", help="run the simulated operator, and compare; conduct nothing"
+        "--compare",
+        action="store_true",
+        help="run the simulated operator and compare it with the people's answers; conduct no trials",
     )
 
 

@@ -23,9 +23,12 @@ def add(commands: Any) -> None:
     text = "say how much of a hand's motion a slave can follow, and propose where to put it"
     parser = command(commands, "reach", _run, text, _EPILOG)
     parser.add_argument(
-        "sources", nargs="+", metavar="BAG|SCENARIO", help="recording, ours or of others, or one of `teleop scenarios`"
+        "sources",
+        nargs="+",
+        metavar="BAG|SCENARIO",
+        help="recording, in our or a foreign format, or one of `teleop scenarios`",
     )
-    parser.add_argument("--robot", help="slave, in place of the recording's; see `teleop robot`")
+    parser.add_argument("--robot", help="slave that replaces the recording's; one of `teleop robot`")
     geometry_argument(parser)
     parser.add_argument("--arm", default="", help="namespace of the arm (default: the first)")
     parser.add_argument(
@@ -33,15 +36,17 @@ def add(commands: Any) -> None:
         type=float,
         default=99.0,
         metavar="PERCENT",
-        help="share of the time that the slave should follow (default: 99)",
+        help="share of the time for which the slave should be able to follow [%%] (default: 99)",
     )
-    parser.add_argument("--keep-axes", action="store_true", help="leave the map of axes from hand to slave as it is")
+    parser.add_argument(
+        "--keep-axes", action="store_true", help="do not propose another map of axes from hand to slave"
+    )
     parser.add_argument("--html", type=Path, metavar="FILE", help="page with pictures")
     parser.add_argument(
         "--out",
         type=Path,
         metavar="FILE.yaml",
-        help="proposal as a ROS 2 parameter file, for --config; of one recording alone",
+        help="write the proposal as a ROS 2 parameter file for --config; needs a single recording",
     )
     setting_arguments(parser)
 
@@ -50,7 +55,7 @@ def _run(arguments: argparse.Namespace) -> int:
     from teleop_core.evaluation.command import check_places
 
     if arguments.out is not None and len(arguments.sources) > 1:
-        raise TeleopError("--out takes the proposal of one recording; give one, or leave it out")
+        raise TeleopError("--out writes the proposal for one recording; give a single recording, or leave out --out")
     check_places(arguments.html, arguments.out)
     if not 0.0 < arguments.share <= 100.0:
         raise TeleopError(f"--share {arguments.share:g} must be above 0 and at most 100 percent")

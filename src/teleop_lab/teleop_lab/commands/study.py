@@ -33,10 +33,10 @@ def add(commands: Any) -> None:
     """Add the command's parser."""
     text = "run sessions over named values of parameters and seeds, and compare their scores"
     parser = command(commands, "study", _run, text, _EPILOG)
-    add_study(parser, "what is compared", "session")
+    add_study(parser, "YAML file of the study: parameter values, seeds and scores", "session")
     parser.add_argument("--scheduler", metavar="ADDRESS", help="run on the workers of this Dask scheduler")
-    parser.add_argument("--recordings", type=Path, metavar="DIR", help="record each session there")
-    parser.add_argument("--explain", action="store_true", help="say what it costs, and run nothing")
+    parser.add_argument("--recordings", type=Path, metavar="DIR", help="directory for a recording of each session")
+    parser.add_argument("--explain", action="store_true", help="print the sessions and their cost, and run nothing")
 
 
 def _run(arguments: argparse.Namespace) -> int:

@@ -29,8 +29,10 @@ def add(commands: Any) -> None:
     """Add the command's parser."""
     text = "search the values of parameters with which a score is best"
     parser = command(commands, "tune", _run, text, _EPILOG)
-    add_study(parser, "what is searched", "trial")
-    parser.add_argument("--trials", type=int, default=30, metavar="N", help="values (default: 30)")
+    add_study(parser, "YAML file of the search: parameters, their ranges, and the score", "trial")
+    parser.add_argument(
+        "--trials", type=int, default=30, metavar="N", help="number of sets of values to try (default: 30)"
+    )
 
 
 def _run(arguments: argparse.Namespace) -> int:

@@ -69,7 +69,7 @@ def run_several(
 
     Args:
         names: Names, each taken once; all experiments if there are none.
-        bench: Where their sessions run.
+        bench: Bench on which the sessions of the experiments run.
         began: Called when an experiment begins, with its name, the number of finished experiments, and the number of
             all.
 

@@ -35,9 +35,9 @@ class Axis(NamedTuple):
         read_mm: Reading of the ruler at each target (10,) [mm].
         step_mm: Smallest step between those readings [mm].
         error_mm: Desired minus measured, as printed (10,) [mm].
-        rms: As printed [mm].
-        deviation: As printed [mm].
-        largest: As printed [mm].
+        rms: RMS as printed [mm].
+        deviation: Standard deviation as printed [mm].
+        largest: Largest error as printed [mm].
     """
 
     direction: tuple[float, float, float]
@@ -187,7 +187,7 @@ _NOTES = (
 
 
 def _errors(which: Axis, read_mm: Array) -> Array:
-    """Desired less measured way (10,) [mm]."""
+    """Desired minus measured displacement (10,) [mm]."""
     return DESIRED_MM - moved(read_mm, which.escape_mm)
 
 

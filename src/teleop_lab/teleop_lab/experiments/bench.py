@@ -24,7 +24,7 @@ Settings = Mapping[str, Setting]
 Progress = Callable[[int, int], None]
 Job = TypeVar("Job")
 Result = TypeVar("Result")
-_WHOLE = 16  # sessions whose streams are kept, 25 MB each
+_WHOLE = 16  # number of sessions whose streams stay in memory, 25 MB each
 SEEDS = 3
 """Number of sessions with different hands over which figures are averaged."""
 # Topics that experiments read; the rest of a recording, most of its memory, is deleted.
@@ -65,14 +65,14 @@ class Session:
 
     @property
     def streams(self) -> Mapping[str, Stream]:
-        """Streams by topic; if they are no longer kept, the session is run again, with the same bits."""
+        """Streams by topic. If they are not in memory any more, the session runs again and gives the same bits."""
         return self.read()
 
     def __getitem__(self, topic: str) -> Stream:
         """A stream by its topic.
 
         Raises:
-            UnknownNameError: The topic was not recorded, or is not kept.
+            UnknownNameError: The topic was not recorded, or is not in memory.
         """
         streams = self.streams
         if topic not in streams:
@@ -101,8 +101,8 @@ class Bench:
         seed: First seed; sessions of several hands also use the next ones.
         progress: Called with the progress of the running session.
         settings: Parameters of every session, over its scenario.
-        workers: Processes that :meth:`map` spreads work over. With more than 1, a program must
-            keep what it runs behind ``if __name__ == "__main__":``.
+        workers: Processes that :meth:`map` spreads work over. With more than 1, a program must call this below ``if
+            __name__ == "__main__":``.
 
     Raises:
         ParameterError: The seed is negative.
@@ -116,7 +116,7 @@ class Bench:
         self.seed, self.progress, self.workers = seed, progress, workers
         self._settings = dict(settings or {})
         self._known: dict[object, Session] = {}
-        self._streams: dict[object, Mapping[str, Stream]] = {}  # of the last sessions
+        self._streams: dict[object, Mapping[str, Stream]] = {}  # streams of the last sessions
 
     @property
     def seeds(self) -> range:
@@ -163,13 +163,13 @@ class Bench:
         return self._known[key]
 
     def _keep(self, key: object, streams: Mapping[str, Stream]) -> None:
-        """Keep streams, and delete the oldest ones if there are many."""
+        """Store streams in memory, and delete the oldest ones if there are many."""
         self._streams[key] = streams
         if len(self._streams) > _WHOLE:
             del self._streams[next(iter(self._streams))]
 
     def sessions(self, scenario: str, settings: Settings | None = None, *, is_scored: bool = True) -> list[Session]:
-        """The same session by several hands; see :meth:`session`."""
+        """Run a session with several hands; see :meth:`session`."""
         return [self.session(scenario, seed, settings, is_scored=is_scored) for seed in self.seeds]
 
     def slave(self, settings: Settings | None = None) -> ArmParameters:
@@ -191,7 +191,7 @@ class Bench:
 
         Args:
             scenario: One of ``teleop scenarios``.
-            seconds: How long it lasts [s].
+            seconds: Duration of the session [s].
             settings: Parameters over the scenario and the bench's settings.
             motion: Wanted motion of the hand, in place of the scenario's operator.
 

@@ -7,9 +7,9 @@ PREDICTED: Settings = {"plant": "hardware", "controller": "source_pid"}
 OURS: Settings = {"plant": "hardware", "controller": "disturbance_observer"}
 """The same machine under a controller of ours.
 
-Of the laws that track within 3 x 11.4 µm in both modes (experiment ``controllers``) it is the one
-without overshoot, with the least change of effort from tick to tick. Its angles stay below half a
-degree near home too, though not below the published largest yaw of the coarse mode.
+Among the laws that track within 3 x 11.4 µm in both modes (experiment ``controllers``), this law has no overshoot, and
+its effort changes least from tick to tick. Its orientation errors stay below half a degree near home too, but exceed
+the largest yaw error published for the coarse mode.
 """
 RESTING: Settings = {"plant": "hardware", "controller": "pid"}
 """For tests whose gains the source tuned for zero error at rest, without regard to tracking (appendix E)."""

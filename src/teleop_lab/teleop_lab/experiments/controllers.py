@@ -95,7 +95,7 @@ def compared(bench: Bench, scenario: str, law: str) -> list[Session]:
 
 
 def steps_of(bench: Bench, law: str) -> joint_steps.StepAnswer:
-    """Answer to steps of the joints, with the reference filter off, on the hardware plant."""
+    """Step responses of the joints on the hardware plant, with the reference filter off."""
     return joint_steps.answer_to_steps(bench.slave({**_PLANT, **LAWS[law], **_STEPS}))
 
 

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 LATE = "network.there.least_delay"
 GAIN = "coarse_gain"
 DELAYS = (0.0, 0.25, 0.5, 1.0)
-"""Of the commands [s]."""
+"""Delays of the commands [s]."""
 FOLLOWED = DELAYS[:3]
 GAINS = (1.0, 0.5, 0.2)
 SCALED = 0.5
@@ -40,7 +40,7 @@ def _study(bench: Bench, kind: str, delays: tuple[float, ...], gains: tuple[floa
 
 
 def _rises(quantity: str, low: float, high: float, group: str) -> Comparison:
-    """Whether a figure is larger in the second case, as the source says; 1 for yes."""
+    """Whether a figure is larger in the second case, as the source reports; 1 for yes."""
     is_so = float(high > low)
     note = f"{low:.3g} and {high:.3g}"
     return Comparison(quantity=quantity, published=1.0, predicted=is_so, within=EXACT, group=group, note=note)

@@ -17,12 +17,12 @@ from teleop_lab.experiments.outcome import Comparison, Findings, absolute
 MATERIALS = ("tissue", "silicone", "steel")
 PASSIVITIES = ("none", "tank", "tdpa", "wave")
 ROUND_TRIPS = (0.2, 0.7)
-"""Half of it each way [s]; the longer one is the longest of Coelho et al. 2019."""
+"""Round-trip delays [s], half in each direction; the longer one is the longest of Coelho et al. 2019."""
 CONTACTS = 10
 GOAL_MM = 1.0
 """Drift that may be left when the next contact begins; assumed."""
 _READY = 4.0  # time at which the arm follows [s], without the network
-_APPROACH, _PERIOD, _REST = 3.0, 2.0, 1.0  # of the hand [s]; assumed
+_APPROACH, _PERIOD, _REST = 3.0, 2.0, 1.0  # durations of the hand's approach, period and rest [s]; assumed
 _WAY = 0.02  # displacement of the hand [m], 9 mm of it within the object of palpation; assumed
 _TOUCH = 0.01  # smallest force of a contact [N]
 _STILL = 200  # ticks at the end over which a position is averaged
@@ -37,10 +37,10 @@ class Drift:
 
     Attributes:
         leaving: Drift as the tip leaves the object in each contact that ended (N,) [m].
-        left: Drift when the next contact may begin, a period after this one began (N,) [m].
+        left: Drift when the next contact may begin, one period after the start of a contact (N,) [m].
         peak: Largest drift [m].
         rest: Distance of the tip from the hand's command, at rest after the last contact [m].
-        given: Energy that came out of both ports minus the energy that went in [J].
+        given: Energy out of both ports minus the energy into them [J].
         force: Largest force on the tip [N].
     """
 
@@ -65,7 +65,7 @@ def measure_drift(bench: Bench, job: Job) -> Drift:
     """Drift over ten contacts of a hand that ignores the force.
 
     Args:
-        bench: Where it runs.
+        bench: Bench on which the sessions run.
         job: Material, passivity and round trip [s].
     """
     material, passivity, round_trip = job

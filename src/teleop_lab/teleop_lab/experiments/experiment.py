@@ -16,9 +16,10 @@ class Experiment:
 
     Attributes:
         name: Name of the experiment for ``teleop experiment``.
-        title: What it is, in one line.
-        source: Where the published figures stand.
-        measure: ``measure(bench)`` runs it; sessions come from the bench, so that they run once.
+        title: One line that describes the experiment.
+        source: Source of the published figures.
+        measure: ``measure(bench)`` runs the experiment; it gets its sessions from the bench, which runs each only
+            once.
     """
 
     name: str

@@ -37,7 +37,7 @@ def numbers(row: "Comparison") -> tuple[str, str, str, str]:
 
 
 def _printed(published: float) -> str:
-    """A published number as it was printed, or four digits of a number that was computed from printed ones."""
+    """A published number as printed, or with four digits if it was computed from printed numbers."""
     text = f"{published:.9g}"
     return text if len(text.partition(".")[2]) <= _DIGITS else f"{published:.4g}"
 
@@ -66,14 +66,14 @@ def _signed(difference: float, published: float) -> str:
 
 
 def spread(row: "Comparison") -> str:
-    """From the smallest to the largest of several seeds."""
+    """Text with the smallest and largest value of several seeds."""
     if row.lowest is None or row.highest is None:
         return ""
     return f"{row.lowest:.3g} … {row.highest:.3g}"
 
 
 def within(row: "Comparison") -> str:
-    """What counts as agreement."""
+    """Text of the tolerance."""
     if row.within is None:
         return ""
     return row.within.text(row.unit) + f", {row.basis}" * (row.basis != "printed")

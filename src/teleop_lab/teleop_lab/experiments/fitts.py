@@ -7,13 +7,13 @@ from teleop_lab.experiments.bench import Bench
 from teleop_lab.experiments.outcome import Comparison, Findings, percent
 
 LAGS = (0.0083, 0.025, 0.075, 0.225)
-"""By which the screen was late [s]."""
+"""Delays of the screen [s]."""
 TIMES = (0.911, 0.934, 1.059, 1.493)
 """Mean times of movement at these lags [s], printed."""
 WAYS, WIDTHS = (96.0, 192.0, 384.0), (6.0, 12.0, 24.0, 48.0)
 """Distances and widths of the targets in pixels; only their ratio matters."""
 LATENCIES = (0.033, 0.133, 0.333)
-"""Of the display in sessions of the scenario ``point`` [s]."""
+"""Latencies of the display in sessions of the scenario ``point`` [s]."""
 
 
 def _laws() -> list[Comparison]:
@@ -33,7 +33,7 @@ def _laws() -> list[Comparison]:
 
 
 def _sessions(bench: Bench) -> list[Comparison]:
-    """Times of whole sessions, beside the slowing that the look-move cycle predicts."""
+    """Movement times of whole sessions, compared with the slowing that the look-move cycle predicts."""
     times = []
     for latency in LATENCIES:
         session = bench.session("point", settings={"display.latency": latency})

@@ -13,7 +13,7 @@ _SETTLED_TICKS, _WAIT_TICKS, _REST_TICKS = 300, 1500, 2000
 
 
 class StepAnswer(NamedTuple):
-    """How a slave answers steps of its joints, one joint after the other.
+    """Step responses of a slave's joints, one joint after the other.
 
     Attributes:
         overshoot: Largest overshoot of each joint (n,), as a share of the step.
@@ -31,7 +31,7 @@ def answer_to_steps(parameters: ArmParameters) -> StepAnswer:
     """Step each joint by itself, from home, towards the middle of its range.
 
     Args:
-        parameters: Of the slave. Its reference filter should be off, and its start at home.
+        parameters: Parameters of the slave. Its reference filter should be off, and its start at home.
     """
     n = SimulatedArm(parameters).robot.n
     overshoot, travel, errors = np.zeros(n), np.zeros(n), []
@@ -62,7 +62,7 @@ def _one_step(slave: SimulatedArm, joint: int) -> tuple[float, float, Array]:
 
 
 def _measured(slave: SimulatedArm, goal: Array, ticks: int) -> Array:
-    """What the encoders show (ticks, n) under a constant command."""
+    """Encoder positions (ticks, n) under a constant command."""
     row, n = slave.signals, slave.robot.n
     rows = np.empty((ticks, n))
     for k in range(ticks):

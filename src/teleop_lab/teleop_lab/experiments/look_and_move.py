@@ -1,7 +1,7 @@
-"""Look and move: how many looks a person needs to a target, and how long they take.
+"""Look and move: the number of looks that a person needs to reach a target, and the time for them.
 
-It has the constants of the operator ``observer``, but no arm: it computes the prediction of the law for any motion
-that the eye guides.
+The model has the constants of the operator ``observer``, but no arm: it predicts the time of any motion that the eye
+guides.
 """
 
 import numpy as np
@@ -20,10 +20,10 @@ def looks(way: float, width: float, passed: float = 1.0, seed: int = 1) -> tuple
     """Mean number of submovements to a target, and their total duration [s].
 
     Args:
-        way: To the target [m].
-        width: Of the target, in which a motion ends [m].
-        passed: Share of each motion that arrives, as over a line that loses increments.
-        seed: Of the noise of the hand.
+        way: Distance to the target [m].
+        width: Width of the target, within which a motion ends [m].
+        passed: Share of each motion that arrives, for example over a line that loses increments.
+        seed: Seed of the hand's noise.
     """
     p, rng = ObserverParameters(), np.random.default_rng(seed)
     off = np.full(_PEOPLE, way)
@@ -39,12 +39,12 @@ def looks(way: float, width: float, passed: float = 1.0, seed: int = 1) -> tuple
 
 
 def movement_time(way: float, width: float, lag: float) -> tuple[float, float]:
-    """Time [s] to press in a target that is seen late, and how many looks it takes.
+    """Time [s] to press inside a target that is seen late, and the number of looks.
 
     Args:
-        way: To the target [m].
-        width: Of the target [m].
-        lag: Delay with which the target is seen, without that of the eye [s].
+        way: Distance to the target [m].
+        width: Width of the target [m].
+        lag: Delay of the display, without the delay of the eye [s].
     """
     p = ObserverParameters()
     count, moving = looks(way, width)

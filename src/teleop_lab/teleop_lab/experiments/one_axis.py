@@ -16,7 +16,7 @@ from teleop_core.graph.signals import DT, TICK_NS
 from teleop_core.hand.master.haptic_master import HapticMaster, HapticMasterParameters
 from teleop_core.kernels.geometry import Array
 
-_AXIS = 1  # of the master's base, along which the hand is pushed
+_AXIS = 1  # axis of the master's base along which the hand is pushed
 _KICK = 1e-5  # speed that the hand is given [m/s]: far from every limit
 _SETTLE, _LOOK = 1.0, 3.0  # time before the growth is measured, and time for which it is measured [s]
 _SETTLED, _LOOKS = 10, 20  # additional times of the same kind, in units of the force's delay
@@ -45,7 +45,7 @@ def exact_boundary(grip: Grip, delay: float, period: float = DT) -> float:
 
     Args:
         grip: The hand.
-        delay: Of the force [s].
+        delay: Delay of the force [s].
         period: Time for which a force is held [s]; half of it adds to the delay.
 
     Source:
@@ -78,8 +78,8 @@ def sampled_boundary(grip: Grip, ticks: int, damping: float = 0.0, period: float
     Args:
         grip: The hand.
         ticks: Whole periods by which the wall's force comes late.
-        damping: Of the wall, on the difference of two samples [N·s/m].
-        period: Between two samples, for which a force is held [s].
+        damping: Damping of the wall, on the difference of two samples [N·s/m].
+        period: Time between two samples, for which a force is held [s].
 
     Source:
         Eigenvalues of the exact step of mass, spring and damper under a held force, with the delayed positions and
@@ -165,7 +165,7 @@ def growth(grip: Grip, delay: float, stiffness: float) -> float:
     Args:
         grip: The hand.
         delay: Delay of the force, in whole ticks, in addition to the tick of the graph [s].
-        stiffness: Of the spring [N/m], at the place where the slave's tip is commanded.
+        stiffness: Stiffness of the spring [N/m] at the commanded position of the slave's tip.
     """
     chain = Mapped(grip)
     late = deque([np.zeros(3)] * (round(delay / DT) + 1))

@@ -11,7 +11,7 @@ Plain = str | int | float | bool | None | list["Plain"] | dict[str, "Plain"]
 _KINDS = ("exact", "share", "absolute", "factor")
 _ROUNDING = 1e-9
 BASES = ("printed", "law", "goal")
-"""What a row is judged against."""
+"""Origins of the values against which rows are judged."""
 
 
 @dataclass(frozen=True)
@@ -20,8 +20,8 @@ class Tolerance:
 
     Attributes:
         kind: "exact" except for rounding errors, "share" of the published figure, "absolute" in the unit of the row,
-            or "factor", which bounds the ratio of both in both directions.
-        amount: Share (0.15), amount in the unit (0.5), or factor above 1 (1.6); of "exact" 0.
+            or "factor", which bounds the ratio of prediction and published figure in both directions.
+        amount: Share (0.15), amount in the unit (0.5), or factor above 1 (1.6); 0 for "exact".
 
     Raises:
         ParameterError: An unknown kind, or an amount that no prediction can meet.
@@ -35,7 +35,7 @@ class Tolerance:
             raise ParameterError("kind", self.kind, f"one of {', '.join(_KINDS)}")
         if self.kind == "exact":
             if self.amount != 0.0:
-                raise ParameterError("amount", self.amount, "0 for what must be exact")
+                raise ParameterError("amount", self.amount, "0 for a quantity that must be exact")
             return
         least = 1.0 if self.kind == "factor" else 0.0
         if not (math.isfinite(self.amount) and self.amount > least):
@@ -83,21 +83,21 @@ def factor(amount: float) -> Tolerance:
 
 @dataclass(frozen=True, kw_only=True)
 class Comparison:
-    """One number of an experiment, each None where there is none.
+    """One quantity of an experiment; values that do not exist are None.
 
     Attributes:
-        quantity: What it is.
+        quantity: Name of the quantity.
         unit: Its unit; empty for pure numbers.
-        published: What the source printed, or another ``basis``.
+        published: Value that the source printed, or a value of another ``basis``.
         predicted: Value of our model of the source's machine.
         ours: Value with another controller on the same model.
-        within: Tolerance for agreement of ``predicted`` with ``published``; None if it is not judged.
-        basis: What ``published`` is: "printed", a "law" of the source evaluated by us, or a "goal"
-            of our own. Only what is printed counts as a published figure.
-        lowest: Smallest of several seeds, of which ``predicted`` is the mean.
-        highest: Largest of them.
-        group: Heading under which it stands.
-        note: What must be known to read it, such as a misprint.
+        within: Tolerance for agreement of ``predicted`` with ``published``; None if the row is not judged.
+        basis: Origin of ``published``: "printed", a "law" of the source evaluated by us, or a "goal" of our own. Only
+            printed values count as published figures.
+        lowest: Smallest value of several seeds; ``predicted`` is their mean.
+        highest: Largest value of these seeds.
+        group: Heading above the row.
+        note: Remark that a reader of the row needs, such as a misprint.
 
     Raises:
         ParameterError: A number is not finite, or the basis is unknown.
@@ -128,7 +128,7 @@ class Comparison:
 
     @property
     def difference(self) -> float | None:
-        """Predicted less published; None if one of them is missing."""
+        """Predicted minus published value; None if one of them is missing."""
         if self.published is None or self.predicted is None:
             return None
         return self.predicted - self.published
@@ -155,12 +155,12 @@ class Comparison:
 
 
 class Findings(NamedTuple):
-    """What the function of an experiment returns.
+    """Return value of an experiment's function.
 
     Attributes:
         rows: Numbers, published and predicted.
         figures: Plots for the page, with published points on them where there are any.
-        notes: Sentences without which the numbers mislead.
+        notes: Sentences that a reader needs so that the numbers do not mislead.
     """
 
     rows: tuple[Comparison, ...]
@@ -170,16 +170,16 @@ class Findings(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """What an experiment found.
+    """Result of an experiment.
 
     Attributes:
         name: Name of the experiment.
-        title: What it is, in one line.
-        source: Where the published figures stand.
+        title: One line that describes the experiment.
+        source: Source of the published figures.
         seed: Seed of everything random in it.
         rows: Numbers, published and predicted.
         figures: Plots for the page.
-        notes: Sentences without which the numbers mislead.
+        notes: Sentences that a reader needs so that the numbers do not mislead.
     """
 
     name: str
@@ -191,18 +191,18 @@ class Outcome:
     notes: tuple[str, ...] = ()
 
     def count(self, basis: str = "printed") -> tuple[int, int]:
-        """How many rows of a basis agree with it, and how many of them are judged."""
+        """Number of rows with a basis that agree with it, and number of judged rows with that basis."""
         marks = [row.agrees for row in self.rows if row.basis == basis]
         return marks.count(True), len(marks) - marks.count(None)
 
     @property
     def judged(self) -> int:
-        """How many published figures are judged."""
+        """Number of published figures that are judged."""
         return self.count()[1]
 
     @property
     def agreeing(self) -> int:
-        """How many of them agree with what was published."""
+        """Number of rows that agree with the published figure."""
         return self.count()[0]
 
     def row(self, quantity: str, group: str = "") -> Comparison:

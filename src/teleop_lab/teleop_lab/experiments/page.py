@@ -28,10 +28,10 @@ p.note { margin: 6px 0; color: var(--soft); font-size: 0.93rem; }
 def experiments_page(outcomes: Sequence[Outcome]) -> str:
     """HTML page with the table and the figures of every experiment.
 
-    It works offline and asks for nothing: plotly.js is inside, once.
+    The page works offline and loads nothing: it contains plotly.js once.
 
     Args:
-        outcomes: What was found, in the order of the page.
+        outcomes: Results of the experiments, in the order of the page.
     """
     arrays, drawn, sections = packing.Arrays(), [], []
     for number, outcome in enumerate(outcomes):

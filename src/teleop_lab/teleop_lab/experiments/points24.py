@@ -27,7 +27,7 @@ _SETTLED = 0.5
 
 
 class Visits(NamedTuple):
-    """How a session did the task; distances in the plane of the board.
+    """Result of the task in a session; distances in the plane of the board.
 
     Attributes:
         targets: Places of the points in the slave's base (24, 3) [mm].
@@ -49,7 +49,7 @@ class Visits(NamedTuple):
 
 
 def visits_of(session: Session, p: TourParameters, center: Array, approach_s: float) -> Visits:
-    """How a session did the task.
+    """Compute the result of the task in a session.
 
     Args:
         session: A session of the scenario.
@@ -94,7 +94,7 @@ def _in_plane(off: Array) -> Array:
 
 
 def _visits(bench: Bench, settings: Settings, *, seeing: bool) -> list[Visits]:
-    """How each hand does the task; a hand that sees repeats it with its aim corrected by the first errors."""
+    """Results of both hands; a hand that sees repeats the task with its aim corrected by the first errors."""
     from teleop_core.session.api import configuration
 
     made = configuration(SCENARIO).group("operator")
@@ -104,7 +104,7 @@ def _visits(bench: Bench, settings: Settings, *, seeing: bool) -> list[Visits]:
         return first
     axes, found = axis_map("axes", MotionScalingParameters.axes), []
     for seed, visits in zip(bench.seeds, first, strict=True):
-        missed = 1e-3 * visits.missed_mm * (1.0, 1.0, 0.0)  # in the plane that the camera shows
+        missed = 1e-3 * visits.missed_mm * (1.0, 1.0, 0.0)  # only the part in the plane that the camera shows
         aims = tuple((p.stops - missed @ axes).ravel().tolist())
         again = bench.session(SCENARIO, seed, {**settings, "operator.tour.points": aims})
         found.append(visits_of(again, p, center, approach))

@@ -24,7 +24,7 @@ class Target(NamedTuple):
         joints: Joint values that give the printed matrix [rad, m].
         place_mm: Position as printed [mm].
         turn: Rotation as printed, rows of n, o, a.
-        note: What is misprinted.
+        note: Description of a misprint.
     """
 
     joints: tuple[float, ...]

@@ -33,12 +33,12 @@ _SOURCE = "Vongbunyong 2008, tables 7.1-7.7 and 8.1, misprints corrected"
 
 
 class Rests(NamedTuple):
-    """Where the slave came to rest.
+    """Rest positions of the slave.
 
     Attributes:
         off: Rest position minus target (6, runs, 6) [rad, m].
         errors_mm: Distance of the tip from the position at the target joints (6, runs) [mm].
-        tips_mm: Where the tip came to rest (6, runs, 3) [mm].
+        tips_mm: Rest positions of the tip (6, runs, 3) [mm].
         aims_mm: Position of the tip at the target joints (6, 3) [mm].
     """
 

@@ -29,7 +29,7 @@ WAYS: tuple[Way, ...] = (
 )
 """Architectures and passivities, as of the experiment ``transparency``."""
 ROUND_TRIPS = (0.0, 0.1, 0.2, 0.4)
-"""Half of it each way [s]."""
+"""Round-trip delays [s], half in each direction."""
 SPEED = 0.01
 """Speed with which the hand pushes [m/s]; assumed."""
 NOTICED = 0.1
@@ -45,7 +45,7 @@ Job = tuple[Way, float]
 
 @dataclass(frozen=True)
 class Puncture:
-    """How a hand reacts to a puncture; infinity or NaN if the hand does not notice it.
+    """Reaction of a hand to a puncture; infinity or NaN if the hand does not notice it.
 
     Attributes:
         tip_drop: Largest fall of the force on the tip from tick to tick [N].
@@ -62,7 +62,7 @@ class Puncture:
 
 
 def _motion(times: Array, stop: float = math.inf) -> Array:
-    """Place (N, 3) [m] of a hand that goes to the block, then pushes on until ``stop`` [s]."""
+    """Positions (N, 3) [m] of a hand that moves to the block, then pushes on until ``stop`` [s]."""
     place = np.zeros((len(times), 3))
     place[:, 2] = 0.04 * minimum_jerk(times / _APPROACH)
     place[:, 1] = -SPEED * np.clip(times - _APPROACH, 0.0, min(stop - _APPROACH, _PUSH))
@@ -87,7 +87,7 @@ def measure_puncture(bench: Bench, job: Job) -> Puncture:
     """A puncture by a hand that pushes on, and by the same hand that stops as it has noticed.
 
     Args:
-        bench: Where it runs.
+        bench: Bench on which the sessions run.
         job: Way and round trip [s].
     """
     settings, late = _settings(*job), job[1]
@@ -96,11 +96,11 @@ def measure_puncture(bench: Bench, job: Job) -> Puncture:
     force = np.linalg.norm(rows["slave_measured_cf"][:, :3], axis=1)
     falls = force[:-1] - force[1:]
     begin = int(falls.argmax())
-    if falls[begin] < _FELL:  # it never got through
+    if falls[begin] < _FELL:  # the tip never punctured the membrane
         return Puncture(float(falls[begin]), math.nan, math.nan, math.nan)
     hears = begin + round(0.5e3 * late)  # the force before this time cannot show the puncture
     led = int(rows["teleop_state"][:, 0].argmax())  # the hand waits until the arm follows
-    end = led + round(1e3 * (_APPROACH + _PUSH))  # from here on the hand itself reduces the force
+    end = led + round(1e3 * (_APPROACH + _PUSH))  # from this sample on the hand itself reduces the force
     push = np.linalg.norm(rows["master_servo_cf"][hears:end, :3], axis=1)
     most = np.maximum.accumulate(push)
     fell = np.flatnonzero(push < (1.0 - NOTICED) * most)

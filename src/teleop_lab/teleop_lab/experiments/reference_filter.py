@@ -25,9 +25,9 @@ _RESTS: Settings = {
     "buttons.fixture": (),
     "duration": 16.0,
 }
-_JUDGED = "theta5"  # which the gimbal turns one to one; near the home pose theta4 and 6 turn more
+_JUDGED = "theta5"  # the gimbal turns theta5 one to one; near the home pose theta4 and theta6 turn more
 _WRIST = ("theta4", "theta5", "theta6")
-_QUIET_S = 6.0  # after the approach, and after the filter has settled
+_QUIET_S = 6.0  # begin of the quiet time, after the approach and the settling of the filter [s]
 
 
 def lag(value: float, last_input: float, last_output: float) -> float:

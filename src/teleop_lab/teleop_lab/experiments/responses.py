@@ -28,13 +28,13 @@ _PEAK_S = (0.08, 0.0, 0.0, 0.08, 0.02, 0.02)
 _SETTLED_S = (None, 0.12, 0.12, 0.10, None, None)
 _REST = 0.1  # share of (largest error minus error at rest) within which an error has settled
 _SPEED, _SETTLE_S = 0.5, 1.0  # share of the speed limits; rest after the move
-_CURVE = 4  # of how many samples one is drawn
+_CURVE = 4  # every fourth sample is drawn
 _SCALES = np.array([math.degrees(1.0), math.degrees(1.0), 1e3, *[math.degrees(1.0)] * 3])
 _UNITS = ("°", "°", "mm", "°", "°", "°")
 
 
 class Response(NamedTuple):
-    """One move, a row a tick.
+    """One move, with a row for each tick.
 
     Attributes:
         times: Since the move began (N,) [s].
@@ -87,7 +87,7 @@ def _rest_mm(found: Response) -> float:
 
 
 def _transient(found: Response) -> tuple[float, float, float]:
-    """Largest error on the way [mm], when it is, and when the error has settled at rest [s]."""
+    """Largest error during the move [mm], its time, and the time at which the error has settled [s]."""
     error = np.linalg.norm(found.error_mm, axis=1)
     peak, room = int(error.argmax()), _REST * (error.max() - error[-1])
     off = np.flatnonzero(np.abs(error - error[-1]) > room)

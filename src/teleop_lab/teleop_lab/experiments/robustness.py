@@ -1,4 +1,4 @@
-"""Robustness: every control law on plants that differ from the one it was made for."""
+"""Robustness: every control law on plants that differ from the plant of its design."""
 
 from collections.abc import Callable, Mapping
 
@@ -15,7 +15,7 @@ from teleop_lab.experiments.bench import Bench, Settings
 from teleop_lab.experiments.outcome import Comparison, Findings
 
 _PLANT: Settings = {"plant": "hardware", "robot": "rcrt1"}
-_SECONDS = 12.0  # of each session
+_SECONDS = 12.0  # duration of each session [s]
 LAWS: Mapping[str, Settings] = {
     "source_pid": {"controller": "source_pid"},
     "pid": {"controller": "pid"},

@@ -11,7 +11,7 @@ from teleop_core.hand.master.haptic_master import HapticMaster
 from teleop_core.kernels.geometry import Array
 from teleop_lab.experiments import one_axis
 
-AXIS = 1  # of the master's base, along which the hand is pushed
+AXIS = 1  # axis of the master's base along which the hand is pushed
 _BLOCK = 500  # ticks for which noise is drawn at once
 _KICK = 1e-4  # speed that the hand is given [m/s]
 _SECONDS, _SETTLE = 0.6, 0.1  # duration of a simulation, and time before the growth is measured [s]
@@ -27,7 +27,7 @@ class Wall:
     """A wall on both sides of a plane, sampled once a period of 1 ms.
 
     Attributes:
-        stiffness: Of its spring [N/m].
+        stiffness: Stiffness of the wall's spring [N/m].
         damping: On the difference of two samples [N·s/m].
         late: Whole periods by which its force comes late.
     """
@@ -62,12 +62,12 @@ class SampledDevice:
 
     @property
     def reading(self) -> float:
-        """What the device reads [m]."""
+        """Position that the device measures [m]."""
         return float(self.master.signals["master_measured_cp"][AXIS])
 
     @property
     def place(self) -> float:
-        """Where the device is [m]."""
+        """True position of the device [m]."""
         return float(self.master.state["position"][AXIS])
 
     @property
@@ -125,7 +125,7 @@ def wall_boundary(grip: one_axis.Grip, damping: float, late: int) -> float:
 
     Args:
         grip: The hand.
-        damping: Of the wall [N·s/m].
+        damping: Damping of the wall [N·s/m].
         late: Periods by which its force comes late.
     """
     start = 0.3 * one_axis.sampled_boundary(grip, late, damping)
@@ -143,7 +143,7 @@ def press_energy(damping: float, wall: Wall, length: int, speed: float) -> float
         damping: Viscous friction of the device [N·s/m].
         wall: The wall.
         length: Periods in, and as many out.
-        speed: Of the hand [m/s].
+        speed: Speed of the hand [m/s].
     """
     loop = SampledDevice(one_axis.Grip(5.0, 1.0, 0.1), wall)
     loop.origin -= 0.25 * speed * DT  # no sample is on the plane: force 0 would end the contact
@@ -159,7 +159,7 @@ def press_energy(damping: float, wall: Wall, length: int, speed: float) -> float
 
 
 def passive_boundary(damping: float, wall_damping: float, length: int, speed: float) -> float:
-    """Stiffness [N/m] above which a press gives energy; the wall's work is linear in it."""
+    """Stiffness [N/m] above which a press gains energy from the wall; the wall's work is linear in the stiffness."""
     tried = 1000.0
     soft, stiff = (press_energy(damping, Wall(stiffness, wall_damping), length, speed) for stiffness in (0.0, tried))
     return tried * soft / (soft - stiff)
@@ -175,7 +175,7 @@ def is_restless(wall: Wall, friction: float, resolution: float, push: float) -> 
         wall: The wall.
         friction: Dry friction of the device [N].
         resolution: Step of its reading [m].
-        push: Of the hand [steps of the wall's force].
+        push: Push of the hand [steps of the wall's force].
     """
     grip = one_axis.Grip(0.045, 1.0, 0.1)
     loop = SampledDevice(grip, wall, friction=friction, position_resolution=resolution)

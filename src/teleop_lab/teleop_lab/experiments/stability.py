@@ -20,7 +20,7 @@ GRIPS: Mapping[str, one_axis.Grip] = {
 }
 """Hands that hold the stylus: mass with the device, stiffness and damping; assumed."""
 DELAYS = (0.0, 0.02, 0.05, 0.1, 0.2)
-"""By which the force comes later [s]."""
+"""Delays of the force [s]."""
 SOFTEST, STIFFEST = 20.0, 50_000.0
 """Objects that are tried [N/m]: softer than tissue, and steel."""
 _WAYS: tuple[transmission.Way, ...] = (
@@ -32,7 +32,7 @@ _WAYS: tuple[transmission.Way, ...] = (
 _TWO_PORTS = ("tdpa",)
 """Passivities that need the slave's port."""
 _ROUNDS = 8
-_SECONDS = 8.0  # of each session: two touches
+_SECONDS = 8.0  # duration of each session: two touches [s]
 _TOUCH = 2000  # ticks before the tip is on its path
 _WINDOW = 20  # ticks over which a speed is measured: encoder steps are small compared with the motion in this time
 _THROWN = 2.0
@@ -69,10 +69,10 @@ def fastest(bench: Bench, grip: one_axis.Grip, delay: float, stiffness: float, w
     """Largest speed of the hand [m/s] in ``palpation``, with an object without damper and friction.
 
     Args:
-        bench: Where it runs.
+        bench: Bench on which the sessions run.
         grip: The hand.
-        delay: By which the force comes later [s].
-        stiffness: Of the object [N/m].
+        delay: Delay of the force [s].
+        stiffness: Stiffness of the object [N/m].
         way: Architecture and passivity.
     """
     rows = bench.signals("palpation", _SECONDS, _settings(grip, delay, stiffness, way))
@@ -92,9 +92,9 @@ def chain_boundary(bench: Bench, grip: one_axis.Grip, delay: float, way: transmi
     The device has its friction and its steps, the arm its lag and the reference its filter.
 
     Args:
-        bench: Where it runs.
+        bench: Bench on which the sessions run.
         grip: The hand.
-        delay: By which the force comes later [s].
+        delay: Delay of the force [s].
         way: Architecture and passivity.
         calm: Speed of the hand up to which it counts as stable [m/s], from :func:`calm_speed`.
     """

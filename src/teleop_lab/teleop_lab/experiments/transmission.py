@@ -19,7 +19,7 @@ WORLDS = (AIR, "tissue", "silicone")
 """Nothing to touch, and two of the chain's materials."""
 _BACK = 2.0 * DT  # a force waits for a tick before the network and for one before the mapping
 _SECONDS = 24.0  # the arm becomes ready, the hand approaches, and one period passes until transients have decayed
-_MIDDLE = (0.0, -0.014, 0.02)  # of the hand's way [m], 3 mm within the object of palpation
+_MIDDLE = (0.0, -0.014, 0.02)  # middle of the hand's motion [m], 3 mm inside the object of palpation
 _TICK: Complex = np.exp(-DT * S)
 
 Way = tuple[str, str]
@@ -32,7 +32,7 @@ class Channels(NamedTuple):
     """Signals that a chain transmits, in addition to the hand's position.
 
     Attributes:
-        force: Force at the hand over the one on the tip.
+        force: Force at the hand divided by the force on the tip.
         stiffness: Force at the hand divided by the lag of the tip [N/m].
         hand: Force that commands the slave, divided by the hand's force.
         yields: Whether the slave has its stage ``impedance``.
@@ -60,15 +60,14 @@ CHANNELS = {
     "three_channel": Channels(_THREE.force_gain, _THREE.stiffness, yields=True),
     "four_channel": Channels(_FOUR.force_gain, _FOUR.stiffness, _FOUR.hand_gain, yields=True),
 }
-"""What ways are made of, with default parameters; ``impedance`` is a slave that yields, before a
-hand that feels its force."""
+"""Channels of each architecture with default parameters; ``impedance`` is position-force with a slave that yields."""
 
 
 class Cell(NamedTuple):
     """Measurement of an architecture with a passivity and a round trip.
 
     Attributes:
-        ports: By world.
+        ports: Ports by world.
         hybrid: Hybrid matrix (L, 2, 2) of all worlds together.
         stray: Largest share of a force outside of the spectral lines.
     """
@@ -92,7 +91,7 @@ def _motion(times: Array) -> Array:
 
 
 def far_settings(round_trip: float) -> Settings:
-    """Parameters of a network with a round trip [s], half of it each way, and of a calm hand."""
+    """Parameters of a network with a round-trip delay [s], half in each direction, and of a calm hand."""
     return {
         "network.there.least_delay": 0.5 * round_trip,
         "network.back.least_delay": 0.5 * round_trip,
@@ -129,7 +128,7 @@ def measure_ports(bench: Bench, job: Job) -> Ports:
     """Both ports in a session of the whole chain, along the normal of the object.
 
     Args:
-        bench: Where it runs.
+        bench: Bench on which the sessions run.
         job: Way, round trip [s] and world.
     """
     rows = bench.signals("palpation", _SECONDS, settings(*job), _motion)
@@ -144,7 +143,7 @@ def measure_ports(bench: Bench, job: Job) -> Ports:
 def measure_cells(
     bench: Bench, cells: Iterable[tuple[Way, float]], worlds: Iterable[str] = WORLDS
 ) -> dict[tuple[Way, float], Cell]:
-    """Cells by way and round trip [s], each in all worlds."""
+    """Results by architecture with passivity and by round-trip delay [s], each for all worlds."""
     wanted, every = list(cells), tuple(worlds)
     found = iter(bench.map(measure_ports, [(*cell, world) for cell in wanted for world in every]))
     return {cell: Cell.of({world: next(found) for world in every}) for cell in wanted}

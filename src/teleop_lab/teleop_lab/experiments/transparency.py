@@ -28,12 +28,12 @@ WAYS = (
     ("three_channel", "none"),
     ("four_channel", "none"),
 )
-"""Architectures and passivities. With ``wave`` the architecture says nothing; ``impedance`` is
-position-force before a slave that yields."""
+"""Architectures and passivities. With ``wave`` the architecture has no effect; ``impedance`` is position-force with a
+slave that yields."""
 ROUND_TRIPS = (0.0, 0.02, 0.1, 0.2)
-"""Half of it each way [s]."""
+"""Round-trip delays [s], half in each direction."""
 LAG = Lag(0.05, 1e-4, 20)
-"""Arm of the two-port that is known exactly: as slow as ours, 20 ms each way; assumed."""
+"""Arm of the two-port that is known exactly: with the lag of our arm, and 20 ms of delay in each direction; assumed."""
 STRAY = 0.3
 """Share of a force off the lines up to which a gain of that force means something; assumed."""
 _AT = int(np.abs(LINES - 1.0).argmin())
@@ -47,14 +47,14 @@ _COLORS = {_FORCE: FIRST, _POSITION: SECOND, ("position_force", "wave"): MEASURE
 
 @dataclass(frozen=True)
 class Number:
-    """One number of a way.
+    """One number of an architecture with a passivity.
 
     Attributes:
-        quantity: What it is.
+        quantity: Name of the number.
         unit: Its unit.
-        measured: At the ports.
-        law: By a hybrid matrix.
-        stray: Share of what it rests on that is off the lines.
+        measured: Value measured at the ports.
+        law: Value computed from a hybrid matrix.
+        stray: Share of the underlying signals outside of the excited lines.
     """
 
     quantity: str
@@ -70,7 +70,7 @@ def numbers(cell: Cell, hybrid: Complex) -> list[Number]:
     hz = f"at {LINES[_AT]:g} Hz"
     follows = [bandwidth(air.tip_speed / air.hand_speed), bandwidth(tip)]
     felt = felt_impedance(hybrid, soft.world)
-    # The tip goes at this speed for each of the hand's.
+    # Speed of the tip divided by the speed of the hand.
     speed = tip / (1.0 + hybrid[:, 1, 1] * soft.world)
     forces = [bandwidth(soft.hand_force / soft.tip_force), bandwidth(felt / (speed * soft.world))]
     drags = [abs(air.felt[_AT]), abs(hybrid[_AT, 0, 0])]
@@ -161,7 +161,7 @@ def report(cells: Cells, known: Cell) -> Findings:
     """Rows and figures of what was measured.
 
     Args:
-        cells: Of the chain, position-force without passivity and round trip among them.
+        cells: Results of the chain; they include position-force without passivity and round trip.
         known: The two-port of :func:`lag_cell`.
     """
     arm, rows = cells[_FORCE, 0.0].hybrid, _lag_rows(known)

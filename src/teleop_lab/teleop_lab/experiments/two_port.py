@@ -17,7 +17,7 @@ from teleop_lab.experiments.one_axis import Grip, Mapped
 Complex = NDArray[np.complex128]
 
 PERIOD = 10.0
-"""Of the excitation [s]: one line each 0.1 Hz."""
+"""Period of the excitation [s]; its lines are multiples of 0.1 Hz."""
 _TICKS = round(PERIOD / DT)
 BINS = np.unique(2 * (np.geomspace(1.0, 300.0, 24) / 2.0).round().astype(int) + 1)
 """Odd multiples of 1/PERIOD that are excited, 0.1 to 30 Hz: quadratic distortion has only even multiples."""
@@ -26,7 +26,7 @@ LINES: Array = BINS / PERIOD
 S: Complex = np.multiply(2j * np.pi, LINES, dtype=np.complex128)
 """Laplace's variable at the lines (L,) [rad/s]."""
 AMPLITUDE = 0.15e-3
-"""Of each line of the hand's way [m]."""
+"""Amplitude of each line of the hand's displacement [m]."""
 _APPROACH, _GROWTH = 3.0, 1.0  # duration of the hand's approach to its centre, then of the rise of the multisine [s]
 _FIRM = Grip(0.02, 5000.0, 40.0)
 """A hand that hardly yields, so that its motion does not depend on the force."""
@@ -55,10 +55,10 @@ class Ports:
     """Both ports at the excited lines, in one experiment; each complex, shape (L,).
 
     Attributes:
-        hand_speed: Of the hand at the master [m/s].
-        hand_force: Of the hand on the master [N].
-        tip_speed: Of the slave's tip [m/s].
-        tip_force: Of the tip on the world [N].
+        hand_speed: Speed of the hand at the master [m/s].
+        hand_force: Force of the hand on the master [N].
+        tip_speed: Speed of the slave's tip [m/s].
+        tip_force: Force of the tip on the world [N].
         stray: Share of a force, or of the tip's displacement if that is larger, outside of the lines up to the last
             line; 0 for a linear system in steady state.
     """
@@ -75,7 +75,7 @@ class Ports:
 
         Args:
             hand: Place of the hand (N,) [m].
-            push: Of the master on the hand (N,) [N].
+            push: Push of the master on the hand (N,) [N].
             tip: Place of the slave's tip (N,) [m].
             reaction: Push of the world on the tip (N,) [N].
 
@@ -127,7 +127,7 @@ def hybrid_matrix(experiments: Sequence[Ports]) -> Complex:
     """
     given = np.stack([np.stack((ports.hand_speed, ports.tip_force), axis=-1) for ports in experiments], axis=1)
     answers = np.stack([np.stack((ports.hand_force, -ports.tip_speed), axis=-1) for ports in experiments], axis=1)
-    sizes = np.linalg.norm(given, axis=1, keepdims=True)  # of speed and force
+    sizes = np.linalg.norm(given, axis=1, keepdims=True)  # magnitudes of speed and force
     scaled = given / np.where(sizes > 0.0, sizes, 1.0)
     if (np.linalg.matrix_rank(scaled, tol=1e-6) < 2).any():
         raise ParameterError("experiments", len(experiments), "two or more whose worlds differ")
@@ -192,7 +192,7 @@ class Lag:
 
     Attributes:
         time: Time constant [s].
-        compliance: How far it yields to the world's push [m/N].
+        compliance: Displacement of the arm per force of the world [m/N].
         late: Delay of a command, and of a force, in ticks.
     """
 
@@ -209,8 +209,8 @@ class Lag:
         """Hybrid matrix (L, 2, 2) of position-force with this arm, exactly.
 
         Source:
-            Lawrence 1993, position-force: force comes back, position goes there. The sampled lag is
-            share / (1 - (1 - share) / z).
+            Lawrence 1993, position-force: the position is sent to the slave, and the force is sent back. The sampled
+            lag is share / (1 - (1 - share) / z).
         """
         later = np.exp(-S * DT)
         lag = self.share / (1.0 - (1.0 - self.share) * later)

@@ -1,6 +1,7 @@
 """UVA: times of a user study of fifteen people, predicted before its table was read.
 
-The prediction stands in ``uva_prediction.csv`` as it was written down; ``docs/predicted_study.md`` says when and how.
+``uva_prediction.csv`` contains the prediction as it was first stored; ``docs/predicted_study.md`` describes when and
+how it was made.
 """
 
 import csv
@@ -40,8 +41,8 @@ PRIMITIVES = (
     Primitive("left reaches the goal", 0.055, 0.004),
     Primitive("left releases", 0.015, 0.002),
 )
-"""Distances are from the geometry of the board. Widths are assumed: fingers on a block 2 mm, a peg through its hole 2
-to 4 mm, clear of a peg 6 mm, out of the way 10 mm."""
+"""Distances follow from the geometry of the board. Widths are assumed: 2 mm for fingers on a block, 2 to 4 mm for a
+peg in its hole, 6 mm to be clear of a peg, 10 mm to be out of the other arm's path."""
 
 
 class Level(NamedTuple):
@@ -51,7 +52,7 @@ class Level(NamedTuple):
     delay: float = 0.0  # mean [s]
     loss: float = 0.0  # share of the increments
     outage: float = 0.0  # mean length [s]
-    pause: float = 0.0  # between two of them [s]
+    pause: float = 0.0  # time between two outages [s]
 
 
 LEVELS = (
@@ -69,7 +70,7 @@ LEVELS = (
 
 
 def _plain(primitive: Primitive, level: Level) -> float:
-    """Time of a primitive at a level [s], before the one scale for all of them.
+    """Time of a primitive at a level [s], before the common scale factor is applied.
 
     Each look takes a cycle, the station's latency and the delay. Lost motion must be repeated. An outage costs its
     length and the cycle that it interrupts.
@@ -82,7 +83,7 @@ def _plain(primitive: Primitive, level: Level) -> float:
 
 
 def _mackenzie(primitive: Primitive, level: Level) -> float:
-    """The same by the law of MacKenzie and Ware 1993: MT = 230 + (169 + 1.03 lag) ID ms."""
+    """Time of a primitive by the law of MacKenzie and Ware 1993: MT = 230 + (169 + 1.03 lag) ID ms."""
     bits = float(difficulty(primitive.way, primitive.width))
     return 0.230 + (0.169 + 1.03 * (LATENCY + level.delay)) * bits
 
@@ -111,7 +112,7 @@ Table = dict[str, dict[str, float]]
 """Times [s] by level and primitive."""
 PERSONS = 15
 _T95 = 2.145
-"""Of Student's distribution with 14 degrees of freedom, both sides."""
+"""Factor of a two-sided 95 % confidence interval: Student's distribution with 14 degrees of freedom."""
 _FOLDER = files("teleop_lab.experiments")
 
 
@@ -141,7 +142,7 @@ def _lines(name: str) -> list[dict[str, str]]:
 
 
 def from_normal(table: Table) -> Table:
-    """The same slowing of each level, from the printed times without faults."""
+    """Times with the predicted slowing of each level, from the printed times without faults."""
     means, _ = published()
     begin = LEVELS[0].name
     return {
@@ -151,7 +152,7 @@ def from_normal(table: Table) -> Table:
 
 
 def inside(table: Table, levels: Iterable[Level] = LEVELS) -> int:
-    """How many times of a table lie within people's intervals."""
+    """Number of times of a table that lie within people's intervals."""
     means, halves = published()
     return sum(
         abs(table[level.name][p.name] - means[level.name][p.name]) <= halves[level.name][p.name]

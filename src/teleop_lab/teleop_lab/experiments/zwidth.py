@@ -20,20 +20,20 @@ friction is assumed."""
 LATE = (0, 1, 2, 3, 5, 10)
 """Periods of 1 ms by which the wall's force comes later."""
 WALL_DAMPINGS = (0.0, 5.0)
-"""Of the walls [N·s/m]; assumed."""
+"""Dampings of the walls [N·s/m]; assumed."""
 DAMPINGS = ((2.0, 0.0), (5.0, 2.0), (5.0, 5.0))
 """Viscous frictions of the device and dampings of the wall for which the energy is computed [N·s/m]."""
 PRESSES = (1, 2, 5, 20, 50)
 """Lengths of the presses, in periods in and as many out."""
 SPEEDS = (0.005, 0.1)
-"""Of the presses [m/s]."""
+"""Speeds of the presses [m/s]."""
 _OWN = DeviceParameters()
 DEVICES = (
     (_OWN.friction, _OWN.position_resolution),
     (0.5 * _OWN.friction, _OWN.position_resolution),
     (_OWN.friction, 0.5 * _OWN.position_resolution),
 )
-"""Dry frictions [N] and steps of the reading [m]: those of our device, and halves of them."""
+"""Dry frictions [N] and reading steps [m]: the values of our device, and half of them."""
 _WITHIN, _EXACT = percent(10.0), percent(2.0)
 _NONE = absolute(10.0)  # N/m; if a law allows no stiffness, a relative difference is undefined
 _CASES = tuple((b, late) for b in WALL_DAMPINGS for late in LATE)
@@ -49,8 +49,8 @@ def linear_law(damping: float, wall_damping: float, delay: float) -> float:
 
     Args:
         damping: Viscous friction of the device [N·s/m].
-        wall_damping: Of the wall [N·s/m].
-        delay: Of the force, beside half a period for its hold [s].
+        wall_damping: Damping of the wall [N·s/m].
+        delay: Delay of the force, in addition to half a period for its hold [s].
 
     Source:
         Gil et al. 2009, K < (b + B) / (T / 2 + td).
@@ -76,7 +76,7 @@ def press_law(damping: float, wall_damping: float, length: int) -> float:
 
     Args:
         damping: Viscous friction of the device [N·s/m].
-        wall_damping: Of the wall [N·s/m].
+        wall_damping: Damping of the wall [N·s/m].
         length: Periods in, and as many out.
     """
     return (damping + wall_damping * (1.0 - 2.0 / length)) / (0.5 * DT)

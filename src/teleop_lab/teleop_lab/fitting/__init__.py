@@ -42,7 +42,7 @@ def fit_plant(
 
     Args:
         table: CSV as :func:`read_rests` takes it; None for the published one of the RCRT-1.
-        robot: Whose joints it has.
+        robot: Robot of the table's joints.
         free: Names of the fitted numbers, as in :func:`fit`; None for those that the table determines.
         files: Parameter files of the slave; without any, the controller is the source's PID.
         texts: Parameters of the slave over them, ``key=value``.

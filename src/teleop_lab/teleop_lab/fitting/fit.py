@@ -23,11 +23,11 @@ from teleop_lab.fitting.rest_table import RestTable
 from teleop_lab.fitting.rests import rest_positions
 
 _WEAK = 0.1  # singular value over the largest below which a direction is not identifiable
-_STEP = 0.01  # of differences, in units of the start
-_SHARE = 0.95  # of intervals
+_STEP = 0.01  # step of finite differences, in units of the start value
+_SHARE = 0.95  # confidence level of intervals
 _ROUNDS = 60
 _UNITS = {"coulomb": "N·m or N", "bias": "N·m or N", "weight": "kg·m"}
-_WANDER = 0.3  # with which the effect of varying friction is measured
+_WANDER = 0.3  # relative variation of friction with which its effect is measured
 # Simulated runs divided by runs of the table. The position at which a joint sticks is practically random, so a change
 # of the last bit changes the spread of ten runs by a tenth, and that of forty runs by a thirtieth.
 _TIMES = 4
@@ -87,7 +87,7 @@ class FitResult:
     one_sided: NDArray[np.bool_]
 
     def value(self, name: str) -> float:
-        """A fitted number.
+        """Return a fitted number by its name.
 
         Raises:
             UnknownNameError: The number was not fitted; the text lists the fitted ones.
@@ -103,7 +103,7 @@ class FitResult:
         return text(self)
 
     def to_json(self) -> dict[str, object]:
-        """All of it as plain values; numbers are exact, [SI]."""
+        """The whole result as plain values; numbers are exact, in SI units."""
         return {
             "robot": self.robot,
             "table": self.table,
@@ -298,15 +298,17 @@ def _insist_on_identifiable(names: Sequence[str], slopes: Array) -> None:
     unseen = [name for name, size in zip(names, sizes, strict=True) if size < _WEAK * sizes.max()]
     if unseen or not sizes.any():
         text = ", ".join(unseen or names)
-        raise FitError(f"not identifiable from this table, on which they do not act: {text}")
+        raise FitError(f"not identifiable from this table, because they have no effect on it: {text}")
     if len(slopes) < len(names):
-        raise FitError(f"{len(names)} parameters need as many rests; the table has {len(slopes)}")
+        raise FitError(
+            f"{len(names)} parameters need at least {len(names)} rest positions; the table has {len(slopes)}"
+        )
     _, values, directions = np.linalg.svd(slopes / sizes)
     for value, direction in zip(values, directions, strict=False):
         if value < _WEAK * values[0]:
             mixed = [n for n, part in zip(names, direction, strict=True) if abs(part) > 0.1]
             text = ", ".join(mixed)
-            raise FitError(f"not identifiable from this table, for they act alike: {text}")
+            raise FitError(f"not identifiable from this table, because their effects are alike: {text}")
 
 
 def _result(

@@ -19,7 +19,7 @@ class RestTable:
     """Targets and rests of a precision test.
 
     Attributes:
-        name: Where it comes from.
+        name: Origin of the table.
         targets: Joint targets (k, n) [rad or m].
         rests: Joints at rest of every run, one array (runs, n) per target [rad or m].
     """
@@ -47,7 +47,7 @@ def read_rests(file: Path, robot: Robot) -> RestTable:
 
     Args:
         file: The table.
-        robot: Whose joints it has.
+        robot: Robot of the table's joints.
 
     Raises:
         TeleopError: It cannot be read, columns or numbers are missing, or a point has one run alone or several targets.

@@ -14,7 +14,7 @@ from teleop_core.slave.commands import SlaveRow
 from teleop_core.slave.pair import ArmParameters, SimulatedArm, arm_step
 from teleop_core.slave.trajectory import cubic_move, shortest_move_time
 
-_FINE = 1e-4  # of an encoder step
+_FINE = 1e-4  # step of smooth encoders, divided by the real encoder step
 
 
 @kernel
@@ -32,8 +32,8 @@ class Mover:
     """A slave that is moved from target to target by cubics, as in the published precision test.
 
     Args:
-        parameters: Its parameters; the slave always starts at home.
-        faults: The arm's faults in place of its own; None for its own.
+        parameters: Parameters of the slave, which always starts at home.
+        faults: Errors of the arm that replace its known ones; None for the known ones.
         speed: Share of the speed limits that the moves use.
         settle: Time at rest after each move [s]; where joints stick, the rests do not depend on it.
         is_smooth: Whether encoders and drives have no steps, because a fit needs derivatives.
@@ -93,10 +93,10 @@ def rest_positions(
     The slave goes home after each move, as in Vongbunyong 2008, section 7.3.
 
     Args:
-        parameters: Of the slave.
+        parameters: Parameters of the slave.
         targets: Joint targets; values outside the limits are set to the limits.
-        runs: Moves to each.
-        faults: The arm's faults in place of its own.
+        runs: Number of moves to each target.
+        faults: Errors of the arm that replace its known ones.
         is_smooth: Whether encoders and drives have no steps.
     """
     mover = Mover(parameters, faults, is_smooth=is_smooth)

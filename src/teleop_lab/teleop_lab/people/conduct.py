@@ -19,7 +19,7 @@ def serve(plan: Plan, journal: Journal, port: int, host: str, token: str) -> tup
     """Server of the pages of a study, and its pages.
 
     Raises:
-        TeleopError: As of :class:`~teleop_console.server.ConsoleServer`.
+        TeleopError: As in :class:`~teleop_console.server.ConsoleServer`.
     """
     server = ConsoleServer(port, host, token, form=partial(PeoplePage, plan=plan, journal=journal))
     page = server.answers.form

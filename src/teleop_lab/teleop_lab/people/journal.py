@@ -19,10 +19,10 @@ _ABOUT, _FILE = "people.json", "journal.json"
 
 
 class Journal:
-    """What was done, by participant; each change is on disk when its method returns.
+    """Finished trials by participant; each change is on disk when its method returns.
 
     Args:
-        folder: Where it is kept, made if it is missing; recordings stand in a folder for each participant.
+        folder: Folder of the journal, created if missing; it contains a folder of recordings for each participant.
         plan: Plan of the study.
 
     Attributes:
@@ -55,7 +55,7 @@ class Journal:
         except (OSError, ValueError, TypeError) as error:
             raise SessionError(f"{self.folder} cannot be used for a study with people: {error}") from error
         if self._about["format"] != FORMAT or self._about["plan"] != digest:
-            raise SessionError(f"{self.folder} is of another study, or of a newer version: its plan is another")
+            raise SessionError(f"{self.folder} belongs to another study or a newer version: its plan differs")
         self.now = str(self._about["now"])
         if self.now not in plan.codes:
             self.now = plan.codes[0]
@@ -75,9 +75,7 @@ class Journal:
                 file.parent.mkdir(exist_ok=True)
                 write_whole(file, json.dumps(content, indent=1))
         except OSError as error:
-            raise SessionError(
-                f"{file} cannot be written: {error.strerror}; what was written before is kept"
-            ) from error
+            raise SessionError(f"{file} cannot be written: {error.strerror}; earlier answers are kept") from error
 
     def choose(self, code: str) -> None:
         """Let a participant take part now."""
@@ -93,7 +91,7 @@ class Journal:
         """Note the new state of a trial.
 
         Args:
-            code: Of the participant.
+            code: Code of the participant.
             trial: Its number.
             state: One of :data:`DONE`, :data:`SKIPPED`, :data:`AGAIN` and :data:`FAILED`.
             facts: Such as ``bag``, ``scores``, ``verdict`` and ``reason``.
@@ -130,7 +128,7 @@ class Journal:
         return path
 
     def step(self, code: str) -> tuple[str, Trial | None]:
-        """What a participant does next: ``consent``, ``begin`` or ``wait`` with a trial, ``questions``, ``thanks``."""
+        """Next step of a participant: ``consent``, ``begin`` or ``wait`` with a trial, ``questions``, ``thanks``."""
         if not self._own[code]["consent"]:
             return "consent", None
         trials = self._plan.trials(code)

@@ -78,7 +78,7 @@ class PeoplePage:
         return f"{address}conduct{'?' + query if query else ''}#{quote(self.key)}"
 
     def answer(self, path: str, query: Query, page: int, body: Body = bytes) -> Told:
-        """Answer to a request, of which each word is checked."""
+        """Answer to a request; every parameter of the request is checked."""
         del body
         try:
             with self._lock:
@@ -97,7 +97,7 @@ class PeoplePage:
     # -- what runs -------------------------------------------------------------------------------
 
     def wait(self) -> tuple[str, Trial]:
-        """Code of a participant and the trial that begins, as soon as one does."""
+        """Wait until a trial begins; return the participant's code and the trial."""
         code, trial = self._wishes.get()
         self._ends.clear()
         self._tried, self.is_stopped = 0, False
@@ -184,7 +184,7 @@ class PeoplePage:
         if code not in self._plan.codes:
             raise UnknownNameError("participant", code, self._plan.codes)
         if self._running is not None:
-            raise ParameterError("participant", code, "chosen when the trial that runs is over")
+            raise ParameterError("participant", code, "chosen after the running trial has ended")
         self._journal.choose(code)
 
     def _pause(self, *, is_paused: bool) -> None:
@@ -195,7 +195,7 @@ class PeoplePage:
         code, word, reason = self._journal.now, _word(query, "trial"), _word(query, "reason").strip()
         numbers = [str(trial.number) for trial in self._plan.trials(code)]
         if word not in numbers or (self._running and self._running[1].number == int(word)):
-            raise ParameterError("trial", word, f"one of 1 to {len(numbers)} that does not run now")
+            raise ParameterError("trial", word, f"a trial from 1 to {len(numbers)} that is not running")
         if not 0 < len(reason) <= _LONGEST or not reason.isprintable():
             raise ParameterError("reason", reason, f"a line of 1 to {_LONGEST} characters")
         self._journal.note(code, int(word), state, reason=reason)

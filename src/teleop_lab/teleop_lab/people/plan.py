@@ -28,7 +28,7 @@ class Question:
 
     Attributes:
         name: Its column in tables.
-        text: What is asked.
+        text: Text of the question.
         low: Word at 0.
         high: Word at 100.
     """
@@ -70,11 +70,11 @@ class Trial:
     """One trial of a participant.
 
     Attributes:
-        number: Place in the participant's order, from 1 on.
+        number: Position in the participant's order, from 1 on.
         condition: Index among the study's combinations of swept values.
         values: Its swept values.
         repetition: Number among the trials of its condition, from 1 on; 0 for practice.
-        asks: Whether questions follow it, if it was done.
+        asks: Whether questions follow the trial, unless it was skipped.
     """
 
     number: int
@@ -111,7 +111,7 @@ class PeopleParameters:
 
 @dataclass(frozen=True)
 class Plan:
-    """What people do in a study.
+    """Work of the people in a study.
 
     Attributes:
         study: Conditions, and the scores that are compared.
@@ -161,7 +161,7 @@ def conditions_of(participant: int, count: int, order: str) -> list[int]:
 
     Args:
         participant: Number from 0 on.
-        count: How many conditions there are.
+        count: Number of conditions.
         order: One of fixed, shuffled and latin; ``shuffled`` is the same for the same participant always.
 
     Source:
@@ -180,10 +180,10 @@ def conditions_of(participant: int, count: int, order: str) -> list[int]:
 
 
 def read_plan(path: Path | str) -> Plan:
-    """Plan of a YAML file: a study's, with an entry ``people``.
+    """Plan in a YAML file, which is the file of a study with an entry ``people``.
 
     Raises:
-        TeleopError: The file cannot be read, or something in it is wrong; nothing was started.
+        TeleopError: The file cannot be read or contains a wrong entry; no session was started.
     """
     study = read_study(path)
     content = named(read_entries(path), PEOPLE)
@@ -195,14 +195,16 @@ def read_plan(path: Path | str) -> Plan:
     plan = Plan(study, build(PeopleParameters, texts, f"{PEOPLE}."), questions)
     trials = plan.trials(plan.codes[0])
     if len(trials) > MOST:
-        raise ParameterError(
-            "people.repetitions", plan.people.repetitions, f"so few that there are {MOST} trials at most"
-        )
+        raise ParameterError("people.repetitions", plan.people.repetitions, f"small enough for at most {MOST} trials")
     study.points()  # a trial that cannot run is reported here
     for trial in {trial.condition: trial for trial in trials}.values():
         stages = plan.configuration(plan.codes[0], trial).groups
         if plan.people.attempts and "task" not in stages:
-            raise ParameterError("people.attempts", plan.people.attempts, "0 where no stage `task` counts them")
+            raise ParameterError(
+                "people.attempts",
+                plan.people.attempts,
+                "0 in a session without the stage `task`, which counts attempts",
+            )
     return plan
 
 

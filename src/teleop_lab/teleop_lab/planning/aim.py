@@ -28,7 +28,7 @@ class Aim:
     Args:
         robot: The slave.
         stylus: Attitude of the stylus, quaternion (4,), when it is engaged.
-        given: Placement whose values are kept if they fit.
+        given: Placement whose tool axes and roll are preferred if they fit.
     """
 
     def __init__(self, robot: Robot, stylus: Array, given: Placement) -> None:
@@ -36,7 +36,7 @@ class Aim:
         self._stylus = rotations_from_quaternions(stylus)
 
     def wanted(self, placement: Placement) -> Array:
-        """Rotation (3, 3) from the tool's axes to those of the stylus with which both turn in the same way."""
+        """Rotation (3, 3) from the tool's axes to the stylus's axes for which both turn about the same axes."""
         tool = self._robot.fk(np.array(placement.start))[:3, :3]
         return np.asarray(self._stylus.T @ axis_map("axes", placement.axes).T @ tool)
 

@@ -19,7 +19,7 @@ class AskedPath:
     """Motion of a hand.
 
     Attributes:
-        name: What it is called in tables.
+        name: Name of the path in tables.
         stamp_ns: Stamps (N,) [ns], rising.
         poses: Poses (N, 7) of the master: position [m], quaternion w, x, y, z.
         buttons: Clutch, fixture, mode (N, 3): 1 pressed.
@@ -45,14 +45,14 @@ class AskedPath:
         return np.array(self.poses[int(is_free.argmax()), 3:])
 
     def limited(self, count: int) -> "AskedPath":
-        """The same path with about ``count`` samples at most, evenly spread over the time."""
+        """Copy of the path with at most about ``count`` samples, evenly spread over the time."""
         return self if len(self) <= count else self.excerpt(count / self.time[-1], 2 * count)
 
     def excerpt(self, rate: float, count: int) -> "AskedPath":
         """Fewer samples of the same motion.
 
-        At most ``rate`` samples a second are kept, and all samples at which a button changes. If there are more than
-        ``count`` of these, only ten stretches of the path are kept, with the times between them.
+        At most ``rate`` samples a second are kept, and all samples at which a button changes. If more than ``count``
+        samples remain, only ten stretches of the path are kept, with their original times.
 
         Args:
             rate: Samples per second.
@@ -70,7 +70,7 @@ class AskedPath:
 
 
 def asked_path(bag: Bag) -> AskedPath:
-    """What the hand of a recording did.
+    """Motion of the hand in a recording.
 
     Args:
         bag: Recording with ``master/measured_cp`` and, if it has them, ``master/buttons``.

@@ -22,7 +22,7 @@ COLORS = {Limit.NONE: "#1c7c54", **LIMIT_COLORS}
 """Colours of samples that are followed, and of other samples by their causes."""
 # More points than these make the page slow and the picture no clearer.
 _POINTS, _WORKSPACE, _BINS = 6_000, 3_000, 1_500
-_ROWS = (2, 3)  # of the figure, with curves over the time
+_ROWS = (2, 3)  # rows of the figure that show curves over time
 _AXES = (("x", "#1971c2"), ("y", "#495057"), ("z", "#b08900"))
 _STYLE = """\
 body { font: 15px/1.45 system-ui, sans-serif; margin: 1rem auto; max-width: 1500px;
@@ -56,7 +56,7 @@ def write_reach_page(reaches: "Sequence[Reach]", file: Path) -> None:
     """Write one self-contained page.
 
     Args:
-        reaches: What was found for each recording, at least one.
+        reaches: Result for each recording, at least one.
         file: Page to write; its folder must exist.
 
     Raises:

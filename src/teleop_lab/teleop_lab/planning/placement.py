@@ -11,18 +11,18 @@ Setting = float | str | list[float] | list[str]
 
 @dataclass(frozen=True, kw_only=True)
 class Placement:
-    """How a slave is arranged for a hand's motion.
+    """Arrangement of a slave for a hand's motion.
 
     Attributes:
-        robot: Which slave: ``robot`` of the stages that have one.
-        geometry: Lengths and options in place of its published ones, ``symbol=value`` each.
+        robot: Name of the slave: ``robot`` of all stages with this parameter.
+        geometry: Lengths and options of the slave that replace the published ones, as ``symbol=value``.
         start: Joints (n,) [rad, m] from which the slave follows: ``slave.start``.
         axes: The slave's x, y, z as axes of the master: ``motion_scaling.axes``.
         coarse_gain: Slave motion per hand motion in coarse mode.
-        fine_gain: The same in fine mode.
+        fine_gain: Slave motion per hand motion in fine mode.
         rotation_gain: Rotation of the tool divided by that of the stylus.
         tool_axes: The tool's x, y, z as axes of the stylus: ``motion_scaling.tool_axes``.
-        tool_roll: Turn [rad] of the tool about its axis, after that.
+        tool_roll: Turn [rad] of the tool about its axis, applied after ``tool_axes``.
     """
 
     robot: str
@@ -73,11 +73,11 @@ class Placement:
         }
 
     def texts(self, arm: str = "") -> list[str]:
-        """The same as ``key=value`` for ``--set``; no value holds blanks."""
+        """Placement as ``key=value`` texts for ``--set``; no value contains blanks."""
         return [f"{name}={_text(value)}" for name, value in self.settings(arm).items()]
 
     def parameter_file(self, arm: str = "") -> str:
-        """The same as a ROS 2 parameter file, which ``--config`` takes."""
+        """Placement as a ROS 2 parameter file for ``--config``."""
         stages: dict[str, dict[str, dict[str, Setting]]] = {}
         for name, value in self.settings(arm).items():
             stage, _, parameter = name.partition(".")

@@ -1,4 +1,4 @@
-"""Reach: how much of a hand's motion a slave can follow, and with which settings it follows most of it."""
+"""Reach: the share of a hand's motion that a slave can follow, and the settings with which this share is largest."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -35,8 +35,8 @@ class Followed:
 
     Attributes:
         placement: Start, turn and gains.
-        session: As in a session: limits cut the hand's motion, joints have their speeds.
-        in_place: The original path, with nothing cut off and joints as fast as needed.
+        session: Walk as in a session: limits cut the hand's motion, and joints have their speed limits.
+        in_place: Walk along the original path: nothing is cut off, and joints are as fast as needed.
         at_given_gain: Share of the time in which a session would follow with the given gains.
         misfit: Angle [rad] between the rotation axes of the tool and those of the hand.
     """
@@ -55,14 +55,14 @@ class Followed:
 
 @dataclass(frozen=True, eq=False)
 class Reach:
-    """How much of a motion a slave can follow.
+    """Share of a motion that a slave can follow.
 
     Attributes:
         path: Motion of the hand.
         robot: The slave.
         goal: Share of the time in which the slave must follow.
-        given: With the parameters as they are.
-        proposed: With the best placement; the given one if that reaches the goal.
+        given: Result with the given parameters.
+        proposed: Result with the best placement; the given one if that reaches the goal.
         arm: Namespace of the arm; empty for the default one.
     """
 
@@ -113,13 +113,13 @@ def reach(
     settings: Mapping[str, Setting] | None = None,
     texts: Iterable[str] = (),
 ) -> Reach:
-    """How much of a hand's motion a slave can follow, and with which settings it follows most of it.
+    """Find the share of a hand's motion that a slave can follow, and the settings with which this share is largest.
 
     Args:
         source: A recording, its path, or the name of a scenario, which is run first. The search starts
             from the recording's own configuration. A foreign recording, in any file that replay reads, has none: then
             the search starts from the default configuration.
-        robot: The slave, in place of the configuration's; its start then is the robot's own.
+        robot: Slave that replaces the configuration's; the start is then the default start of that robot.
         geometry: Lengths and angles of the slave [m, rad] as ``symbol=value``.
         share: Share of the time that is to be followed, above 0 and at most 1.
         arm: Namespace of the arm; empty for the default one.
@@ -128,7 +128,7 @@ def reach(
         progress: Called with the progress.
         files: ROS 2 parameter files over the configuration.
         settings: Parameters over the files.
-        texts: The same as ``key=value``, over the settings.
+        texts: Parameters as ``key=value``, which override the settings.
 
     Returns:
         Shares and causes, and a proposal.

@@ -43,10 +43,10 @@ class Search:
 
     Args:
         walker: Walks the path, or an excerpt of it.
-        given: Placement to begin with; its gains are the largest that are tried.
+        given: First placement; larger gains than its gains are not tried.
         aim: Fits the tool's axes to every start and turn.
         tell: Called before every walk.
-        keeps_axes: Whether ``axes`` stay as they are given.
+        keeps_axes: Whether ``axes`` must not change.
     """
 
     def __init__(
@@ -59,13 +59,13 @@ class Search:
         self._starts = [self._rounded(q) for q in free_postures(walker.robot, STARTS)]
 
     def best(self, goal: float) -> Found:
-        """The placement with the largest gains that reach the goal, or the one that comes nearest.
+        """The placement with the largest gains that reaches the goal, or else the placement nearest to the goal.
 
         Args:
-            goal: Share of the time that is to be followed.
+            goal: Wanted share of the time in which the slave follows.
 
         Returns:
-            Share of the time that the walker's path is followed, and the placement.
+            Share of the time in which the slave follows the walker's path, and the placement.
         """
         self._goal, nearest = goal, (-1.0, self._given)
         self._known.clear()
@@ -139,7 +139,7 @@ class Search:
         return None
 
     def _improved(self, found: Found) -> Found:
-        """The same placement with its start shifted by the motion that was cut off, as long as that helps."""
+        """Placement whose start is shifted by the motion that was cut off, as long as this increases the share."""
         for _ in range(_ROUNDS):
             if found[0] >= 1.0:
                 break

@@ -56,7 +56,7 @@ class Walked:
         asked: Poses (N, 7) [m] commanded to the slave.
         reached: Poses (N, 7) [m] of its answer.
         q: Joints (N, n) [rad, m] of its answer.
-        limit: :class:`~teleop_core.graph.topics.Limit` (N,) that kept it from following.
+        limit: :class:`~teleop_core.graph.topics.Limit` (N,) that kept the slave from following.
         joint: Joint (N,) that was at its limit; -1 for none.
         residual: Distance [m] and angle [rad] (N, 2) from the commanded pose.
     """

@@ -29,17 +29,21 @@ def insist_on_scores(made: Configuration, metrics: Sequence[str]) -> None:
             continue
         reads = [topic.name for topic in metric.topics]
         if reads and not written.intersection(reads):
-            raise ParameterError("metrics", asked, f"of topics of the session; no stage writes {' or '.join(reads)}")
+            raise ParameterError(
+                "metrics", asked, f"metrics of topics of the session; no stage writes {' or '.join(reads)}"
+            )
         world = made.value("world")
         if issubclass(metric, ObjectMetric) and not (world and isinstance(world.kind.parameters, metric.kind)):
-            raise ParameterError("metrics", asked, f"of an object of the session, which has no {metric.place()}")
+            raise ParameterError(
+                "metrics", asked, f"metrics of an object of the session, which has no {metric.place()}"
+            )
 
 
 def insist_on_reach(made: Configuration) -> None:
-    """Insist on an object, if a place is given for it, that the slave can touch.
+    """Check that the slave can touch the object, if the session gives a position for it.
 
     Raises:
-        ParameterError: The tip comes nowhere near it.
+        ParameterError: The tip cannot come near the object.
     """
     for arm in made.graph.namespaces:
         world = made.value("world", arm)

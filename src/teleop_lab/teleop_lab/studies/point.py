@@ -21,7 +21,7 @@ from teleop_core.session import api, configuration
 
 @dataclass(frozen=True)
 class Key:
-    """What a result depends on: digests of its parameters and of the code that made it."""
+    """Digests of everything that a result depends on: its parameters, and the code that made it."""
 
     recipe: str
     code: str
@@ -33,10 +33,10 @@ class Point:
 
     Attributes:
         place: Its value in every dimension.
-        scenario: As the study's.
+        scenario: Scenario of the study.
         settings: All parameters that are given.
         seed: Its seed.
-        length: How long the hand moves [s].
+        length: Duration of the hand's motion [s].
         key: Digests of all that its result depends on.
     """
 
@@ -59,11 +59,11 @@ class Result:
     """Result of a point: scores, or an error.
 
     Attributes:
-        name: Of the point.
+        name: Name of the point.
         key: Its key.
         scores: Numbers by key of a score; None where it does not apply.
         error: Text of the error; empty without one.
-        seconds: How long it took [s].
+        seconds: Time that the session took [s].
     """
 
     name: str
@@ -98,7 +98,7 @@ def recipe_of(made: configuration.Configuration) -> str:
 
 
 def point_key(recipe: str, seed: int, metrics: Sequence[str], code: str) -> Key:
-    """Key of a point: any change of parameters, seed, scores or code makes another one."""
+    """Key of a point; any change of parameters, seed, scores or code changes the key."""
     text = json.dumps([recipe, seed, sorted(metrics)])
     return Key(hashlib.sha256(text.encode()).hexdigest()[:20], code)
 
@@ -155,7 +155,7 @@ _READ_MORE: set[tuple[str, ...]] = set()
 
 
 def _kept(metrics: tuple[str, ...]) -> frozenset[str] | None:
-    """Streams to be kept for some scores; None: all."""
+    """Streams that some scores need; None: all streams."""
     return None if metrics in _READ_MORE else streams_of(metrics)
 
 

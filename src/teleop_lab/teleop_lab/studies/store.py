@@ -19,7 +19,7 @@ class Store:
     """Results by the names of their points.
 
     Args:
-        folder: Where they are kept; None: in memory.
+        folder: Folder of the results; None: they stay in memory.
     """
 
     def __init__(self, folder: Path | None) -> None:
@@ -101,8 +101,8 @@ def write_result(folder: Path, result: Result) -> None:
         place.mkdir(exist_ok=True)
         write_whole(place / f"{result.name}.json", result.to_json())
     except OSError as error:
-        text = f"{folder} cannot take more: {error.strerror}; what is done is kept"
-        raise SessionError(f"{text}, and the same command goes on from there") from error
+        text = f"{folder} cannot be written: {error.strerror}; results of finished sessions are kept"
+        raise SessionError(f"{text}; run the same command again to continue") from error
 
 
 def write_whole(path: Path, text: str) -> None:

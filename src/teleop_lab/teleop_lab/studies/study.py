@@ -36,16 +36,16 @@ _SECOND = 200_000
 
 @dataclass(frozen=True)
 class Explained:
-    """What a study costs, without running it.
+    """Cost of a study, estimated without running it.
 
     Attributes:
-        sessions: How many there are in all.
-        to_run: Those that are missing, failed or changed.
+        sessions: Number of all sessions.
+        to_run: Number of sessions that are missing, failed or changed.
         why: Number of these sessions by reason: missing, failed, changed code, changed parameters.
-        simulated: Time that those last [s].
-        wall: Estimated time for them with the given processes [s].
+        simulated: Simulated time of the sessions to run [s].
+        wall: Estimated time to run them with the given number of processes [s].
         stored: Bytes of all results.
-        recorded: Bytes of their recordings, if they are kept.
+        recorded: Bytes of the recordings of all sessions, if recordings are made.
     """
 
     sessions: int
@@ -114,7 +114,7 @@ class Study:
         """All points, in the order of the dimensions; each configuration is checked here.
 
         Raises:
-            TeleopError: One of them cannot run; the text names the value.
+            TeleopError: A point cannot run; the text names the wrong value.
         """
         found = []
         for values in product(*self.swept.values()):
@@ -125,7 +125,7 @@ class Study:
         """Points of all seeds at a value for each swept parameter, be it one of the study or not.
 
         Raises:
-            TeleopError: They cannot run; the text names the value.
+            TeleopError: Some points cannot run; the text names the wrong value.
         """
         found, code = [], code_digest() + own_digest()
         given = {**self.settings, **chosen}
@@ -140,14 +140,14 @@ class Study:
         return found
 
     def explain(self, store: Path | str | None = None, jobs: int | None = None) -> Explained:
-        """How many sessions, how long and how many bytes, without running one.
+        """Number, duration and bytes of the sessions, without running one.
 
         Args:
-            store: Where results are already.
+            store: Store with earlier results.
             jobs: Processes; None: as many as processors.
 
         Raises:
-            TeleopError: As :meth:`points`, or the store is another study's.
+            TeleopError: As in :meth:`points`, or the store belongs to another study.
         """
         points = self.points()
         kept = Store.open(store, self) if store is not None else None
@@ -172,7 +172,7 @@ class Study:
         recordings: Path | str | None = None,
         progress: Callable[[int, int], None] = runner.silent,
     ) -> "xarray.Dataset":
-        """Run what is missing, failed or changed, and give all results.
+        """Run the sessions that are missing, failed or changed, and return all results.
 
         Results are written one by one as they are computed. So after a killed call, another call with the same store
         continues the study. If a session fails, its point has the error.
@@ -185,7 +185,7 @@ class Study:
             progress: Called with the number of finished points, and the number of all.
 
         Raises:
-            TeleopError: As :meth:`explain`, before the first session.
+            TeleopError: As in :meth:`explain`, before the first session.
         """
         from teleop_lab.studies.dataset import dataset_of
         from teleop_lab.studies.workers import in_processes, on_dask
@@ -227,11 +227,11 @@ def sweep(
         seed: Seeds.
         settings: Parameters by name; a list is swept, any other value applies to all sessions.
         parts: Files that register parts of your own.
-        store: As in :meth:`Study.run`, and so those that follow.
-        jobs: As there.
-        client: As there.
-        progress: As there.
-        **parameters: As ``settings``, with ``__`` for each dot: ``display__latency=[0.0, 0.3]``.
+        store: As in :meth:`Study.run`.
+        jobs: As in :meth:`Study.run`.
+        client: As in :meth:`Study.run`.
+        progress: As in :meth:`Study.run`.
+        **parameters: Parameters like ``settings``, with ``__`` for each dot: ``display__latency=[0.0, 0.3]``.
 
     Raises:
         TeleopError: A name or value is wrong; nothing was run.
@@ -260,7 +260,7 @@ def read_study(path: Path | str) -> Study:
     below ``people`` are for :mod:`teleop_lab.people`.
 
     Raises:
-        TeleopError: The file cannot be read, or says something else.
+        TeleopError: The file cannot be read, or is no study.
     """
     content = read_entries(path)
     swept = named(content, "sweep")
@@ -290,11 +290,11 @@ def read_entries(path: Path | str, known: Sequence[str] = _KEYS) -> dict[str, An
 
 
 def common(content: Mapping[str, Any], path: Path) -> dict[str, Any]:
-    """Scenario, seeds, settings and parts that a file at a path says."""
+    """Scenario, seeds, settings and parts of a file."""
     seeds, fixed = content.get("seeds", 1), named(content, "set")
     is_count = isinstance(seeds, int) and seeds > 0
     if not is_count and not (isinstance(seeds, list) and all(isinstance(s, int) for s in seeds)):
-        raise ParameterError("seeds", seeds, "how many there are, or a list of whole numbers")
+        raise ParameterError("seeds", seeds, "a number of seeds, or a list of whole numbers")
     if "duration" in content:
         fixed = {f"{SESSION}.duration": content["duration"], **fixed}
     return {

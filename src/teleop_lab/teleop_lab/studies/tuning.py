@@ -15,7 +15,8 @@ from teleop_lab.studies.workers import in_processes
 
 _KEYS = ("scenario", "seeds", "set", "tune", "minimize", "maximize", "parts", "duration")
 _TOGETHER = 5
-"""Trials whose values are chosen before the first of them has run, so that processes share them.
+"""Number of trials whose values are chosen together, before the first of them has run, so that several processes can
+run them.
 This is not an option, because the result must not depend on the machine."""
 
 
@@ -37,7 +38,7 @@ class Trial(NamedTuple):
     """Result of some values.
 
     Attributes:
-        values: By parameter.
+        values: Values by parameter.
         score: Mean over the seeds; None where a session failed or does not have it.
         error: Reason why there is no score.
     """
@@ -49,11 +50,11 @@ class Trial(NamedTuple):
 
 @dataclass(frozen=True)
 class Tuned:
-    """What a search found.
+    """Result of a search.
 
     Attributes:
-        trials: All of them, in their order.
-        best: The best of them.
+        trials: All trials, in their order.
+        best: The best trial.
     """
 
     trials: tuple[Trial, ...]
@@ -112,20 +113,20 @@ class Tuning:
         jobs: int | None = None,
         progress: Callable[[int, int], None] = runner.silent,
     ) -> Tuned:
-        """Try values, each chosen by the scores of those before it.
+        """Try values, each chosen by the scores of the earlier ones.
 
         With a store, a search that was killed and continued tries the same values as an uninterrupted one, and a
         search with more trials continues after the existing ones.
 
         Args:
             store: Directory of the results, made if it is missing; None keeps them in memory.
-            trials: How many values are tried.
+            trials: Number of trials.
             jobs: Processes; None: as many as processors.
-            progress: Told how many trials are done, and how many there are.
+            progress: Called with the number of finished trials, and the number of all.
 
         Raises:
-            SessionError: No trial has a score, Optuna is missing, or the store is another's.
-            ParameterError: There is no trial.
+            SessionError: No trial has a score, Optuna is missing, or the store belongs to another search.
+            ParameterError: ``trials`` is less than 1.
         """
         if trials < 1:
             raise ParameterError("trials", trials, "1 or more")
@@ -206,7 +207,7 @@ def read_tuning(path: Path | str) -> Tuning:
     A parameter below ``tune`` has a list of choices, or ``{low: 0.1, high: 1.0, log: true}``.
 
     Raises:
-        TeleopError: The file cannot be read, or says something else.
+        TeleopError: The file cannot be read, or is no search.
     """
     content = read_entries(path, _KEYS)
     metrics = [(word, content[word]) for word in ("minimize", "maximize") if word in content]

@@ -160,7 +160,7 @@ def _batch(
 
 @lru_cache(1)
 def _written(parts: tuple[tuple[str, str], ...]) -> list[Path]:
-    """Files of the worker's own parts and of the study's, kept as long as this process lives; another study's go."""
+    """Files of the worker's and the study's parts; they exist until this process ends or another study begins."""
     own = [path for path in named_files() if not path.parent.name.startswith(_FOLDER)]
     forget_own_parts()
     folder = Path(tempfile.mkdtemp(prefix=_FOLDER))

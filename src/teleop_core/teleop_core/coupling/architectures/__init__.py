@@ -38,10 +38,10 @@ def unled(parameters: object) -> float:
 
 @dataclass(frozen=True)
 class Architecture:
-    """A kind of architecture: what comes back to the hand.
+    """A kind of architecture: defines the force on the hand.
 
     Attributes:
-        name: Its name in ``--set reflection.architecture=``.
+        name: Name of the architecture in ``--set reflection.architecture=``.
         parameters: Its parameter group.
         push: ``push(numbers, memory, felt, away, period, out)``, a kernel or a plain function, called for every sample
             of the master. ``numbers`` are those of the parameters; ``memory`` (12,) is kept from sample to sample, and
@@ -55,7 +55,7 @@ class Architecture:
             it, > 0. Energies of hand and slave are compared by this factor.
         lead_gain: ``lead_gain(parameters)`` returns the force on the slave's tip per force with which the hand resists
             the push [N/N], for the stage ``impedance``.
-        needs_impedance: Whether it works only together with a stage ``impedance``.
+        needs_impedance: Whether the architecture needs a stage ``impedance``.
     """
 
     name: str
@@ -74,7 +74,7 @@ def _try(part: Architecture) -> None:
     """Push for some samples, so that errors are reported before anything runs."""
     needs = "one with push(numbers, memory, felt, away, period, out) and parameters that all have defaults"
     with tried("architecture", part.name, needs):
-        numbers, _ = fenced(part.numbers(part.parameters()))  # one too far is NaN
+        numbers, _ = fenced(part.numbers(part.parameters()))  # an index one too large reads NaN
         memory, fence = fenced(np.zeros(MEMORY))
         out, behind = fenced(np.zeros(3))
         for size in (0.0, 1.0, -3.0):

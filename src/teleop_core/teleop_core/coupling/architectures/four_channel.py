@@ -1,4 +1,4 @@
-"""Four channels: positions and forces go both ways, and the slave yields to the difference of the forces."""
+"""Four channels: positions and forces are sent in both directions; the slave yields to the difference of the forces."""
 
 from dataclasses import dataclass
 
@@ -10,13 +10,13 @@ from teleop_core.coupling.architectures.three_channel import ThreeChannelParamet
 
 @dataclass(frozen=True, kw_only=True)
 class FourChannelParameters(ThreeChannelParameters):
-    """What the hand gets of the slave, and what the slave gets of the hand's force."""
+    """Gains of the channels between hand and slave."""
 
     hand_gain: float = parameter(
         1.0,
         Within(0.0, 10.0, "N/N"),
-        "force that leads the slave over the hand's; with 1/force_gain a press that lasts "
-        "moves the tip no way from its command",
+        "force that moves the slave, divided by the hand's force; with 1/force_gain a constant press "
+        "does not move the tip away from its command",
     )
 
 

@@ -23,24 +23,26 @@ class ImpedanceParameters:
     mass: float = parameter(
         1.0,
         Within(0.0, 100.0, "kg"),
-        "of the tip as it yields",
-        source="assumed: with spring and damper it does not swing",
+        "virtual mass of the tip that yields to force",
+        source="assumed: together with stiffness and damping it does not oscillate",
     )
     damping: float = parameter(
         100.0,
         Within(1.0, 10_000.0, "N·s/m"),
-        "force over the speed of yielding",
-        source="assumed: what keeps an arm that lags by 50 ms calm before silicone of 1000 N/m",
+        "virtual damping: force divided by the speed at which the tip yields",
+        source="assumed: with it, an arm that lags by 50 ms does not oscillate on silicone of 1000 N/m",
     )
     stiffness: float = parameter(
         1000.0,
         Within(10.0, 100_000.0, "N/m"),
-        "force over the way of yielding",
-        source="assumed: five times that of tissue, as much as silicone's",
+        "virtual stiffness: force divided by the distance by which the tip yields",
+        source="assumed: five times the stiffness of tissue, and the same as that of silicone",
     )
-    force_gain: float = parameter(1.0, Within(0.0, 10.0, "N/N"), "force that it yields to over slave/measured_cf")
+    force_gain: float = parameter(
+        1.0, Within(0.0, 10.0, "N/N"), "force to which the tip yields, divided by slave/measured_cf"
+    )
     largest_way: float = parameter(
-        0.02, Within(0.0, 0.5, "m"), "how far it yields at most, whatever the force", source="assumed"
+        0.02, Within(0.0, 0.5, "m"), "largest distance by which the tip yields, at any force", source="assumed"
     )
 
 

@@ -9,9 +9,9 @@ from teleop_core.kernels import Array, kernel
 
 @dataclass(frozen=True, kw_only=True)
 class PositionForceParameters:
-    """How much of the force comes back."""
+    """Gain of the force at the hand."""
 
-    force_gain: float = parameter(1.0, Within(0.0, 10.0, "N/N"), "force at the hand over slave/measured_cf")
+    force_gain: float = parameter(1.0, Within(0.0, 10.0, "N/N"), "force at the hand, divided by slave/measured_cf")
 
 
 @kernel

@@ -14,8 +14,8 @@ class PositionPositionParameters:
     stiffness: float = parameter(
         150.0,
         Within(0.0, 5000.0, "N/m"),
-        "force at the hand over the way from its command to slave/measured_cp",
-        source="assumed: half of the stiffness of a medium grip, so that no delay makes it throw the hand",
+        "force at the hand, divided by the distance from its command to slave/measured_cp",
+        source="assumed: half of the stiffness of a medium grip, so that no delay makes the force throw the hand",
     )
 
 

@@ -57,7 +57,7 @@ def _try(part: TremorFilter) -> None:
     """Filter some values, so that errors are reported before anything runs."""
     needs = "one with filter(numbers, memory, value, period) -> float and parameters that all have defaults"
     with tried("tremor filter", part.name, needs):
-        numbers, _ = fenced(part.numbers(part.parameters()))  # one too far is NaN
+        numbers, _ = fenced(part.numbers(part.parameters()))  # an index one too large reads NaN
         memory, fence = fenced(np.zeros(MEMORY))
         rest = float(part.filter(numbers, memory, 0.0, 1e-3))
         for i in range(64):

@@ -12,8 +12,8 @@ from teleop_core.kernels import Array, inner, kernel
 class BandStopParameters:
     """Edges of the band."""
 
-    low: float = parameter(8.0, Within(3.0, 25.0, "Hz"), "lower edge, of which 3 dB are taken out")
-    high: float = parameter(12.0, Within(3.0, 25.0, "Hz"), "upper edge, of which 3 dB are taken out")
+    low: float = parameter(8.0, Within(3.0, 25.0, "Hz"), "lower edge of the stop band, at which 3 dB are removed")
+    high: float = parameter(12.0, Within(3.0, 25.0, "Hz"), "upper edge of the stop band, at which 3 dB are removed")
 
     def __post_init__(self) -> None:
         """Refuse edges that enclose no band."""

@@ -23,27 +23,28 @@ class KalmanParameters:
     acceleration_noise: float = parameter(
         0.02,
         Within(1e-6, 100.0, "m/s²/√Hz"),
-        "root of the density of the meant acceleration, which is white",
-        source="derived: least distance from what was meant, of a hand as in scenario human",
+        "square root of the spectral density of the intended acceleration, which is white noise",
+        source="derived: gives the smallest error from the intended motion, for a hand as in scenario human",
     )
     reading_noise: float = parameter(
         1.6e-7,
         Within(1e-9, 0.1, "m/√Hz"),
-        "root of the density of what the readings add, which is white",
-        source="derived: as acceleration_noise; 5 µm a sample at 1 kHz",
+        "square root of the spectral density of the noise of the readings, which is white",
+        source="derived: in the same way as acceleration_noise; it is 5 µm per sample at 1 kHz",
     )
-    frequency: float = parameter(10.0, Within(4.0, 20.0, "Hz"), "of the tremor")
+    frequency: float = parameter(10.0, Within(4.0, 20.0, "Hz"), "frequency at which the tremor's spectrum has its peak")
     half_width: float = parameter(
         1.0,
         Within(0.01, 5.0, "Hz"),
-        "from the peak of the tremor's spectrum to half of it; the wider, the less is taken",
+        "frequency difference from the peak of the tremor's spectrum to half of it; the wider, the "
+        "less tremor is removed",
         source="assumed: tremor of 8 to 12 Hz (Elble and Koller 1990)",
     )
     tremor: float = parameter(
         45e-6,
         Within(0.0, 0.1, "m"),
-        "tremor on each axis, root mean square",
-        source="derived: 77 µm over three axes, as of operator human",
+        "RMS amplitude of the tremor on each axis",
+        source="derived: 77 µm over three axes, as for the operator human",
     )
 
 

@@ -13,14 +13,14 @@ _WIDEST = 0.45
 
 @dataclass(frozen=True, kw_only=True)
 class NotchParameters:
-    """Where the notch is, and how narrow."""
+    """Frequency and width of the notch."""
 
-    frequency: float = parameter(10.0, Within(3.0, 25.0, "Hz"), "frequency that is taken out")
+    frequency: float = parameter(10.0, Within(3.0, 25.0, "Hz"), "frequency that the filter removes")
     quality: float = parameter(
         1.0,
         Within(0.3, 30.0),
-        "frequency over the width in which more than 3 dB are taken out; slow motion is late "
-        "by 1/(2π frequency quality)",
+        "frequency divided by the width of the band in which more than 3 dB are removed; slow motion "
+        "is delayed by 1/(2π frequency quality)",
     )
 
     def __post_init__(self) -> None:

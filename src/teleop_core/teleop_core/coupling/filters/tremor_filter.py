@@ -25,9 +25,9 @@ _FADE = 0.2
 class TremorFilterParameters:
     """Parameters of :class:`RunningTremorFilter`."""
 
-    kind: Choice = choice(TREMOR_FILTERS, "wflc", doc="how tremor is taken out")
+    kind: Choice = choice(TREMOR_FILTERS, "wflc", doc="filter that removes the hand's tremor")
     longest_pause: float = parameter(
-        0.3, Within(0.002, 5.0, "s"), "after a longer pause of the master the filter begins anew at the reading"
+        0.3, Within(0.002, 5.0, "s"), "after a longer pause of the master the filter restarts at the next reading"
     )
     plausible: plausibility.HandLimits = field(default_factory=plausibility.HandLimits)
 
@@ -166,7 +166,7 @@ class RunningTremorFilter(RunningStage):
         numbers, step = kind.numbers(parameters.kind.parameters), kind.filter_pointer
         if step is self._part.filter and len(numbers) == len(self._part.numbers):
             self.state["is_retuned"] |= not np.array_equal(numbers, self._part.numbers)
-            self._part.numbers[:] = numbers  # the tick that is composed already goes on
+            self._part.numbers[:] = numbers  # in place, so that the composed tick stays valid
             return
         self._part = Part(step, numbers, self._part.memory)
         self.arguments = (self.parameters, self.state, self._part)
@@ -179,7 +179,7 @@ class RunningTremorFilter(RunningStage):
         self._told = count
         if count <= told:
             return []
-        return [f"began anew at {count - told} samples of the master that no hand can make"]
+        return [f"restarted at {count - told} samples of the master that are implausible for a hand"]
 
 
 TREMOR_FILTER = Stage(

@@ -24,21 +24,24 @@ _DAMPING, _WIDE = math.sqrt(2.0), 0.6
 class WflcParameters:
     """How the tremor is separated from the intended motion, and how fast it is learned."""
 
-    frequency: float = parameter(10.0, Within(6.0, 14.0, "Hz"), "of the tremor, at the beginning")
+    frequency: float = parameter(
+        10.0, Within(6.0, 14.0, "Hz"), "frequency of the tremor that the filter assumes at the beginning"
+    )
     high_pass: float = parameter(
-        6.0, Within(0.5, 6.0, "Hz"), "motion that is slower is taken as meant, and not learned"
+        6.0, Within(0.5, 6.0, "Hz"), "motion below this frequency counts as intended; the filter does not learn it"
     )
     amplitude_rate: float = parameter(
         6.0,
         Within(0.1, 50.0, "1/s"),
-        "inverse of the time in which the amplitude is learned; the larger, the farther from "
-        "the tremor's frequency motion is taken for tremor",
-        source="derived: least distance from what was meant, of a hand as in scenario human",
+        "inverse of the time in which the filter learns the amplitude; the larger, the wider the "
+        "band of frequencies that counts as tremor",
+        source="derived: gives the smallest error from the intended motion, for a hand as in scenario human",
     )
     frequency_rate: float = parameter(
         0.3,
         Within(0.0, 5.0, "1/s"),
-        "inverse of the time in which the frequency is learned, within 2 Hz of frequency; 0: it is kept",
+        "inverse of the time in which the filter learns the tremor's frequency, within 2 Hz of "
+        "frequency; 0: the frequency stays constant",
     )
 
 

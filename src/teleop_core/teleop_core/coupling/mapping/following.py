@@ -22,10 +22,10 @@ class FollowingState(Fields):
     last_ns: int  # stamp of the last command
     is_engaged: int
     in_force_ns: int  # stamp in force
-    rose_ns: int  # when it rose last
-    lag_ns: int  # how far the setpoint was behind the last command at that time
-    lost_ns: int  # since when the slave does not follow
-    felt_ns: int  # stamp of its force
+    rose_ns: int  # time at which the stamp last rose
+    lag_ns: int  # time by which the setpoint was behind the last command then
+    lost_ns: int  # time since which the slave does not follow
+    felt_ns: int  # stamp of the slave's force
     felt_at_ns: int  # when that rose last
     seen_ns: int  # stamp of the measured pose
     seen_at_ns: int  # when that rose last

@@ -28,40 +28,40 @@ class FixtureParameters:
     place: tuple[float, ...] = parameter(
         (0.0, 0.0, 0.0),
         Within(-0.5, 0.5, "m"),
-        "from the middle, where the hand was, to that of the shape, in the master's base",
+        "vector from the hand's position at the start to the middle of the shape, in the master's base",
         length=3,
     )
-    keep_out: bool = parameter(False, doc="whether the hand stays outside of the shape in place of inside")
+    keep_out: bool = parameter(False, doc="true: the hand stays outside of the shape; false: inside")
     side: str = parameter(
         "hand",
         choices=SIDES,
-        doc="whom it holds: hand: it pushes the hand, and the slave goes where that goes; slave: "
-        "the slave's command stays inside, and the hand feels nothing of it; both: both",
+        doc="hand: the fixture pushes the hand, and the slave follows the hand; slave: the fixture "
+        "bounds the slave's command, and the hand feels nothing; both: it does both",
     )
     wall: str = parameter(
         "damped",
         choices=tuple(walls.WALLS),
-        doc="damped: spring and damper up to max_force, passive if soft enough (up to 1000 N/m); "
-        "hard: the same, as steep as sampling allows; source: the published spring, full after "
-        "1 mm; soft: a spring; step: max_force at once, which buzzes",
+        doc="damped: spring and damper up to max_force, passive up to some 1000 N/m; hard: the "
+        "stiffest spring that sampling allows; source: the published spring, at full force after "
+        "1 mm; soft: a spring only; step: max_force at once, which vibrates",
     )
     stiffness: float = parameter(
         1000.0,
         Within(1.0, 5000.0, "N/m"),
-        "spring of the damped and the soft wall",
-        source="assumed: below the least stiffness of the device, 1020 N/m; none is published",
+        "stiffness of the damped and the soft wall",
+        source="assumed: less than the smallest stiffness of the device, 1020 N/m; the source states no value",
     )
     damping: float = parameter(
         10.0,
         Within(0.0, 50.0, "N·s/m"),
-        "damper of the damped and the hard wall; at least stiffness times period is taken",
-        source="assumed: what keeps slow contacts of a trembling hand passive too, twenty times "
-        "K T / 2 of 1000 N/m at 1 kHz (Colgate and Schenkel 1997)",
+        "damping of the damped and the hard wall; a value below stiffness times tick is raised to it",
+        source="assumed: keeps slow contacts of a trembling hand passive too; twenty times K T / 2 of "
+        "1000 N/m at 1 kHz (Colgate and Schenkel 1997)",
     )
     max_force: float = parameter(
         3.3,
         Within(0.0, 10.0, "N"),
-        "largest push; the device limits it further",
+        "largest force on the hand; the device may limit it further",
         source="published: Vongbunyong 2008, section 6.3, the peak force of the device",
     )
 
@@ -89,32 +89,36 @@ class ReachForceParameters:
     stiffness: float = parameter(
         500.0,
         Within(1.0, 5000.0, "N/m"),
-        "spring of it",
-        source="assumed: half of the fixture's, so that one feels which of the two it is",
+        "stiffness of the wall that shows the slave's limits",
+        source="assumed: half of the fixture's stiffness, so that a person can tell both walls apart",
     )
     max_force: float = parameter(
-        1.5, Within(0.0, 10.0, "N"), "largest push", source="assumed: half of the fixture's, for the same reason"
+        1.5,
+        Within(0.0, 10.0, "N"),
+        "largest force of the wall that shows the slave's limits",
+        source="assumed: less than half of the fixture's force, so that a person can tell both walls apart",
     )
 
 
 @dataclass(frozen=True, kw_only=True)
 class ReflectionParameters:
-    """What the hand feels of the slave, and of what the slave touches."""
+    """Force on the hand from the slave and its contacts."""
 
-    architecture: Choice = choice(ARCHITECTURES, "unilateral", doc="what the hand feels of the slave")
+    architecture: Choice = choice(ARCHITECTURES, "unilateral", doc="law by which the hand feels the slave")
     max_force: float = parameter(
         3.3,
         Within(0.0, 10.0, "N"),
-        "largest push; the device limits it further",
+        "largest force on the hand; the device may limit it further",
         source="published: Vongbunyong 2008, section 6.3, the peak force of the device",
     )
     passivity: Choice = choice(
         PASSIVITIES,
         "none",
-        doc="tank: the push gives the hand no more energy than it took from it in this touch, "
-        "however late it comes; tdpa: no more than the slave got back, and with a stage passivity "
-        "the slave gives no more than the hand did; wave: waves of force and speed, if there is "
-        "that stage; none: what the slave feels, which may throw the hand",
+        doc="tank: in each contact the force gives the hand no more energy than it took from the "
+        "hand, at any delay; tdpa: no more than the slave got from its contact, and with a stage "
+        "passivity the slave spends no more than the hand supplied; wave: both sides exchange "
+        "waves of force and speed, if there is a stage passivity; none: energy is not limited, "
+        "and a delayed force may throw the hand",
     )
 
 
@@ -122,30 +126,38 @@ class ReflectionParameters:
 class MotionScalingParameters:
     """Parameters of :class:`MotionScaling`."""
 
-    coarse_gain: float = parameter(1.0, Within(1e-3, 10.0, "m/m"), "slave motion per master motion, coarse mode")
-    fine_gain: float = parameter(0.1, Within(1e-3, 10.0, "m/m"), "slave motion per master motion, fine mode")
-    mode: str = parameter("coarse", choices=MODES, doc="mode; the mode button changes it too")
+    coarse_gain: float = parameter(
+        1.0, Within(1e-3, 10.0, "m/m"), "slave motion divided by master motion, in coarse mode"
+    )
+    fine_gain: float = parameter(0.1, Within(1e-3, 10.0, "m/m"), "slave motion divided by master motion, in fine mode")
+    mode: str = parameter("coarse", choices=MODES, doc="mode, coarse or fine; the mode button changes it too")
     tool_roll: float = parameter(
         math.pi / 2,
         Within(-math.pi, math.pi, "rad"),
-        "turn of the slave's tool about its axis; π/2 aligns it with the home pose",
+        "turn of the slave's tool about its axis; π/2 aligns the tool with the home pose",
     )
     axes: tuple[str, ...] = parameter(
         ("-z", "-x", "+y"),
         choices=AXES,
         length=3,
-        doc="the slave's x, y, z as axes of the master's base; the default is that of the source",
+        doc="axes of the master's base along x, y, z of the slave's base; the default is published",
     )
     tool_axes: tuple[str, ...] = parameter(
-        ("+x", "-y", "-z"), choices=AXES, length=3, doc="the tool's x, y, z as axes of the stylus, before tool_roll"
+        ("+x", "-y", "-z"),
+        choices=AXES,
+        length=3,
+        doc="axes of the stylus along x, y, z of the tool, before tool_roll is applied",
     )
     rotation_gain: float = parameter(
         1.0,
         Within(0.0, 1.0, "rad/rad"),
-        "tool turn per stylus turn; below 1 the tool keeps no fixed relation to the stylus",
+        "turn of the tool divided by the turn of the stylus; below 1 the attitude of the tool "
+        "relative to the stylus changes with time",
     )
     longest_pause: float = parameter(
-        0.3, Within(0.002, 5.0, "s"), "after a longer pause of the master the slave is aligned anew and does not jump"
+        0.3,
+        Within(0.002, 5.0, "s"),
+        "after a longer pause of the master, motion scaling takes a new reference, so that the slave does not jump",
     )
     feedback_timeout: float = parameter(
         0.1,

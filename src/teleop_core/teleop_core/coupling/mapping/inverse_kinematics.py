@@ -19,22 +19,30 @@ from teleop_core.robots.selection import RobotParameters
 class InverseKinematicsParameters(RobotParameters):
     """Parameters of :class:`InverseKinematics`."""
 
-    speed_share: float = parameter(1.0, Within(0.01, 1.0), "share of the drives' speed limits that references may use")
-    position_tolerance: float = parameter(
-        1e-3, Within(0.0, 1.0, "m"), "an arm that lags behind by less than this, for want of speed, still follows"
+    speed_share: float = parameter(
+        1.0, Within(0.01, 1.0), "share of the drives' speed limits that joint references may use"
     )
-    rotation_tolerance: float = parameter(math.radians(1.0), Within(0.0, 1.0, "rad"), "the same for its orientation")
+    position_tolerance: float = parameter(
+        1e-3,
+        Within(0.0, 1.0, "m"),
+        "an arm at its speed limit counts as following while its position error is less than this",
+    )
+    rotation_tolerance: float = parameter(
+        math.radians(1.0),
+        Within(0.0, 1.0, "rad"),
+        "an arm at its speed limit counts as following while its orientation error is less than this",
+    )
     longest_pause: float = parameter(
         0.3,
         Within(0.002, 5.0, "s"),
-        "time between commands of one stream, at most; for one that comes alone, after a "
-        "longer pause, joints go as far as 0.45 s of full speed",
+        "largest time between two commands of one stream; for a command after a longer pause, joints "
+        "may move as far as full speed allows in 0.45 s",
     )
     feedback_timeout: float = parameter(
         0.1,
         Within(0.002, 5.0, "s"),
-        "with an older slave setpoint, solutions start from the slave's joints again; of slow "
-        "commands twice their period counts",
+        "largest age of the slave's setpoint; if it is older, the solver starts from the slave's "
+        "joints again. If commands are slow, the limit is twice their period",
     )
 
 
@@ -44,7 +52,7 @@ class SolverNumbers(Fields):
     speed: PerJoint  # rated [rad/s or m/s]
     longest_ns: int
     timeout_ns: int
-    tolerance: Annotated[Array, 2]  # of position and rotation [m, rad]
+    tolerance: Annotated[Array, 2]  # tolerances of position and rotation [m, rad]
 
 
 class SolverState(Fields):
@@ -239,7 +247,7 @@ class InverseKinematics(RunningStage):
         self._told = 0, 0
 
     def concerns(self) -> list[str]:
-        """What kept the slave from following since the last call, in words."""
+        """Texts with the reasons why the slave could not follow since the last call."""
         asked, limited = int(self.state["asked"]), int(self.state["limited"])
         share = (limited - self._told[1]) / max(asked - self._told[0], 1)
         self._told = asked, limited

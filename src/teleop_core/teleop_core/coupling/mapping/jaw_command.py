@@ -10,26 +10,31 @@ from teleop_core.graph import Row, Stage, topics
 from teleop_core.kernels import Fields, kernel
 
 SOURCES = ("hand", "clutch", "fixture", "mode")
-"""What closes the jaw: the hand's handle, or a button, in the order of ``master/buttons``."""
+"""Sources that can close the jaw: the hand's handle, or a button, in the order of ``master/buttons``."""
 _HAND = SOURCES.index("hand")
 _PRESSED = 0.5
 
 
 @dataclass(frozen=True, kw_only=True)
 class JawCommandParameters:
-    """What closes the jaw, and how far."""
+    """Source that closes the jaw, and the angles of the jaw."""
 
     source: str = parameter(
         "hand",
         choices=SOURCES,
-        doc="what closes it: hand/jaw, by its share, or a button, which keeps its own meaning too",
+        doc="signal that closes the jaw: hand/jaw in proportion, or a button, which also keeps its own function",
     )
-    toggles: bool = parameter(False, doc="whether each press closes or opens it, not the button as long as it is held")
-    open_angle: float = parameter(0.8, Within(0.0, 3.0, "rad"), "between the fingers of the open jaw", source="assumed")
+    toggles: bool = parameter(
+        False,
+        doc="true: each press of the button closes or opens the jaw; false: the jaw is closed while the button is held",
+    )
+    open_angle: float = parameter(
+        0.8, Within(0.0, 3.0, "rad"), "angle between the fingers of the open jaw", source="assumed"
+    )
     closed_angle: float = parameter(
         0.0,
         Within(-0.5, 3.0, "rad"),
-        "asked for when it is closed; less presses harder on what is thin",
+        "commanded angle of the closed jaw; a smaller angle presses harder on thin objects",
         source="assumed",
     )
 

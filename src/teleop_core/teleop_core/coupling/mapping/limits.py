@@ -13,7 +13,7 @@ from teleop_core.kernels import Fields, PoseRow, Quaternion, Vector3, geometry, 
 from teleop_core.kernels.room import room
 
 SENT = 8192
-"""Number of commands that are stored until the answer comes that tells how far they could be followed."""
+"""Number of commands that are stored until the slave reports how far it could follow them."""
 
 
 class Sent(Fields):
@@ -32,19 +32,19 @@ class LimitState(Fields):
     """
 
     command: PoseRow
-    hand: Vector3  # where the hand leads the slave [m]
-    tool: Quaternion  # how it turns it
+    hand: Vector3  # position to which the hand moves the slave [m]
+    tool: Quaternion  # tool orientation that the hand commands
     alignment: Quaternion
-    moved: Vector3  # what was cut off all commands so far
+    moved: Vector3  # sum of everything that was cut off commands so far
     turned: Quaternion
     answered_ns: int  # index of the command that was answered last
-    sent: int  # how many there were
+    sent: int  # number of sent commands
     limit: int
     joint: int
     until_ns: int
-    anchor: Vector3  # where the hand met the limit
-    out: Vector3  # which way is out
-    depth: float  # how far beyond it is
+    anchor: Vector3  # position at which the hand reached the limit
+    out: Vector3  # outward direction
+    depth: float  # distance beyond the limit
     turn_anchor: Quaternion
     turn_out: Vector3
     turn_depth: float
@@ -66,7 +66,7 @@ _ROUNDING = 1e-9
 
 @inner
 def forget_limits(s: LimitState) -> None:
-    """Forget all limits, as when the hand lets go of the slave."""
+    """Forget all limits, for example when the hand disengages from the slave."""
     s.limit, s.joint, s.until_ns = _NONE, -1, 0
     s.depth = s.turn_depth = 0.0
 

@@ -36,7 +36,7 @@ class ScalingNumbers(
     slave_master: Quaternion
     axis: Annotated[Integers, 3]
     sign: Vector3
-    size: Vector3  # of the fixture [m]
+    size: Vector3  # size of the fixture [m]
     rotation_gain: float
     reach_stiffness: float  # [N/m]
     reach_depth: float  # [m]
@@ -58,7 +58,7 @@ class ScalingState(
     is_fixture_on: int
     stylus: Vector3
     has_led: int  # whether the last sample moved the slave
-    aligned: int  # how often following and alignment began anew
+    aligned: int  # numbers of restarts of following and of alignment
 
 
 _FOLLOWING, _CLUTCHED = STATE["is_following"], STATE["is_clutched"]
@@ -156,7 +156,7 @@ def _move(p: ScalingNumbers, s: ScalingState, fixture: Held, gain: float, positi
 
 @inner
 def _wall(p: ScalingNumbers, s: ScalingState, fixture: Held, period: float, stylus: Array, force: Array) -> None:
-    """Write the push (3,) [N] of the fixture's wall; after a pause it begins anew."""
+    """Write the push (3,) [N] of the fixture's wall; after a pause the wall restarts without a previous position."""
     offset, out, length = room(3), room(3), 0.0
     for i in range(3):
         offset[i], out[i] = stylus[i] - s.center[i], 0.0
@@ -211,7 +211,7 @@ def _refuse(
     stylus: Array,
     row: Row,
 ) -> None:
-    """Answer an implausible sample: hold the command, write no force, and begin anew after it."""
+    """Answer an implausible sample: hold the command, write no force, and restart at the next sample."""
     s.must_latch = 1
     limits.remember(s, sent, row.master_measured_cp_ns)
     walls.forget_wall(s, stylus)
@@ -243,7 +243,7 @@ def motion_scaling_step(
         dt: Tick [s].
 
     Position is incremental (X_S += gain X_P), so a change of gain alone causes no motion. Orientation follows the
-    stylus absolutely, up to an alignment that is latched whenever the slave is engaged anew. While clutched the
+    stylus absolutely, except for an alignment that is stored whenever the slave is engaged again. While clutched the
     command is held. While the slave does not follow, the command is the slave's own setpoint. A command out of reach
     is cut, and motion continues from there: see :mod:`teleop_core.coupling.mapping.limits`. The slave follows the
     pose, which a tremor filter may have delayed. Forces on the hand use the unfiltered stylus. A fixture that confines
@@ -302,7 +302,7 @@ class MotionScaling(RunningStage):
 
     def __init__(self, parameters: gains.MotionScalingParameters, dt: float = DT) -> None:
         super().__init__(MOTION_SCALING, 0, dt)
-        self.changes_itself = True  # its mode, by a button
+        self.changes_itself = True  # a button changes the stage's mode
         self.parameters, self.state = record(ScalingNumbers), record(ScalingState)
         self._sent = record_array(limits.Sent, limits.SENT)
         self._values = parameters
@@ -344,7 +344,7 @@ class MotionScaling(RunningStage):
             self.state["is_fine"] = gains.MODES.index(parameters.mode)
         turned = ("tool_roll", "axes", "tool_axes")
         if any(getattr(parameters, name) != getattr(self._values, name) for name in turned):
-            self.state["must_latch"] = 1  # align anew: the tool does not turn
+            self.state["must_latch"] = 1  # align again, so that the tool does not turn
         self._values = parameters
 
     def present(self) -> gains.MotionScalingParameters:
@@ -365,11 +365,12 @@ class MotionScaling(RunningStage):
         p, s = self.parameters, self.state
         p["size"] = fixture.made.size()
         p["holds_hand"], p["holds_slave"] = fixture.side != "slave", fixture.side != "hand"
-        if fixture.made != self._values.fixture.made:  # the new one begins where the slave is
+        if fixture.made != self._values.fixture.made:  # a new fixture begins at the slave's position
             s["center"] += s["beyond"]
             s["beyond"] = 0.0
         if held.distance is last.distance and len(held.numbers) == len(last.numbers):
-            last.numbers[:], last.place[:] = held.numbers, held.place  # the composed tick goes on
+            last.numbers[:], last.place[:] = held.numbers, held.place  # in place, so that the composed tick stays
+            # valid
             return
         self._held = held
         self._compose_anew()
@@ -411,15 +412,17 @@ class MotionScaling(RunningStage):
         found, told = [], self._told
         count, aligned = self._told = int(self.state["implausible"]), int(self.state["aligned"])
         if count > told[0]:
-            found.append(f"held {count - told[0]} samples of the master that no hand can make")
+            found.append(
+                f"refused {count - told[0]} samples of the master that are implausible for a hand, and held the slave"
+            )
         elif aligned > told[1]:
             often = f", {aligned - told[1]} times" if aligned - told[1] > 1 else ""
             found.append(
-                f"aligned hand and slave anew, which shifts the one against the other{often}: the "
-                "master paused, or the slave did not follow"
+                f"aligned hand and slave again{often}, which changes the offset between them: the master "
+                "paused, or the slave did not follow"
             )
         if self.state["is_lost"]:
-            found.append("the buttons fell silent: holds as if clutched")
+            found.append("no messages of the buttons: holds as if the clutch were pressed")
         return found
 
     def described(self) -> dict[str, str]:

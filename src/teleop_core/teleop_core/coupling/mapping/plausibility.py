@@ -15,36 +15,42 @@ from teleop_core.kernels import Array, Fields, PoseRow, Vector3, inner
 
 @dataclass(frozen=True, kw_only=True)
 class HandLimits:
-    """What a hand on the master can do."""
+    """Bounds of the motion that a hand on the master can make."""
 
     speed: float = parameter(
         3.0,
         Within(0.01, 1000.0, "m/s"),
-        "largest speed of the stylus",
-        source="assumed: across the Phantom's workspace in a twentieth of a second",
+        "largest plausible speed of the stylus; faster samples are refused",
+        source="assumed: crosses the Phantom's workspace in a twentieth of a second",
     )
     acceleration: float = parameter(
         1000.0,
         Within(1.0, 1e6, "m/s²"),
-        "largest acceleration of the stylus",
-        source="assumed: ten times that of a fast arm, for one reading step in 1 ms is 55 m/s²",
+        "largest plausible acceleration of the stylus",
+        source="assumed: ten times the acceleration of a fast arm, because one step of the reading in 1 ms is 55 m/s²",
     )
     turn: float = parameter(
-        60.0, Within(0.1, 1e4, "rad/s"), "largest speed of its turn", source="assumed: three times that of a fast wrist"
+        60.0,
+        Within(0.1, 1e4, "rad/s"),
+        "largest plausible angular speed of the stylus",
+        source="assumed: three times the angular speed of a fast wrist",
     )
     reach: float = parameter(
-        2.0, Within(0.01, 100.0, "m"), "farthest stylus from the master's base", source="assumed: longer than an arm"
+        2.0,
+        Within(0.01, 100.0, "m"),
+        "largest plausible distance of the stylus from the master's base",
+        source="assumed: longer than an arm",
     )
 
 
 @dataclass(frozen=True, kw_only=True)
 class PlausibilityParameters(HandLimits):
-    """What a hand on the master can do, and how long its buttons may be silent."""
+    """Bounds of the motion that a hand on the master can make, and of the silence of its buttons."""
 
     button_silence: float = parameter(
         0.5,
         Within(0.01, 60.0, "s"),
-        "a stream of buttons that fell silent for longer counts as a pressed clutch; 0: never",
+        "if a stream of buttons has no message for this time, the clutch counts as pressed; 0: never",
         off=0.0,
     )
 
@@ -56,7 +62,7 @@ class PlausibilityNumbers(Fields):
     hand_acceleration: float  # [m/s²]
     hand_turn: float  # [rad/s]
     hand_reach: float  # [m]
-    silence_ns: int  # of buttons
+    silence_ns: int  # allowed silence of the buttons
     pause_ns: int  # pause after which any sample is plausible
 
 
@@ -66,7 +72,7 @@ class PlausibilityState(Fields):
     raw: PoseRow
     raw_rate: Vector3
     raw_ns: int
-    raw_elapsed_ns: int  # from the sample before
+    raw_elapsed_ns: int  # time since the previous sample
     implausible: int
     is_doubted: int
     is_lost: int
@@ -79,8 +85,9 @@ _SHORTEST = 1e-3
 # In a gap of the samples, a motion cannot be told from a jump. So the hand may move no farther than its speed limit
 # allows in this time [s], or in two periods of a slower stream.
 _GAP = 20e-3
-# So many messages no farther apart than this are a stream [ns]. A pause takes so many away from at
-# most twice as many: the one in which the poses were silent too leaves a stream one, two do not.
+# This number of messages, no farther apart than this time [ns], is a stream. The count is at most twice this number,
+# and a pause reduces it by this number. After one pause in which the poses were silent too there is still a stream;
+# after two there is none.
 _STREAM, _STREAM_NS = 20, 100_000_000
 
 

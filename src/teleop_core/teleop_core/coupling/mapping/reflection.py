@@ -45,8 +45,8 @@ class ReflectionState(FollowingState):
 
     heard: float  # share of the force that counts
     seen: float  # share of the slave's place that counts
-    push: Vector3  # the last one [N]
-    pushed_at: Vector3  # where it began [m]
+    push: Vector3  # last push [N]
+    pushed_at: Vector3  # position at which the push began [m]
     scale: float  # the hand's energy, divided by the slave's
     command: PoseRow  # position to which the hand moves the slave
     led_from: PoseRow  # the same before
@@ -69,7 +69,7 @@ class Law(NamedTuple):
     out: Array
     hand: Any
     kept: Array  # numbers of the passivity
-    left: Array  # its memory
+    left: Array  # memory of the passivity
     last: Array
     moved: Array
     led: Array
@@ -78,7 +78,7 @@ class Law(NamedTuple):
     heard: Array  # energies of the slave, its wave along the master's base
     port: Array
     wall: Array  # force of fixture and limits since the last sample [N]
-    walls: Array  # its energies
+    walls: Array  # energies of this force
 
     def clear(self) -> None:
         """Forget what happened."""
@@ -115,7 +115,7 @@ def reflect(
         row: Signals.
     """
     if p.is_reflected == 0:
-        if row.master_energy[LAW] != 0.0:  # nothing is asked of the slave's side any more
+        if row.master_energy[LAW] != 0.0:  # the slave's side gets no more requests
             begin_round(row.master_energy, 0.0, 1e-9 * row.master_measured_cp_ns)
         return
     _count(p, s, law, is_following, stylus, row)
@@ -180,9 +180,9 @@ def _bound(push: Array, most: float, rounding: float) -> None:
 
 @inner
 def _count(p: ReflectionNumbers, s: ReflectionState, law: Law, is_following: bool, stylus: Array, row: Row) -> None:
-    """Add the work of the last push on the hand; a law that begins anew has zero energy.
+    """Add the work of the last push on the hand; a restarted law has zero energy.
 
-    Energies begin anew when law or scale changes, and while the slave does not follow the hand.
+    Energies are reset to zero when law or scale changes, and while the slave does not follow the hand.
     """
     scale = p.force_scale / p.gain[s.is_fine]
     is_other = law.port[LAW] != p.law or s.scale != scale or law.port[ROUND] == 0.0

@@ -34,7 +34,7 @@ class SideState(Fields):
 
     center: Vector3  # middle of the fixture
     master: Vector3  # position of the hand at the last sample
-    beyond: Vector3  # vector from the proxy to it; zero if the slave is not confined
+    beyond: Vector3  # vector from the proxy to the hand; zero if the slave is not confined
 
 
 # Depth up to which a position is allowed [m]: a tenth of the nanometre to which reports are rounded, because the
@@ -80,10 +80,10 @@ def _draw_in(fixture: Held, place: Array) -> bool:
 
 @inner
 def _approach(fixture: Held, last: Array, aim: Array, most: float) -> None:
-    """Replace an aim (3,) by the next position of the proxy on its way there, at most ``most`` [m] away.
+    """Overwrite ``aim`` (3,) with the proxy's next position on the path to it, at most ``most`` [m] from ``last``.
 
     A proxy outside the fixture, for example after a change of the shape, moves inwards on the shortest path. A proxy
-    without a path stays.
+    without a path into the fixture does not move.
     """
     target, share = room(3), most / max(_distance(aim, last), most)
     copy(aim, target)

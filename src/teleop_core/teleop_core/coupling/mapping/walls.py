@@ -1,4 +1,4 @@
-"""Walls: how a fixture pushes back a hand that is beyond it.
+"""Walls: the force of a fixture on a hand that is beyond it.
 
 The source's wall is a spring up to a constant force (:func:`wall_force`). A sampled spring returns more energy than it
 took: its force belongs to the position at the beginning of a period, and is held for the whole period. So the force is
@@ -29,7 +29,7 @@ class WallState(Fields):
     """Fields of a state record with the last sample."""
 
     felt: Vector3  # place [m]
-    rate: Vector3  # its smoothed rate [m/s]
+    rate: Vector3  # smoothed rate of the hand [m/s]
 
 
 # The speed is that of the readings after a first-order lag. Its time constant is the time in which the hand moves this
@@ -40,7 +40,8 @@ _SMOOTH_WAY, _SMOOTH_LEAST, _SMOOTH_MOST = 0.3e-3, 1e-3, 20e-3
 # The damping grows to its full value over this depth [m], an encoder step, so that the force is continuous at the
 # surface.
 _RAMP = 0.05e-3
-# On the way out at least this share of the spring's force stays: beyond a wall the force is never zero.
+# When the hand moves out of the wall, at least this share of the spring's force remains: inside a wall the force is
+# never zero.
 _LEAST = 0.05
 SOFT_ZONE = 1e-3
 """Depth over which the source's wall reaches its full force [m] (Vongbunyong 2008, section 7.6)."""

@@ -56,7 +56,7 @@ def _try(part: Network) -> None:
     """Draw for some packets, so that errors are reported before anything runs."""
     needs = "one with draw(numbers, memory, chances, now) -> float and parameters that all have defaults"
     with tried("network", part.name, needs):
-        numbers, _ = fenced(part.numbers(part.parameters()))  # one too far is NaN
+        numbers, _ = fenced(part.numbers(part.parameters()))  # an index one too large reads NaN
         memory, fence = fenced(np.zeros(MEMORY))
         for i, chance in enumerate(np.linspace(0.0, 0.999, 32)):
             drawn = float(part.draw(numbers, memory, np.full(CHANCES, chance), 1e-3 * i))

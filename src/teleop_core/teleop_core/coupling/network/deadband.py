@@ -23,7 +23,7 @@ class DeadbandNumbers(Fields):
 
     has_deadband: int
     place: float  # [m]
-    chord: float  # between quaternions
+    chord: float  # chord between quaternions
     force_share: float
     least_force: float  # [N]
     longest_ticks: int
@@ -32,30 +32,31 @@ class DeadbandNumbers(Fields):
 class DeadbandState(LinkState):
     """Fields of a state record with the values of the last packets."""
 
-    told_pose: Annotated[Array, 2, 7]  # of each direction
+    told_pose: Annotated[Array, 2, 7]  # last sent poses of both directions
     told_force: Annotated[Array, 2, 3]  # [N]
 
 
 @dataclass(frozen=True, kw_only=True)
 class DeadbandParameters:
-    """Change of position, rotation or force after which a packet is sent; one of them is enough."""
+    """Changes of position, rotation and force after which a packet is sent; a single one of these changes is enough."""
 
-    is_on: bool = parameter(False, doc="whether packets wait for a change")
-    place: float = parameter(2e-4, Within(0.0, 0.1, "m"), "way of the tip before a packet is sent")
-    turn: float = parameter(0.01, Within(0.0, 1.0, "rad"), "turn of the tip before a packet is sent")
+    is_on: bool = parameter(False, doc="whether a packet is sent only if its content has changed")
+    place: float = parameter(2e-4, Within(0.0, 0.1, "m"), "distance that the tip must move before a packet is sent")
+    turn: float = parameter(0.01, Within(0.0, 1.0, "rad"), "angle that the tip must turn before a packet is sent")
     force: float = parameter(
         0.1,
         Within(0.0, 1.0),
-        "share of the force that was sent last by which it must change",
-        source="assumed: about what people feel",
+        "change of the force, as a share of the last sent force, after which a packet is sent",
+        source="assumed: about the smallest change that people feel",
     )
     least_force: float = parameter(
-        0.02, Within(0.0, 10.0, "N"), "change of a force that is not sent, however small the force is"
+        0.02, Within(0.0, 10.0, "N"), "a smaller change of the force is never sent, even if the force itself is small"
     )
     longest_pause: float = parameter(
         0.02,
         Within(1e-3, 1.0, "s"),
-        "time after which a packet is sent though nothing changed; below command_timeout and feedback_timeout",
+        "time after which a packet is sent even without a change; must be less than command_timeout "
+        "and feedback_timeout",
     )
 
 

@@ -11,19 +11,27 @@ _LEVEL = "published: UVA-DSA telesurgery QoS analysis 2026, loss of 10 %"
 
 @dataclass(frozen=True, kw_only=True)
 class GilbertElliottParameters:
-    """Good times and bad ones, each with bursts of lost packets of its own length."""
+    """Good and bad periods, which differ in the lengths of bursts of lost packets."""
 
-    to_bad: float = parameter(0.05, Within(0.0, 1.0), "chance at every packet that a bad time begins", source=_LEVEL)
-    stay_bad: float = parameter(0.9, Within(0.0, 1.0), "chance at every packet that a bad time goes on", source=_LEVEL)
+    to_bad: float = parameter(
+        0.05, Within(0.0, 1.0), "probability, at each packet, that a bad period begins", source=_LEVEL
+    )
+    stay_bad: float = parameter(
+        0.9, Within(0.0, 1.0), "probability, at each packet, that a bad period continues", source=_LEVEL
+    )
     good: tuple[float, ...] = parameter(
         (4.428, 1.638),
         Within(1e-3, 100.0),
-        "shape and scale of the length of bursts in good times, a Pareto II distribution rounded down [packets]",
+        "shape and scale of the burst length in good periods, a Pareto II distribution, rounded down [packets]",
         length=2,
         source=_LEVEL,
     )
     bad: tuple[float, ...] = parameter(
-        (4.966, 0.271), Within(1e-3, 100.0), "the same in bad times", length=2, source=_LEVEL
+        (4.966, 0.271),
+        Within(1e-3, 100.0),
+        "shape and scale of the burst length in bad periods, a Pareto II distribution, rounded down [packets]",
+        length=2,
+        source=_LEVEL,
     )
 
 
@@ -40,7 +48,7 @@ def gilbert_elliott_draw(numbers: Array, memory: Array, chances: Array, now: flo
     if memory[0] < 1.0:
         at = 4 if memory[1] > 0.0 else 2
         length = numbers[at + 1] * ((1.0 - chances[1]) ** (-1.0 / numbers[at]) - 1.0)
-        memory[0] = float(int(min(length, 1e9))) + 1.0  # and one that passes
+        memory[0] = float(int(min(length, 1e9))) + 1.0  # the burst, and one packet that passes
     memory[0] -= 1.0
     return LOST if memory[0] >= 1.0 else 0.0
 

@@ -12,20 +12,22 @@ from teleop_core.kernels import Array, kernel
 class JitterParameters:
     """Delay beyond the least delay: most packets have one mean, some packets another mean."""
 
-    mean: float = parameter(0.02, Within(0.0, 5.0, "s"), "mean of most packets, exponentially distributed")
-    slow_mean: float = parameter(0.05, Within(0.0, 5.0, "s"), "mean of the slow ones")
-    slow_share: float = parameter(0.0, Within(0.0, 1.0), "share of the slow ones")
+    mean: float = parameter(
+        0.02, Within(0.0, 5.0, "s"), "mean delay of most packets; delays are exponentially distributed"
+    )
+    slow_mean: float = parameter(0.05, Within(0.0, 5.0, "s"), "mean delay of slow packets")
+    slow_share: float = parameter(0.0, Within(0.0, 1.0), "share of packets that are slow")
     hold: float = parameter(
         0.0,
         Within(0.0, 60.0, "s"),
-        "time for which the same delay lasts, on average; 0: every packet has its own, and one "
-        "that is late is overtaken",
+        "mean time for which the delay stays constant; 0: every packet has its own delay, so that "
+        "packets can overtake each other",
     )
 
 
 @kernel
 def jitter_draw(numbers: Array, memory: Array, chances: Array, now: float) -> float:
-    """Delay beyond the least delay [s]: drawn anew, or that of the last packet.
+    """Delay beyond the least delay [s]: a new random delay, or the delay of the last packet.
 
     ``memory`` contains the delay, when the last packet was sent, and whether there was one.
     """

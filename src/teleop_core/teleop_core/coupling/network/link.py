@@ -1,7 +1,8 @@
 """Link: packets in transit, one direction of a network.
 
 A packet waits in a queue while the line is busy with earlier packets. Its transmission begins at ``max(sent, end of
-the one before)`` and lasts its size divided by the bandwidth: a queue of one server (Kleinrock 1975, section 1.2). The
+the previous transmission)`` and lasts its size divided by the bandwidth: a queue of one server (Kleinrock 1975,
+section 1.2). The
 tick of its arrival is determined when its transmission begins. Packets due at the same tick share an entry in a
 calendar of ticks, which keeps the newest packet. So the cost of a tick does not depend on the delay.
 """
@@ -28,7 +29,7 @@ class LinkNumbers(Fields):
     least_delay: Annotated[Array, 2]  # [s]
     loss: Annotated[Array, 2]
     keeps_order: _BothWays
-    every: _BothWays  # least ticks from packet to packet
+    every: _BothWays  # smallest number of ticks between two packets
     byte_ticks: Annotated[Array, 2]  # ticks that a byte takes; 0 without a bound
     queue: _BothWays  # packets that wait at most
 
@@ -41,10 +42,10 @@ class LinkState(Fields):
     behind: int  # ticks by which the present tick is late
     sent: _BothWays
     lost: _BothWays
-    newest: _BothWays  # that arrived
+    newest: _BothWays  # newest packets that arrived
     last_due: _BothWays  # tick
     sent_tick: _BothWays
-    arrived: _BothWays  # whether one just came
+    arrived: _BothWays  # whether a packet arrived in this tick
     free: Annotated[Array, 2]  # tick, with fractions, at which the line is free
     head: _BothWays  # index of the packet that has waited longest
     waits: _BothWays  # packets that wait
@@ -136,7 +137,7 @@ def send_packet(p: LinkNumbers, s: LinkState, way: Way, k: int, dt: float) -> No
         p: Parameters.
         s: State; written.
         way: Written.
-        k: Which direction it is.
+        k: Index of the direction.
         dt: Tick [s].
     """
     s.sent[k] += 1
@@ -177,7 +178,7 @@ def serve_line(p: LinkNumbers, s: LinkState, way: Way, k: int, dt: float) -> Non
         p: Parameters.
         s: State; written.
         way: Written.
-        k: Which direction it is.
+        k: Index of the direction.
         dt: Tick [s].
     """
     while s.waits[k] > 0 and s.free[k] <= s.tick:

@@ -53,7 +53,7 @@ _CARRIED = (
     (SLAVE_SERVO_CP, MASTER_ENERGY, SLAVE_JAW_SERVO_JP, SLAVE_SERVO_CF),
     (SLAVE_SETPOINT_CP, SLAVE_MEASURED_CP, SLAVE_MEASURED_CF, SLAVE_REACH, SLAVE_ENERGY),
 )
-"""Topics of a packet to the slave, and of one from it, in the order of their stamps."""
+"""Topics of a packet to the slave, and topics of a packet from the slave, in the order of their stamps."""
 
 
 class NetworkNumbers(link.LinkNumbers, deadband.DeadbandNumbers):
@@ -69,7 +69,7 @@ class NetworkState(deadband.DeadbandState):
 
     sent_ns: int
     first_ns: int  # time of the first tick
-    base: Vector3  # from where increments count [m]
+    base: Vector3  # origin of increments [m]
 
 
 @inner
@@ -266,7 +266,7 @@ class NetworkLink(RunningStage):
         way, kind = self._ways[k], NETWORKS.find(given.kind.kind)
         numbers = kind.numbers(given.kind.parameters)
         if kind.draw_pointer is way.draw and len(numbers) == len(way.numbers):
-            way.numbers[:] = numbers  # the tick that is composed already goes on
+            way.numbers[:] = numbers  # in place, so that the composed tick stays valid
             return
         way.memory[:] = 0.0
         self._ways[k] = way._replace(draw=kind.draw_pointer, numbers=numbers)

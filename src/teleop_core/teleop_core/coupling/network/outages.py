@@ -19,16 +19,16 @@ class OutagesParameters:
     pause: float = parameter(
         8.5,
         Within(1e-3, 1e6, "s"),
-        "from the end of an outage to the beginning of the next; in packets with in_packets",
+        "time from the end of an outage to the beginning of the next; with in_packets, a number of packets",
         source=_LEVEL,
     )
     longest: float = parameter(
         3.0,
         Within(0.0, 1e6, "s"),
-        "longest outage; each lasts for any time up to it; in packets with in_packets",
+        "longest outage; each outage has a random duration up to it; with in_packets, a number of packets",
         source=_LEVEL,
     )
-    in_packets: bool = parameter(False, doc="count pause and longest in packets that are sent, in place of seconds")
+    in_packets: bool = parameter(False, doc="whether pause and longest are numbers of sent packets instead of seconds")
 
 
 @kernel

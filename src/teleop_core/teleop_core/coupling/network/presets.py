@@ -1,4 +1,4 @@
-"""Presets of the network, measured ones among them, and its parameters: two directions, each of a kind."""
+"""Presets of the network, some of them measured, and its parameters: two directions, each with a kind of network."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -57,34 +57,34 @@ PRESETS: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
     "iss": _far(0.4, 0.05),
     "ets7": _far(3.4, 0.1),
 }
-"""Networks by name. Loss, delay and outages are the nine levels of the UVA-DSA telesurgery QoS
-analysis 2026, on the way to the slave alone. Its table gives outages in milliseconds, the program
-it ships counts packets (``_packets``), of which its recording has 517 a second. ``iss`` takes 0.8
-to 1 s there and back, ``ets7`` 7 s (ETS-VII 1999); how the delay of these two varies is assumed."""
+"""Networks by name. Loss, delay and outages are the nine levels of the UVA-DSA telesurgery QoS analysis 2026; they
+affect only packets to the slave. The table of that analysis gives outages in milliseconds, but its program counts
+packets (``_packets``); its recording has 517 packets a second. ``iss`` has a round trip of 0.8 to 1 s, ``ets7`` of 7 s
+(ETS-VII 1999); the variation of these two delays is assumed."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class WayParameters:
     """One direction of the network."""
 
-    kind: Choice = choice(NETWORKS, "constant", doc="how packets travel")
-    least_delay: float = parameter(0.0, Within(0.0, LONGEST_DELAY, "s"), "least time of a packet on the way")
-    loss: float = parameter(0.0, Within(0.0, 1.0), "share of packets that are lost, each by itself")
+    kind: Choice = choice(NETWORKS, "constant", doc="law by which packets are delayed and lost")
+    least_delay: float = parameter(0.0, Within(0.0, LONGEST_DELAY, "s"), "smallest delay of a packet")
+    loss: float = parameter(0.0, Within(0.0, 1.0), "share of packets that are lost, each independently of the others")
     packet_order: str = parameter(
         "newest",
         choices=("newest", "kept"),
-        doc="newest: a packet that was overtaken is thrown away; kept: the packets behind a late one wait for it",
+        doc="newest: a packet that a newer packet has overtaken is dropped; kept: packets behind a "
+        "late packet wait for it",
     )
-    packet_rate: float = parameter(1000.0, Within(1.0, 1e6, "Hz"), "packets sent in a second, at most")
+    packet_rate: float = parameter(1000.0, Within(1.0, 1e6, "Hz"), "largest number of packets sent per second")
     bandwidth: float = parameter(
-        0.0,
-        Within(0.0, 1e12, "bit/s"),
-        "bits that the line carries in a second; packets wait while it is busy; 0: no bound",
+        0.0, Within(0.0, 1e12, "bit/s"), "bandwidth of the line; packets wait while the line is busy; 0: no limit"
     )
     queue: int = parameter(
         100,
         Within(1, link.QUEUE),
-        "packets that wait for the line at most; one more costs the oldest of them, or where order is kept itself",
+        "largest number of packets that wait for the line; one packet more drops the oldest of them, "
+        "or is dropped itself if packet_order is kept",
         source="assumed",
     )
 
@@ -97,20 +97,20 @@ class NetworkParameters:
     preset: str = parameter(
         "own",
         choices=("own", *PRESETS),
-        doc="a network that was measured, in place of both directions below; own: these",
+        doc="measured network whose values replace the parameters of both directions; own: the parameters are used",
         source=f"published: {_QOS} for all but iss and ets7, which are assumed",
     )
     commands: str = parameter(
         "absolute",
         choices=("absolute", "incremental"),
-        doc="what a packet to the slave says: where the tip shall be, or by how much it moves, so "
-        "that a lost packet is lost motion",
+        doc="content of a packet to the slave: absolute: the pose of the tip; incremental: its "
+        "motion since the last packet, so that a lost packet is lost motion",
     )
     clock_offset: float = parameter(
-        0.0, Within(-3600.0, 3600.0, "s"), "by how much the slave's clock is ahead of the master's at the start"
+        0.0, Within(-3600.0, 3600.0, "s"), "time of the slave's clock minus that of the master's clock, at the start"
     )
     clock_drift: float = parameter(
-        0.0, Within(-1000.0, 1000.0, "ppm"), "by how much the slave's clock is faster than the master's"
+        0.0, Within(-1000.0, 1000.0, "ppm"), "rate of the slave's clock relative to the master's clock"
     )
     deadband: DeadbandParameters = field(default_factory=DeadbandParameters)
     there: WayParameters = field(default_factory=WayParameters)
@@ -118,7 +118,7 @@ class NetworkParameters:
 
     @property
     def ways(self) -> tuple[WayParameters, WayParameters]:
-        """Parameters to the slave, and back from it: those of the preset, or the given ones."""
+        """Parameters of the directions to and from the slave: from the preset, or else the given ones."""
         if self.preset == "own":
             return self.there, self.back
         named = PRESETS[self.preset]

@@ -22,8 +22,8 @@ class TraceParameters:
 
     file: str = parameter(
         "",
-        doc="CSV file with columns time and delay [s], ping by ping; an empty delay is a loss. It "
-        "begins anew at its end",
+        doc="CSV file with the columns time and delay [s], one row per ping; an empty delay is a "
+        "lost packet. At its end the file starts again",
     )
 
 
@@ -31,14 +31,14 @@ def read_trace(path: str) -> Array:
     """Numbers of a trace: times [s] from 0, each followed by its delay [s] or :data:`LOST`.
 
     Raises:
-        ParameterError: The file cannot be read, or its times are negative or not in order, or a
-            delay is negative, or either looks like milliseconds; the text names the line.
+        ParameterError: The file cannot be read; times are negative or not in order; a delay is negative; or times or
+            delays seem to be in milliseconds. The text names the line.
     """
     try:
         with Path(path).expanduser().open(newline="", encoding="utf-8") as file:
             lines = list(csv.reader(file))
     except (OSError, UnicodeDecodeError) as error:
-        reason = error.strerror if isinstance(error, OSError) else "it is no text"
+        reason = error.strerror if isinstance(error, OSError) else "the file is no text"
         raise ParameterError(_NAME, path, f"a file that can be read ({reason})") from error
     rows: list[float] = []
     for number, line in enumerate(lines, start=1):
@@ -50,7 +50,7 @@ def read_trace(path: str) -> Array:
     times = np.array(rows, dtype=np.float64)
     times[::2] -= times[0]
     if (step := float(np.median(np.diff(times[::2])))) > _SLOW:
-        needed = f"a row every {_SLOW:g} s at least, not every {step:g} s: are the times ms?"
+        needed = f"a file with a row at least every {_SLOW:g} s, not every {step:g} s: are its times in ms?"
         raise ParameterError(_NAME, path, needed)
     return times
 
@@ -63,16 +63,16 @@ def _row(path: str, number: int, line: list[str], before: float) -> tuple[float,
         time = math.nan
         delay = 0.0
     if not (math.isfinite(time) and math.isfinite(delay)):
-        raise ParameterError(_NAME, path, f"numbers, time and delay, in line {number}")
+        raise ParameterError(_NAME, path, f"a file with two a file with two numbers, time and delay, in line {number}")
     if time > LATEST_S:
-        needed = f"times of at most {LATEST_S:g} s; line {number} says {time:.15g} s: are they ms?"
+        needed = f"a file with times of at most {LATEST_S:g} s; line {number} has {time:.15g} s: are they in ms?"
         raise ParameterError(_NAME, path, needed)
     if time < 0.0 or time <= before:
-        needed = f"times that are not negative and grow; line {number} says {time:g} s"
+        needed = f"a file with times that are not negative and grow; line {number} has {time:g} s"
         raise ParameterError(_NAME, path, f"{needed}, the row before {before:g} s" if before >= 0 else needed)
     if not 0.0 <= delay <= LONGEST_DELAY and delay != LOST:
-        needed = f"delays from 0 to {LONGEST_DELAY:g} s; line {number} says {delay:g} s"
-        raise ParameterError(_NAME, path, needed + ": are they ms?" * (delay > 0.0))
+        needed = f"a file with delays from 0 to {LONGEST_DELAY:g} s; line {number} has {delay:g} s"
+        raise ParameterError(_NAME, path, needed + ": are the delays in ms?" * (delay > 0.0))
     return time, delay
 
 

@@ -87,7 +87,7 @@ def hold_lead(
     no energy is left, this is the only motion allowed.
 
     Args:
-        numbers: Those of :func:`teleop_core.coupling.passivity.tdpa.tdpa_slave`.
+        numbers: Numbers of :func:`teleop_core.coupling.passivity.tdpa.tdpa_slave`.
         memory: Memory; its second to fourth number are the direction of the last force; written.
         left: Remaining energy [J].
         stop: Force at which the command may no longer be ahead of the tip, against this force [N].

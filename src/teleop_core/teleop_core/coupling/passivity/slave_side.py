@@ -23,47 +23,53 @@ class PassivityParameters:
     """Parameters of the slave's side, of every kind of passivity."""
 
     recovery: float = parameter(
-        0.2, Within(1e-3, 100.0, "s"), "time constant with which what a command lost is made up for", source="assumed"
+        0.2,
+        Within(1e-3, 100.0, "s"),
+        "time constant with which the slave's command makes up the distance that it lost for want of energy",
+        source="assumed",
     )
     recovery_speed: float = parameter(
         5e-3,
         Within(0.0, 1.0, "m/s"),
-        "largest speed of the same, and of going back from what is overdrawn",
-        source="assumed: at it an arm meets steel with some 2 N",
+        "largest speed at which the slave's command makes up a lost distance, or moves back because "
+        "the slave spent more energy than it had",
+        source="assumed: at this speed an arm hits steel with some 2 N",
     )
     least_force: float = parameter(
         0.01,
         Within(0.0, 10.0, "N"),
-        "a smaller force on the tip is none; above what the sensor tells of nothing",
-        source="assumed: that of an ideal sensor",
+        "a smaller force on the tip counts as zero; must exceed the force that the sensor reports without contact",
+        source="assumed: suits an ideal sensor",
     )
     credit: float = parameter(
         2e-4,
         Within(0.0, 1.0, "J"),
-        "energy that the arm lends before the hand has paid: once with tank and tdpa, in each "
-        "touch with wave; what the world gives back goes to it first, never to the hand",
-        source="assumed: moves the arm by half a millimetre until the hand has paid",
+        "credit of energy that the arm can spend before the hand has supplied any: with tank and "
+        "tdpa once, with wave in each contact. Energy that the world returns repays it first and "
+        "never goes to the hand",
+        source="assumed: moves the arm by half a millimetre before the hand supplies energy",
     )
     credit_force: float = parameter(
         1.0,
         Within(1e-3, 100.0, "N"),
-        "with wave, force on the tip up to which it lends all of that; from twice the force on "
-        "it lends nothing, and what an arm that ran into something hard overdrew is given back",
-        source="assumed: a gentle touch",
+        "with wave, force on the tip up to which the whole credit is available; from twice this "
+        "force on there is no credit, and an arm that overspent at a hard obstacle gives the energy "
+        "back",
+        source="assumed: the force of a gentle touch",
     )
     stop_force: float = parameter(
         5.0,
         Within(0.1, 1000.0, "N"),
-        "force on the tip at which a tank stops a command that goes against it; the arm, which "
-        "comes behind its command, presses harder",
-        source="assumed: below what RCRT-1's drives give for long",
+        "force on the tip at which the tank stops a command that moves against the force; the arm "
+        "lags behind its command, and therefore still presses harder",
+        source="assumed: less than the continuous force of the RCRT-1's drives",
     )
     approach_stiffness: float = parameter(
         1300.0,
         Within(1.0, 1e6, "N/m"),
-        "stiffness of what may be met: with tank and tdpa the command is ahead of the tip no "
-        "farther than what is left pays for on the way into it",
-        source="assumed: silicone; into softer things the arm needs less, and harder ones stop it",
+        "stiffness of objects that the tip may meet: with tank and tdpa, the command leads the tip "
+        "only as far as the remaining energy pays for pressing into such an object",
+        source="assumed: silicone; pressing into softer objects needs less energy, and harder objects stop the arm",
     )
 
 
@@ -73,7 +79,7 @@ class Laws(NamedTuple):
     slaves: Any
     numbers: Array
     memory: Array
-    flow: Array  # heard, in and out since the last command
+    flow: Array  # energies since the last command: received from the other side, in, out
     last: Array  # the command that was given last (7,)
 
 

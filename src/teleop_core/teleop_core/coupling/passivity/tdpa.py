@@ -31,22 +31,23 @@ class StoreParameters:
     kept_way: float = parameter(
         3e-4,
         Within(0.0, 0.01, "m"),
-        "what the hand gave is told to the slave but for the present push over this way, which "
-        "is kept so that the push outlasts a step of the reading outwards",
+        "distance; the hand's side keeps the energy of the present push over this distance and "
+        "credits the rest to the slave, so that the push outlasts an outward step of the position "
+        "reading",
         source="assumed: five steps of the device's reading, 0.055 mm",
     )
     store: float = parameter(
         6e-3,
         Within(0.0, 1.0, "J"),
-        "energy that the slave shall have before it touches anything; while it has less the hand feels a drag",
+        "energy that the slave should have before a contact; while it has less, the hand feels a drag",
         source="derived: half of approach_stiffness times the square of the 3 mm by which the arm "
         "lags behind a command of 60 mm/s",
     )
     drag: float = parameter(
         10.0,
         Within(0.0, 100.0, "N·s/m"),
-        "that drag, where the slave has nothing or less",
-        source="assumed: that of a wave",
+        "damping of the drag on the hand while the slave has no energy",
+        source="assumed: the same as the impedance of a wave",
     )
 
 
@@ -71,8 +72,8 @@ def tdpa_hand(
     While the slave has less than its store, or while there is a debt here, a drag on the hand supplies energy.
 
     Source:
-        Ryu, Artigas and Preusche 2010 for the law. Theirs is a damper by a measured speed; the
-        bound for the next sample, which needs none, is that of the tank here. The drag is the
+        Ryu, Artigas and Preusche 2010 for the law. Their law is a damper that uses a measured speed; here the bound
+        for the next sample, which needs no speed, is that of the tank. The drag is the
         tank level controller of Franken, Stramigioli, Misra, Secchi and Macchelli 2011.
     """
     way = square = 0.0
@@ -108,9 +109,9 @@ def pay_push(port: Array, push: Array, size: float, way: float, scale: float) ->
 
 @inner
 def keep_account(numbers: Array, flow: Array, force: Array, port: Array) -> float:
-    """Update the energy left at the slave's port, report it, and return it plus the arm's loan [J].
+    """Update the energy left at the slave's port, report it, and return it plus the arm's credit [J].
 
-    Debts are never cancelled, so the total loan of the arm is bounded.
+    Debts are never cancelled, so the total credit of the arm is bounded.
     """
     port[MARGIN] += flow[0] + flow[1] - flow[2]
     tell(port, 0.0)
@@ -139,12 +140,12 @@ def tdpa_slave(
     """Let the command (7,) be ahead of the tip as far as the remaining energy pays for.
 
     The remaining energy is counted at the tip, from its wrench and its motion on all six axes. It is what was heard
-    and what came in, minus what was told and what went out, plus the loan, which is given only once. The last numbers
+    and what came in, minus what was told and what went out, plus the credit, which is given only once. The last numbers
     of ``port`` are the drift, from the given to the original command [m].
 
     Args:
         numbers: Time constant [s] and largest speed [m/s] with which drift decays; the force below which there is no
-            contact [N]; the largest loan of the arm [J]; two unused numbers; and the stiffness for which a lead is
+            contact [N]; the largest credit of the arm [J]; two unused numbers; and the stiffness for which a lead is
             paid [N/m].
         memory: Direction of the last force; written.
         flow: Heard, in, out [J].
@@ -157,8 +158,8 @@ def tdpa_slave(
         period: Time since the last command [s].
 
     Source:
-        Ryu, Artigas and Preusche 2010, an admittance that takes from the command; Coelho, Ott, Singh, Lizarralde and
-        Kondak 2019 for drift that is made up for while energy is left. Our addition: without contact, drift also
+        Ryu, Artigas and Preusche 2010, an admittance that reduces the command; Coelho, Ott, Singh, Lizarralde and
+        Kondak 2019 for the removal of drift while energy is left. Our addition: without contact, drift also
         decays by the distance by which the command moves back.
     """
     lead_slave(numbers, memory, flow, force, tip, last, port, command, 1e9, period)

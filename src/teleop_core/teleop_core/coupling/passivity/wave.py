@@ -24,9 +24,9 @@ class WaveParameters:
     impedance: float = parameter(
         10.0,
         Within(0.1, 100.0, "N·s/m"),
-        "force over speed of a wave, at the hand; the hand feels 1.5 times as much as a drag",
-        source="assumed: tissue of 200 N/m times the arm's lag of 50 ms, below which an arm that "
-        "yields to a force that it reads late swings",
+        "wave impedance: force divided by speed of a wave at the hand; the hand feels a drag of 1.5 times this damping",
+        source="assumed: stiffness of tissue, 200 N/m, times the arm's lag of 50 ms; with less, an arm "
+        "that yields to a delayed force oscillates",
     )
 
 
@@ -177,7 +177,7 @@ def wave_slave(
     wave = _take(memory, flow[0], heard, port, period)
     memory[0] += port[MARGIN] - before + flow[1]
     port[MARGIN] += flow[1] - flow[2]
-    if is_free:  # a part of the damper's energy is kept, for a possible debt from the arm's lag
+    if is_free:  # a part of the damper's energy is reserved for a debt that the arm's lag may cause
         port[MARGIN] *= numbers[0] / (numbers[0] + period)
         memory[0] = port[MARGIN]
     for i in range(3):

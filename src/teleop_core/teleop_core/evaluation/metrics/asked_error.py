@@ -103,7 +103,10 @@ def _last(begins: NDArray[np.bool_]) -> Integers:
 
 
 _GROUP = "against what was asked for"
-_MEANING = "slave/measured_cp to where the hand has asked it to be since it was engaged or the clutch let go"
+_MEANING = (
+    "slave/measured_cp to the pose that follows from the hand's motion since the slave last "
+    "began to follow or the clutch was released"
+)
 
 
 class _AskedMetric(SpreadMetric):
@@ -139,7 +142,7 @@ class AskedTurnMetric(_AskedMetric):
     """
 
     name, label, unit = "asked_error_deg", "rotation", "deg"
-    meaning = f"angle of {_MEANING}"
+    meaning = f"angle from {_MEANING}"
 
     def errors(self, window: Window) -> Array:
         """Angles (N,) [deg]."""

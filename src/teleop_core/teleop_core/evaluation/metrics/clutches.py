@@ -11,8 +11,8 @@ class ClutchesMetric(Metric):
     """Presses of the clutch, and the share of the samples in which it is down."""
 
     name, topics = "clutches", (MASTER_BUTTONS,)
-    count = figure("1", "how often the clutch was pressed")
-    share = figure("1", "share of the samples of the buttons in which it is down")
+    count = figure("1", "number of presses of the clutch")
+    share = figure("1", "share of the button samples in which the clutch is pressed")
     _last, _samples, _down = np.inf, 0, 0
 
     def add(self, window: Window) -> None:

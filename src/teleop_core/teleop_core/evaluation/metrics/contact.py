@@ -1,4 +1,4 @@
-"""Contact: the energy that the device's force took from the hand and gave back to it."""
+"""Contact: the energy that the device's force absorbed from the hand and returned to it."""
 
 from dataclasses import dataclass
 
@@ -21,23 +21,32 @@ _NUMBER, _TAKEN, _RETURNED, _FRICTION, _MOST = range(len(MASTER_CONTACT.columns)
 class ContactScore:
     """Energy of the contacts of the hand with walls; None if there was no contact, or contacts were not recorded."""
 
-    count: int | None = figure("1", "stretches in which the device pushed and took 14 µJ or more; null if not recorded")
-    touches: int | None = figure("1", "those that took less")
-    returned_max: float | None = figure(
-        "1", "largest share of the energy taken that a contact gave back; above 1 it fed the hand"
+    count: int | None = figure(
+        "1",
+        "number of contacts: stretches in which the device pushed the hand and took 14 µJ or "
+        "more; null if not recorded",
     )
-    feeding: int | None = figure("1", "contacts whose wall gave back more than it took")
+    touches: int | None = figure(
+        "1", "number of touches: stretches in which the device pushed the hand and took less than 14 µJ"
+    )
+    returned_max: float | None = figure(
+        "1", "largest ratio of returned to absorbed energy in a contact; above 1, the contact gave the hand energy"
+    )
+    feeding: int | None = figure("1", "number of contacts in which the wall returned more energy than it absorbed")
     feeding_device: int | None = figure(
         # Only in this case the hand gets more energy than it spent.
         "1",
-        "contacts that gave back more than wall and dry friction of the device took",
+        "number of contacts that returned more energy than the wall and the device's dry friction absorbed",
     )
     gain_max_uj: float | None = figure(
-        "uJ", "most that a contact or touch gave beyond what it took; negative: each took more"
+        "uJ",
+        "largest difference of returned and absorbed energy in a contact or touch; negative: every one absorbed more",
     )
-    taken_max_mj: float | None = figure("mJ", "most energy that one took")
-    worst_s: float | None = figure("s", "when the one with returned_max began, after the start")
-    largest_force_min_n: float | None = figure("N", "least force that the warmth of the device's motors allowed")
+    taken_max_mj: float | None = figure("mJ", "largest energy that a contact absorbed")
+    worst_s: float | None = figure("s", "start of the contact with returned_max, since the start of the recording")
+    largest_force_min_n: float | None = figure(
+        "N", "smallest force limit that the temperature of the device's motors imposed"
+    )
 
 
 class ContactMetric(Metric):

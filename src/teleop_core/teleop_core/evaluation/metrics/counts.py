@@ -18,7 +18,7 @@ class NodesMetric(Metric):
     """Last reported counts of each node; empty in virtual time, where nodes do not report."""
 
     name = "nodes"
-    keys = (Key("nodes.<node>.<name>", "1", "counts that the nodes reported last on diagnostics"),)
+    keys = (Key("nodes.<node>.<name>", "1", "last values of the counters that the node reported on diagnostics"),)
 
     def __init__(self, context: Context) -> None:
         self._counts = _read_counts(context.bag)
@@ -74,8 +74,9 @@ class TicksMetric(Metric):
         Key(
             "ticks.executed|late|made_up|dropped",
             "1",
-            "control ticks of the slave: begun late, executed after the next one was due, never "
-            "executed; late and made_up are null if uncounted",
+            "control ticks of the slave: executed: all; late: begun late; made_up: executed after "
+            "the next tick was due; dropped: never executed; late and made_up are null if nobody "
+            "counted them",
         ),
     )
     topics = (SLAVE_MEASURED_CP,)
@@ -132,14 +133,15 @@ class TopicsMetric(Metric):
         Key(
             "topics.<name>.gaps",
             "1",
-            "messages missing by their stamps, lost or passed over by a stage that takes only the "
-            "newest; a hole counts where it begins, and not at all in a file that was replayed; "
-            "null if not a stream, or one that is sent where it changes",
+            "missing messages, found by gaps between the stamps: lost, or skipped by a stage that "
+            "takes only the newest. A gap counts at the topic where it begins, and does not count in "
+            "a replayed file. Null for topics that are no streams or are sent only on changes",
         ),
         Key(
             "topics.<name>.lost",
             "1",
-            "messages that were sent and did not reach the recorder, by its own count; null if uncounted",
+            "messages that were sent but did not reach the recorder, by the recorder's count; null "
+            "if it did not count them",
         ),
     )
 
@@ -180,9 +182,9 @@ class TopicsMetric(Metric):
 class Samples:
     """Number of scored slave poses, and of poses that were not scored, by reason."""
 
-    scored: int = figure("1", "slave poses with their reference")
-    unpaired: int = figure("1", "slave poses whose reference was lost on the way")
-    invalid: int = figure("1", "slave poses or references with NaN or without a direction")
+    scored: int = figure("1", "number of slave poses whose reference of the same tick was recorded")
+    unpaired: int = figure("1", "number of slave poses whose reference was lost before the recorder")
+    invalid: int = figure("1", "number of slave poses or references with NaN or a zero quaternion")
 
 
 class SamplesMetric(Metric):

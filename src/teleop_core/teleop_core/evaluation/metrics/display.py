@@ -11,11 +11,11 @@ class DisplayMetric(Metric):
     """Age of the displayed slave pose, from its measurement to the end of each frame; None without a display."""
 
     name, topics = "display", (DISPLAY_MEASURED_CP,)
-    age_mean_ms = figure("ms", "mean age of the newest frame that was on the screen", "age of what is seen, mean")
-    rate_hz = figure("Hz", "frames with another pose that were shown in a second", "frames")
+    age_mean_ms = figure("ms", "mean age of the frame on the screen", "age of what is seen, mean")
+    rate_hz = figure("Hz", "shown frames per second whose pose differs from the frame before", "frames")
 
     def __init__(self, _: Context) -> None:
-        self._log_ns = self._stamp_ns = NO_COMMAND_NS  # of the newest frame
+        self._log_ns = self._stamp_ns = NO_COMMAND_NS  # times of the newest frame
         self._frames, self._span_s, self._seen = 0, 0.0, 0.0
 
     def add(self, window: Window) -> None:
@@ -27,7 +27,7 @@ class DisplayMetric(Metric):
             return
         logs = np.append(self._log_ns, shown.log_ns[is_new])
         stamps = np.append(self._stamp_ns, shown.stamp_ns[is_new])
-        first = int(self._frames == 0)  # nothing was shown before it
+        first = int(self._frames == 0)  # no frame was shown before the first one
         until = 1e-9 * np.diff(logs)[first:]
         # The age grows from the arrival of a frame to the arrival of the next frame.
         ages = 1e-9 * (logs[:-1] - stamps[:-1])[first:] + 0.5 * until

@@ -13,8 +13,8 @@ class EconomyMetric(Metric):
     """Sum of the straight distances to a task's goals divided by the length of the tip's path; 1 is straight."""
 
     name, topics = "economy", (SLAVE_TRUE_CP, TASK_STATE)
-    path_mm = figure("mm", "path of the tip, of places 0.1 s apart")
-    share = figure("1", "straight ways of the attempts over that path; 1: all were straight")
+    path_mm = figure("mm", "length of the tip's path, from positions every 0.1 s")
+    share = figure("1", "straight distances of all attempts, divided by path_mm; 1: all paths are straight")
     _path, _slot, _straight, _tried = np.empty((0, 3)), -1, 0.0, 0.0
 
     def add(self, window: Window) -> None:

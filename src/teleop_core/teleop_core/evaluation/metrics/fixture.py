@@ -43,15 +43,21 @@ class FixtureScore:
     """Score of the time in which a fixture was on; None if no fixture was ever on."""
 
     on_s: float = figure("s", "time with the fixture on")
-    outside_share: float | None = figure("1", "share of that time with the slave's tip outside")
+    outside_share: float | None = figure(
+        "1", "share of the time with the fixture on in which the slave's tip was outside"
+    )
     penetration_max_mm: float | None = figure("mm", "largest distance of the slave's tip from the fixture")
-    penetration_rms_mm: float | None = figure("mm", "root mean square of it, zero inside")
+    penetration_rms_mm: float | None = figure(
+        "mm", "RMS distance of the slave's tip from the fixture; 0 for samples inside"
+    )
     hand_penetration_max_mm: float | None = figure(
-        "mm", "largest distance of the hand from its fixture, by the command; 0 if held inside"
+        "mm",
+        "largest distance of the slave's command from the fixture, which shows how far the hand "
+        "pushed through; 0 if it stayed inside",
     )
     kind: str | None = figure("1", "kinds of fixture that were on; null if none was")
     unscored: str | None = figure(
-        "1", "those whose shape is not known here, for which there is only on_s; null if none"
+        "1", "kinds of fixture whose shape is not known here; only on_s is scored for them; null if there is none"
     )
 
 

@@ -13,7 +13,7 @@ class ForcePeaksMetric(Metric):
     """Number of peaks of the force on the tip that are at least 0.1 N higher than both sides."""
 
     name, topics = "force_peaks", (SLAVE_TRUE_CF,)
-    count = figure("1", "peaks of the force on the tip, 0.1 N above both sides")
+    count = figure("1", "number of peaks of the force on the tip that rise by 0.1 N or more above both sides")
     _turn, _rises = 0.0, True
 
     def add(self, window: Window) -> None:

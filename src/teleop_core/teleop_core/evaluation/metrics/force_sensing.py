@@ -20,15 +20,18 @@ class ForceSensingMetric(Metric):
     topics = (SLAVE_TRUE_CF, SLAVE_MEASURED_CF, SLAVE_ESTIMATED_CF)
     measured_rms_n = figure(
         "N",
-        "root mean square of the distance of slave/measured_cf from slave/true_cf, at all samples "
-        "of both in touch; null without a touch, or if nobody tells the true force",
+        "RMS difference of slave/measured_cf and slave/true_cf at all common samples with contact; "
+        "null without a contact, or if the true force is unknown",
         "measured, error, rms",
     )
-    measured_max_n = figure("N", "largest such distance")
+    measured_max_n = figure("N", "largest difference of slave/measured_cf and slave/true_cf at samples with contact")
     estimated_rms_n = figure(
-        "N", "the same of slave/estimated_cf; null too if nothing was estimated", "estimated, error, rms"
+        "N",
+        "RMS difference of slave/estimated_cf and slave/true_cf at all common samples with "
+        "contact; null also if no force was estimated",
+        "estimated, error, rms",
     )
-    estimated_max_n = figure("N", "largest such distance")
+    estimated_max_n = figure("N", "largest difference of slave/estimated_cf and slave/true_cf at samples with contact")
 
     def __init__(self, context: Context) -> None:
         super().__init__(context)

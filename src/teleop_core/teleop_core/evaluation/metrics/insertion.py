@@ -1,4 +1,4 @@
-"""Insertion: how deep the slave's tip went into a hole, and which force and torque resisted."""
+"""Insertion: the depth of the slave's tip in a hole, and the force and torque that resisted it."""
 
 from teleop_core.evaluation.metric import figure
 from teleop_core.evaluation.objects import ObjectMetric
@@ -11,10 +11,12 @@ class InsertionMetric(ObjectMetric):
 
     name, kind = "insertion", HoleParameters
     depth_mm = figure(
-        "mm", "largest depth of the slave's tip in the hole, at most to its far end", "largest depth in the hole"
+        "mm",
+        "largest depth of the slave's tip in the hole, at most the length of the hole",
+        "largest depth in the hole",
     )
     resistance_n = figure(
-        "N", "largest force on the tool along the hole's axis, against a tip that goes in", "largest force against it"
+        "N", "largest force on the tool along the hole's axis, against the insertion", "largest force against it"
     )
     torque_nm = figure("N·m", "largest torque about the slave's tip", "largest torque about the tip")
 

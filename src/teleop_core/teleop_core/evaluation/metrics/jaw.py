@@ -10,10 +10,10 @@ class JawMetric(Metric):
     """Grips of a simulated jaw, as its simulator reports them."""
 
     name, group, topics = "jaw", "the jaw", (SLAVE_JAW_GRIP,)
-    grips = figure("1", "how often the jaw closed on the object", "grips")
-    slips = figure("1", "grips in which the object slid by more than 1 mm", "slips")
-    drops = figure("1", "how often it slid out of the jaw above the table", "drops")
-    peak_force_n = figure("N", "largest push of each finger on the object", "push of each finger, max")
+    grips = figure("1", "number of times that the jaw gripped the object", "grips")
+    slips = figure("1", "number of grips in which the object slid by more than 1 mm", "slips")
+    drops = figure("1", "number of times that the object slid out of the jaw above the table", "drops")
+    peak_force_n = figure("N", "largest force of a finger on the object", "push of each finger, max")
 
     def __init__(self, context: Context) -> None:
         super().__init__(context)

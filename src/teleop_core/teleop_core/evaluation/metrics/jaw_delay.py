@@ -12,9 +12,7 @@ class JawDelayMetric(Metric):
 
     name, below, group, topics = "jaw_delay", "jaw", "the jaw", (SLAVE_JAW_GRIP, SLAVE_JAW_SERVO_JP)
     delay_s = figure(
-        "s",
-        "mean time from the master's sample that begins to close the jaw to the grip",
-        "from the command to the grip",
+        "s", "mean time from the first master sample that closes the jaw to the grip", "from the command to the grip"
     )
 
     def __init__(self, context: Context) -> None:

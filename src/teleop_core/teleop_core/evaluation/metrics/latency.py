@@ -30,10 +30,10 @@ class LatencyMetric(Metric):
         Key(
             "latency_ms.<stage>.median|p99|max",
             "ms",
-            "own delay of each stage between the hand and the slave: from the arrival at the "
-            "recorder of what it answers to that of its answer; of the first, and "
-            f"{TOTAL}: from the stamp of the hand's sample to the arrival of the sample and of the "
-            f"last answer; {ASKED}: what a simulated network and teleop.delays are to add to it",
+            "delay of each stage between hand and slave: time from its input to its output, both at "
+            "their arrival at the recorder. First stage: time from the stamp of the hand's sample to "
+            f"the arrival of that sample; {TOTAL}: to the arrival of the last output; {ASKED}: delay "
+            "that a simulated network and teleop.delays add",
         ),
     )
 
@@ -54,7 +54,7 @@ class LatencyMetric(Metric):
             arrivals = logs - (stamps if before is None else _arrivals(window, before, stamps))
             self._delays[stage].add(arrivals[arrivals > -_NEVER // 2])
             before = topic
-        # At its start, the last stage holds a pose that nobody commanded; only commands count.
+        # At its start, the last stage holds a pose that was not commanded; only commands count.
         is_command = same_stamp(stamps, window.around(self._command).stamp_ns) != NONE
         self._delays[TOTAL].add((logs - stamps)[is_command])
 

@@ -16,7 +16,7 @@ class LooksMetric(Metric):
     """
 
     name, topics = "looks", (MASTER_MEASURED_CP,)
-    count = figure("1", "how often the hand moved on, at 5 mm/s, after 0.1 s of rest or more")
+    count = figure("1", "number of times that the hand moved again, at 5 mm/s or more, after a rest of at least 0.1 s")
     _place, _slot, _still = np.full((1, 3), np.inf), -1, 0
 
     def add(self, window: Window) -> None:

@@ -8,11 +8,13 @@ class MissesMetric(AttemptsMetric):
     """Counts of errors, in the order of :class:`~teleop_core.hand.tasks.Miss`."""
 
     name, below = "misses", "task"
-    beside = figure("1", "errors: it ended beside the goal", "errors: beside")
-    late = figure("1", "errors: it took too long", "errors: late")
-    forced = figure("1", "errors: it pressed too hard", "errors: forced")
-    dropped = figure("1", "errors: what was carried came to rest beside its goal", "errors: dropped")
-    wrong = figure("1", "errors: what was carried came to rest on another one's goal", "errors: wrong")
+    beside = figure("1", "number of errors: the attempt ended beside the goal", "errors: beside")
+    late = figure("1", "number of errors: the attempt took too long", "errors: late")
+    forced = figure("1", "number of errors: the tip pressed too hard", "errors: forced")
+    dropped = figure("1", "number of errors: the carried object came to rest beside its goal", "errors: dropped")
+    wrong = figure(
+        "1", "number of errors: the carried object came to rest on the goal of another object", "errors: wrong"
+    )
 
     def judge(self, tried: Attempts) -> None:
         """Count each kind."""

@@ -92,12 +92,13 @@ class MotionMetric(Metric):
     name = "motion"
     keys = (
         *keys_of("motion.hand|slave|in_fixture", MotionFigures),
-        Key("motion.clutch.count", "1", "strokes of the clutch"),
+        Key("motion.clutch.count", "1", "number of clutch strokes"),
         Key("motion.clutch.time_s", "s", "time with the clutch pressed"),
         Key(
             "motion.segments.<number>.begin_s|end_s",
             "s",
-            "hand between clutch strokes, from 0.5 s on: when, from the start of the recording",
+            "segment of the hand's motion between two clutch strokes, if it lasts 0.5 s or more: its "
+            "begin and end since the start of the recording",
         ),
         *keys_of("motion.segments.<number>", _OF_SEGMENTS, "of a segment: "),
         Key("motion.segment_median.count", "1", "number of segments"),

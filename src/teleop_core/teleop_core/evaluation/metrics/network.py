@@ -25,10 +25,10 @@ _ROUND_NS = 100_000
 class WayScore:
     """Ages at the reader in one direction, and losses; None if nothing was recorded."""
 
-    age_mean_ms: float | None = figure("ms", "mean age of the newest packet that its reader has")
-    age_p99_ms: float | None = figure("ms", "the age that is exceeded for 1 % of the time")
+    age_mean_ms: float | None = figure("ms", "mean age of the newest packet that has arrived")
+    age_p99_ms: float | None = figure("ms", "age of the newest arrived packet that is exceeded for 1 % of the time")
     lost_share: float | None = figure("1", "share of the packets that were lost")
-    packet_rate_hz: float | None = figure("Hz", "packets that were sent in a second")
+    packet_rate_hz: float | None = figure("Hz", "number of packets sent per second")
 
 
 @dataclass(frozen=True)

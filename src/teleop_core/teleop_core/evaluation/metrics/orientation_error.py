@@ -63,9 +63,10 @@ class OrientationErrorMetric(Metric):
             "difference of the fixed angles of slave/measured_cp and slave/setpoint_cp of the "
             f"same tick, wrapped to ±180: {SPREAD_MEANING}"),
         Key("orientation_error_deg.angle.rms|sd|max", "deg",
-            f"angle of the one rotation between the same two: {SPREAD_MEANING}"),
+            "angle of the single rotation from slave/setpoint_cp to slave/measured_cp of the same tick: "
+            f"{SPREAD_MEANING}"),
         Key("orientation_error_deg.degenerate_share", "1",
-            "share of samples with pitch within 1° of ±90°, left out of roll and yaw"),
+            "share of samples whose pitch is within 1° of ±90°; they do not count for roll and yaw"),
     )  # fmt: skip
     topics = TRACKED
 
@@ -137,9 +138,14 @@ class CommandOrientationErrorMetric(Metric):
         Key(
             "command_orientation_error_deg.angle.rms|sd|max",
             "deg",
-            f"angle of the one rotation between the same two: {SPREAD_MEANING}",
+            f"angle of the single rotation from the latest slave/servo_cp to slave/measured_cp: {SPREAD_MEANING}",
         ),
-        Key("command_orientation_error_deg.degenerate_share", "1", "as in orientation_error_deg"),
+        Key(
+            "command_orientation_error_deg.degenerate_share",
+            "1",
+            "share of samples whose commanded or measured pitch is within 1° of ±90°; they do not "
+            "count for roll and yaw",
+        ),
     )
     topics = TRACKED
 

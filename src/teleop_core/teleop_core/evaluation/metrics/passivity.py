@@ -1,4 +1,4 @@
-"""Passivity: the energy that went in and out at hand and slave, and the cost of keeping the session passive."""
+"""Passivity: the energy into and out of the ports of hand and slave, and the cost of keeping the session passive."""
 
 from dataclasses import dataclass, fields
 
@@ -21,11 +21,11 @@ _COLUMNS = [IN, OUT, HEARD, WITHHELD]
 class PortScore:
     """Energies of one port in the slave's scale; None if they were not recorded."""
 
-    in_mj: float | None = figure("mJ", "energy that went in")
-    out_mj: float | None = figure("mJ", "energy that went out")
-    withheld_mj: float | None = figure("mJ", "energy that was kept from going out")
+    in_mj: float | None = figure("mJ", "energy that flowed into the port")
+    out_mj: float | None = figure("mJ", "energy that flowed out of the port")
+    withheld_mj: float | None = figure("mJ", "energy that the passivity law did not let out of the port")
     least_margin_mj: float | None = figure(
-        "mJ", "least that was left to be given; negative: so much more went out than was paid for"
+        "mJ", "smallest remaining energy; negative: more energy flowed out of the port than was available"
     )
 
 
@@ -35,11 +35,9 @@ class PassivityScore:
 
     hand: PortScore
     slave: PortScore
-    chatter_ns: float | None = figure(
-        "N/s", "how much the force at the hand changes, its variation over the recorded time"
-    )
-    drift_max_mm: float | None = figure("mm", "largest way by which the command was held back")
-    drift_end_mm: float | None = figure("mm", "the same at the end")
+    chatter_ns: float | None = figure("N/s", "total variation of the force at the hand, divided by the recorded time")
+    drift_max_mm: float | None = figure("mm", "largest distance by which the passivity law held back the command")
+    drift_end_mm: float | None = figure("mm", "distance by which the command is held back at the end of the recording")
 
 
 class _Port:
@@ -86,7 +84,7 @@ class _Port:
         return PortScore(into, out, withheld, _MJ * self._least)
 
     def line(self) -> tuple[Array, Rows]:
-        """Times [s] and in, out, heard and withheld [mJ]."""
+        """Times [s], and energies in, out, received from the other side and withheld [mJ]."""
         return self._trace.line()
 
 

@@ -34,7 +34,7 @@ class TrueErrorMetric(SpreadMetric):
     """Spread of the distance between the true tip and the reference, [mm]."""
 
     name, group = "true_error_mm", "true tip, behind the encoders"
-    meaning = "slave/true_cp to slave/setpoint_cp of the same tick, null if nobody tells the true tip"
+    meaning = "slave/true_cp to slave/setpoint_cp of the same tick, null if the true tip is unknown"
     topics = TRACKED
 
     def __init__(self, context: Context) -> None:

@@ -28,23 +28,31 @@ class ReachScore:
 
     followed_share: float | None = figure(
         "1",
-        "share of the time since the slave first followed in which it could do what it was asked: "
-        "commands whose limit in slave/reach is 0, each until the next one; clutched time counts "
-        "as followed",
+        "share of the time, since the slave first followed, in which it could follow its commands. A "
+        "command whose limit in slave/reach is 0 counts as followed until the next command; so does "
+        "time with the clutch pressed",
     )
-    longest_s: float | None = figure("s", "longest stretch in which it did not follow")
-    joint_share: float | None = figure("1", "share of that time against the end of a joint")
-    workspace_share: float | None = figure("1", "share of it beyond all joint vectors")
-    singularity_share: float | None = figure("1", "share of it too slow near a singularity")
-    speed_share: float | None = figure("1", "share of it too slow, because joints were")
+    longest_s: float | None = figure("s", "longest stretch in which the slave could not follow")
+    joint_share: float | None = figure("1", "share of the time in which a joint limit kept the slave from following")
+    workspace_share: float | None = figure("1", "share of the time in which the command was outside the workspace")
+    singularity_share: float | None = figure(
+        "1", "share of the time in which the slave was too slow near a singularity"
+    )
+    speed_share: float | None = figure(
+        "1", "share of the time in which the slave was too slow because of its joints' speed limits"
+    )
     aligning_share: float | None = figure(
-        "1", "share of it in which master or slave were silent, or it was aligned anew"
+        "1", "share of the time in which master or slave sent nothing, or both were aligned again"
     )
-    residual_mm: Spread = figure("mm", f"what inverse kinematics left of each command: {SPREAD_MEANING}")
-    residual_deg: Spread = figure("deg", f"the same for angles: {SPREAD_MEANING}")
-    master_hz: float | None = figure("Hz", "commands per second, by the median step of their stamps")
-    interpolation: str | None = figure("1", "how the slave goes from command to command; null if it is not told")
-    interpolation_ms: float | None = figure("ms", "by what that is late; 0 where there is a command every tick")
+    residual_mm: Spread = figure(
+        "mm", f"position error of the inverse kinematics' solution for each command: {SPREAD_MEANING}"
+    )
+    residual_deg: Spread = figure(
+        "deg", f"orientation error of the inverse kinematics' solution for each command: {SPREAD_MEANING}"
+    )
+    master_hz: float | None = figure("Hz", "commands per second, from the median difference of their stamps")
+    interpolation: str | None = figure("1", "interpolation between two commands; null if it was not recorded")
+    interpolation_ms: float | None = figure("ms", "delay that the interpolation adds; 0 with a command at every tick")
 
 
 class ReachMetric(Metric):
@@ -97,7 +105,7 @@ class ReachMetric(Metric):
             return
         stretch = np.cumsum(np.diff(is_off, prepend=True) != 0)
         sums = np.bincount(stretch, weights=np.where(is_off, spans, 0.0))
-        sums[0] += self._open_s  # until the first change, the earlier stretch continues
+        sums[0] += self._open_s  # the earlier stretch continues until the first change
         self._longest_s = max(self._longest_s, float(sums.max()))
         self._open_s = float(sums[-1]) if is_off[-1] else 0.0
 

@@ -30,11 +30,13 @@ class RemoteCentreMetric(Metric):
     topics = (REMOTE_CENTRE, SLAVE_MEASURED_CP)
     off_rms_mm = figure(
         "mm",
-        "RMS distance from the centre to the line of the shaft, of slave/measured_cp",
+        "RMS distance from the remote centre to the shaft's axis, by slave/measured_cp",
         "shaft beside the centre, RMS",
     )
-    off_max_mm = figure("mm", "largest such distance", "shaft beside the centre, max")
-    least_depth_mm = figure("mm", "least distance from the centre to the tip", "least depth of the tip")
+    off_max_mm = figure(
+        "mm", "largest distance from the remote centre to the shaft's axis", "shaft beside the centre, max"
+    )
+    least_depth_mm = figure("mm", "smallest distance from the remote centre to the tip", "least depth of the tip")
 
     def __init__(self, context: Context) -> None:
         self._begin_ns = approach_end_ns(context) if context.span is None else context.span.first_ns
@@ -46,7 +48,7 @@ class RemoteCentreMetric(Metric):
         places, poses = window.around(REMOTE_CENTRE), window.samples(SLAVE_MEASURED_CP)
         counts = poses.stamp_ns >= self._begin_ns
         if len(places):
-            self._last = places.values[-1]  # it does not change during a session
+            self._last = places.values[-1]  # the centre does not change during a session
         if self._last is None or not counts.any():
             return
         off, depth = distances(poses.values[counts, :7], self._last[:3], self._last[3:])

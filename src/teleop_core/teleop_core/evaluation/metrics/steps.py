@@ -13,7 +13,7 @@ class StepsMetric(Metric):
     """Mean time of each step over the attempts at a task that has steps, [s]."""
 
     name, topics = "step_s", (TASK_STATE,)
-    keys = (Key(f"step_s.{'|'.join(STEPS[1:])}", "s", "mean time of this step of a transfer"),)
+    keys = (Key(f"step_s.{'|'.join(STEPS[1:])}", "s", "mean duration of the named step of a transfer"),)
 
     def __init__(self, _: Context) -> None:
         self._times, self._last, self._tried = np.zeros(len(STEPS)), (0, 0), 0.0

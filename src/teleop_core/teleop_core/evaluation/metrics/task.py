@@ -8,12 +8,13 @@ class TaskMetric(AttemptsMetric):
     """Counts and times of the attempts in ``task/state``."""
 
     name = "task"
-    attempts = figure("1", "attempts at a goal", "attempts")
-    successes = figure("1", "attempts that ended within the goal's width", "successes")
-    error_share = figure("1", "share of the attempts that ended outside of it", "errors")
+    attempts = figure("1", "number of attempts at a goal", "attempts")
+    successes = figure("1", "number of attempts that ended within the goal's width", "successes")
+    error_share = figure("1", "share of the attempts that ended outside of the goal", "errors")
     time_s = figure(
         "s",
-        "mean time of an attempt since its goal was set; of four or more without the first, in which the arm is led in",
+        "mean time of an attempt since its goal was set; of four or more attempts the first does not "
+        "count, because it includes the approach",
         "time of an attempt, mean",
     )
 

@@ -18,9 +18,13 @@ class ThroughputMetric(AttemptsMetric):
 
     name, below = "throughput", "task"
     throughput = figure(
-        "bit/s", "log2(mean way / effective width + 1) over the mean time, without the first attempt", "throughput"
+        "bit/s",
+        "log2(mean distance / effective width + 1) divided by the mean time, without the first attempt",
+        "throughput",
     )
-    effective_width_mm = figure("mm", "4.133 standard deviations of the end points along their ways", "effective width")
+    effective_width_mm = figure(
+        "mm", "4.133 standard deviations of the end points along the directions of the movements", "effective width"
+    )
 
     def judge(self, tried: Attempts) -> None:
         """Compute the effective width from the end points of the attempts."""

@@ -46,15 +46,19 @@ class TouchMetric(Metric):
 
     name, group = "touch", "what the slave touched"
     topics = (SLAVE_TRUE_CF, SLAVE_MEASURED_CF)
-    count = figure("1", "touches: how often the force on the slave's tip set in", "touches")
+    count = figure("1", "number of touches: times that a force on the slave's tip began", "touches")
     peak_n = figure("N", "largest force on the tip; null without a touch", "force on the tip, max")
-    rms_n = figure("N", "root mean square of the samples with a force")
-    share = figure("1", "share of the recorded time in touch", "share of the time in touch")
+    rms_n = figure("N", "RMS force over the samples with a force")
+    share = figure("1", "share of the recorded time with contact", "share of the time in touch")
     drop_n = figure(
-        "N", "largest fall of the force from sample to sample within 5 ms, as of a puncture", "largest fall of it"
+        "N",
+        "largest drop of the force between two samples at most 5 ms apart, such as at a puncture",
+        "largest fall of it",
     )
     presses = figure(
-        "1", "how often a button was pressed to its stop, from click to click; null without one", "presses"
+        "1",
+        "number of times that the button was pressed to its stop; each press needs a new click; null without a button",
+        "presses",
     )
 
     def __init__(self, context: Context) -> None:

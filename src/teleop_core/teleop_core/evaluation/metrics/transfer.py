@@ -11,10 +11,10 @@ class TransferMetric(Metric):
     """Counts, times and peg forces of a simulated board, as its simulator reports them."""
 
     name, group, topics = "transfer", "peg transfer", (SLAVE_JAW_BOARD, SLAVE_JAW_GRIP)
-    transferred = figure("1", "objects that were let go onto another peg", "transferred")
-    dropped = figure("1", "objects that came to rest on no peg", "dropped")
-    time_s = figure("s", "mean time of those transferred, from the last grip to rest", "time of a transfer, mean")
-    peak_pull_n = figure("N", "largest pull of a peg on the gripped object, across the peg", "pull of a peg, max")
+    transferred = figure("1", "number of objects that were released onto another peg", "transferred")
+    dropped = figure("1", "number of objects that came to rest on no peg", "dropped")
+    time_s = figure("s", "mean time from the last grip of a transferred object to its rest", "time of a transfer, mean")
+    peak_pull_n = figure("N", "largest force of a peg on the gripped object, across the peg", "pull of a peg, max")
 
     def __init__(self, context: Context) -> None:
         super().__init__(context)

@@ -23,22 +23,28 @@ class TremorFilterScore:
     Values are None without a filter, or if the recording's rate is too low or the recording is too short.
     """
 
-    before_um: float | None = figure("um", "RMS of the stylus's motion in 8 to 12 Hz over three axes; null below 60 Hz")
-    after_um: float | None = figure("um", "the same of the filtered stylus")
-    left_share: float | None = figure("1", "tremor after the filter over tremor before it")
+    before_um: float | None = figure(
+        "um", "RMS motion of the stylus from 8 to 12 Hz over three axes; null for sample rates below 60 Hz"
+    )
+    after_um: float | None = figure("um", "RMS motion of the filtered stylus from 8 to 12 Hz over three axes")
+    left_share: float | None = figure("1", "tremor after the filter divided by the tremor before it")
     delay_ms: float | None = figure(
         "ms",
-        "by how much motion below 2 Hz comes out later: slope of the phase of the cross-spectrum "
-        "of both velocities, weighted with its magnitude; negative where it is ahead",
+        "delay of the filter for motion below 2 Hz: phase slope of the cross-spectrum of both "
+        "velocities, weighted by its magnitude; negative if the output leads",
     )
-    gain: float | None = figure("1", "how large motion below 2 Hz comes out: in phase with it, over all of it")
+    gain: float | None = figure(
+        "1", "gain of the filter for motion below 2 Hz: in-phase part of the output, divided by the input"
+    )
     intention_before_um: float | None = figure(
         "um",
-        "RMS distance of the stylus from what the hand meant, against intention: its tremor; "
-        "null where no hand/tremor was recorded",
+        "RMS distance of the stylus from the intended position, which is its tremor; null if no "
+        "hand/tremor was recorded",
     )
     intention_after_um: float | None = figure(
-        "um", "the same of the filtered stylus, with what its delay and gain cost"
+        "um",
+        "RMS distance of the filtered stylus from the intended position, including the errors by "
+        "the filter's delay and gain",
     )
 
 

@@ -11,8 +11,10 @@ class WaitsMetric(Metric):
     """Rests of the hand: at least 0.3 s with less than 0.5 mm of motion in each tenth of a second."""
 
     name, topics = "waits", (MASTER_MEASURED_CP,)
-    count = figure("1", "rests of the hand: 0.3 s or more, with < 0.5 mm in each 0.1 s")
-    share = figure("1", "share of the time in such rests, without the first 0.3 s of each")
+    count = figure(
+        "1", "number of waits: rests of the hand of 0.3 s or more, with less than 0.5 mm of motion in each 0.1 s"
+    )
+    share = figure("1", "share of the time in waits, without the first 0.3 s of each wait")
     _place, _slot, _slots, _still, _rests = np.full(3, np.inf), -1, 0, 0, 0
 
     def add(self, window: Window) -> None:

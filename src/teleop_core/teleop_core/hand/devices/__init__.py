@@ -21,7 +21,7 @@ class Reading(NamedTuple):
         is_held: Whether the person wants to move the stylus.
         fixture: Whether the fixture button is pressed.
         mode: Whether the mode button is pressed.
-        jaw: How far the jaw is closed, 0 open to 1 closed; None for a device without a jaw control.
+        jaw: Closing of the jaw, 0 open to 1 closed; None for a device without a jaw control.
     """
 
     rates: Array

@@ -27,12 +27,15 @@ _HINTS = {
 class GamepadParameters(pilot.PilotParameters):
     """How a gamepad moves the stylus, and how it displays the force."""
 
-    rumble: float = parameter(1.0, Within(0.0, 1.0), "rumble at the device's peak force; 0: none", fixed=True)
+    rumble: float = parameter(
+        1.0, Within(0.0, 1.0), "strength of the rumble at the device's peak force; 0: no rumble", fixed=True
+    )
     triggers: str = parameter(
         "roll",
         choices=("roll", "jaw"),
         fixed=True,
-        doc="what they do: they roll the stylus, or the right one closes the jaw and nothing rolls",
+        doc="roll: the triggers roll the stylus; jaw: the right trigger closes the jaw, and no "
+        "trigger rolls the stylus",
     )
 
 
@@ -96,7 +99,7 @@ class Gamepad:
         self._sdl.pygame.event.pump()
         self._sdl.pygame.event.clear()
         if not self._own.attached():
-            raise SessionError(f"gamepad {self.name} is gone")
+            raise SessionError(f"gamepad {self.name} is disconnected")
         pad, axis, button = self._sdl.pygame, self._axis, self._button
         right, left = map(axis, (pad.CONTROLLER_AXIS_TRIGGERRIGHT, pad.CONTROLLER_AXIS_TRIGGERLEFT))
         rates = np.array(

@@ -15,26 +15,26 @@ _LONGEST = 0.05  # time beyond this between two readings is not integrated [s]
 
 @dataclass(frozen=True, kw_only=True)
 class RateParameters:
-    """How fast a device that says rates moves the stylus."""
+    """Speeds of the stylus for devices whose deflection commands a velocity."""
 
     speed: float = parameter(
         0.04,
         Within(1e-3, 0.5, "m/s"),
-        "speed at full deflection",
+        "speed of the stylus at full deflection of a stick or cap",
         fixed=True,
-        source="assumed: through the Phantom's workspace in four seconds",
+        source="assumed: crosses the Phantom's workspace in 4 s",
     )
     turn_speed: float = parameter(
         0.6,
         Within(0.01, 6.0, "rad/s"),
-        "speed of the turn at full deflection",
+        "turning speed of the stylus at full deflection of a stick or cap",
         fixed=True,
-        source="assumed: a right angle in 2.6 s",
+        source="assumed: turns the stylus by a right angle in 2.6 s",
     )
     dead_zone: float = parameter(
         0.12,
         Within(0.0, 0.9),
-        "share of the deflection that counts as none",
+        "deflections below this share of the full deflection count as zero",
         fixed=True,
         source="assumed: sticks of gamepads rest within a tenth of the middle",
     )
@@ -42,9 +42,9 @@ class RateParameters:
 
 @dataclass(frozen=True, kw_only=True)
 class PilotParameters(RateParameters):
-    """How a device that says rates moves the stylus."""
+    """Motion of the stylus by a device whose deflection commands a velocity."""
 
-    device: str = parameter("", fixed=True, doc="part of the device's name; empty: the first that is found")
+    device: str = parameter("", fixed=True, doc="part of the name of the device to use; empty: the first device found")
 
 
 def beyond(rates: Array, dead_zone: float) -> Array:

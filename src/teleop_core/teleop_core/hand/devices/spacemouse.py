@@ -102,7 +102,7 @@ class SpaceMouse:
                 self._reports.take(bytes(report))
                 self._heard = now
         except (OSError, ValueError) as error:
-            raise SessionError(f"3-D mouse {self.name} is gone") from error
+            raise SessionError(f"3-D mouse {self.name} is disconnected") from error
         if now - self._heard > _REST:
             self._reports.deflection[:] = 0.0
         rates = self._reports.rates()

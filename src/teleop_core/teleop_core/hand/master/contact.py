@@ -28,7 +28,7 @@ def account(s: ContactState, force: Array, friction: float, moved: float, place:
 
     Args:
         s: State; written.
-        force: What the device applied during the tick (3,) [N].
+        force: Force of the device during the tick (3,) [N].
         friction: Dry friction of the device [N].
         moved: Distance of the device against friction during the tick [m].
         place: Position of the device at its encoders, before rounding, at the end of the tick (3,) [m], in the

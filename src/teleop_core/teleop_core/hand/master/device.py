@@ -28,20 +28,20 @@ class DeviceParameters:
     workspace: tuple[float, ...] = parameter(
         (0.16, 0.12, 0.07),
         Within(0.01, 1.0, "m"),
-        "width, height, depth within which the tip can move",
+        "width, height and depth of the space in which the tip can move",
         length=3,
         source=_OMNI,
     )
     start: tuple[float, ...] = parameter(
         (0.0, 0.0, -0.03),
         Within(-0.5, 0.5, "m"),
-        "place of the inkwell relative to the middle of the workspace",
+        "position of the inkwell relative to the middle of the workspace",
         length=3,
         fixed=True,
-        source="assumed: the inkwell is behind the middle; no source says how far",
+        source="assumed: the inkwell is behind the middle; no source gives the distance",
     )
     position_resolution: float = parameter(
-        0.055e-3, Within(0.0, 1e-2, "m"), "step of the position reading; 0: none", source=_OMNI
+        0.055e-3, Within(0.0, 1e-2, "m"), "step size of the position reading; 0: no steps", source=_OMNI
     )
     gimbal_noise: float = parameter(
         2e-3,
@@ -50,38 +50,48 @@ class DeviceParameters:
         source="derived: raw fluctuation of the slave's reference at rest (Vongbunyong 2008, "
         "section 6.2), not a specification of the potentiometers",
     )
-    peak_force: float = parameter(3.3, Within(0.0, 50.0, "N"), "largest force, for a short time", source=_OMNI)
+    peak_force: float = parameter(
+        3.3, Within(0.0, 50.0, "N"), "largest force that the device can give for a short time", source=_OMNI
+    )
     continuous_force: float = parameter(
         0.88,
         Within(1e-3, 50.0, "N"),
-        "root mean square of the force that its motors bear; peak_force or more: no limit",
+        "largest RMS force that the device's motors can give continuously; peak_force or more: no limit",
         source=_OMNI,
     )
     thermal_time: float = parameter(
         60.0,
         Within(0.1, 1e4, "s"),
-        "time constant with which its motors grow warm",
-        source="assumed: between the winding (some 10 s) and the housing (some 100 s) of coreless "
-        "motors of this size, by their makers' data sheets",
+        "thermal time constant of the device's motors",
+        source="assumed: between that of the winding (some 10 s) and that of the housing (some 100 s) "
+        "of coreless motors of this size, by data sheets",
     )
     stiffness: tuple[float, ...] = parameter(
         (1260.0, 2310.0, 1020.0),
         Within(10.0, 1e7, "N/m"),
-        "of the tip against its motors and encoders, on x, y, z; in series with every wall",
+        "stiffness of the device between tip and motors, along x, y, z; it acts in series with every wall",
         length=3,
         source=_OMNI,
     )
     structure_damping: float = parameter(
         5.0,
         Within(0.0, 1e4, "N·s/m"),
-        "of the same, beside the stiffness",
-        source="assumed: a quarter to a third of critical for apparent_mass on this stiffness",
+        "damping of the device between tip and motors, in parallel with its stiffness",
+        source="assumed: a quarter to a third of critical damping for apparent_mass on this stiffness",
     )
-    apparent_mass: float = parameter(0.045, Within(1e-3, 5.0, "kg"), "mass at the tip", source=_OMNI)
-    friction: float = parameter(0.26, Within(0.0, 5.0, "N"), "backdrive friction: it sticks below", source=_OMNI)
-    handle: str = parameter("", fixed=True, doc="robot whose joints read the hand, such as mma; empty: the Phantom's")
+    apparent_mass: float = parameter(
+        0.045, Within(1e-3, 5.0, "kg"), "apparent mass of the device at its tip", source=_OMNI
+    )
+    friction: float = parameter(
+        0.26, Within(0.0, 5.0, "N"), "backdrive friction; a smaller force does not move the tip", source=_OMNI
+    )
+    handle: str = parameter(
+        "", fixed=True, doc="robot whose joints measure the hand's pose, such as mma; empty: the Phantom's joints"
+    )
     handle_geometry: tuple[str, ...] = parameter(
-        (), fixed=True, doc="symbol=value in place of the handle's lengths and options [m, rad]"
+        (),
+        fixed=True,
+        doc="symbol=value for each length or option of the handle that differs from its default [m, rad]",
     )
 
 
@@ -102,7 +112,7 @@ class Handle(NamedTuple):
 class ReadingNumbers(Fields):
     """Fields of a parameter record with the resolution of the device."""
 
-    resolution: float  # of its place [m]
+    resolution: float  # resolution of the position [m]
     gimbal: float  # bound of the noise of its attitude [rad]
 
 

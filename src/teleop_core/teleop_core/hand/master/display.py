@@ -20,20 +20,20 @@ class DisplayParameters:
     rate: float = parameter(
         60.0,
         Within(1.0, 240.0, "Hz"),
-        "frames a second",
+        "frame rate of the display",
         source="published: UVA-DSA telesurgery QoS analysis 2026 draws at 60 Hz",
     )
     latency: float = parameter(
         0.033,
         Within(0.0, 2.0, "s"),
-        "from when a frame is taken to when it is on the screen, beside any network",
+        "time from taking a frame to showing it on the screen; delays of a network add to it",
         source="assumed: two frames at 60 Hz",
     )
     shows: str = parameter(
         "slave",
         choices=SHOWS,
-        doc="slave: what it says of itself; command: where it is told to go, which no network "
-        "delays: a predictive display",
+        doc="slave: the display shows the slave's measured pose; command: it shows the commanded "
+        "pose, which no network delays (a predictive display)",
     )
 
     def __post_init__(self) -> None:
@@ -72,7 +72,7 @@ def display_step(p: DisplayNumbers, s: DisplayState, row: Row, dt: float) -> Non
         dt: Tick [s].
     """
     stamp_ns = row.slave_servo_cp_ns if p.shows == 1 else row.slave_measured_cp_ns
-    if row.now_ns >= s.due_ns and stamp_ns > 0:  # without it there is no pose to show yet
+    if row.now_ns >= s.due_ns and stamp_ns > 0:  # without a stamp there is no pose to show yet
         s.due_ns = max(s.due_ns, row.now_ns - 1_000_000_000) + int(1e9 / p.rate)
         at = s.taken % _FRAMES
         shown = row.slave_servo_cp if p.shows == 1 else row.slave_measured_cp

@@ -14,7 +14,7 @@ from teleop_core.kernels.room import room
 
 _FASTEST = 1.5
 """Largest phase [rad] of the oscillation of hand against device in one step of constant friction."""
-_PLACE, _SPEED, _HAND, _HAND_SPEED = range(4)  # what a step gives
+_PLACE, _SPEED, _HAND, _HAND_SPEED = range(4)  # indices of the results of a step
 _PUSH = 5  # index of the last input of a step
 
 
@@ -25,21 +25,21 @@ class HandParameters:
     mass: float = parameter(
         0.15,
         Within(0.01, 5.0, "kg"),
-        "mass moved with the tip",
+        "mass of the hand that moves with the tip",
         source="assumed: fingers and a part of the hand of some 0.4 kg; a fingertip alone "
         "has some grams (Hajian and Howe 1997)",
     )
     stiffness: float = parameter(
         300.0,
         Within(1.0, 5000.0, "N/m"),
-        "how firmly the hand holds its path",
+        "stiffness with which the hand holds the tip on its path",
         source="assumed: some 100 to 1000 N/m by grip, as of fingertips (Hajian and Howe 1997) and "
         "wrists that hold a stylus (Kuchenbecker, Park and Niemeyer 2003)",
     )
     damping: float = parameter(
         12.0,
         Within(0.1, 200.0, "N·s/m"),
-        "damping of the arm",
+        "damping with which the hand holds the tip on its path",
         source="assumed: 0.8 of critical with the masses and the stiffness here; fingertips have "
         "some 5 N·s/m (Hajian and Howe 1997), a firm grip more",
     )
@@ -49,20 +49,20 @@ class HandNumbers(Fields):
     """Fields of a parameter record with the mechanics of hand and device."""
 
     friction: float  # dry, of the device [N]
-    steps: int  # of equal length, in a tick
-    flow: Annotated[Array, 2, 3, 4, 6]  # of join()
-    center: Vector3  # of the workspace [m]
-    half: Vector3  # of its sides [m]
+    steps: int  # number of equal steps in a tick
+    flow: Annotated[Array, 2, 3, 4, 6]  # matrices of join()
+    center: Vector3  # centre of the workspace [m]
+    half: Vector3  # half of the workspace's sides [m]
 
 
 class HandState(Fields):
     """Fields of a state record with position and speed of hand and device."""
 
-    position: Vector3  # of the device [m]
+    position: Vector3  # position of the device [m]
     speed: Vector3  # [m/s]
-    hand: Vector3  # where the hand is [m]
+    hand: Vector3  # position of the hand [m]
     hand_speed: Vector3
-    wanted: Vector3  # where it wants to be [m]
+    wanted: Vector3  # wanted position of the hand [m]
 
 
 @inner
@@ -104,7 +104,7 @@ def _push_on(p: HandNumbers, s: HandState, aim_speed: Array, force: Array, time:
         given[i, 2] = s.hand[i] - s.position[i]
         given[i, 3] = s.wanted[i] + time * aim_speed[i] - s.hand[i]
         given[i, 4], given[i, _PUSH] = aim_speed[i], force[i]
-        # Force against which the device would stand still at the end of the step.
+        # Force with which the device would be at rest at the end of the step.
         needed[i] = _flows(p.flow[0, i, _SPEED], given[i]) / p.flow[0, i, _SPEED, _PUSH]
         square += needed[i] * needed[i]
         rests = rests and s.speed[i] == 0.0

@@ -40,19 +40,21 @@ class HapticMasterParameters:
     """Parameters of :class:`HapticMaster`."""
 
     seed: int = parameter(1, Within(0), "seed of everything random in the session", fixed=True)
-    force_timeout: float = parameter(0.1, Within(0.002, 5.0, "s"), "without a newer servo_cf the force is zero")
+    force_timeout: float = parameter(
+        0.1, Within(0.002, 5.0, "s"), "if no servo_cf arrives for this time, the force becomes zero"
+    )
     force_range: float = parameter(
         30.0,
         Within(0.1, 1000.0, "N"),
-        "a servo_cf beyond it comes from a broken sensor: no force until it was within for 1 s",
-        source="assumed: no stage asks for more than 20 N, no such device gives more than 10",
+        "a larger servo_cf is taken as a sensor fault: the force is zero until servo_cf was smaller for 1 s",
+        source="assumed: no stage asks for more than 20 N, and no such device gives more than 10 N",
     )
     hand_timeout: float = parameter(
         0.5,
         Within(0.02, 60.0, "s"),
-        "a hand/servo_cp that is silent for longer lets go: the stylus stays, the clutch is "
-        "pressed; if it comes back elsewhere, until 0.3 s later",
-        source="assumed: as of buttons, longer than a busy machine keeps a process waiting",
+        "if no hand/servo_cp arrives for this time, the stylus stays in place and the clutch is "
+        "pressed; if the hand returns at another pose, the clutch stays pressed for 0.3 s more",
+        source="assumed: the same time as for buttons; a busy machine delays a process for less",
     )
     device: DeviceParameters = field(default_factory=DeviceParameters)
     hand: hand_mechanics.HandParameters = field(default_factory=hand_mechanics.HandParameters)

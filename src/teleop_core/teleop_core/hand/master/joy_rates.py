@@ -19,13 +19,19 @@ class JoyParameters(RateParameters):
     axes: tuple[int, ...] = parameter(
         (0, 1, 2, 3, 4, 5),
         Within(-1, 63),
-        "which axes of the Joy move along x, y, z and turn about x, y, z; -1: none does",
+        "axes of the Joy that move the stylus along x, y, z and turn it about x, y, z; -1: no axis",
         length=6,
         fixed=True,
     )
-    held_button: int = parameter(-1, Within(-1, 63), "button that must be held to move; -1: none", fixed=True)
+    held_button: int = parameter(
+        -1, Within(-1, 63), "index of the button that must be held to move; -1: no button is needed", fixed=True
+    )
     reach: float = parameter(
-        0.1, Within(0.001, 1.0, "m"), "largest way from the start along each axis", fixed=True, source="assumed"
+        0.1,
+        Within(0.001, 1.0, "m"),
+        "largest distance of the stylus from its start, along each axis",
+        fixed=True,
+        source="assumed",
     )
 
 
@@ -47,7 +53,7 @@ class JoyRates:
         """
         p = self._parameters
         if max(p.axes) >= len(axes) or p.held_button >= len(buttons):
-            return f"its Joy has {len(axes)} axes and {len(buttons)} buttons, fewer than are named"
+            return f"its Joy has {len(axes)} axes and {len(buttons)} buttons, fewer than the parameters name"
         said = np.array([axes[place] if place >= 0 else 0.0 for place in p.axes], np.float64)
         if not np.isfinite(said).all():
             return "an axis of its Joy is not a finite number"

@@ -29,7 +29,7 @@ POSE_MESSAGES = (
 """Message types with the pose of a stylus; the last type has joint positions instead."""
 RATE_MESSAGE = "sensor_msgs/msg/Joy"
 """Message type in which gamepads and 3-D mice send the speed of the stylus."""
-_OFF_UNIT = 1e-2  # of a quaternion's length
+_OFF_UNIT = 1e-2  # tolerance of a quaternion's length
 _THREE = ("+x", "+y", "+z")
 
 
@@ -37,9 +37,11 @@ _THREE = ("+x", "+y", "+z")
 class MasterBridgeParameters:
     """Parameters of :class:`MasterBridge`."""
 
-    pose_topic: str = parameter("device/measured_cp", fixed=True, doc="where the device says where its stylus is")
+    pose_topic: str = parameter(
+        "device/measured_cp", fixed=True, doc="topic on which the device publishes the pose of its stylus"
+    )
     pose_message: str = parameter(
-        POSE_MESSAGES[0], choices=(*POSE_MESSAGES, RATE_MESSAGE), fixed=True, doc="type of these messages"
+        POSE_MESSAGES[0], choices=(*POSE_MESSAGES, RATE_MESSAGE), fixed=True, doc="message type of pose_topic"
     )
     joy: JoyParameters = field(default_factory=JoyParameters)
     device_axes: tuple[str, ...] = parameter(
@@ -47,39 +49,44 @@ class MasterBridgeParameters:
         choices=AXES,
         length=3,
         fixed=True,
-        doc="the x (right), y (up), z (towards the person) of master_base as axes of the device",
+        doc="axes of the device along x (right), y (up) and z (towards the person) of master_base",
     )
     stylus_axes: tuple[str, ...] = parameter(
-        _THREE, choices=AXES, length=3, fixed=True, doc="the x, y, z of our stylus as axes of that of the device"
+        _THREE, choices=AXES, length=3, fixed=True, doc="axes of the device's stylus along x, y, z of our stylus frame"
     )
     unit: float = parameter(
-        1.0, Within(1e-6, 10.0, "m"), "length in which the device counts: 0.001 for millimetres", fixed=True
+        1.0, Within(1e-6, 10.0, "m"), "length unit of the device; 0.001 for millimetres", fixed=True
     )
     handle: str = parameter(
-        "", fixed=True, doc="robot whose tip is the stylus, by name or file, where the device says its joints"
+        "", fixed=True, doc="robot whose tip is the stylus, by name or file, for devices that publish joint positions"
     )
     handle_geometry: tuple[str, ...] = parameter(
-        (), fixed=True, doc="symbol=value in place of its lengths and options [m, rad]"
+        (),
+        fixed=True,
+        doc="symbol=value for each length or option of the handle that differs from its default [m, rad]",
     )
     handle_joints: tuple[str, ...] = parameter(
-        (), fixed=True, doc="ours=theirs for each joint that the device calls otherwise"
+        (), fixed=True, doc="ours=theirs for each joint that has another name in the device's messages"
     )
     handle_signs: tuple[float, ...] = parameter(
         (),
         Within(-1.0, 1.0),
-        "1.0 or -1.0 for each of our joints: ours = sign * theirs + offset; empty: 1.0",
+        "sign of each of our joints, 1.0 or -1.0: our position = sign * device position + offset; empty: 1.0",
         fixed=True,
     )
     handle_offsets: tuple[float, ...] = parameter(
-        (), Within(unit="rad or m"), "of each of our joints; empty: 0.0", fixed=True
+        (),
+        Within(unit="rad or m"),
+        "offset of each of our joints: our position = sign * device position + offset; empty: 0.0",
+        fixed=True,
     )
     buttons_topic: str = parameter(
-        "", fixed=True, doc="where the device says its buttons, as sensor_msgs/Joy; empty: nowhere"
+        "", fixed=True, doc="topic on which the device publishes its buttons, as sensor_msgs/Joy; empty: no buttons"
     )
     button_places: tuple[int, ...] = parameter(
         (0, 1, 2),
         Within(-1, 63),
-        "which of them are clutch, fixture and mode, counted from 0; -1: it has none",
+        "indices of the clutch, fixture and mode buttons in the device's Joy, from 0; -1: no such button",
         length=3,
         fixed=True,
     )
@@ -87,30 +94,32 @@ class MasterBridgeParameters:
         "header",
         choices=("header", "sent"),
         fixed=True,
-        doc="when a pose was taken: as its header says, or when it was sent, for devices on a "
-        "clock of their own; a Pose has no header",
+        doc="timestamp of a pose: header: the stamp of its header; sent: the time when it was sent, "
+        "for devices with another clock and for Pose, which has no header",
     )
     oldest_pose: float = parameter(
         0.1,
         Within(0.001, 1.0, "s"),
-        "poses whose stamps differ by more from our clock are refused",
+        "largest difference between the stamp of a pose and our clock; poses beyond it are refused",
         fixed=True,
         source="assumed",
     )
     force_topic: str = parameter(
-        "", fixed=True, doc="where the device takes forces, as geometry_msgs/WrenchStamped; empty: it has none"
+        "",
+        fixed=True,
+        doc="topic on which the device receives forces, as geometry_msgs/WrenchStamped; empty: it gives no force",
     )
-    force_gain: float = parameter(1.0, Within(0.0, 10.0), "force of the device over the one that is asked for")
+    force_gain: float = parameter(1.0, Within(0.0, 10.0), "force sent to the device, divided by master/servo_cf")
     largest_force: float = parameter(
         3.3,
         Within(0.0, 100.0, "N"),
-        "the device is asked for no more",
+        "largest force that is sent to the device",
         source="published: peak force of the Phantom Omni",
     )
     force_timeout: float = parameter(
         0.1,
         Within(0.002, 5.0, "s"),
-        "without master/servo_cf for longer, or a pose of the device, it is given no force",
+        "if no master/servo_cf or no pose of the device arrives for this time, the device gets zero force",
         source="assumed",
     )
 
@@ -135,7 +144,7 @@ class MasterBridge(RunningStage):
     and ``force`` for the force to send.
 
     Attributes:
-        wrong: What is wrong with the newest pose, in words; empty if it is valid.
+        wrong: Text about the fault of the newest pose; empty if the pose is valid.
         heard_ns: Arrival time of the newest valid pose [ns]; 0 before the first.
         refused: Number of rejected poses, by reason.
 
@@ -246,7 +255,7 @@ class MasterBridge(RunningStage):
     def concerns(self) -> list[str]:
         """Why the pose of the stylus is not published."""
         if self.wrong:
-            return [f"the device is not believed: {self.wrong}"]
+            return [f"the device's messages are refused: {self.wrong}"]
         if not self.heard_ns:
             return [f"waits for the device on {self.parameters.pose_topic}"]
         return []

@@ -23,14 +23,14 @@ class OperatorNumbers(Fields):
     """Parameter record of the operator."""
 
     tremor: float  # amplitude [m]
-    frequency: float  # of the tremor [Hz]
+    frequency: float  # frequency of the tremor [Hz]
     patience_ns: int
 
 
 class OperatorState(Fields):
     """State record of the operator."""
 
-    phase: Vector3  # of the tremor [rad]
+    phase: Vector3  # phase of the tremor [rad]
     wander: Vector3
     next: int
     next_noise: int
@@ -148,7 +148,7 @@ class RunningOperator(RunningStage):
         row[topics.HAND_BUTTONS.field] = row[topics.HAND_TREMOR.field] = row[topics.HAND_JAW.field] = 0.0
 
     def retune(self, parameters: OperatorParameters) -> None:
-        """Take new tremor and patience from the next tick on; the motion goes on."""
+        """Use new values of tremor and patience from the next tick on; the motion continues."""
         p, operator = self.parameters, OPERATORS.find(self._fixed.kind.kind)
         p["tremor"] = 0.0 if operator.trembles else parameters.tremor_amplitude
         p["frequency"] = parameters.tremor_frequency
@@ -171,10 +171,11 @@ class RunningOperator(RunningStage):
         """Compute the wanted motion of the next ticks, as far ahead as the operator allows."""
         self._noise.prepare(self.state, ticks)
         now = int(self.state["next"])
-        left = self._end - now  # with the record of the present tick
+        left = self._end - now  # number of remaining records, including that of the present tick
         if left > ticks:
             return
-        as_bytes = self._wanted.view(np.dtype((np.void, self._wanted.itemsize)))  # not field by field, which is slow
+        # copy whole records, because copying each field is slow
+        as_bytes = self._wanted.view(np.dtype((np.void, self._wanted.itemsize)))
         as_bytes[:left] = as_bytes[now : self._end]
         self._end = max(ticks, min(left - 1 + self._operator.ahead, BLOCK)) + 1
         self.state["next"] = 0
@@ -210,7 +211,7 @@ class RunningOperator(RunningStage):
             raise PartError("operator", name, f"one whose motion is numbers, not {moves.dtype}")
         moves = moves.astype(np.float64, copy=False)
         if moves.shape not in {(len(times), columns) for columns in (3, 6, 9, 12, 13)}:
-            text = f"one who answers (N, 3), (N, 6) or (N, 9) for N times, not {moves.shape}"
+            text = f"one whose motion has the shape (N, 3), (N, 6) or (N, 9) for N times, not {moves.shape}"
             raise PartError("operator", name, text)
         if not np.isfinite(moves).all():
             bad = times[int(np.flatnonzero(~np.isfinite(moves).all(axis=1))[0])]

@@ -1,6 +1,6 @@
 """Operators: the motion that the hand wants, one file per kind.
 
-An operator is asked for its motion during a block of ticks. It returns positions and rotations of the hand relative to
+The motion of an operator is requested for a block of ticks. It returns positions and rotations of the hand relative to
 the rest pose of the stylus. The simulated hand then follows them, against its mass, its tremor and the device's force.
 """
 
@@ -28,10 +28,11 @@ how far the jaw is closed, from 0 to 1. Missing columns count as zero.
 
 
 class Seen(NamedTuple):
-    """What an operator sees and feels, as of the operator's last step.
+    """Data that an operator sees and feels, at the operator's last step.
 
     The attributes are views of the signals: read them when the motion is asked for. An operator that reacts to them
-    should have ``ahead=1``, so that it is asked as late as possible. The slave's values come with the declared delay,
+    should have ``ahead=1``, so that its motion is requested as late as possible. The slave's values come with the
+    declared delay,
     such as ``delays=["slave/measured_cp@operator=0.3"]``.
 
     Attributes:
@@ -51,13 +52,13 @@ class Seen(NamedTuple):
 
 
 class Setting(NamedTuple):
-    """What an operator is made with, in addition to its own parameters.
+    """Data with which an operator is made, in addition to its own parameters.
 
     Attributes:
         common: The whole parameter group ``operator``.
         phases: Random phases (6, 4) [rad] of the session's seed, the same for every operator.
         seed: Seed of the session, for more random numbers.
-        seen: What the operator sees and feels; None if only the length of a motion is asked for.
+        seen: Data that the operator sees and feels; None if only the length of a motion is requested.
     """
 
     common: Any
@@ -74,7 +75,7 @@ class Operator:
         name: Its name in ``--set operator=``.
         make: ``make(parameters, setting)`` gives the :data:`Motion` of one session.
         parameters: Its parameter group, beside those that all operators share.
-        ahead: Largest number of ticks for which it is asked at once; 1 for an operator that reacts to what happens.
+        ahead: Largest number of ticks per request of its motion; 1 for an operator that reacts to measurements.
         trembles: Whether its motion contains its own tremor, so that ``operator.tremor_amplitude`` is not added.
         approaches: Whether it begins with a smooth move to ``operator.center`` that takes ``operator.approach_time``.
         length: ``length(parameters, setting)`` returns the duration of its motion [s]. A session without a given
@@ -138,7 +139,7 @@ def sampled_motion(name: str, times: object, rows: object) -> Motion:
 def _checked(name: str, part: object) -> Operator:
     if isinstance(part, Operator):
         if not callable(part.make) or part.ahead < 1:
-            raise PartError("operator", name, "one whose make can be called, asked >= 1 tick ahead")
+            raise PartError("operator", name, "one with a callable make and with ahead >= 1 tick")
         if part.length is not None and not callable(part.length):
             raise PartError("operator", name, "one whose length is length(parameters, setting)")
         if part.opens is not None and not callable(part.opens):

@@ -17,11 +17,25 @@ PRESS_TIME = 0.1
 class ButtonParameters:
     """When the operator uses the buttons [s]; each press of fixture or mode lasts 0.1 s."""
 
-    clutch: tuple[float, ...] = parameter((), Within(0.0, None, "s"), "press, release, press, release, …", fixed=True)
-    fixture: tuple[float, ...] = parameter((), Within(0.0, None, "s"), "presses: each toggles the box", fixed=True)
-    mode: tuple[float, ...] = parameter((), Within(0.0, None, "s"), "presses: each toggles coarse and fine", fixed=True)
+    clutch: tuple[float, ...] = parameter(
+        (), Within(0.0, None, "s"), "times of press, release, press, release, … of the clutch button", fixed=True
+    )
+    fixture: tuple[float, ...] = parameter(
+        (),
+        Within(0.0, None, "s"),
+        "times of presses of the fixture button; each press switches the fixture on or off",
+        fixed=True,
+    )
+    mode: tuple[float, ...] = parameter(
+        (),
+        Within(0.0, None, "s"),
+        "times of presses of the mode button; each press changes between coarse and fine",
+        fixed=True,
+    )
 
-    jaw: tuple[float, ...] = parameter((), Within(0.0, None, "s"), "jaw: close, open, close, open, …", fixed=True)
+    jaw: tuple[float, ...] = parameter(
+        (), Within(0.0, None, "s"), "times at which the hand closes, opens, closes, opens, … the jaw", fixed=True
+    )
 
     def __post_init__(self) -> None:
         for name, pairs in (("clutch", self.clutch), ("jaw", self.jaw)):
@@ -43,14 +57,14 @@ class RoomParameters:
     workspace: tuple[float, ...] = parameter(
         (0.16, 0.12, 0.07),
         Within(0.01, 1.0, "m"),
-        "width, height, depth within which the tip can move; as haptic_master's",
+        "width, height and depth of the space in which the tip can move; the same as haptic_master's",
         length=3,
         fixed=True,
     )
     start: tuple[float, ...] = parameter(
         (0.0, 0.0, -0.03),
         Within(-0.5, 0.5, "m"),
-        "place of the inkwell relative to the middle of it; as haptic_master's",
+        "position of the inkwell relative to the middle of the workspace; the same as haptic_master's",
         length=3,
         fixed=True,
     )
@@ -66,29 +80,33 @@ class RoomParameters:
 class OperatorParameters:
     """Which operator moves the hand; motions are relative to the start of the stylus, in the master's base."""
 
-    kind: Choice = choice(OPERATORS, "random", fixed=True, doc="who moves the hand, and how")
+    kind: Choice = choice(
+        OPERATORS, "random", fixed=True, doc="kind of operator: a simulated motion, a recording or a person's device"
+    )
     seed: int = parameter(1, Within(0), "seed of everything random in the session", fixed=True)
     patience: float = parameter(
         10.0,
         Within(0.0, 3600.0, "s"),
-        "it begins when teleop/state says that the slave follows, or after this",
+        "longest wait for teleop/state to report that the slave follows; then the operator begins anyway",
         fixed=True,
     )
     center: tuple[float, ...] = parameter(
         (0.0, 0.0, 0.0), Within(-0.3, 0.3, "m"), "centre of the motion, first point of a line", length=3, fixed=True
     )
-    approach_time: float = parameter(4.0, Within(0.1, 60.0, "s"), "smooth move from start to the centre", fixed=True)
+    approach_time: float = parameter(
+        4.0, Within(0.1, 60.0, "s"), "duration of the smooth move from the start to the centre", fixed=True
+    )
     size: tuple[float, ...] = parameter(
         (0.03, 0.03, 0.03),
         Within(0.0, 0.3, "m"),
-        "random: width of the region; circle: diameters on x, y, z; line: from end to end",
+        "random: width of the region; circle: diameters along x, y, z; line: vector from end to end",
         length=3,
         fixed=True,
     )
     period: float = parameter(
         8.0,
         Within(0.1, 600.0, "s"),
-        "time of one round; random: of the slowest part of the motion; points: per leg",
+        "duration of one round; random: period of the slowest part of the motion; points: duration of each leg",
         fixed=True,
     )
     tilt: tuple[float, ...] = parameter(
@@ -104,21 +122,21 @@ class OperatorParameters:
     points: tuple[float, ...] = parameter(
         (),
         Within(-0.3, 0.3, "m"),
-        "points: x, y, z of each stop relative to the centre, one after the other",
+        "points: x, y, z of each stop relative to the centre, one stop after the other",
         fixed=True,
     )
-    bag: str = parameter("", fixed=True, doc="bag: recording whose master/measured_cp is followed")
+    bag: str = parameter("", fixed=True, doc="bag: recording whose master/measured_cp the hand follows")
     longest_gap: float = parameter(
         0.1,
         Within(0.0, 60.0, "s"),
-        "bag, file: over longer gaps between samples the hand waits, but not below 5 periods",
+        "bag, file: at a longer gap between two samples (and of more than 5 periods) the hand stays in place",
         fixed=True,
     )
 
     tremor_amplitude: float = parameter(
         0.1e-3,
         Within(0.0, 5e-3, "m"),
-        "amplitude of the wanted tremor on each axis",
+        "amplitude of the hand's intended tremor on each axis",
         source="assumed: within the 50 to 200 µm of microsurgery; friction swallows it at rest",
     )
     tremor_frequency: float = parameter(
@@ -150,7 +168,7 @@ def insist_on_virtual(stage: str, group: object) -> None:
     if not isinstance(group, OperatorParameters) or _is_virtual(group.kind.kind):
         return
     others = ", ".join(filter(_is_virtual, OPERATORS.names()))
-    text = f"one of {others} in virtual time; {group.kind.kind} is for teleop live"
+    text = f"one of {others} in virtual time; {group.kind.kind} works only with teleop live"
     raise ParameterError(f"{stage}.kind", group.kind.kind, text)
 
 

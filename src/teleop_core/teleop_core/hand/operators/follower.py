@@ -120,7 +120,7 @@ class Follower:
         speed: Largest linear and angular speed [m/s, rad/s].
         acceleration: Largest linear and angular acceleration [m/s², rad/s²].
         start: Pose (7,) in which it starts at rest: position [m], quaternion w, x, y, z.
-        room: Low and high corner (3,) [m] of the box in which it stays.
+        room: Low and high corner (3,) [m] of the box that bounds the stylus.
     """
 
     def __init__(

@@ -1,11 +1,11 @@
-"""Hand room: how far a hand can move and turn from its pose, and to which pose to bring it back."""
+"""Hand room: the distance by which a hand can still move and turn, and the pose to which it should return."""
 
 import numpy as np
 
 from teleop_core.kernels import Array, length
 from teleop_core.kernels.geometry import rotate_by_vector, turn_within
 
-_MARGIN = 2e-3  # from the ends of the room [m]
+_MARGIN = 2e-3  # distance from the ends of the hand's range [m]
 _REST = np.array([1.0, 0.0, 0.0, 0.0])
 
 

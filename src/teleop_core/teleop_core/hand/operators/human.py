@@ -37,124 +37,125 @@ class HumanParameters:
         Within(1e-3, 0.3, "m"),
         "median distance from target to target, within the region of operator.size",
         fixed=True,
-        source="assumed: how far apart things are is the task's",
+        source="assumed: the distances between targets depend on the task",
     )
     reach_spread: float = parameter(
         0.72,
         Within(0.0, 2.0),
-        "standard deviation of its logarithm",
+        "standard deviation of the logarithm of the distance from target to target",
         fixed=True,
-        source="assumed: with reach, fits the figures of people",
+        source="assumed: together with reach, fits the figures of people",
     )
     turn: float = parameter(
         0.3,
         Within(0.0, 2.0),
-        "standard deviation of the turn to the next target, in parts of operator.rotation",
+        "standard deviation of the turn to the next target, divided by operator.rotation",
         fixed=True,
         source="assumed: fits the figures of people",
     )
     width: float = parameter(
         2.6e-3,
         Within(1e-4, 0.1, "m"),
-        "width of a target, as of Fitts",
+        "width of a target in Fitts's law",
         fixed=True,
         source="assumed: fits the figures of people",
     )
     tolerance: float = parameter(
         2.4e-3,
         Within(1e-4, 0.1, "m"),
-        "distance from the target at which no correction is made",
+        "the hand makes no correction if it is nearer to the target than this",
         fixed=True,
         source="assumed: a little below width",
     )
     movement_time: float = parameter(
         0.055,
         Within(0.05, 2.0, "s"),
-        "duration of a submovement of no difficulty",
+        "duration of a submovement whose index of difficulty is 0",
         fixed=True,
         source="assumed: fits the figures of people; form of Fitts 1954",
     )
     time_per_bit: float = parameter(
         0.195,
         Within(0.0, 2.0, "s"),
-        "what each bit of difficulty adds to the duration of a submovement",
+        "added duration of a submovement for each bit of its index of difficulty",
         fixed=True,
-        source="assumed: 5 bit/s, as of a mouse (Soukoreff, MacKenzie 2004); pen: 10 (Fitts 1954)",
+        source="assumed: 5 bit/s, as with a mouse (Soukoreff, MacKenzie 2004); 10 bit/s with a pen (Fitts 1954)",
     )
     time_spread: float = parameter(
         0.23,
         Within(0.0, 1.0),
-        "standard deviation of its logarithm",
+        "standard deviation of the logarithm of a submovement's duration",
         fixed=True,
         source="assumed: fits the figures of people",
     )
     shortfall: float = parameter(
         0.05,
         Within(0.0, 0.5),
-        "share of the distance that a first submovement aims short by",
+        "share of the distance by which a first submovement aims too short",
         fixed=True,
         source="assumed: first submovements fall short (Engelbrecht, Berthier and O'Sullivan 2003)",
     )
     noise_along: float = parameter(
         0.05,
         Within(0.0, 0.2, "s"),
-        "standard deviation of a submovement's end along its way, per mean speed",
+        "standard deviation of a submovement's end along its direction, divided by its mean speed",
         fixed=True,
         source="assumed: ends spread with mean speed (Schmidt et al. 1979; Meyer et al. 1988)",
     )
     noise_across: float = parameter(
         0.018,
         Within(0.0, 0.2, "s"),
-        "the same across its way",
+        "standard deviation of a submovement's end across its direction, divided by its mean speed",
         fixed=True,
-        source="assumed: smaller than along (Gordon, Ghilardi and Ghez 1994)",
+        source="assumed: smaller than along the direction (Gordon, Ghilardi and Ghez 1994)",
     )
     reaction_time: float = parameter(
         0.22,
         Within(0.05, 1.0, "s"),
-        "from seeing an error, half way through a submovement, to its correction",
+        "time from seeing an error, half way through a submovement, to the start of its correction",
         fixed=True,
         source="published: 0.19 to 0.26 s (Keele and Posner 1968)",
     )
     corrections: int = parameter(
         3,
         Within(0, 10),
-        "largest number of corrections of a reach",
+        "largest number of corrections in one reach",
         fixed=True,
         source="assumed: more are hardly ever needed",
     )
     dwell_time: float = parameter(
         0.22,
         Within(0.01, 10.0, "s"),
-        "median rest at a target",
+        "median duration of a rest at a target",
         fixed=True,
         source="assumed: fits the figures of people",
     )
     dwell_spread: float = parameter(
         0.4,
         Within(0.0, 2.0),
-        "standard deviation of its logarithm",
+        "standard deviation of the logarithm of the rest's duration",
         fixed=True,
         source="assumed: fits the figures of people",
     )
     passing: float = parameter(
         0.75,
         Within(0.0, 1.0),
-        "share of targets at which the hand rests not",
+        "share of targets at which the hand does not rest",
         fixed=True,
         source="assumed: fits the figures of people",
     )
     overlap: float = parameter(
         0.32,
         Within(0.0, 0.5),
-        "share of the last submovement into which the next reach begins at such a target",
+        "at a target without rest, the next reach begins before the last submovement ends, by this "
+        "share of its duration",
         fixed=True,
-        source="assumed: that submovements overlap: Flash and Henis 1991",
+        source="assumed: Flash and Henis 1991 state that submovements overlap",
     )
     tremor: float = parameter(
         63e-6,
         Within(0.0, 5e-3, "m"),
-        "tremor of the tip from 8 to 12 Hz, at rest too: root mean square over three axes",
+        "RMS tremor of the tip over three axes, from 8 to 12 Hz; the hand trembles at rest too",
         fixed=True,
         source="fitted: to the tremor of a hand that rests, docs/human_operator.md",
     )
@@ -165,7 +166,7 @@ class HumanParameters:
 
 
 class Submovement(NamedTuple):
-    """A minimum-jerk movement: when it begins, how long it takes [s], and where it leads.
+    """A minimum-jerk movement: its begin [s], its duration [s] and its displacement.
 
     ``step`` (6,) is the displacement [m] and the rotation vector [rad].
     """
@@ -312,7 +313,7 @@ def tremor(size: float, rng: np.random.Generator) -> Motion:
     angles = first + (last - first) * places
     rates = 2.0 * math.pi * (_PEAK + _HALF_WIDTH * np.sin(angles) / np.cos(angles))
     phases = rng.uniform(0.0, 2.0 * math.pi, (3, _LINES))
-    share = (high - low) / (last - first)  # of its power within the band
+    share = (high - low) / (last - first)  # share of the power within the band
     amplitude = size * math.sqrt(2.0 / (3 * _LINES * share))
 
     def motion(times: Array) -> Array:

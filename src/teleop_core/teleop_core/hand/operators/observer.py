@@ -23,7 +23,7 @@ from teleop_core.kernels.axes import axis_map
 from teleop_core.kernels.geometry import turn_within
 
 AHEAD = 16
-"""Ticks for which it is asked at once, about a frame; the eye needs longer, so this adds no delay."""
+"""Number of ticks per request of the motion, about one frame; the delay of the eye is longer, so this adds no delay."""
 _COLUMNS = ("number", "act", "goal_x", "width", "goal_qw", "turn", "force", "clearance")
 _NUMBER, _ACT, _GOAL, _WIDTH, _ATTITUDE, _TURN, _FORCE, _CLEARANCE = map(topics.TASK_STATE.columns.index, _COLUMNS)
 _BOX, _SIZE = STATE["fixture_center_x"], STATE["fixture_size_x"]
@@ -52,7 +52,7 @@ class Observer:
         self._room = HandRoom(setting.common.device.corners, p.largest_turn)
         self._rng = np.random.default_rng((setting.seed, 3))
         self._glances = Glances(p.eye)
-        self._hand = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])  # where the last submovement ends
+        self._hand = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])  # pose at which the last submovement ends
         self._softness = p.softness  # last felt compliance: displacement per newton [m/N]
         self._move: Move | None = None
         self._turns = False  # whether the last submovement turns the stylus
@@ -62,7 +62,7 @@ class Observer:
         self._is_still = self._was_felt = False  # whether the end of the last motion was seen, or only felt
         self._close = -math.inf  # when the hand closes for a moment [s]
         self._holds, self._since = False, -math.inf  # whether the hand stays closed, and since when
-        self._lag = -1.0  # how late the last motion was seen, without the eye's delay [s]; < 0: not known
+        self._lag = -1.0  # delay with which the last motion was seen, without the eye's delay [s]; < 0: not known
 
     def __call__(self, times: Array) -> Array:
         """Rows (N, 13) of :data:`~teleop_core.hand.operators.Motion` for times (N,) [s]."""
@@ -85,7 +85,7 @@ class Observer:
         if (move := self._move) is None:
             return
         if not move.is_clutched and not self._turns and move.begin + move.duration < times[0]:
-            rows[:, :3] = move.start[:3] + move.step  # it is over
+            rows[:, :3] = move.start[:3] + move.step  # the submovement is over
             return
         share, has_begun = minimum_jerk((times - move.begin) / move.duration), times >= move.begin
         moved = move.start[:3] + share[:, None] * move.step
@@ -150,7 +150,7 @@ class Observer:
             self._softness *= min(max(pressed / more / self._softness, 1.0 / 3.0), 3.0)
 
     def _pressed(self, move: Move) -> float:
-        """How far a submovement went against the force that was felt before it [m]."""
+        """Displacement of a submovement against the force that was felt before it [m]."""
         force = move.seen.force
         return -float(dot(product(self._hand_of_slave, move.way.step), force)) / max(float(length(force)), _FELT)
 
@@ -206,7 +206,7 @@ class Observer:
         return np.concatenate((b.tip[:3] - a.tip[:3], lever * turn))
 
     def _half_way(self, move: Move, until: float) -> float:
-        """When the tip was seen half way [s]; infinite if this was not before ``until``."""
+        """Time at which the tip was seen at half of the path [s]; infinite if this was not before ``until``."""
         unseen, whole = move.unseen, float(dot(move.unseen, move.unseen))
         half = 1.0 - 0.5 * float(length(move.way.both)) / math.sqrt(whole)
         before: tuple[float, float] | None = None

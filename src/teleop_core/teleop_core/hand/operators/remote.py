@@ -20,8 +20,8 @@ __all__ = ["REMOTE", "Person", "RemoteHand", "RemoteParameters", "remote_operato
 AHEAD = follower.MOST
 """Largest number of ticks per call. A new target takes effect at most this many ticks late."""
 BUTTONS = ("clutch", "fixture", "mode")
-_PRESSED, _BETWEEN = 0.1, 0.05  # how long a button is pressed, and released at least [s]
-_UNIT = 1e-3  # how far a quaternion may be from unit length
+_PRESSED, _BETWEEN = 0.1, 0.05  # shortest times for which a button is pressed, and released [s]
+_UNIT = 1e-3  # tolerance of a quaternion's length
 _FARTHEST = 10.0  # poses farther than this from the master's base are refused [m]
 
 
@@ -32,23 +32,24 @@ class RemoteParameters:
     delay: float = parameter(
         0.045,
         Within(0.005, 0.5, "s"),
-        "how far the stylus is behind a steady motion that is wanted",
+        "delay of the stylus behind a commanded motion of constant speed",
         fixed=True,
-        source="assumed: smooths 30 to 60 poses a second; less than a third of what people feel",
+        source="assumed: smooths 30 to 60 poses per second; less than a third of the delay that people feel",
     )
     timeout: float = parameter(
         0.2,
         Within(0.02, 5.0, "s"),
-        "silence that lets go of the stylus: the clutch is pressed until the next pose",
+        "if no pose arrives for this time, the operator lets go of the stylus: the clutch is pressed "
+        "until the next pose",
         fixed=True,
-        source="assumed: some six frames of a slow page",
+        source="assumed: the time of some six frames of a slow page",
     )
     speed: float = parameter(
         0.5,
         Within(0.01, 2.5, "m/s"),
         "largest speed of the stylus",
         fixed=True,
-        source="assumed: through the Phantom's workspace in a third of a second",
+        source="assumed: crosses the Phantom's workspace in a third of a second",
     )
     acceleration: float = parameter(
         30.0,
@@ -60,14 +61,14 @@ class RemoteParameters:
     turn_speed: float = parameter(
         6.0,
         Within(0.05, 50.0, "rad/s"),
-        "largest speed of its turn",
+        "largest angular speed of the stylus",
         fixed=True,
         source="assumed: about one turn a second",
     )
     turn_acceleration: float = parameter(
         300.0,
         Within(1.0, 5000.0, "rad/s²"),
-        "largest acceleration of its turn",
+        "largest angular acceleration of the stylus",
         fixed=True,
         source="assumed: reaches turn_speed in half of the delay",
     )
@@ -104,7 +105,7 @@ class RemoteHand:
 
     Attributes:
         room: Corners low and high (3,) [m] of the box that the stylus stays in.
-        closing: How far the hand closes the jaw, 0 open to 1 closed; it does not change when no poses come.
+        closing: Share by which the hand closes the jaw, 0 open to 1 closed; it does not change when no poses come.
         refused: Number of poses that were not used.
     """
 
@@ -137,7 +138,7 @@ class RemoteHand:
 
         Args:
             pose: Position [m] in the master's base and quaternion w, x, y, z of unit length, (7,).
-            time: When it was wanted, in the time of :meth:`motion` [s]; None for now.
+            time: Time of the wanted pose, in the time of :meth:`motion` [s]; None for now.
 
         Returns:
             Whether the pose is used. A pose is refused if it is not finite, is more than 10 m away, or has no unit
@@ -235,7 +236,7 @@ class RemoteHand:
         Args:
             first: Time of the first tick [s].
             tick: Length of a tick [s].
-            count: How many ticks, 1 to 4.
+            count: Number of ticks, 1 to 4.
 
         Returns:
             Records (count,) of :class:`teleop_core.hand.operators.follower.Wanted`: positions and attitudes in the

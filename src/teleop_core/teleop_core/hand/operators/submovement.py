@@ -28,9 +28,9 @@ class Move(NamedTuple):
     begin: float
     duration: float
     start: Array  # position (3,) [m] and attitude (4,) of the hand at its start, relative to rest
-    step: Array  # of the hand (3,) [m]
+    step: Array  # displacement of the hand (3,) [m]
     turn: Array  # rotation of the stylus in its own frame (3,) [rad]
-    seen: Glance  # what was seen when it began
-    way: Way  # of the tip, as the hand feels
-    unseen: Array  # this motion, and those before it that were felt but not seen (6,) [m]
+    seen: Glance  # data that were seen when the submovement began
+    way: Way  # path of the tip, as the hand feels it
+    unseen: Array  # motions that were felt but not yet seen, including this one (6,) [m]
     is_clutched: bool = False  # the slave does not follow

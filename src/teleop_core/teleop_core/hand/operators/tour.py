@@ -21,24 +21,31 @@ class TourParameters:
     """Where a tour goes, and how fast."""
 
     points: tuple[float, ...] = parameter(
-        (), Within(-0.3, 0.3, "m"), "x, y, z of each point relative to the centre, one after the other", fixed=True
+        (),
+        Within(-0.3, 0.3, "m"),
+        "x, y, z of each point relative to the centre, one point after the other",
+        fixed=True,
     )
     leg_time: float = parameter(
         0.7,
         Within(0.05, 60.0, "s"),
-        "from one point to the next",
+        "duration of the move from one point to the next",
         fixed=True,
-        source="assumed: 24 points, rests and the line take the published 45 s",
+        source="assumed: with it, 24 points, their rests and the line back take the published 45 s",
     )
     rest_time: float = parameter(
-        0.6, Within(0.0, 60.0, "s"), "rest at each point", fixed=True, source="assumed: as the time of a leg"
+        0.6,
+        Within(0.0, 60.0, "s"),
+        "duration of the rest at each point",
+        fixed=True,
+        source="assumed: for the same reason as leg_time",
     )
     trace_time: float = parameter(
         13.8,
         Within(0.0, 600.0, "s"),
-        "line back through all points, from the last to the first; 0: none",
+        "duration of the line back through all points, from the last to the first; 0: no line back",
         fixed=True,
-        source="assumed: as the time of a leg",
+        source="assumed: for the same reason as leg_time",
     )
 
     def __post_init__(self) -> None:

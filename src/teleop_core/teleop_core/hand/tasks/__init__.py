@@ -50,9 +50,9 @@ class Miss(IntEnum):
     """What was wrong with an attempt at a task."""
 
     NONE = 0  # nothing
-    BESIDE = 1  # it ended beside the goal
-    LATE = 2  # it took too long
-    FORCE = 3  # it pressed too hard
+    BESIDE = 1  # the attempt ended beside the goal
+    LATE = 2  # the attempt took too long
+    FORCE = 3  # the tip pressed too hard
     DROP = 4  # the carried object came to rest beside its goal
     WRONG = 5  # the carried object came to rest on another object's goal
 
@@ -85,7 +85,7 @@ def _try(part: Task) -> None:
     """Judge some ticks, so that errors are reported before anything runs."""
     needs = "one with judge(numbers, memory, scene, state) and parameters that all have defaults"
     with tried("task", part.name, needs):
-        numbers, _ = fenced(part.numbers(part.parameters()))  # one too far is NaN
+        numbers, _ = fenced(part.numbers(part.parameters()))  # an index one too large reads NaN
         memory, fence = fenced(np.zeros(MEMORY))
         state, beyond = fenced(np.zeros(len(topics.TASK_STATE.columns)))
         scene = np.zeros(len(SCENE))
@@ -101,7 +101,7 @@ def _try(part: Task) -> None:
         text = "one that sets a first goal at once, with a width > 0"
         raise PartError("task", part.name, f"{text}; it writes {state.tolist()}")
     tried_once, done, act = (state[topics.TASK_STATE.columns.index(name)] for name in ("attempts", "successes", "act"))
-    if not done and act not in (Act.GRIP, Act.LET_GO):  # to which a jaw belongs
+    if not done and act not in (Act.GRIP, Act.LET_GO):  # other goals need no jaw
         text = "one that counts a success at its goal: `end_attempt` of tasks.attempts with NONE, or `tell_attempt`"
         came = f"{tried_once:.0f} attempts without one" if tried_once else "no attempt"
         raise PartError("task", part.name, f"{text}; in ten minutes at its goals it counts {came}")

@@ -88,9 +88,13 @@ def end_attempt(memory: Array, scene: Array, state: Array, miss: int) -> None:
 class PressedParameters:
     """Bounds of tasks with contact; they are the first numbers of such a task."""
 
-    width: float = parameter(0.004, Within(1e-4, 0.1, "m"), "of a goal, a ball")
-    most: float = parameter(2.0, Within(0.01, 500.0, "N"), "a larger force is an error")
-    longest: float = parameter(20.0, Within(0.1, 600.0, "s"), "an attempt that takes longer is an error")
+    width: float = parameter(0.004, Within(1e-4, 0.1, "m"), "diameter of a goal, which is a ball")
+    most: float = parameter(
+        2.0, Within(0.01, 500.0, "N"), "largest force on the tip; an attempt with a larger force is an error"
+    )
+    longest: float = parameter(
+        20.0, Within(0.1, 600.0, "s"), "longest time of an attempt; a longer attempt is an error"
+    )
 
 
 @inner
@@ -114,9 +118,13 @@ def tell_attempt(memory: Array, scene: Array, state: Array) -> None:
 class LedParameters:
     """How following a moving goal is judged; these are the first numbers of such a task."""
 
-    width: float = parameter(0.006, Within(1e-4, 0.1, "m"), "twice the distance from it that is near")
+    width: float = parameter(
+        0.006, Within(1e-4, 0.1, "m"), "twice the distance within which the tip counts as near the moving goal"
+    )
     step: float = parameter(
-        0.5, Within(0.01, 60.0, "s"), "after which the tip is judged each time, and the next place counts as a goal"
+        0.5,
+        Within(0.01, 60.0, "s"),
+        "period after which the tip is judged and the next position of the goal counts as a new goal",
     )
 
 
@@ -127,7 +135,7 @@ def lead_on(numbers: Array, memory: Array, scene: Array, state: Array, y: float,
     Args:
         numbers: Numbers of the task, those of :class:`LedParameters` first.
         memory: Memory of the task: the position at its start (3,), and the time of the next step [s].
-        scene: What the task sees.
+        scene: Data that the task sees.
         state: State of the task; written.
         y: Present y of the goal, relative to the start of the task [m].
         z: Present z of the goal, relative to the start of the task [m].

@@ -19,8 +19,10 @@ class FollowParameters(attempts.LedParameters):
         Sums of sines as targets: McRuer and Jex 1967, IEEE Trans. Human Factors in Electronics 8.
     """
 
-    size: float = parameter(0.02, Within(1e-3, 0.5, "m"), "farthest that it goes along each axis")
-    period: float = parameter(60.0, Within(1.0, 3600.0, "s"), "after which its way repeats itself")
+    size: float = parameter(
+        0.02, Within(1e-3, 0.5, "m"), "largest distance of the goal from the start of the task, along each axis"
+    )
+    period: float = parameter(60.0, Within(1.0, 3600.0, "s"), "period after which the path of the goal repeats itself")
 
 
 @kernel

@@ -16,13 +16,25 @@ class InsertParameters(attempts.PressedParameters):
     """Position of the hole, and how deep to go; the object with the hole is a part of the world."""
 
     place: tuple[float, ...] = parameter(
-        (0.3, 0.0, 0.0), Within(-10.0, 10.0, "m"), "of its mouth in the slave's base, as world.place", length=3
+        (0.3, 0.0, 0.0),
+        Within(-10.0, 10.0, "m"),
+        "position of the hole's mouth in the slave's base; the same as world.place",
+        length=3,
     )
-    axis: tuple[float, ...] = parameter((0.0, 0.0, 1.0), Within(-1.0, 1.0), "out of it, as world.hole.axis", length=3)
-    depth: float = parameter(0.01, Within(1e-3, 0.5, "m"), "of the goal inside")
-    outside: float = parameter(0.008, Within(0.0, 0.5, "m"), "goal before the mouth")
+    axis: tuple[float, ...] = parameter(
+        (0.0, 0.0, 1.0),
+        Within(-1.0, 1.0),
+        "axis of the hole, pointing out of its mouth; the same as world.hole.axis",
+        length=3,
+    )
+    depth: float = parameter(0.01, Within(1e-3, 0.5, "m"), "depth of the goal inside the hole")
+    outside: float = parameter(
+        0.008, Within(0.0, 0.5, "m"), "distance of the first goal from the mouth, outside the hole"
+    )
     clearance: float = parameter(
-        0.0, Within(0.0, 0.1, "m"), "from the tool to the hole's edge, which the hand heeds; 0: it does not"
+        0.0,
+        Within(0.0, 0.1, "m"),
+        "radial clearance between tool and hole, which the hand takes into account; 0: it does not",
     )
 
     def __post_init__(self) -> None:

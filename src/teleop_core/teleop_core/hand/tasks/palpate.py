@@ -15,13 +15,15 @@ _FORCE = topics.TASK_STATE.columns.index("force")
 class PalpateParameters(attempts.PressedParameters):
     """Places below a row of points along y; the tip is in the middle of the row when the task begins."""
 
-    count: int = parameter(5, Within(1, 99), "places of the row")
-    spacing: float = parameter(0.005, Within(0.0, 0.1, "m"), "between places")
-    force: float = parameter(0.5, Within(0.01, 100.0, "N"), "along z, to press with")
-    tolerance: float = parameter(0.2, Within(1e-3, 100.0, "N"), "it may be so far off")
-    hold: float = parameter(0.5, Within(0.0, 60.0, "s"), "it must last so long")
+    count: int = parameter(5, Within(1, 99), "number of places in the row")
+    spacing: float = parameter(0.005, Within(0.0, 0.1, "m"), "distance between neighbouring places")
+    force: float = parameter(0.5, Within(0.01, 100.0, "N"), "wanted pressing force along z")
+    tolerance: float = parameter(
+        0.2, Within(1e-3, 100.0, "N"), "largest difference between the pressing force and the wanted force"
+    )
+    hold: float = parameter(0.5, Within(0.0, 60.0, "s"), "time for which the pressing force must be within tolerance")
     yielding: float = parameter(
-        0.003, Within(1e-5, 0.1, "m/N"), "the goal is so much deeper than the tip for each newton that is missing"
+        0.003, Within(1e-5, 0.1, "m/N"), "depth of the goal below the tip for each newton of missing force"
     )
 
 

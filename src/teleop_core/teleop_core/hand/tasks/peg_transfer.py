@@ -19,20 +19,25 @@ class PegTransferParameters:
     arms: str = parameter(
         "one",
         choices=transfer.KINDS,
-        doc="who transfers: one arm all blocks; each of two every other one; the first hands each over to the second",
+        doc="which arm transfers a block: one arm transfers all; two arms take turns; or the first "
+        "arm hands each block over to the second",
     )
     ways: tuple[float, ...] = parameter(
         (0.0, -0.04),
         Within(-1.0, 1.0, "m"),
-        "x, y of the way from each block to the peg of its colour; one way holds for all",
+        "x, y of the displacement from each block to the peg of its colour; a single one is used for all blocks",
     )
-    lift: float = parameter(0.03, Within(1e-3, 0.5, "m"), "above where blocks stand")
+    lift: float = parameter(
+        0.03, Within(1e-3, 0.5, "m"), "height above the standing blocks at which a block is carried"
+    )
     clearance: float = parameter(
-        0.0015, Within(0.0, 0.1, "m"), "of a block that is on a peg, as jaw_sim.pegs.clearance"
+        0.0015, Within(0.0, 0.1, "m"), "clearance between peg and block; the same as jaw_sim.pegs.clearance"
     )
-    width: float = parameter(0.002, Within(1e-4, 0.1, "m"), "of a goal, a ball")
-    longest: float = parameter(60.0, Within(1.0, 600.0, "s"), "a transfer that takes longer is an error")
-    tries: int = parameter(2, Within(1, 99), "how often a block is taken up, if it is dropped")
+    width: float = parameter(0.002, Within(1e-4, 0.1, "m"), "diameter of a goal, which is a ball")
+    longest: float = parameter(
+        60.0, Within(1.0, 600.0, "s"), "longest time of a transfer; a longer transfer is an error"
+    )
+    tries: int = parameter(2, Within(1, 99), "number of times that the arm picks up a block, if it drops the block")
 
     def __post_init__(self) -> None:
         if len(self.ways) not in {_ONE_WAY, _WAYS}:

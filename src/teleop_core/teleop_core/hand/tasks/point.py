@@ -15,13 +15,16 @@ class PointParameters:
     count: int = parameter(
         13,
         Within(3, 99),
-        "targets of the ring",
-        source="published: ISO/TS 9241-411 2012 has an odd number, 13 and 25 in its figures",
+        "number of targets on the ring",
+        source="published: ISO/TS 9241-411 2012 requires an odd number, and shows 13 and 25 in its figures",
     )
-    diameter: float = parameter(0.03, Within(1e-3, 0.5, "m"), "of the ring")
-    width: float = parameter(0.004, Within(1e-4, 0.1, "m"), "diameter of a target, a ball")
+    diameter: float = parameter(0.03, Within(1e-3, 0.5, "m"), "diameter of the ring")
+    width: float = parameter(0.004, Within(1e-4, 0.1, "m"), "diameter of a target, which is a ball")
     normal: tuple[float, ...] = parameter(
-        (1.0, 0.0, 0.0), Within(-1.0, 1.0), "axis of the ring in the slave's base, of any length but 0", length=3
+        (1.0, 0.0, 0.0),
+        Within(-1.0, 1.0),
+        "axis of the ring in the slave's base; its length does not matter, but must not be 0",
+        length=3,
     )
 
 

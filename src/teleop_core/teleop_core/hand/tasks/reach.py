@@ -18,12 +18,20 @@ _STEPS = (0.8191725133961645, 0.6710436067037893, 0.5497004779019703)
 class ReachTaskParameters:
     """A box around the position of the tip when the task begins."""
 
-    size: tuple[float, ...] = parameter((0.01, 0.04, 0.04), Within(0.0, 0.5, "m"), "of the box", length=3)
-    width: float = parameter(0.004, Within(1e-4, 0.1, "m"), "diameter of a goal, a ball")
-    longest: float = parameter(10.0, Within(0.1, 600.0, "s"), "after which a goal counts as an error")
-    first: int = parameter(0, Within(0, 10**6), "which place comes first")
-    turn: float = parameter(0.0, Within(0.0, 1.5, "rad"), "largest turn of a goal; 0: any does")
-    turn_width: float = parameter(0.2, Within(0.01, 3.0, "rad"), "twice how far the tool may be off it")
+    size: tuple[float, ...] = parameter(
+        (0.01, 0.04, 0.04), Within(0.0, 0.5, "m"), "edge lengths of the box that contains the goals", length=3
+    )
+    width: float = parameter(0.004, Within(1e-4, 0.1, "m"), "diameter of a goal, which is a ball")
+    longest: float = parameter(
+        10.0, Within(0.1, 600.0, "s"), "longest time for a goal; if it takes longer, the goal counts as an error"
+    )
+    first: int = parameter(0, Within(0, 10**6), "index of the first goal in the sequence of goals")
+    turn: float = parameter(
+        0.0, Within(0.0, 1.5, "rad"), "largest turn of a goal's attitude; 0: any attitude of the tool is accepted"
+    )
+    turn_width: float = parameter(
+        0.2, Within(0.01, 3.0, "rad"), "twice the largest angle between the tool's attitude and the goal's"
+    )
 
 
 @kernel
@@ -48,7 +56,7 @@ def reach_judge(numbers: Array, memory: Array, scene: Array, state: Array) -> No
     goal_y = memory[1] + numbers[1] * ((0.5 + at * _STEPS[1]) % 1.0 - 0.5)
     goal_z = memory[2] + numbers[2] * ((0.5 + at * _STEPS[2]) % 1.0 - 0.5)
     attempts.begin_goal(memory, scene, state, attempts.PASS, goal_x, goal_y, goal_z, numbers[3])
-    if numbers[6] > 0.0:  # about an axis that varies over all directions
+    if numbers[6] > 0.0:  # turn the goal about an axis that varies over all directions
         height, angle = 2.0 * (at * _STEPS[0] % 1.0) - 1.0, 2.0 * math.pi * (at * _STEPS[1] % 1.0)
         size, across = numbers[6] * (0.25 + 0.75 * (at * _STEPS[2] % 1.0)), math.sqrt(1.0 - height * height)
         x, y = size * across * math.cos(angle), size * across * math.sin(angle)

@@ -20,7 +20,7 @@ _SECOND, _FIRST_BLOCK = SCENE.index("is_second"), SCENE.index("x0")
 class TaskParameters:
     """Choice of the task."""
 
-    kind: Choice = choice(TASKS, "point", fixed=True, doc="what the operator is to do")
+    kind: Choice = choice(TASKS, "point", fixed=True, doc="task of the operator")
 
 
 class TaskState(Fields):

@@ -12,8 +12,8 @@ from teleop_core.kernels import Array, kernel
 class TraceParameters(attempts.LedParameters):
     """A ring in the slave's y-z plane; the start of the task is its lowest point."""
 
-    diameter: float = parameter(0.03, Within(1e-3, 0.5, "m"), "of the ring")
-    period: float = parameter(12.0, Within(0.5, 600.0, "s"), "in which the point goes round once")
+    diameter: float = parameter(0.03, Within(1e-3, 0.5, "m"), "diameter of the ring")
+    period: float = parameter(12.0, Within(0.5, 600.0, "s"), "time in which the point goes once around the ring")
 
 
 @kernel

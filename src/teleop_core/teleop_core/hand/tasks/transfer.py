@@ -48,7 +48,7 @@ def _begin_step(numbers: Array, memory: Array, scene: Array, state: Array, step:
     block, lift, width = max(int(memory[0]), 0), numbers[0], numbers[1]
     start, now = _STARTS + 3 * block, _X0 + 3 * block
     way_x, way_y = numbers[4 + 2 * block], numbers[5 + 2 * block]
-    x, y, z = state[2], state[3], state[4]  # by default the tip stays
+    x, y, z = state[2], state[3], state[4]  # by default the tip does not move
     state[_STEP] = float(step)
     if step in (_REACH, _GRASP) or (step == _TAKE and scene[_SECOND] > 0.0):
         x, y, z = scene[now], scene[now + 1], scene[now + 2]
@@ -58,7 +58,7 @@ def _begin_step(numbers: Array, memory: Array, scene: Array, state: Array, step:
         share = 1.0 if scene[_SECOND] > 0.0 else 0.5
         x, y = memory[start] + share * way_x, memory[start + 1] + share * way_y
         z = memory[start + 2] + lift
-    elif step == _CARRY:  # so that the block comes above the peg, whatever its position in the jaw
+    elif step == _CARRY:  # bring the block above the peg, at any position in the jaw
         x = scene[1] + memory[start] + way_x - scene[now]
         y = scene[2] + memory[start + 1] + way_y - scene[now + 1]
         z = scene[3] + memory[start + 2] + memory[1] - scene[now + 2]

@@ -38,7 +38,7 @@ _FLIP = np.diag([1.0, -1.0, -1.0, 1.0])
 
 @dataclass(frozen=True, kw_only=True)
 class Solution:
-    """How an arm is solved: description, kernels, and the constants after its geometry row."""
+    """Solution of an arm: description, kernels, and the constants after its geometry row."""
 
     text: str
     kernels: Kernels

@@ -19,7 +19,7 @@ from teleop_core.kernels.room import room
 _SLACK = 1e-9
 # Amplitude below which an equation does not determine its angle; the angle is then the seed.
 _FREE = 1e-12
-_STEPS = 60  # of a bracketed Newton search
+_STEPS = 60  # largest number of steps of a bracketed Newton search
 
 
 @inner
@@ -176,7 +176,7 @@ def open_pairs(A: Array, B: Array, h: Array, rule: Array, seeds: Array, pairs: A
         A: Factors of x, (2, 2).
         B: Factors of y, (2, 2).
         h: Right-hand side (2,).
-        rule: How to solve (4,): 0 if B has a null vector, 1 if A has one, 2 if neither; the null vector, two numbers;
+        rule: Method (4,): 0 if B has a null vector, 1 if A has one, 2 if neither; the null vector, two numbers;
             and the row that remains for the second angle.
         seeds: Values of x and y to use if the equations leave them free (2,).
         pairs: Written.

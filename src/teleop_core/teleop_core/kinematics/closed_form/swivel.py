@@ -26,11 +26,11 @@ from teleop_core.kinematics.branches import BESIDE, cost_of, is_allowed, turn
 from teleop_core.kinematics.closed_form import candidates, spherical_wrist, swivel_arcs, swivel_families
 
 _SPEED = 0.3  # share of a joint's largest step with which psi moves back to its margin in a path
-_ROUNDS, _MORE_ROUNDS = 8, 40  # of the search for the least move, and if it comes close
+_ROUNDS, _MORE_ROUNDS = 8, 40  # largest numbers of rounds of the search: for the least move, and if it is close
 _CLOSE = 1e-4  # squared weighted error: a limit on the path slows a search that would still converge
 _FLAT = 0.3  # volume of three unit axes below which manipulability counts
 _ASIDE = 1e-3  # psi [rad] to either side at which manipulability is compared
-_GAIN = 200.0  # of the relative difference, up to full speed
+_GAIN = 200.0  # gain from the relative difference to the share of full speed
 _NONE = 1e-9  # sum of two manipulabilities that counts as zero
 
 

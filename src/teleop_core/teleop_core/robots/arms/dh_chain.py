@@ -163,7 +163,7 @@ def chain_robot(
         reach: Length [m] that weighs distances against angles; 0 means 1 m.
         task: Directions that the arm controls, of :data:`DIRECTIONS`.
         drives: Drive table.
-        solution: How its inverse kinematics are solved.
+        solution: Text about the method of inverse kinematics.
         followers: How the motions follow the joints; None if each motion is a joint.
         geometry: Symbols and values [m, rad] that the robot shows; none for those of its row.
     """

@@ -34,7 +34,7 @@ _UNITS = {
 }  # fmt: skip
 # Shares of the effort: dry friction, and viscous friction at the largest speed.
 _MOST_ASSUMED = {"coulomb": 0.1, "viscous": 0.5}
-_OF_POSITION = ("friction_speed", "speed_limit", "encoder_step")  # in the table's unit of angles
+_OF_POSITION = ("friction_speed", "speed_limit", "encoder_step")  # entries in the table's unit of angles
 _FASTEST = {"bandwidth": 500.0}  # [rad/s], the largest that the 1 kHz control allows
 # Largest rate [1/s] at which friction may stop a joint: two integration steps a millisecond can follow it.
 _STIFFEST = 2000.0

@@ -253,7 +253,7 @@ def ik(T: Array, seed: Array, limits: Array, geometry: Array, q: Array, residual
     """
     if not is_askable(T, seed):
         return -1
-    reached = room(4, 4)  # until the end its corner holds the rotation left to the wrist
+    reached = room(4, 4)  # until the end, its rotation part is the rotation left to the wrist
     is_reachable = _choose(T, seed, limits, geometry, reached, q)
     is_slowed = abs(q[4]) < _NEAR and math.isfinite(limits[2, 3])
     if is_slowed or not is_allowed(q, seed, limits):

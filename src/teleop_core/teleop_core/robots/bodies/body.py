@@ -81,8 +81,8 @@ class Joint(IntEnum):
     """How a body moves relative to its parent."""
 
     FIXED = 0
-    REVOLUTE = 1  # about z of its own frame
-    PRISMATIC = 2  # along z of its own frame
+    REVOLUTE = 1  # turns about z of the body's own frame
+    PRISMATIC = 2  # slides along z of the body's own frame
     FREE = 3  # placed in the base as a whole: legs, platforms
 
 
@@ -94,7 +94,7 @@ class Body:
         name: Unique in the robot; the first is ``base``, the last ``tip``.
         solids: Its shapes, in its frame.
         parent: Index of its parent body; -1 for the base.
-        joint: How it moves.
+        joint: Kind of joint that moves the body.
         origin: Its pose (7,) in the parent's frame, with its coordinate at zero; unused for a free body.
         coordinate: Index of its coordinate, or of its pose for a free body; -1 for a fixed body.
     """
@@ -151,7 +151,7 @@ class Bodies:
         Raises:
             ShapeError: Another shape.
         """
-        joints = np.array(q, dtype=np.float64, order="C")  # a copy: one that can be written
+        joints = np.array(q, dtype=np.float64, order="C")  # a writable copy
         if joints.ndim not in {1, 2} or joints.shape[-1] != self.n:
             raise ShapeError("q", (self.n,), joints.shape)
         rows = joints.reshape(-1, self.n)

@@ -174,7 +174,7 @@ def chain(
 
 
 def length_of(chained: Sequence[Place], tip: Array) -> float:
-    """Length [m] of the way along a chain from the base to the tip (7,), with its rods."""
+    """Length [m] of the path along a chain and its rods, from the base to the tip (7,)."""
     points = [np.zeros(3)]
     for place in chained:
         points += [place.seat, place.arrive, place.leave]
@@ -201,7 +201,7 @@ def _base(chained: Sequence[Place], reach: float, radius: float) -> tuple[Solid,
 
 
 def _link(place: Place, end: Array, stroke: float, radius: float, frame: Array) -> tuple[Solid, ...]:
-    """Solids of the link after a joint, in its frame: joint, way to the next one, rod."""
+    """Solids of the link after a joint, in its frame: the joint, the connection to the next joint, and the rod."""
     up = np.array([0.0, 0.0, 1.0])
     points = [seen_from(frame, point) for point in (place.arrive, place.leave, end)]
     run = _run(points, radius, "link")

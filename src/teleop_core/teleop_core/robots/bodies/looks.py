@@ -18,7 +18,7 @@ def looks_of(robot: Robot) -> dict[int, Mesh]:
     """Meshes of the bodies of a robot, by their index in :func:`bodies_of`.
 
     For a mesh that cannot be read, a warning names its link. A body without any readable mesh is not among the keys.
-    Files are read anew at each call.
+    Files are read again at each call.
     """
     bodies = bodies_of(robot)
     frames = bodies.poses(robot.home)

@@ -26,7 +26,7 @@ def mesh_of(solid: Solid, around: int = AROUND) -> Mesh:
 
 
 def merged(meshes: list[Mesh]) -> Mesh:
-    """Several meshes, at least one, as one."""
+    """Merge one or more meshes into a single mesh."""
     begins = np.cumsum([0, *(len(vertices) for vertices, _ in meshes[:-1])])
     faces = [faces + begin for (_, faces), begin in zip(meshes, begins, strict=True)]
     return np.concatenate([vertices for vertices, _ in meshes]), np.concatenate(faces)

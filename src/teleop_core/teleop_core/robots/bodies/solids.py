@@ -20,7 +20,7 @@ class Solid:
     """A shape of a body.
 
     Args:
-        kind: What it is.
+        kind: Kind of solid.
         size: All in metres. Capsule and cylinder: radius, and length along z between the centres of
             the capsule's ends or of the cylinder's faces. Box: x, y, z. Sphere: radius.
         pose: Its centre in the body's frame (7,): x, y, z [m], quaternion w, x, y, z.

@@ -20,7 +20,7 @@ from teleop_core.robots.drives import Dynamics
 from teleop_core.robots.dynamics import rigid_body
 
 GRAVITY = (0.0, 0.0, -9.81)
-"""Acceleration of free fall in the base [m/s²]: the base stands, z up."""
+"""Acceleration of free fall in the base [m/s²]; the base is mounted upright, with z up."""
 _BODY = 13
 
 

@@ -87,7 +87,7 @@ def dynamics_row(followers: Followers, chain: Array, motors: Array) -> Array:
     """Parameter row of the kernels below.
 
     Args:
-        followers: What the motions of the chain do.
+        followers: Relation of the chain's motions to the joints.
         chain: Row of :func:`~teleop_core.robots.dynamics.chain_dynamics.chain_row` of the motions.
         motors: Inertia of each motor at its joint (n,) [kg·m² or kg].
     """

@@ -43,7 +43,7 @@ def write_model(acceleration: Any, model: Array, q: Array, dq: Array, out: Array
             inertia, row by row [kg·m², kg·m or kg]; written.
 
     Source:
-        Walker and Orin 1982, method 1, with the solve the other way round.
+        Walker and Orin 1982, method 1, with forward instead of inverse dynamics.
     """
     n = q.shape[0]
     effort, free, ddq, inertia = np.zeros(n), np.empty(n), np.empty(n), np.empty((n, n))

@@ -75,8 +75,8 @@ def load_urdf(
 
     Raises:
         RecordingError: The file cannot be read, or is not XML.
-        ParameterError: An element that is missing or not possible; the message names it. With
-            dynamics of links also a joint beside the way to the tip that moves with one on it.
+        ParameterError: An element is missing or not possible; the message names it. With dynamics of links also: a
+            joint outside of the path to the tip moves with a joint on the path.
         UnknownNameError: A tip, direction, dynamics, link, type of joint, argument of a xacro, or
             joint or entry of the drives that does not exist.
         TeleopError: The package ``xacro`` is needed and not installed.
@@ -93,7 +93,7 @@ def load_urdf(
     chain = urdf_tree.chain_to(urdf_tree.tip_of(tip, links, joints), by_child)
     moving = [joint for joint in chain if joint.axis is not None]
     if not moving:
-        raise ParameterError("tip", tip or chain, "a link that some joint between it and the root moves")
+        raise ParameterError("tip", tip or chain, "a link that moves: a joint must lie between this link and the root")
     trains, followers = _trains(moving, {joint.name: joint for joint in joints})
     leaders = [train[0].joint for train in trains]
     limits = [_narrowed(train) for train in trains]
@@ -101,7 +101,7 @@ def load_urdf(
     reach = sum(float(length(joint.origin[:3, 3])) for joint in chain)
     reach += sum(max(map(abs, urdf_tree.limits_of(j))) for j in moving if j.kind == "prismatic")
     home, n = np.array([limit.home for limit in limits]), len(limits)
-    may_be_any = dynamics == "independent"  # whose inertia counts as assumed
+    may_be_any = dynamics == "independent"  # the inertia then counts as assumed
     bodies, inertia = _bodies(moving, base, links, joints, may_be_any), np.zeros((n, n))
     chain_numbers = chain_row(kinds, fixed, bodies, np.zeros(len(moving)))
     follower_inertia(home, dynamics_row(followers, chain_numbers, np.zeros(n)), inertia)
@@ -171,7 +171,9 @@ def _leader(
         where = f"mimic of joint {joint.name}"
         own = float(urdf_tree.numbers_of(where, mimic, "multiplier", (1.0,))[0])
         if own == 0.0:
-            raise ParameterError(f"multiplier of {where}", own, "not 0: what never moves is fixed")
+            raise ParameterError(
+                f"multiplier of {where}", own, "not 0; a joint that never moves must have the type fixed"
+            )
         unit = urdf_tree.UNITS[urdf_tree.KINDS[joint.kind]]
         offset += factor * float(urdf_tree.numbers_of(where, mimic, "offset", (0.0,), unit)[0])
         factor, name = factor * own, mimic.get("joint", "")
@@ -179,7 +181,7 @@ def _leader(
         if name not in movable:
             raise UnknownNameError(where, name, movable)
         if name in passed:
-            raise ParameterError(where, name, "a joint that does not follow it in turn")
+            raise ParameterError(where, name, "a joint that does not itself follow this joint")
         joint = named[name]
         passed.append(name)
     return joint, factor, offset
@@ -192,7 +194,7 @@ def _refuse_beside(
     named = {joint.name: joint for joint in joints}
     for joint in joints:
         if joint.axis is not None and joint not in moving and _leader(joint, named)[0] in leaders:
-            needed = f"independent: joint {joint.name} is not on the way to the tip, and moves too"
+            needed = f"independent: joint {joint.name} moves too, but is not on the path to the tip"
             raise ParameterError("dynamics", "links", needed)
 
 
@@ -224,7 +226,7 @@ def _narrowed(train: list[_Geared]) -> dh_chain.DhJoint:
             lower, upper = max(lower, ends[0]), min(upper, ends[1])
     if not lower < upper:
         names = ", ".join(geared.joint.name for geared in train[1:])
-        needed = f"lower < upper within the limits of {names}, by which it is followed"
+        needed = f"lower < upper within the limits of {names}, which follow this joint"
         raise ParameterError(f"limits of joint {leader.name}", (lower, upper), needed)
     home = 0.0 if lower <= 0.0 <= upper else 0.5 * (lower + upper)
     return dh_chain.DhJoint(name=leader.name, symbol="", sign=1.0, lower=lower, upper=upper, home=home)
@@ -336,7 +338,7 @@ def _mass(name: str, link: Xml.Element, may_be_any: bool) -> tuple[float, Array,
     if 0.0 <= mass < _NO_MASS and abs(inertia).max() < _NO_MASS:  # a frame to which the file gives mass
         return 0.0, np.zeros((3, 3)), np.eye(4)
     if mass < 0.0 or not (may_be_any or _is_possible(inertia)):
-        needed = "that of a body; dynamics=independent takes any"
+        needed = "that of a rigid body; dynamics=independent accepts any"
         raise ParameterError(f"inertial of {where}", (mass, inertia.tolist()), needed)
     return mass, inertia, urdf_tree.origin_of(where, element)
 

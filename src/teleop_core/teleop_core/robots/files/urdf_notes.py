@@ -1,4 +1,4 @@
-"""Notes on a URDF: what may be read differently from what its author meant."""
+"""Notes on a URDF: content that may be read differently from the author's intention."""
 
 from collections.abc import Callable, Iterator, Sequence
 
@@ -18,10 +18,12 @@ def notes_on(chain: Sequence[urdf_tree.UrdfJoint], links: urdf_tree.Links) -> It
     bounded = [joint for joint in moving if joint.kind != "continuous"]
     yield from _listed("narrowed to the soft limits of its safety_controller", bounded, _is_narrowed)
     endless = [joint for joint in moving if joint.kind == "continuous"]
-    yield from _listed("lower and upper left out: it is continuous", endless, _has_limits)
+    yield from _listed("lower and upper are ignored: the joint is continuous", endless, _has_limits)
     for kind, unit in urdf_tree.UNITS.items():
         own = [joint for joint in bounded if urdf_tree.KINDS[joint.kind] == kind]
-        what = f"limits beyond {MOST_OF_ARM:g} {unit} mean none; {urdf_tree.ASSUMED[kind]:.3g} are assumed"
+        what = (
+            f"limits beyond {MOST_OF_ARM:g} {unit} count as no limits; {urdf_tree.ASSUMED[kind]:.3g} {unit} are assumed"
+        )
         yield from _listed(what, own, lambda joint: _widest(joint) > MOST_OF_ARM)
         near = [joint for joint in own if _widest(joint) <= MOST_OF_ARM]
         yield from _told("limits", near, list(map(_widest, near)), unit)

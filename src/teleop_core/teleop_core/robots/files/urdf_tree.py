@@ -182,7 +182,7 @@ def limits_of(joint: UrdfJoint) -> tuple[float, float]:
         lower, upper = ends_of(joint, "limit", "lower", "upper")
         if joint.element.find("limit") is None or lower == upper == 0.0:
             name = f"<limit> of joint {joint.name}"
-            needed = "given: a lower < upper; a joint without limits is continuous"
+            needed = "given, with lower < upper; a joint without limits must have the type continuous"
             raise ParameterError(name, "missing", needed)
         lower = -most if lower < -MOST_OF_ARM else lower
         upper = most if upper > MOST_OF_ARM else upper
@@ -233,7 +233,7 @@ def origin_of(where: str, element: Xml.Element) -> Array:
     turn = product(product(rotation("z", yaw), rotation("y", pitch)), rotation("x", roll))
     place = numbers_of(where, found, "xyz", (0.0, 0.0, 0.0), "m")
     if max(map(abs, place.tolist())) > MOST_OF_ARM:
-        needed = f"within {MOST_OF_ARM:g} m in each direction; place the arm near its root"
+        needed = f"within {MOST_OF_ARM:g} m in each direction; put the arm near its root"
         raise ParameterError(f"origin of {where}", place.tolist(), needed)
     return transform(turn, place)
 
@@ -242,7 +242,7 @@ def numbers_of(where: str, element: Xml.Element | None, key: str, default: tuple
     """Numbers of an attribute, or the default where element or attribute is missing.
 
     Args:
-        where: What has the attribute, for the error.
+        where: Name of the element with the attribute, for the error.
         element: The element.
         key: Name of the attribute.
         default: Default values; their number is the required number.

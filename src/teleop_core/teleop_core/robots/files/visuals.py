@@ -144,8 +144,8 @@ def visuals_of(
     """Shapes of all links, in the order of the file.
 
     Args:
-        home: Coordinate at home of each joint on the way to the tip that moves [rad, m], by its
-            name; all other joints stay at 0.
+        home: Coordinate at home of each moving joint on the path to the tip [rad, m], by its name; all other joints
+            stay at 0.
         links: Elements of the links by their names.
         by_child: The joint that carries each link.
         urdf: The file.

@@ -12,7 +12,7 @@ from teleop_core.base import ParameterError, TeleopError, UnknownNameError, dama
 from teleop_core.robots.files import urdf_tree, visuals
 
 EXPANDED = ".expanded.urdf"
-"""Suffix of the expanded URDF that a recording keeps of a xacro; arguments for it are allowed and ignored."""
+"""Suffix of the expanded URDF that a recording stores for a xacro; arguments for it are allowed and ignored."""
 _DECLARED = re.compile(r"<xacro:arg\s[^>]*?name=[\"']([^\"']+)")
 _MOST_CHARACTERS = 300  # characters kept of the package's message, which may be pages long
 
@@ -51,7 +51,7 @@ def _expanded(path: Path, arguments: dict[str, str]) -> bytes:
         with _our_files(path):
             document = xacro.process_file(str(path), mappings=dict(arguments), verbosity=0)
         expanded: str = document.documentElement.toxml()
-    except Exception as error:  # whatever the expressions of a file raise, one line names the file
+    except Exception as error:  # one line names the file for any exception that its expressions raise
         if ours := _wrapped(error):
             raise ours from None
         reason = " ".join(f"{type(error).__name__}: {error}".split())[:_MOST_CHARACTERS]

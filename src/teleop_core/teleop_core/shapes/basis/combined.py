@@ -24,7 +24,7 @@ _NOT = "not "
 
 def parts_parameter(default: tuple[str, ...], doc: str) -> Any:
     """Field of a parameter group that holds the texts of parts."""
-    doc += f"; each is one of {', '.join(PARTS)}, its parameters, and at=[x, y, z] of its middle"
+    doc += f"; each part is one of {', '.join(PARTS)}, followed by its parameters and at=[x, y, z] of its middle"
     return parameter(default, doc=f"{doc}; not before it: what is outside of that shape")
 
 
@@ -90,7 +90,7 @@ class Combined(Protocol):
 
     @property
     def parts(self) -> tuple[str, ...]:
-        """Texts of its parts."""
+        """Texts of the shape's parts."""
 
 
 def numbers_of_parts(parameters: Combined) -> Array:

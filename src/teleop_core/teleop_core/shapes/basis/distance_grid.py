@@ -36,13 +36,13 @@ EDGE = 2
 """Nodes at each end of the grid where the spline is not used, because it is straight there."""
 _MADE = "1"  # must change when a file is converted differently
 _MOST = 4_000_000  # nodes of a grid, 32 MB
-_SIDES = (1e-3, 2.0)  # of a mesh's longest side [m]
+_SIDES = (1e-3, 2.0)  # allowed length of a mesh's longest side [m]
 _THINNEST = 4.0  # steps across the shortest side of a mesh
 _SHARP = math.cos(math.radians(30.0))
 
 
 class GridRequest(NamedTuple):
-    """What a grid depends on.
+    """Everything that a grid depends on.
 
     Attributes:
         file: Path of the mesh or the heights.
@@ -114,7 +114,7 @@ def _loaded(kept: Path) -> DistanceGrid | None:
     try:
         with np.load(io.BytesIO(kept.read_bytes())) as file:
             grid = DistanceGrid(file["numbers"], file["outline"])
-        os.utime(kept)  # it was used, see teleop_core.kernels.store.prune
+        os.utime(kept)  # note that the grid was used, see teleop_core.kernels.store.prune
     except Exception:  # a damaged archive may raise anything
         return None
     is_whole = len(grid.numbers) == HEADER + grid.numbers[:3].prod()
@@ -180,10 +180,10 @@ def _check_size(request: GridRequest, size: Array) -> None:
     while math.prod(_nodes(size, fits)) > _MOST:
         fits *= 1.05
     if fits > request.step:
-        text = f"at least {fits:.2g} m for what is of this size: its grid would be too large"
+        text = f"at least {fits:.2g} m for an object of this size: the grid would be too large"
         raise request.error("step", request.step, text)
     if (shortest := float(size.min())) < _THINNEST * request.step:
-        text = f"at most {shortest / _THINNEST:.2g} m for what is so thin"
+        text = f"at most {shortest / _THINNEST:.2g} m for an object as thin as this one"
         raise request.error("step", request.step, text)
 
 

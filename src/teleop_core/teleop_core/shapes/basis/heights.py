@@ -17,7 +17,7 @@ from teleop_core.shapes.basis import spline, triangles
 
 FIELD = "height_field"
 THICKNESS = 0.02
-"""Of the block below the lowest height [m]."""
+"""Thickness of the block below the lowest height [m]."""
 _LEAST = 4  # least number of heights along x and along y
 _MOST = 400_000  # places of the surface
 
@@ -39,7 +39,7 @@ def read_heights(path: Path, data: bytes, spacing: float, step: float) -> triang
     nodes = tuple(parts * (n - 1) + 1 for n in heights.shape)
     if math.prod(nodes) > _MOST:
         fits = 2.0 * spacing * math.sqrt(heights.size / _MOST)
-        text = f"some {max(fits, 1.2 * step):.2g} m at least for a field of so many heights"
+        text = f"at least {max(fits, 1.2 * step):.2g} m for a field with this number of heights"
         raise ParameterError(f"{FIELD}.step", step, text)
     for axis in range(2):
         lines = np.ascontiguousarray(np.moveaxis(heights, axis, 0))[None]

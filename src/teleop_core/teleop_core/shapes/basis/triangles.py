@@ -53,7 +53,7 @@ def read_triangles(path: Path, data: bytes, placed: Array) -> Triangles:
             mesh = trimesh.load_mesh(io.BytesIO(data), file_type=path.suffix.lower().lstrip("."))
             mesh.merge_vertices(merge_tex=True, merge_norm=True)
         points, faces = np.array(mesh.vertices, np.float64), np.array(mesh.faces, np.int64)
-        faces = faces.reshape(-1, 3)  # without triangles it has no second axis
+        faces = faces.reshape(-1, 3)  # an empty array has no second axis otherwise
     except Exception as error:  # a third-party reader may raise anything for an arbitrary file
         text = f"a mesh that can be read, such as STL or OBJ ({type(error).__name__}: {error})"
         raise ParameterError(name, str(path), text) from error
@@ -89,7 +89,7 @@ def _check_closed(name: str, path: Path, points: Array, faces: NDArray[np.int64]
         lone = edges[is_lone][0]
     place = points[lone].mean(axis=0)
     sides = int((np.sort(edges, axis=1) == np.sort(lone)).all(axis=1).sum())
-    wrong = {1: "it has a hole", 2: "two triangles look to opposite sides"}
+    wrong = {1: "it has a hole", 2: "two triangles face opposite sides"}
     text = (
         f"a closed mesh; {wrong.get(sides, f'{sides} triangles meet')} at the edge whose middle is "
         f"{[float(f'{x:.6g}') for x in place]} in the file"

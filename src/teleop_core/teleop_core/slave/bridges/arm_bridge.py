@@ -1,7 +1,7 @@
-"""Arm bridge: the stage that stands between the arm's server and the controller of a real arm.
+"""Arm bridge: the stage between the slave stage, which is the arm's server, and the controller of a real arm.
 
 It replaces ``slave_sim``: it reads the same setpoints and writes the measured joints of the real arm. It does not pass
-on samples that cannot be true. The server then holds the arm and reports ``feedback``.
+on invalid samples. The server then holds the arm and reports ``feedback``.
 """
 
 from dataclasses import dataclass
@@ -28,17 +28,17 @@ _STATE, _BRAKED = topics.OPERATION.index("state"), topics.OPERATION.index("is_br
 class BridgeParameters:
     """Parameters of every bridge to a controller."""
 
-    kind: Choice = choice(BRIDGES, "joint_state", doc="what the arm's controller understands", fixed=True)
+    kind: Choice = choice(BRIDGES, "joint_state", doc="kind of command that the arm's controller accepts", fixed=True)
     command_topic: str = parameter(
-        "", fixed=True, doc="where the controller takes commands; empty: where its kind does"
+        "", fixed=True, doc="topic on which the controller receives commands; empty: the usual topic of its kind"
     )
     state_topic: str = parameter(
-        "", fixed=True, doc="where the arm's JointState comes from; empty: from where that of its kind does"
+        "", fixed=True, doc="topic on which the arm publishes its JointState; empty: the usual topic of its kind"
     )
     rate: int = parameter(
         500,
         Within(100, 1000, "1/s"),
-        "commands a second, one of " + ", ".join(map(str, RATES)),
+        "number of commands per second, one of " + ", ".join(map(str, RATES)),
         fixed=True,
         source="assumed",
     )
@@ -46,35 +46,36 @@ class BridgeParameters:
         "header",
         choices=("header", "sent"),
         fixed=True,
-        doc="when a sample of the arm was taken: as its header says, or when it was sent, for "
-        "arms on a clock of their own",
+        doc="timestamp of a sample of the arm: header: the stamp of its header; sent: the time when "
+        "it was sent, for arms with another clock",
     )
     oldest_stamp: float = parameter(
         0.1,
         Within(0.001, 1.0, "s"),
-        "samples whose stamps differ by more from our clock are refused",
+        "largest difference between the stamp of a sample and our clock; samples beyond it are refused",
         fixed=True,
         source="assumed",
     )
     jump_tolerance: float = parameter(
         0.02,
         Within(1e-4, 0.1, "rad or m"),
-        "what a joint may move between two samples beyond twice its rated speed",
+        "largest joint motion between two samples, added to the motion at twice the rated speed; "
+        "samples beyond it are refused",
         fixed=True,
         source="assumed",
     )
     arm_timeout: float = parameter(
         0.3,
         Within(0.02, 5.0, "s"),
-        "without a sound sample for longer the arm is commanded no more; the server holds "
-        "before, at its command_timeout",
+        "if no valid sample of the arm arrives for this time, the bridge sends no more commands; the "
+        "slave holds earlier, after its command_timeout",
         fixed=True,
         source="assumed",
     )
     setpoint_timeout: float = parameter(
         0.1,
         Within(0.005, 5.0, "s"),
-        "without slave/setpoint_js for longer the arm is commanded no more",
+        "if no slave/setpoint_js arrives for this time, the bridge sends no more commands",
         fixed=True,
         source="assumed",
     )
@@ -89,24 +90,31 @@ class BridgeParameters:
 class ArmBridgeParameters(RobotParameters, BridgeParameters):
     """Parameters of :class:`ArmBridge`."""
 
-    joints: tuple[str, ...] = parameter((), fixed=True, doc="ours=theirs for each joint that the arm calls otherwise")
+    joints: tuple[str, ...] = parameter(
+        (), fixed=True, doc="ours=theirs for each joint that has another name in the arm's messages"
+    )
     signs: tuple[float, ...] = parameter(
         (),
         Within(-1.0, 1.0),
-        "1.0 or -1.0 for each of our joints: ours = sign * theirs + offset; empty: 1.0",
+        "sign of each of our joints, 1.0 or -1.0: our position = sign * arm position + offset; empty: 1.0",
         fixed=True,
     )
-    offsets: tuple[float, ...] = parameter((), Within(unit="rad or m"), "of each of our joints; empty: 0.0", fixed=True)
+    offsets: tuple[float, ...] = parameter(
+        (),
+        Within(unit="rad or m"),
+        "offset of each of our joints: our position = sign * arm position + offset; empty: 0.0",
+        fixed=True,
+    )
     order: tuple[str, ...] = parameter(
         (),
         fixed=True,
-        doc="the arm's joints in the order of its commands, which a forward command does not name; "
-        "empty: the robot's order",
+        doc="names of the arm's joints in the order of its commands, because a forward command "
+        "contains no names; empty: the robot's order",
     )
     start_tolerance: float = parameter(
         0.02,
         Within(1e-4, 0.1, "rad or m"),
-        "the arm is commanded once each joint is as near to its setpoint",
+        "the bridge starts to send commands when each joint is nearer to its setpoint than this",
         fixed=True,
         source="assumed",
     )
@@ -119,7 +127,7 @@ class ControllerBridge(RunningStage):
 
     Args:
         stage: Description of the stage: setpoints are its first input, measured joints its output.
-        parameters: Of the bridge.
+        parameters: Parameters of the bridge.
         joints: Map between the robot's joints and those of the controller.
         lead: Computes the commands to the controller.
         speed_limit: Rated speeds (n,) [rad/s or m/s].
@@ -142,7 +150,7 @@ class ControllerBridge(RunningStage):
         """Take a sample of the arm that came at ``now_ns`` [ns]; return whether ``slave/measured_js`` is new.
 
         After a jump, or when the server went on without the arm, ``slave/measured_js`` is not updated until the server
-        has left ENABLED. Then the arm begins anew.
+        has left ENABLED. Then the arm restarts as after its first sample.
         """
         hearing, row = self.hearing, self.signals
         if row["slave_operation"][_STATE] != State.ENABLED:
@@ -179,7 +187,7 @@ class ControllerBridge(RunningStage):
         elapsed, self._sent_ns = 1e-9 * (now_ns - self._sent_ns), now_ns
         is_late = elapsed > self.parameters.setpoint_timeout
         if is_late and self.lead_arm.has_lost(self.hearing.position):
-            self.lead_arm.let_go("the arm has moved while nobody commanded it")
+            self.lead_arm.let_go("the arm moved although the bridge sent no command")
         if not self._moves(now_ns, setpoint_age, is_led, elapsed):
             return None
         joints, lead = self.joints, self.lead_arm
@@ -190,14 +198,14 @@ class ControllerBridge(RunningStage):
     def _moves(self, now_ns: int, setpoint_age: float, is_led: bool, elapsed: float) -> bool:
         row, lead, hearing, p = self.signals, self.lead_arm, self.hearing, self.parameters
         silence = 1e-9 * (now_ns - hearing.heard_ns)
-        strange = f"; heard are {hearing.strange} alone" if hearing.strange else ""
+        strange = f"; its messages contain only {hearing.strange}" if hearing.strange else ""
         if not hearing.heard_ns:
-            return lead.let_go(f"the arm has not said yet where it is{strange}")
+            return lead.let_go(f"the arm has not sent its joint positions yet{strange}")
         if hearing.has_jumped or silence > p.arm_timeout:
-            silent = f"no sound sample of the arm for {silence:.1f} s{strange}"
+            silent = f"no valid sample of the arm for {silence:.1f} s{strange}"
             return lead.let_go(hearing.wrong if hearing.has_jumped else silent)
         if not is_led:
-            return lead.let_go("waits for slave/operation: no server leads it")
+            return lead.let_go("waits for slave/operation: no slave node commands the arm")
         if self._is_braked():
             return lead.brake(hearing.position, elapsed)
         if setpoint_age > p.setpoint_timeout:
@@ -209,7 +217,7 @@ class ControllerBridge(RunningStage):
         return bool(self.signals["slave_operation"][_BRAKED] > 0.0)
 
     def _leads(self, setpoint: Array, now_ns: int, elapsed: float) -> bool:
-        """Go towards the setpoint. If the server went on without the arm, wait until the setpoint is at rest."""
+        """Move towards the setpoint. If the setpoint has moved away without the arm, wait until it is at rest."""
         lead = self.lead_arm
         go = lead.rejoin if self._is_left(now_ns) else lead.step
         goes = go(setpoint, self.hearing.position, self.joints.ours, elapsed)
@@ -219,7 +227,7 @@ class ControllerBridge(RunningStage):
     def trouble(self) -> str:
         """Why the arm holds, or why its samples are rejected, in one line; empty without a problem."""
         if self.hearing.wrong:
-            return f"the arm's state is not believed: {self.hearing.wrong}: holds"
+            return f"the arm's messages are refused: {self.hearing.wrong}: holds"
         return self.lead_arm.waits
 
     def concerns(self) -> list[str]:

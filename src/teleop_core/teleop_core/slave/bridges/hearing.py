@@ -32,9 +32,9 @@ class Sample:
     Attributes:
         names: Joint names.
         position: Position of each joint [rad or m].
-        velocity: Of each [rad/s or m/s], or empty; NaN where it is not known.
-        effort: Of each [N·m or N], or empty; NaN where it is not known.
-        stamp_ns: When it was sampled [ns].
+        velocity: Velocity of each joint [rad/s or m/s], or empty; NaN where it is not known.
+        effort: Effort of each joint [N·m or N], or empty; NaN where it is not known.
+        stamp_ns: Time of the sample [ns].
     """
 
     names: Sequence[str]
@@ -56,12 +56,12 @@ class Hearing:
         oldest: Largest difference between a stamp and our clock [s]; 0: stamps only have to rise.
 
     Attributes:
-        position: Where the arm is, shape (n,) [rad or m].
+        position: Joint positions of the arm, shape (n,) [rad or m].
         velocity: Shape (n,) [rad/s or m/s].
         effort: Shape (n,) [N·m or N].
         stamp_ns: Stamp of the newest valid sample [ns]; 0 before the first.
         heard_ns: Arrival time of that sample [ns]; 0 before the first.
-        wrong: What is wrong with the newest sample, in words; empty if it is valid.
+        wrong: Text about the fault of the newest sample; empty if the sample is valid.
         strange: Names in a message that has none of our joints, such as a gripper's, since the newest valid sample.
         has_jumped: Whether a joint jumped.
         refused: Number of rejected samples, by reason.
@@ -161,11 +161,11 @@ def wrong_stamp(stamp_ns: int, newest_ns: int, now_ns: int, oldest: float, optio
         option: Name of the parameter that makes the bridge use sending times in place of stamps.
     """
     if stamp_ns == 0:
-        return f"its messages have no stamp; {option}: sent takes the time when each was sent"
+        return f"its messages have no stamp; {option}: sent uses the time when each was sent"
     if stamp_ns <= newest_ns:
         behind = 1e-9 * (newest_ns - stamp_ns)
-        return f"its stamp does not rise: {behind:.4g} s behind the newest one"
+        return f"its stamp is {behind:.4g} s older than the newest one; stamps must rise"
     age = 1e-9 * (now_ns - stamp_ns)
     if 0.0 < oldest < abs(age):
-        return f"its stamp is {age:.4g} s old, at most {oldest:g} s to either side"
+        return f"its stamp is {age:.4g} s old; it may differ from our clock by at most {oldest:g} s"
     return ""

@@ -1,4 +1,4 @@
-"""Jaw bridge: the stage that stands between the jaw's server and a real gripper.
+"""Jaw bridge: the stage between the jaw's server and a real gripper.
 
 It does for the jaw what ``arm_bridge`` does for the arm, with two differences. Brakes of the arm do not open the jaw.
 Fingers that press on an object stop before their setpoint.
@@ -22,20 +22,22 @@ _SAME = 1e-3  # a setpoint that moved by less while the gripper was not commande
 class JawBridgeParameters(arm_bridge.BridgeParameters):
     """Parameters of :class:`JawBridge`."""
 
-    command_topic: str = parameter("/gripper_controller/commands", fixed=True, doc="where the gripper takes commands")
-    state_topic: str = parameter("/joint_states", fixed=True, doc="where the gripper's JointState comes from")
-    joint: str = parameter("jaw", fixed=True, doc="what the gripper calls its joint")
+    command_topic: str = parameter(
+        "/gripper_controller/commands", fixed=True, doc="topic on which the gripper receives commands"
+    )
+    state_topic: str = parameter("/joint_states", fixed=True, doc="topic on which the gripper publishes its JointState")
+    joint: str = parameter("jaw", fixed=True, doc="name of the joint in the gripper's messages")
     scale: float = parameter(
         1.0,
         Within(-1e4, 1e4, "1 or rad/m"),
-        "our angle = scale * theirs + offset; negative where theirs grows as it closes",
+        "our angle = scale * gripper position + offset; negative if the gripper's position grows as it closes",
         fixed=True,
     )
-    offset: float = parameter(0.0, Within(-10.0, 10.0, "rad"), "our angle where theirs is 0", fixed=True)
+    offset: float = parameter(0.0, Within(-10.0, 10.0, "rad"), "our angle at the gripper's position 0", fixed=True)
     speed_limit: float = parameter(
         4.0,
         Within(0.01, 100.0, "rad/s"),
-        "rated speed, which commands exceed by a fifth at most",
+        "rated speed of the gripper; commands exceed it by at most a fifth",
         fixed=True,
         source="assumed",
     )

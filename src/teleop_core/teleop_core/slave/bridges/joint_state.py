@@ -16,7 +16,7 @@ from teleop_core.slave.bridges import Bridge, Command, write_time
 class JointStateParameters:
     """Parameters of commands as joint states."""
 
-    has_velocity: bool = parameter(False, doc="whether commands carry velocities too")
+    has_velocity: bool = parameter(False, doc="whether commands contain velocities too")
 
 
 def write_joint_state(

@@ -1,4 +1,4 @@
-"""Joint trajectories of one point: what ``joint_trajectory_controller`` of ros2_control takes.
+"""Joint trajectories of one point, the commands of ``joint_trajectory_controller`` of ros2_control.
 
 Each message replaces the trajectory before it. Its point lies at least two periods ahead. So the arm does not reach
 the end of its trajectory and stop when one message is late.
@@ -19,13 +19,16 @@ class JointTrajectoryParameters:
     """Parameters of trajectories of one point."""
 
     ahead: int = parameter(
-        2, Within(2, 100, "periods"), "time from start of the point: the arm follows so much later", source="assumed"
+        2,
+        Within(2, 100, "periods"),
+        "time_from_start of the trajectory's point; the arm lags behind the setpoint by this time",
+        source="assumed",
     )
     velocity: str = parameter(
         "none",
         choices=("none", "zero", "setpoint"),
-        doc="velocities of the point: left out, 0, or the setpoint's; a controller that commands "
-        "velocities too needs them",
+        doc="velocities of the trajectory's point: none, zeros, or those of the setpoint; a "
+        "controller that also commands velocities needs them",
     )
 
 

@@ -6,8 +6,8 @@ from teleop_core.kernels.geometry import Array
 
 _CATCHING_UP = 1.2
 """Largest speed of commands, in rated speeds. Setpoints need at most 1; the rest makes up for late setpoints."""
-_SLOWLY = 0.1  # speed of an arm that catches up with a setpoint that went on without it, in rated speeds
-_LONGEST = 2.0  # largest number of missed periods that one command makes up for
+_SLOWLY = 0.1  # speed of an arm that catches up with a setpoint that has moved away, divided by the rated speed
+_LONGEST = 2.0  # largest number of missed periods that one command may catch up
 
 
 class Lead:
@@ -26,7 +26,7 @@ class Lead:
         position: The last command (n,) [rad or m].
         velocity: Velocity of the last command (n,) [rad/s or m/s].
         is_leading: Whether the arm is commanded towards the setpoint.
-        waits: What is commanded instead, and why; empty while ``is_leading``.
+        waits: Text with the reason why the arm does not follow the setpoint; empty while ``is_leading``.
     """
 
     def __init__(
@@ -39,12 +39,12 @@ class Lead:
         self.position, self.velocity, self._braked = np.zeros(n), np.zeros(n), np.zeros(n)
         self._setpoint = np.full(n, np.nan)
         self._is_braked = self.is_leading = False
-        self.waits = "commands nothing: nothing has come yet"
+        self.waits = "sends no commands: no message has arrived yet"
 
     def let_go(self, reason: str) -> bool:
         """Stop commanding; the controller holds the arm at the last command. Returns False for `step`."""
         self.is_leading = self._is_braked = False
-        self.waits = f"commands nothing: {reason}"
+        self.waits = f"sends no commands: {reason}"
         return False
 
     def has_lost(self, measured: Array) -> bool:
@@ -75,9 +75,9 @@ class Lead:
         return True
 
     def rejoin(self, setpoint: Array, measured: Array, names: tuple[str, ...], elapsed: float) -> bool:
-        """Go slowly to a setpoint that went on without the arm; arguments and result as in :meth:`step`.
+        """Move slowly to a setpoint that has moved away from the arm; arguments and result as in :meth:`step`.
 
-        The setpoint must stand still. The arm must have been commanded before, and must still be at its last command:
+        The setpoint must be at rest. The arm must have been commanded before, and must still be at its last command:
         an arm that was moved meanwhile gets no command. Normal commands resume when the arm arrives.
         """
         is_still = bool((setpoint == self._setpoint).all())
@@ -88,7 +88,7 @@ class Lead:
         self.is_leading = bool((np.abs(setpoint - measured) <= self.tolerance).all())
         if self.is_leading:
             return self.step(setpoint, measured, names, elapsed)
-        self.waits = "goes slowly to the setpoint, which went on without the arm"
+        self.waits = "moves slowly to the setpoint, which has moved away from the arm"
         self._approach(np.clip(setpoint, self._lower, self._upper), elapsed, _SLOWLY)
         return True
 
@@ -99,7 +99,7 @@ class Lead:
         if self.is_leading:
             self._braked[:] = measured
             self.is_leading, self._is_braked = False, True
-            self.waits = "commands nothing: its brakes hold it"
+            self.waits = "sends no commands: brakes hold the arm"
         self._approach(self._braked, elapsed)
         return True
 

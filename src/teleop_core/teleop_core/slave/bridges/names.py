@@ -66,7 +66,7 @@ class JointMap:
             twice = [name for name in self.theirs if names.count(name) > 1]
             if missing:
                 heard = ", ".join(names) or "no names"
-                return f"it says nothing of {', '.join(missing)}; it names {heard}"
+                return f"it lacks {', '.join(missing)}; it names {heard}"
             if twice:
                 return f"it names {', '.join(twice)} twice"
             self._known = names, [names.index(name) for name in self.theirs]
@@ -107,5 +107,5 @@ def _theirs(ours: Sequence[str], renamed: Sequence[str], parameter: str) -> tupl
         found[own] = other
     theirs = tuple(found.values())
     if len(set(theirs)) < len(theirs):
-        raise ParameterError(parameter, tuple(renamed), "another joint for each of ours")
+        raise ParameterError(parameter, tuple(renamed), "a different joint for each of our joints")
     return theirs

@@ -42,7 +42,7 @@ class Controller:
         parameters: Its parameter group.
         gains: ``gains(parameters, robot, viscous)`` gives the table (n, k) that ``control`` takes;
             ``viscous`` (n,) is the friction in force [N·m·s/rad or N·s/m].
-        memory: How many numbers it remembers for each joint; they are zero at the start.
+        memory: Number of values that it remembers for each joint; they are zero at the start.
         control: ``control(gains, memory, setpoint, measured, feedforward, limit, dt, effort)``, a kernel or a plain
             function over all joints. Setpoint and measured position [rad or m], feedforward and limit [N·m or N] are
             (n,), ``memory`` (n, m) is its own to write, and ``effort`` (n,) gets the drive efforts; they are cut at

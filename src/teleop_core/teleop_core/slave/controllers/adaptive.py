@@ -33,18 +33,18 @@ class AdaptiveParameters:
     rate: float = parameter(
         1.0,
         Within(0.0, 10.0),
-        "how fast it learns, over what gives load and loop three equal poles",
-        source="derived: of load alone, 1 gives the poles of pid",
+        "adaptation gain, divided by the gain that gives the load estimate and the loop three equal poles",
+        source="derived: if only the load is adapted, 1 gives the poles of pid",
     )
     span: float = parameter(
         0.5,
         Within(0.0, 0.9),
-        "how far inertia may be from the table, share of it",
-        source="assumed: inertias of links change less than that between postures",
+        "largest deviation of the adapted inertia from that of the table, as a share of it",
+        source="assumed: the inertia of a joint changes less between postures",
     )
-    friction_share: float = fields.friction_share("from which it begins")
+    friction_share: float = fields.friction_share("with which the adaptation begins")
     friction_counts: float = fields.friction_counts()
-    dead_band: float = fields.dead_band("from which nothing is learned")
+    dead_band: float = fields.dead_band("up to which nothing is learned")
 
 
 @kernel

@@ -28,7 +28,7 @@ class ComputedTorqueParameters:
 
     bandwidth: tuple[float, ...] = fields.bandwidth("triple")
     filter_ratio: float = fields.ratio("filters of motion")
-    dead_band: float = fields.dead_band("that the integral does not sum")
+    dead_band: float = fields.dead_band("up to which the integral does not change")
 
 
 @kernel

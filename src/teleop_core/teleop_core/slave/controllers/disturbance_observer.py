@@ -31,7 +31,7 @@ class DisturbanceObserverParameters:
     observer_ratio: float = fields.ratio("observer")
     friction_share: float = fields.friction_share("that is fed forward")
     friction_counts: float = fields.friction_counts()
-    dead_band: float = fields.dead_band("that nothing is done about")
+    dead_band: float = fields.dead_band("up to which nothing is corrected")
 
 
 @kernel

@@ -15,18 +15,18 @@ def ratio(what: str) -> Any:
     return parameter(
         3.5,
         Within(1.0, 10.0),
-        f"pole of the {what} over that of the loop, where encoder noise allows it",
+        f"pole of the {what}, divided by the pole of the loop, if encoder noise allows it",
         source="assumed: the middle, √12, of the rule of two to six",
     )
 
 
 def friction_share(use: str) -> Any:
-    """Share of known dry friction that is used; ``use`` says for what."""
+    """Share of known dry friction that a law uses; ``use`` completes the text with its purpose."""
     return parameter(
         0.8,
         Within(0.0, 1.5),
         f"share of known dry friction {use}",
-        source="assumed: less than all of it, for what is too much pushes the joint ahead",
+        source="assumed: less than all of it, because too much compensation pushes the joint ahead",
     )
 
 
@@ -35,16 +35,16 @@ def friction_counts() -> Any:
     return parameter(
         4.0,
         Within(0.1, 1000.0),
-        "encoder counts of travel that turn dry friction on",
-        source="assumed: a joint gives by a few encoder counts before it slips",
+        "travel, in encoder counts, after which dry friction acts fully",
+        source="assumed: a joint moves elastically by a few encoder counts before it slips",
     )
 
 
 def dead_band(use: str) -> Any:
-    """Error [encoder counts] within which a joint counts as at rest; ``use`` says what stops there."""
+    """Error [encoder counts] within which a joint counts as at rest; ``use`` ends the text with the effect."""
     return parameter(
         0.5,
         Within(0.0, 100.0),
-        f"encoder counts of error {use}",
-        source="derived: the nearest count is never farther, so that the joint may rest there",
+        f"error, in encoder counts, {use}",
+        source="derived: the error at the nearest encoder count is never larger, so that the joint can rest there",
     )

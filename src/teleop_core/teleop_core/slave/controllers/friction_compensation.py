@@ -32,7 +32,7 @@ class FrictionCompensationParameters:
     filter_ratio: float = fields.ratio("filters of motion")
     friction_share: float = fields.friction_share("that is fed forward")
     friction_counts: float = fields.friction_counts()
-    dead_band: float = fields.dead_band("that the integral does not sum")
+    dead_band: float = fields.dead_band("up to which the integral does not change")
 
 
 @kernel

@@ -25,9 +25,9 @@ from teleop_core.slave.controllers import Begin, Shift
 MEMORY = 9
 """Numbers of each joint that :func:`follow_motion` and :func:`friction_of_setpoint` keep."""
 PLACE, SPEED, UNEXPLAINED = 0, 1, 2
-"""Of the joint: position, speed, and unexplained acceleration, beyond the expected one."""
+"""Estimates of the joint: position, speed, and acceleration beyond the expected one."""
 SET_PLACE, SET_SPEED, SET_ACCELERATION = 3, 4, 5
-"""Of its setpoint: position, speed, acceleration."""
+"""Estimates of the joint's setpoint: position, speed, acceleration."""
 EXPECTED = 6
 """Expected acceleration of the joint, which the law writes."""
 _LAST_SETPOINT, _BENT = 7, 8

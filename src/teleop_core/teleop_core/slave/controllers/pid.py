@@ -18,9 +18,9 @@ class PidParameters:
     """Gains; empty lists are filled from the robot's drive table, by the rule of three equal poles."""
 
     bandwidth: tuple[float, ...] = fields.bandwidth("triple", "assumed: the drive table's")
-    kp: tuple[float, ...] = parameter((), Within(0.0), "N·m/rad or N/m of each joint")
-    ki: tuple[float, ...] = parameter((), Within(0.0), "N·m/(rad·s) or N/(m·s) of each joint")
-    kd: tuple[float, ...] = parameter((), Within(0.0), "N·m·s/rad or N·s/m of each joint")
+    kp: tuple[float, ...] = parameter((), Within(0.0), "proportional gain of each joint [N·m/rad or N/m]")
+    ki: tuple[float, ...] = parameter((), Within(0.0), "integral gain of each joint [N·m/(rad·s) or N/(m·s)]")
+    kd: tuple[float, ...] = parameter((), Within(0.0), "derivative gain of each joint [N·m·s/rad or N·s/m]")
     setpoint_weight: float = parameter(
         1.0,
         Within(0.0, 1.0),
@@ -116,7 +116,7 @@ def weighted_setpoint(setpoint: float, measured: float, gains: Array, memory: Ar
         dt: Tick [s], > 0.
     """
     pull, weight, near = gains[_KI] * dt, gains[_WEIGHT], setpoint
-    if weight == 1.0 or pull == 0.0:  # without an integral the lag would stand still
+    if weight == 1.0 or pull == 0.0:  # without an integral the lag would not change
         memory[_LAGGED] = setpoint
         return setpoint
     linear = room / (max(weight, THIRD) * gains[_KP] + 1e-300)

@@ -32,9 +32,9 @@ class SourcePidParameters:
         "double, or with integral action triple,",
         "assumed: the source prints no gains; critically damped, as it says they were",
     )
-    kp: tuple[float, ...] = parameter((), Within(0.0), "N·m/rad or N/m of each joint")
-    ki: tuple[float, ...] = parameter((), Within(0.0), "N·m/(rad·s) or N/(m·s) of each joint")
-    kd: tuple[float, ...] = parameter((), Within(0.0), "N·m·s/rad or N·s/m of each joint")
+    kp: tuple[float, ...] = parameter((), Within(0.0), "proportional gain of each joint [N·m/rad or N/m]")
+    ki: tuple[float, ...] = parameter((), Within(0.0), "integral gain of each joint [N·m/(rad·s) or N/(m·s)]")
+    kd: tuple[float, ...] = parameter((), Within(0.0), "derivative gain of each joint [N·m·s/rad or N·s/m]")
 
 
 # Columns of the table of gains, and of the memory.

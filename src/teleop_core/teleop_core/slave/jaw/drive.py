@@ -13,14 +13,14 @@ class DriveNumbers(Fields):
     """Fields of a parameter record with the jaw's drive and the stiffness of what it grips."""
 
     upper: float  # largest angle [rad]
-    effort: float  # largest one of the drive [N·m]
-    stiffness: float  # of the control law [N·m/rad]
-    damping: float  # of the control law [N·m·s/rad]
+    effort: float  # largest effort of the drive [N·m]
+    stiffness: float  # stiffness of the control law [N·m/rad]
+    damping: float  # damping of the control law [N·m·s/rad]
     inertia: float  # [kg·m²]
     friction: float  # viscous [N·m·s/rad]
-    length: float  # of a finger [m]
-    size: float  # of the object [m]
-    pad_stiffness: float  # of both pads and the object [N/m]
+    length: float  # length of a finger [m]
+    size: float  # size of the object [m]
+    pad_stiffness: float  # stiffness of both pads and the object [N/m]
     pad_damping: float  # [N·s/m]
 
 
@@ -30,8 +30,8 @@ class DriveState(Fields):
     setpoint: float  # [rad]
     angle: float  # [rad]
     velocity: float  # [rad/s]
-    effort: float  # of the drive [N·m]
-    force: float  # of each finger on the object [N]
+    effort: float  # effort of the drive [N·m]
+    force: float  # force of each finger on the object [N]
     is_between: int  # whether the object is between the fingers
 
 

@@ -32,23 +32,23 @@ _LETS_GO = 0.01  # a setpoint wider than the grip's tightest one by more than th
 class GripNumbers(drive.DriveNumbers):
     """Parameter record of the jaw."""
 
-    objects: int  # how many there are
+    objects: int  # number of objects
     place: Vector3  # initial position of the first object on the table [m]
-    pegs: int  # how many there are
-    axes: Annotated[geometry.Array, 2 * PEGS]  # of the pegs, x and y of each [m]
+    pegs: int  # number of pegs
+    axes: Annotated[geometry.Array, 2 * PEGS]  # axes of the pegs, x and y of each [m]
     peg_height: float  # [m]
     clearance: float  # clearance of a peg in an object, on each side [m]
     mass: float  # [kg]
     pad_friction: float
-    second_base: Vector3  # of the second arm, in the first one's [m]
+    second_base: Vector3  # position of the second arm's base in the first arm's base [m]
 
 
 class GripState(drive.DriveState):
     """State record of the jaw. The two hands are this jaw and the second arm's jaw."""
 
     tip_ns: int
-    tips: Annotated[geometry.Array, 14]  # pose of each hand's tip; second arm: last two of its own tip
-    held: Vector3  # of the second arm: the object's middle in the tip's frame as the grip began [m]
+    tips: Annotated[geometry.Array, 14]  # pose of each hand's tip; for the second arm, the last two poses of its tip
+    held: Vector3  # middle of the second arm's object in the tip's frame when the grip began [m]
     forces: Annotated[geometry.Array, 2]  # force of each hand's fingers on its object [N]
     numbers: Annotated[Integers, 2]  # number of the object that each hand moves, or moved last
     objects: Annotated[geometry.Array, 7 * topics.JAW_OBJECTS]  # poses
@@ -60,7 +60,7 @@ class GripState(drive.DriveState):
     dropped: int
     is_gripped: int
     tightest: float  # setpoint of the present grip [rad]
-    slid: float  # in the present grip [m]
+    slid: float  # sliding distance in the present grip [m]
     grips: int
     slips: int
     drops: int
@@ -285,7 +285,7 @@ def _hold(p: GripNumbers, s: GripState, tips: geometry.Array, number: int, hands
         s: State; written.
         tips: Present poses of both tips (2, 7).
         number: Number of the object.
-        hands: Which jaws hold it: 1 this jaw, 2 the second arm's, 3 both.
+        hands: Jaws that hold the object: 1 this jaw, 2 the second arm's, 3 both.
         dt: Tick [s].
     """
     pose, motion = s.objects[7 * number : 7 * number + 7], s.motions[3 * number : 3 * number + 3]

@@ -24,16 +24,14 @@ class JawParameters:
     command_timeout: float = parameter(
         0.1,
         Within(0.002, 5.0, "s"),
-        "the jaw stays where it is led when for longer than this no command came, or the jaw did not say where it is",
+        "if no command or no measured angle of the jaw arrives for this time, the jaw holds its setpoint",
     )
     upper: float = parameter(
-        0.8,
-        Within(0.05, 3.0, "rad"),
-        "largest angle between the fingers that the jaw is led to",
-        fixed=True,
-        source="assumed",
+        0.8, Within(0.05, 3.0, "rad"), "largest commanded angle between the fingers", fixed=True, source="assumed"
     )
-    speed_limit: float = parameter(4.0, Within(0.01, 100.0, "rad/s"), "of the setpoint", source="assumed")
+    speed_limit: float = parameter(
+        4.0, Within(0.01, 100.0, "rad/s"), "largest speed of the jaw's setpoint", source="assumed"
+    )
 
 
 class JawNumbers(Fields):
@@ -48,9 +46,9 @@ class JawState(Fields):
     """State record of the jaw's server."""
 
     told_ns: int  # stamp of the newest command
-    heard_ns: int  # when it came
+    heard_ns: int  # time of arrival of the newest command [ns]
     sampled_ns: int  # stamp of the newest slave/jaw/measured_js
-    seen_ns: int  # when it came
+    seen_ns: int  # time of arrival of the newest measured angle [ns]
     off: float  # distance of the jaw from its setpoint at that time [rad]
     setpoint: float  # [rad]
     is_led: int  # whether the jaw has followed commands since its last hold
@@ -159,7 +157,7 @@ class Jaw(RunningStage):
             return []
         asked, held = float(self.signals["slave_jaw_servo_jp"][0]), float(s["setpoint"])
         way = "close the hand first" if asked > held else "open the hand first, or close it"
-        return [f"the jaw holds at {held:.3f} rad, commanded are {asked:.3f} rad: {way}"]
+        return [f"the jaw holds at {held:.3f} rad, the command is {asked:.3f} rad: {way}"]
 
 
 JAW_STAGE = Stage(

@@ -21,15 +21,21 @@ class GripObjectParameters:
     place: tuple[float, ...] = parameter(
         (),
         Within(-10.0, 10.0, "m"),
-        "its middle at first, half its size above the table; those of "
-        "several one after the other, with the same z; empty: none",
+        "start position of the middle of the object, half its size above the table; several objects: "
+        "one position after the other, with the same z; empty: no object",
         fixed=True,
     )
-    size: float = parameter(0.02, Within(1e-3, 0.2, "m"), "thickness")
-    mass: float = parameter(0.05, Within(1e-4, 10.0, "kg"), "mass")
-    stiffness: float = parameter(4000.0, Within(10.0, 1e6, "N/m"), "of it and both pads", source="assumed")
-    damping: float = parameter(20.0, Within(0.0, 1e4, "N·s/m"), "of it and both pads", source="assumed")
-    friction: float = parameter(0.5, Within(0.0, 5.0), "dry friction of each pad on it", source="assumed")
+    size: float = parameter(0.02, Within(1e-3, 0.2, "m"), "edge length of the object")
+    mass: float = parameter(0.05, Within(1e-4, 10.0, "kg"), "mass of the object")
+    stiffness: float = parameter(
+        4000.0, Within(10.0, 1e6, "N/m"), "stiffness of the object and both pads together", source="assumed"
+    )
+    damping: float = parameter(
+        20.0, Within(0.0, 1e4, "N·s/m"), "damping of the object and both pads together", source="assumed"
+    )
+    friction: float = parameter(
+        0.5, Within(0.0, 5.0), "coefficient of dry friction between each pad and the object", source="assumed"
+    )
 
     def __post_init__(self) -> None:
         n, rest = divmod(len(self.place), 3)
@@ -43,15 +49,18 @@ class PegParameters:
     """Upright pegs of the table, onto which objects can be put."""
 
     place: tuple[float, ...] = parameter(
-        (), Within(-10.0, 10.0, "m"), "x, y of the axis of each, one after the other; empty: none", fixed=True
+        (),
+        Within(-10.0, 10.0, "m"),
+        "x, y of the axis of each peg, one peg after the other; empty: no pegs",
+        fixed=True,
     )
     height: float = parameter(
-        0.015, Within(1e-3, 0.5, "m"), "by which an object must be lifted to come off", source="assumed"
+        0.015, Within(1e-3, 0.5, "m"), "height by which an object must be lifted to come off a peg", source="assumed"
     )
     clearance: float = parameter(
         0.0015,
         Within(0.0, 0.1, "m"),
-        "way of an object from the axis on which the peg does not touch it",
+        "distance by which an object can move from the peg's axis before the peg touches it",
         source="assumed",
     )
 
@@ -72,28 +81,35 @@ class JawSimParameters:
     upper: float = parameter(
         0.8,
         Within(0.05, 3.0, "rad"),
-        "angle between the fingers at the drive's stop, where it begins",
+        "angle between the fingers at the drive's open stop, which is also the start",
         fixed=True,
         source="assumed",
     )
-    effort_limit: float = parameter(0.15, Within(0.0, 100.0, "N·m"), "of the drive", source="assumed")
-    inertia: float = parameter(1e-4, Within(1e-7, 1.0, "kg·m²"), "of drive and fingers", source="assumed")
-    viscous: float = parameter(1e-3, Within(0.0, 10.0, "N·m·s/rad"), "friction", source="assumed")
-    bandwidth: float = parameter(
-        100.0, Within(1.0, 200.0, "rad/s"), "of the control law, which is damped critically", source="assumed"
+    effort_limit: float = parameter(
+        0.15, Within(0.0, 100.0, "N·m"), "effort limit of the jaw's drive", source="assumed"
     )
-    finger_length: float = parameter(0.04, Within(1e-3, 0.5, "m"), "from the pivot to the pads", source="assumed")
+    inertia: float = parameter(1e-4, Within(1e-7, 1.0, "kg·m²"), "inertia of drive and fingers", source="assumed")
+    viscous: float = parameter(1e-3, Within(0.0, 10.0, "N·m·s/rad"), "viscous friction of the drive", source="assumed")
+    bandwidth: float = parameter(
+        100.0,
+        Within(1.0, 200.0, "rad/s"),
+        "bandwidth of the jaw's control law, which is critically damped",
+        source="assumed",
+    )
+    finger_length: float = parameter(
+        0.04, Within(1e-3, 0.5, "m"), "distance from the pivot of a finger to its pad", source="assumed"
+    )
     origin: tuple[float, ...] = parameter(
         (0.0, 0.0, 0.0),
         Within(-10.0, 10.0, "m"),
-        "of the board, in the base of the first arm; objects and pegs are placed from there",
+        "origin of the board in the base of the first arm; positions of objects and pegs are relative to it",
         length=3,
         fixed=True,
     )
     second_base: tuple[float, ...] = parameter(
         (0.0, 0.0, 0.0),
         Within(-10.0, 10.0, "m"),
-        "where the base of the second arm is in that of the first, axes parallel",
+        "position of the second arm's base in the base of the first arm; their axes are parallel",
         length=3,
         fixed=True,
     )
@@ -112,7 +128,7 @@ def jaw_sim_step(p: GripNumbers, s: GripState, row: Row, dt: float) -> None:
         dt: Tick [s].
     """
     before = s.setpoint
-    if row.slave_jaw_setpoint_js_ns > topics.NO_COMMAND_NS:  # without a setpoint the jaw stays where it begins
+    if row.slave_jaw_setpoint_js_ns > topics.NO_COMMAND_NS:  # without a setpoint the jaw stays at its start
         s.setpoint = row.slave_jaw_setpoint_js[0]
     row.slave_jaw_measured_js[0], row.slave_jaw_measured_js[1] = s.angle, s.velocity
     drive(p, s, (s.setpoint - before) / dt, dt)

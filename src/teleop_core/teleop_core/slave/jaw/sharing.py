@@ -25,7 +25,7 @@ def far_from(a: geometry.Array, b: geometry.Array) -> float:
 
 @inner
 def _sticks(motion: geometry.Array, tip: geometry.Array, most: float, other: geometry.Array, against: float) -> bool:
-    """Whether an object sticks to a tip, while another one slides on it or moves alike."""
+    """Whether an object sticks to a tip while the other tip slides on the object or moves with the same speed."""
     apart = far_from(other, tip)
     if apart == 0.0:
         return far_from(motion, tip) <= most + against

@@ -26,17 +26,17 @@ class Fault(IntEnum):
 
     @property
     def word(self) -> str:
-        """Its name in parameters and reports: ``"joint_limit"``."""
+        """Name of the fault in parameters and reports: ``"joint_limit"``."""
         return self.name.lower()
 
 
 class Reaction(Enum):
     """Reaction of the arm to a fault."""
 
-    HOLD = "FAULT; the setpoint stands still at once, the drives hold the arm there"
-    BRAKE = "FAULT; drives off, brakes on: control is not to be trusted"
-    PAUSE = "PAUSED; it brakes at its limits, and goes on when it is told to resume"
-    REPORT = "it is told, and goes on"
+    HOLD = "FAULT; the setpoint stops at once, and the drives hold the arm there"
+    BRAKE = "FAULT; drives off, brakes on, because control is not reliable"
+    PAUSE = "PAUSED; the arm brakes at its limits, and goes on after the command resume"
+    REPORT = "reported only; the arm goes on"
 
 
 @dataclass(frozen=True)
@@ -56,11 +56,11 @@ FAULTS: Mapping[Fault, FaultKind] = {
     Fault.EFFORT: FaultKind(Reaction.BRAKE, "drive at its effort limit for too long", "s"),
     Fault.OVERSPEED: FaultKind(Reaction.BRAKE, "joint faster than its drive", "rad/s or m/s"),
     Fault.SILENCE: FaultKind(Reaction.PAUSE, "no command for too long", "s"),
-    Fault.JUMP: FaultKind(Reaction.PAUSE, "commands too far from the one in force", "s"),
+    Fault.JUMP: FaultKind(Reaction.PAUSE, "commands too far from the present one", "s"),
     Fault.JOINT_LIMIT: FaultKind(Reaction.REPORT, "commands press a joint into its limit", "s"),
     Fault.CLOCK: FaultKind(Reaction.PAUSE, "this machine's clock was stepped", "s"),
     Fault.PUBLISHERS: FaultKind(Reaction.PAUSE, "two publishers on a command topic"),
-    Fault.FLOOD: FaultKind(Reaction.REPORT, "more messages than anybody needs"),
+    Fault.FLOOD: FaultKind(Reaction.REPORT, "more messages per second than flood_rate"),
     Fault.STALL: FaultKind(Reaction.PAUSE, "the slave's own loop stood still", "s"),
     Fault.FEEDBACK: FaultKind(
         Reaction.HOLD, "no slave/measured_js; its sender, such as arm_bridge, says why in its log", "s"

@@ -21,7 +21,7 @@ class Presses:
     def __init__(self) -> None:
         self._last: dict[bytes, int] = {}
         self._heard_ns: dict[bytes, int] = {}
-        self._holders: dict[bytes, None] = {}  # in the order of their presses
+        self._holders: dict[bytes, None] = {}  # pressed buttons, in the order of their presses
         self._doubted: set[bytes] = set()
         self._missing = self._told = 0
 
@@ -68,7 +68,7 @@ class Presses:
             number: Number of the message at its button, 1 for the first; 0 where the middleware
                 does not number messages.
             now_ns: Time [ns], of any clock that never goes back.
-            is_pressed: What the message says.
+            is_pressed: State in the message.
             is_idle: Whether the arm is disabled. Then presses before the first message from this button are ignored.
 
         Returns:
@@ -89,7 +89,7 @@ class Presses:
         Args:
             sender: Identity of the button; messages of a button that :meth:`take` knows are ignored.
             now_ns: Time [ns], as in :meth:`take`.
-            is_pressed: What the message says.
+            is_pressed: State in the message.
         """
         return () if sender in self._last else self._note(sender, now_ns, is_pressed=is_pressed)
 
@@ -113,7 +113,7 @@ class Presses:
         self._heard_ns.clear()
 
     def knows(self, sender: bytes) -> bool:
-        """Whether this button has been heard."""
+        """Whether a message of this button was received."""
         return sender in self._heard_ns or sender in self._last
 
     def _note(self, sender: bytes, now_ns: int, *, is_pressed: bool) -> tuple[bool, ...]:

@@ -23,7 +23,7 @@ class State(IntEnum):
 
 
 class Event(IntEnum):
-    """What may change the state: commands, and events that the arm detects itself."""
+    """Events that may change the state: commands, and events that the arm detects itself."""
 
     ENABLE = 0
     DISABLE = 1
@@ -48,7 +48,7 @@ class Answer(IntEnum):
 
     DONE = 0
     ALREADY = 1  # nothing had to change
-    REFUSED = 2  # not in this state
+    REFUSED = 2  # the event is refused in this state
     STOPPED = 3  # the emergency stop is still pressed, or must be reset first
     BRAKING = 4  # the arm is not at rest yet
 
@@ -88,7 +88,7 @@ class OperatingState(Fields):
     is_homing: int
     must_plan: int  # a move is to be planned; during homing, to the start position
     is_stopped: int  # an emergency stop is latched
-    is_pressed: int  # its cause is still there
+    is_pressed: int  # the cause of the stop still exists
     is_moving: int  # the arm is not at rest
     must_home: int  # a pause interrupted homing; resume restarts homing
     fault: int
@@ -174,7 +174,7 @@ def answer_text(event: Event, answer: Answer, state: State) -> str:
 
     Args:
         event: The event.
-        answer: What :func:`change` returned.
+        answer: Result of :func:`change`.
         state: State before the event.
     """
     name = event.name.lower()

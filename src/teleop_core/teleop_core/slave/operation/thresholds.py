@@ -15,75 +15,89 @@ class OperationParameters:
     """Limits, faults and states of an arm in operation."""
 
     starts_enabled: bool = parameter(
-        True, fixed=True, doc="whether it enables and homes itself; false: it waits for enable and home, as hardware"
+        True,
+        fixed=True,
+        doc="true: the arm enables and homes itself; false: it waits for the commands enable and "
+        "home, as hardware does",
     )
     standstill: str = parameter(
         "hold",
         choices=_STANDSTILLS,
-        doc="after a stop, or disabled: the drives hold the arm, or are off and brakes hold it",
+        doc="a stopped or disabled arm is held by its drives, or by its brakes with the drives off",
     )
     heartbeat: float = parameter(
         0.0,
         Within(0.01, 10.0, "s"),
-        "a stop button that says 'released' less often than this counts as pressed; 0: none is there",
+        "longest time between two messages of a stop button; after a longer time the button counts "
+        "as pressed; 0: there is no stop button",
         off=0.0,
     )
     longest_outage: float = parameter(
         2.0,
         Within(0.01, 60.0, "s"),
-        "after a longer silence of commands it is paused and resumes on purpose only; 0: never",
+        "if no command arrives for this time, the arm pauses, and needs the command resume to go on; 0: never",
         off=0.0,
-        source="assumed: longer than a node takes to hiccup, shorter than a person to look away",
+        source="assumed: longer than short interruptions of a node, and shorter than a person looks away",
     )
     longest_silence: float = parameter(
         2.0,
         Within(0.01, 60.0, "s"),
-        "an arm that has not said for longer where it is has a fault; it holds long before, after the command timeout",
-        source="assumed: as the longest outage",
+        "if the arm reports no position for this time, that is a fault; the arm holds much earlier, "
+        "after the command timeout",
+        source="assumed: the same as longest_outage",
     )
     acceleration_share: float = parameter(
         20.0,
         Within(1.0, 1000.0),
-        "largest acceleration of setpoints over that of the drives, effort limit over inertia",
-        source="assumed: encoder steps of the stylus alone ask for up to 12 times at 1 kHz",
+        "largest acceleration of setpoints, divided by the acceleration of the drives, which is "
+        "effort limit over inertia",
+        source="assumed: at 1 kHz, encoder steps of the stylus alone need up to 12 times the "
+        "acceleration of the drives",
     )
     tool_speed: float = parameter(
         0.0,
         Within(0.0, 10.0, "m/s"),
-        "largest speed of the tip; 0: what the joint that moves it fastest at home reaches",
+        "largest speed of the tip; 0: the tip speed of the joint that moves the tip fastest at home",
     )
     tool_acceleration: float = parameter(
-        0.0, Within(0.0, 1e5, "m/s²"), "largest rise of the tip's speed; 0: what that joint's acceleration_share gives"
+        0.0,
+        Within(0.0, 1e5, "m/s²"),
+        "largest acceleration of the tip's speed; 0: derived from acceleration_share for the "
+        "joint that moves the tip fastest at home",
     )
     longest_lag: float = parameter(
         0.2,
         Within(0.001, 10.0, "s"),
-        "a joint farther from its setpoint than full speed makes up in this time is a fault",
-        source="assumed: four times what the PID laws leave at full speed, 3 over their bandwidth",
+        "if a joint is farther from its setpoint than it moves at full speed in this time, that is a fault",
+        source="assumed: four times the lag of the PID laws at full speed, which is 3 over their bandwidth",
     )
     tip_error: float = parameter(
         0.0,
         Within(0.0, 1.0, "m"),
-        "a tip farther from its setpoint than this is a fault; 0: than tool_speed makes up in longest_lag",
+        "if the tip is farther from its setpoint than this, that is a fault; 0: tool_speed times longest_lag",
     )
     effort_time: float = parameter(
         1.0,
         Within(0.01, 60.0, "s"),
-        "a drive at its effort limit for longer is a fault",
-        source="assumed: braking from full speed takes 0.1 s",
+        "if a drive is at its effort limit for longer than this, that is a fault",
+        source="assumed: to brake from full speed takes 0.1 s",
     )
     overspeed: float = parameter(
         1.5,
         Within(1.0, 10.0),
-        "a joint faster than this share of its speed limit is a fault",
-        source="assumed: motors fade out a tenth above their rated speed",
+        "if the speed of a joint divided by its speed limit exceeds this, that is a fault",
+        source="assumed: motors have no more torque at a tenth above their rated speed",
     )
     pressing_time: float = parameter(
-        1.0, Within(0.01, 60.0, "s"), "commands beyond a joint's limit for longer press it into that limit"
+        1.0,
+        Within(0.01, 60.0, "s"),
+        "if commands are beyond a joint's limit for longer than this, the joint counts as pressed into the limit",
     )
-    reported: tuple[str, ...] = parameter((), choices=NAMES, doc="faults that are told only and stop nothing")
+    reported: tuple[str, ...] = parameter((), choices=NAMES, doc="faults that are reported, but do not stop the arm")
     events: tuple[str, ...] = parameter(
-        (), fixed=True, doc="commands at times since the start, command@seconds: stop@2.5, reset@4, enable@4.1"
+        (),
+        fixed=True,
+        doc="state commands and their times since the start, as command@seconds: stop@2.5, reset@4, enable@4.1",
     )
 
     def __post_init__(self) -> None:

@@ -18,7 +18,7 @@ class ServerParameters(Fields):
     upper: PerJoint
     effort_limit: PerJoint  # rated efforts [N·m or N]
     speed_limit: PerJoint  # rated speeds [rad/s or m/s]
-    lag: PerJoint  # how far a joint may be from its setpoint [rad or m]
+    lag: PerJoint  # largest allowed distance of a joint from its setpoint [rad or m]
     timeout_ns: int
     brakes: int
     heartbeat_ns: int
@@ -41,7 +41,7 @@ class ServerState(OperatingState):
     target: PerJoint
     measured: PerJoint
     speed: PerJoint  # [rad/s or m/s]
-    full_ns: IntegerPerJoint  # how long a drive has been at its effort limit
+    full_ns: IntegerPerJoint  # time for which a drive has been at its effort limit [ns]
     must_brake: int
     told: int
     played: int

@@ -36,67 +36,68 @@ FAULTS = {
 
 @dataclass(frozen=True, kw_only=True)
 class HardwareParameters:
-    """Which faults to simulate, values that replace the robot's, and values that no robot file states."""
+    """Simulated effects, values that replace the robot's, and values that no robot file states."""
 
     without: tuple[str, ...] = parameter(
-        (), choices=tuple(FAULTS), fixed=True, doc="faults that are left out, to see what they add"
+        (), choices=tuple(FAULTS), fixed=True, doc="effects that the plant leaves out, to see what each contributes"
     )
     coulomb: tuple[float, ...] = parameter(
         (), Within(0.0, None, "N·m or N"), "dry friction of each joint; empty: the robot's"
     )
     wander: tuple[float, ...] = parameter(
-        (), Within(0.0, 2.0), "standard deviation of each joint's dry friction over its mean; empty: the robot's"
+        (), Within(0.0, 2.0), "standard deviation of each joint's dry friction, divided by its mean; empty: the robot's"
     )
     bias: tuple[float, ...] = parameter(
-        (), Within(unit="N·m or N"), "effort of each amplifier when none is asked; empty: the robot's"
+        (), Within(unit="N·m or N"), "effort of each amplifier at a command of zero; empty: the robot's"
     )
     play: tuple[float, ...] = parameter(
-        (), Within(0.0, None, "rad or m"), "half width of the play behind each encoder; empty: the robot's"
+        (), Within(0.0, None, "rad or m"), "half of the backlash behind each encoder; empty: the robot's"
     )
     weights: tuple[str, ...] = parameter(
-        (), fixed=True, doc="symbol=value of the dynamics that the source does not state; empty: the robot's"
+        (), fixed=True, doc="symbol=value for each dynamic parameter that the source does not state; empty: the robot's"
     )
     bristle_frequency: float = parameter(
         250.0,
         Within(10.0, 2000.0, "rad/s"),
-        "at which a joint swings on its friction before it slips",
-        source="assumed: a joint gives by a few encoder counts before it slips",
+        "frequency at which a joint oscillates on the elasticity of its friction before it slips",
+        source="assumed: a joint moves elastically by a few encoder counts before it slips",
     )
     wander_travel: float = parameter(
         2000.0,
         Within(1.0, 1e7, "encoder counts"),
-        "way on which dry friction changes as a joint slips; at rest it stays",
-        source="assumed: about a turn of the motor, in which gears and bearings meet themselves",
+        "distance over which the random dry friction of a slipping joint changes; at rest it does not change",
+        source="assumed: about one turn of the motor, after which gears and bearings repeat",
     )
     drive_bits: int = parameter(
         14,
         Within(4, 32),
-        "of the converter that commands the amplifier, peak to peak",
-        source="assumed: usual for cards of analog outputs; the source names no number",
+        "resolution of the converter that commands the amplifier, in bits for the range from peak to peak",
+        source="assumed: usual for analog output cards; the source states no number",
     )
     # Faults that no source of the RCRT-1 mentions; `teleop experiment robustness` turns them on.
     effort_delay: float = parameter(
         0.0,
         Within(0.0, 0.03, "s"),
-        "from the control law to the motor, beyond the tick, in whole ticks",
-        source="assumed: none; buses of drives take 1 to 5 ms",
+        "delay from the control law to the motor in addition to one tick, rounded to whole ticks",
+        source="assumed: no delay; field buses of drives take 1 to 5 ms",
     )
     drive_gain: float = parameter(
         1.0,
         Within(0.1, 20.0),
-        "effort of the drives over the one asked for",
-        source="assumed: 1; torque constants are good to some 10 %",
+        "effort of the drives, divided by the commanded effort",
+        source="assumed: 1; torque constants are known to some 10 %",
     )
     gear_stiffness: tuple[float, ...] = parameter(
         (),
         Within(0.0, None, "N·m/rad or N/m"),
-        "stiffness of each gear between motor, with its encoder, and link; 0 or empty: rigid",
+        "stiffness of each gear between its motor (with the encoder) and its link; 0 or empty: rigid",
         fixed=True,
     )
     motor_inertia: tuple[float, ...] = parameter(
         (),
         Within(1e-12, None, "kg·m² or kg"),
-        "of each motor through its gear, a part of its axis's; where gears bend. Empty: known",
+        "inertia of each motor at the output of its gear, a part of the axis's inertia; used for "
+        "elastic gears only; empty: the robot's",
         fixed=True,
     )
 
@@ -129,7 +130,7 @@ def _steps(drives: Drives, bits: int) -> Array:
 
 
 def hardware_physics(parameters: HardwareParameters, robot: Robot) -> Physics:
-    """Numbers of a robot's drive table and of its faults, less those that are left out.
+    """Numbers of a robot's drive table and of its faults, without the faults that are left out.
 
     Raises:
         ParameterError: The length of a list is not the robot's number of joints, or a weight has no value.

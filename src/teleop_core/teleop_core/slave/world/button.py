@@ -1,7 +1,8 @@
-"""Button: an upright post whose surface gives way with a click, over a stiff stop.
+"""Button: an upright post whose surface yields with a click, above a stiff stop.
 
 Its spring force grows up to the click force, and then falls until the button is on its stop. The stop has the material
-of the world. On release the button pushes less than on the press, because of dry friction, a share of its force. This
+of the world. On release the button pushes less than on the press because of dry friction, which is a share of its
+force. This
 friction is a second spring that yields at that bound.
 """
 
@@ -34,7 +35,7 @@ class ButtonState(Fields):
 
     gap: float  # gap of the tip along the present normal [m]
     is_pressed: int
-    presses: int  # so far
+    presses: int  # number of presses so far
     held: float  # bend of the friction's spring, positive inwards [m]
 
 
@@ -42,17 +43,24 @@ class ButtonState(Fields):
 class ButtonParameters(CylinderParameters):
     """A post that is pressed from above, or from any other side."""
 
-    radius: float = parameter(0.02, Within(1e-3, 1.0, "m"), "of the post")
-    length: float = parameter(0.03, Within(1e-3, 2.0, "m"), "from end to end")
-    direction: tuple[float, ...] = parameter((0.0, 0.0, 1.0), Within(-1.0, 1.0), "upwards, of any length", length=3)
-    click_force: float = parameter(1.0, Within(0.01, _LARGEST, "N"), "on the way in, where it snaps", source="assumed")
-    click_travel: float = parameter(2e-3, Within(1e-4, 0.1, "m"), "way to the click", source="assumed")
-    contact_force: float = parameter(
-        0.4, Within(0.0, _LARGEST, "N"), "on the way in, just before the stop", source="assumed"
+    radius: float = parameter(0.02, Within(1e-3, 1.0, "m"), "radius of the button's post")
+    length: float = parameter(0.03, Within(1e-3, 2.0, "m"), "length of the button's post")
+    direction: tuple[float, ...] = parameter(
+        (0.0, 0.0, 1.0),
+        Within(-1.0, 1.0),
+        "axis of the button, pointing out of it; its length does not matter",
+        length=3,
     )
-    stroke: float = parameter(3e-3, Within(2e-4, 0.1, "m"), "way to the stop", source="assumed")
+    click_force: float = parameter(
+        1.0, Within(0.01, _LARGEST, "N"), "force at which the button clicks, on the way in", source="assumed"
+    )
+    click_travel: float = parameter(2e-3, Within(1e-4, 0.1, "m"), "travel from rest to the click", source="assumed")
+    contact_force: float = parameter(
+        0.4, Within(0.0, _LARGEST, "N"), "force on the way in, just before the stop", source="assumed"
+    )
+    stroke: float = parameter(3e-3, Within(2e-4, 0.1, "m"), "travel from rest to the stop", source="assumed")
     hysteresis: float = parameter(
-        0.3, Within(0.0, 1.0), "share of the spring's force that is missing on the way out", source="assumed"
+        0.3, Within(0.0, 1.0), "hysteresis: share of the spring's force that is lost on the way out", source="assumed"
     )
 
     def __post_init__(self) -> None:
@@ -71,7 +79,7 @@ class ButtonParameters(CylinderParameters):
 
 @inner
 def _spring(p: ButtonNumbers, depth: float) -> float:
-    """Force of the spring on the way in [N], at a depth [m]."""
+    """Force of the spring during a press [N], at a depth [m]."""
     if depth <= p.click_travel:
         return p.click_force * max(depth, 0.0) / p.click_travel
     fallen = min((depth - p.click_travel) / (p.stroke - p.click_travel), 1.0)
@@ -133,7 +141,7 @@ def count_presses(depths: Array, parameters: ButtonParameters, *, is_pressed: bo
         Number of new presses, and whether the button is pressed at the end.
     """
     is_down = depths >= parameters.stroke
-    is_known = is_down | (depths <= parameters.click_travel)  # in between it stays as it was
+    is_known = is_down | (depths <= parameters.click_travel)  # between both depths the state does not change
     states = np.append(is_pressed, is_down[is_known])
     return int(np.sum(states[1:] & ~states[:-1])), bool(states[-1])
 

@@ -29,7 +29,7 @@ class WorldNumbers(PunctureNumbers, ButtonNumbers):
     world_damping: float
     world_friction: float
     world_center: Vector3
-    tool_length: float  # from the tip to the last of several points [m]
+    tool_length: float  # distance from the tip to the last of several points [m]
     tool_radius: float  # [m]
 
 
@@ -180,7 +180,7 @@ def _touch_at(
     Args:
         p: Parameters.
         s: State of the point; written.
-        arm: As :func:`touch` takes it.
+        arm: As in :func:`touch`.
         has_jacobian: Whether ``arm.J`` already belongs to this tick.
         lever: Point relative to the tip (3,) [m]; overwritten with the point of contact.
         q: Joints of the links (n,).

@@ -44,73 +44,86 @@ _FARTHEST = 3.0  # distance below a tip within which an object is looked for [m]
 
 @dataclass(frozen=True, kw_only=True)
 class WorldParameters:
-    """What the tip can touch."""
+    """Parameters of the object that the tip can touch."""
 
-    kind: Choice = choice(WORLD_OBJECTS, "empty", fixed=True, doc="what the tip can touch", usual=_USUAL)
+    kind: Choice = choice(WORLD_OBJECTS, "empty", fixed=True, doc="object that the tip can touch", usual=_USUAL)
     place: tuple[float, ...] = parameter(
         (),
         Within(-10.0, 10.0, "m"),
-        "middle of the object in the slave's base; empty: straight below the tip of the robot's start, gap apart",
+        "middle of the object in the slave's base; empty: vertically below the tip at the robot's "
+        "start, at the distance gap",
         fixed=True,
     )
     base: tuple[float, ...] = parameter(
         (0.0, 0.0, 0.0),
         Within(-10.0, 10.0, "m"),
-        "where the base of this arm is, with parallel axes, from where place is given: that of a second arm in the "
-        "base of the first, so that both touch the same object",
+        "position of this arm's base in the frame in which place is given, with parallel axes. For a "
+        "second arm: its base in the first arm's base, so that both touch the same object",
         length=3,
         fixed=True,
     )
     gap: float = parameter(
-        0.01, Within(0.0, 1.0, "m"), "between that tip and the object, if no place is given", fixed=True
+        0.01,
+        Within(0.0, 1.0, "m"),
+        "distance from the tip at the robot's start to the object, if place is empty",
+        fixed=True,
     )
     material: str = parameter(
         "tissue",
         choices=(*MATERIALS, "own"),
-        doc="what it is made of; own: of the following three numbers",
-        source="assumed: all five; what a tip meets depends on its own size as well",
+        doc="material of the object; own: the parameters stiffness, damping and friction",
+        source="assumed: all five materials; the contact force depends on the size of the tip as well",
     )
-    stiffness: float = parameter(1000.0, Within(1.0, 1e5, "N/m"), "of the surface, if the material is own")
+    stiffness: float = parameter(1000.0, Within(1.0, 1e5, "N/m"), "stiffness of the surface, if the material is own")
     damping: float = parameter(
         1.0,
         Within(0.0, 100.0, "s/m"),
-        "share of the force per speed, if the material is own",
-        source="assumed: the number; the law is that of Hunt and Crossley 1975",
+        "damping of the surface, as a share of the force per speed, if the material is own",
+        source="assumed: the value; the law is that of Hunt and Crossley 1975",
     )
-    friction_coefficient: float = parameter(0.3, Within(0.0, 2.0), "over the normal force, if the material is own")
+    friction_coefficient: float = parameter(
+        0.3, Within(0.0, 2.0), "friction force divided by the normal force, if the material is own"
+    )
 
     tool_points: int = parameter(
         1,
         Within(1, 16),
-        "places where the tool touches: its tip, and others behind it along its axis, which is z of the tip",
+        "number of points at which the tool can touch: its tip, and others behind it on the tool's "
+        "axis, which is z of the tip",
         fixed=True,
     )
     tool_length: float = parameter(
-        0.02, Within(1e-3, 1.0, "m"), "from the tip to the last of several points", fixed=True, source="assumed"
+        0.02,
+        Within(1e-3, 1.0, "m"),
+        "distance from the tip to the last of several contact points",
+        fixed=True,
+        source="assumed",
     )
-    tool_radius: float = parameter(0.0, Within(0.0, 0.1, "m"), "of the tool at each of its points", fixed=True)
+    tool_radius: float = parameter(
+        0.0, Within(0.0, 0.1, "m"), "radius of the tool at each of its contact points", fixed=True
+    )
 
     puncture_force: float = parameter(
         0.0,
         Within(0.0, 100.0, "N"),
-        "push along the normal at which the surface gives way to the tip, of any material; 0: it never does",
+        "normal force at which the tip punctures the surface, for any material; 0: the surface cannot be punctured",
     )
     cutting_force: float = parameter(
         0.2,
         Within(0.0, 100.0, "N"),
-        "push against a tip that goes deeper than before, behind a punctured surface",
-        source="assumed: the number; the law is that of Okamura, Simone and O'Leary 2004",
+        "cutting force on a tip that goes deeper than before, behind a punctured surface",
+        source="assumed: the value; the law is that of Okamura, Simone and O'Leary 2004",
     )
     shaft_friction: float = parameter(
         20.0,
         Within(0.0, 1e4, "N/m"),
-        "dry friction of the needle's shaft over its depth behind a punctured surface",
-        source="assumed: the number; the law is that of Okamura, Simone and O'Leary 2004",
+        "dry friction of the needle's shaft, divided by its depth behind the punctured surface",
+        source="assumed: the value; the law is that of Okamura, Simone and O'Leary 2004",
     )
     hole_radius: float = parameter(
         0.002,
         Within(1e-4, 0.1, "m"),
-        "how near to the last hole the tip enters it again without a puncture",
+        "within this distance of the last hole the tip enters the hole again without a puncture",
         source="assumed",
     )
 
@@ -158,7 +171,7 @@ class WorldParameters:
         """Middle of the object (3,) [m] in the arm's base, for a tip that begins at a pose (4, 4).
 
         Raises:
-            ParameterError: As :meth:`below`.
+            ParameterError: As in :meth:`below`.
         """
         return np.array(self.place) - np.array(self.base) if self.place else self.below(T_base_tip)
 

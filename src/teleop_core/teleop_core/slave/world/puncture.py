@@ -1,4 +1,4 @@
-"""Puncture: a surface that gives way to the tip, and the channel of the needle behind it.
+"""Puncture: a surface that opens under the tip, and the channel of the needle behind it.
 
 Once the push along the normal reaches the puncture force, the surface opens under the tip, and the spring of the
 surface vanishes there. The tip then moves in a straight channel along the normal at that point. Two forces act in the
@@ -29,7 +29,7 @@ class PunctureState(Fields):
     normal: Vector3
     stuck: Vector3  # bend of the bristle across the normal [m]
     is_open: int  # the tip is in the channel, or above its hole
-    punctures: int  # so far
+    punctures: int  # number of punctures so far
     hole: Vector3  # position of the hole, from the middle of the object [m]
     channel: Vector3  # direction of the channel, a unit vector out of the object
     cut: float  # depth from which tissue ahead of the tip resists [m]
@@ -76,7 +76,7 @@ def _is_open(p: PunctureNumbers, s: PunctureState, before: float, along: float, 
         return True
     if p.puncture_force <= 0.0 or beside > p.hole_radius:
         return False
-    # Not from behind: a tip there is outside, though it lies deep along the channel.
+    # Not from behind the object: a tip there is outside, although its depth along the channel is large.
     return along >= 0.0 if s.gap >= 0.0 else abs(along - s.gap) <= p.hole_radius
 
 
@@ -91,7 +91,7 @@ def follow_channel(
     Args:
         p: Parameters.
         s: State; written: the gap becomes the one along the channel.
-        stiffness: Of the object [N/m].
+        stiffness: Stiffness of the object [N/m].
         before: Gap a tick ago [m].
         offset: Tip from the middle of the object (3,) [m].
         normal: Normal out of the object (3,); written.
