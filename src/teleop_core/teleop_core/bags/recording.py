@@ -4,7 +4,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from teleop_core.bags import compression
-from teleop_core.base import ParameterError, UnknownNameError, Within, parameter
+from teleop_core.base import ParameterError, UnknownNameError, Within, fixed
 from teleop_core.graph import Stage
 from teleop_core.graph.topics import BY_NAME, Kind, Quality, Stamp, Topic
 
@@ -13,20 +13,19 @@ from teleop_core.graph.topics import BY_NAME, Kind, Quality, Stamp, Topic
 class RecordingParameters:
     """Parameters of :class:`~teleop_core.bags.writer.BagWriter`."""
 
-    compression: str = parameter("zstd", doc="compression of the bag", choices=compression.NAMES, fixed=True)
-    compression_level: int = parameter(
-        1, Within(1, 16), "compression level; a higher level gives smaller files and is slower", fixed=True
+    compression: str = fixed("zstd", doc="compression of the bag", choices=compression.NAMES)
+    compression_level: int = fixed(
+        1, Within(1, 16), "compression level; a higher level gives smaller files and is slower"
     )
-    topics: tuple[str, ...] = parameter((), doc="topics to record; empty for all", fixed=True)
-    every: int = parameter(1, Within(1, 1_000_000), "n: only every n-th sample of each stream is recorded", fixed=True)
-    every_of: tuple[str, ...] = parameter(
-        (), doc="topics with another n than `every`, as topic=n, e.g. slave/measured_js=10", fixed=True
+    topics: tuple[str, ...] = fixed((), doc="topics to record; empty for all")
+    every: int = fixed(1, Within(1, 1_000_000), "n: only every n-th sample of each stream is recorded")
+    every_of: tuple[str, ...] = fixed(
+        (), doc="topics with another n than `every`, as topic=n, e.g. slave/measured_js=10"
     )
-    tf_rate: float = parameter(
+    tf_rate: float = fixed(
         50.0,
         Within(0.0, 1000.0, "1/s"),
         "messages of /tf per second; the robot's model is recorded too; 0: neither is recorded",
-        fixed=True,
     )
 
     def __post_init__(self) -> None:

@@ -80,6 +80,11 @@ def parameter(
     return field(default=default, metadata=meta)
 
 
+def fixed(default: Any, within: Within = _ANY, doc: str = "", **more: Any) -> Any:
+    """Field of a parameter that can only be set before the stage is built; arguments as of :func:`parameter`."""
+    return parameter(default, within, doc, fixed=True, **more)
+
+
 @dataclass(frozen=True)
 class NoParameters:
     """Group of a part without parameters."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from teleop_core.base import Spec, TeleopError, UnknownNameError, Within, parameter, plain_yaml, shown, specs
+from teleop_core.base import Spec, TeleopError, UnknownNameError, Within, fixed, parameter, plain_yaml, shown, specs
 from teleop_core.base.texts import LONGEST_VALUE
 from teleop_core.graph.stage import STAGES
 
@@ -16,29 +16,23 @@ from teleop_core.graph.stage import STAGES
 class RealTimeParameters:
     """What a live node requests from the operating system; a refusal is reported, and the node works on."""
 
-    priority: int = parameter(
+    priority: int = fixed(
         -1,
         Within(-1, 98),
         "SCHED_FIFO priority of the loop; its helper threads get 1. 0: ordinary scheduling; -1: 20 "
         "for sessions by side or in one process if the system permits it, else ordinary scheduling",
-        fixed=True,
     )
-    cpus: tuple[int, ...] = parameter((), Within(0), "processors that the loop may use; empty: all", fixed=True)
-    patience: float = parameter(
+    cpus: tuple[int, ...] = fixed((), Within(0), "processors that the loop may use; empty: all")
+    patience: float = fixed(
         0.8,
         Within(0.01, 60.0, "s"),
         "if the loop makes no progress for this time, it counts as hung and its process ends; time "
         "without a processor does not count; 0: never",
         off=0.0,
-        fixed=True,
         source="assumed",
     )
-    lock_memory: bool = parameter(
-        False, fixed=True, doc="whether all memory of the process is locked, so that it is never swapped out"
-    )
-    freeze_gc: bool = parameter(
-        True, fixed=True, doc="whether garbage collections skip the objects that exist at the start"
-    )
+    lock_memory: bool = fixed(False, doc="whether all memory of the process is locked, so that it is never swapped out")
+    freeze_gc: bool = fixed(True, doc="whether garbage collections skip the objects that exist at the start")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,17 +41,15 @@ class SessionParameters:
 
     description: str = parameter("", doc="one sentence that describes the session")
     duration: float = parameter(10.0, Within(0.001, 86400.0, "s"), "duration of the session, in simulated or live time")
-    ends_with_task: bool = parameter(
-        False, fixed=True, doc="whether the session ends within 1 s after the tasks of all arms are finished"
+    ends_with_task: bool = fixed(
+        False, doc="whether the session ends within 1 s after the tasks of all arms are finished"
     )
-    arms: tuple[str, ...] = parameter(
-        (), fixed=True, doc="names of the arms; the first arm's topics have no namespace; empty: one arm without a name"
+    arms: tuple[str, ...] = fixed(
+        (), doc="names of the arms; the first arm's topics have no namespace; empty: one arm without a name"
     )
-    stages: tuple[str, ...] = parameter(
-        (), fixed=True, doc="additional stages of every arm, besides the built-in stages"
-    )
-    delays: tuple[str, ...] = parameter(
-        (), fixed=True, doc="delays of topics, as topic=seconds, or topic@reader=seconds for one reader"
+    stages: tuple[str, ...] = fixed((), doc="additional stages of every arm, besides the built-in stages")
+    delays: tuple[str, ...] = fixed(
+        (), doc="delays of topics, as topic=seconds, or topic@reader=seconds for one reader"
     )
     real_time: RealTimeParameters = field(default_factory=RealTimeParameters)
 

@@ -13,7 +13,7 @@ from teleop_core.bags.recording import MARKS, RECORDER, RecordingParameters
 from teleop_core.bags.reports import report
 from teleop_core.bags.writer import BagWriter
 from teleop_core.base.errors import RecordingError, SessionError, TeleopError
-from teleop_core.base.parameters import build, parameter, specs, values_of
+from teleop_core.base.parameters import build, fixed, parameter, specs, values_of
 from teleop_core.graph.graph import RECORDER_NAME, Graph
 from teleop_core.graph.layers import SESSION, parse_text
 from teleop_core.graph.stage import Stage
@@ -49,13 +49,9 @@ _RECENT = 1000
 class RecorderParameters(RecordingParameters):
     """Parameters of the recorder as a node."""
 
-    out: str = parameter(
-        "", fixed=True, doc="directory of the new recording; empty: a directory in bags/ named after the current time"
-    )
-    configuration: str = parameter(
-        "", fixed=True, doc="text of the session's parameter file; it is stored in the recording"
-    )
-    scenario: str = parameter("", fixed=True, doc="name of the session; it is stored in the recording")
+    out: str = fixed("", doc="directory of the new recording; empty: a directory in bags/ named after the current time")
+    configuration: str = fixed("", doc="text of the session's parameter file; it is stored in the recording")
+    scenario: str = fixed("", doc="name of the session; it is stored in the recording")
     mark: str = parameter("", doc="text of the next marks; empty: each mark gets its number as text")
 
 

@@ -6,7 +6,7 @@ from typing import Any
 
 from teleop_core.bags.messages import BUTTONS
 from teleop_core.base.errors import ParameterError, SessionError, TeleopError
-from teleop_core.base.parameters import Value, Within, build, parameter, specs, values_of
+from teleop_core.base.parameters import Value, Within, build, fixed, specs, values_of
 from teleop_core.graph.layers import RealTimeParameters
 from teleop_core.graph.stage import Runner, Stage
 from teleop_core.middleware.ros import ROS
@@ -23,47 +23,39 @@ spare_generator()  # must be called before the first node is made
 class NodeParameters:
     """Parameters that every node has in addition to the parameters of its stage."""
 
-    autostart: bool = parameter(
-        True, fixed=True, doc="true: the node configures and activates itself; false: a supervisor does it"
-    )
-    max_catch_up: int = parameter(
+    autostart: bool = fixed(True, doc="true: the node configures and activates itself; false: a supervisor does it")
+    max_catch_up: int = fixed(
         1000,
         Within(0, 10_000, "ticks"),
         "largest number of missed ticks that the loop makes up after a late wake-up; it skips the others",
-        fixed=True,
     )
-    links: tuple[str, ...] = parameter(
+    links: tuple[str, ...] = fixed(
         (),
-        fixed=True,
         doc="other topics that feed a port, as port=topic or port=topic@delay, with the delay in "
         "seconds; the values of several topics of one port are added",
     )
-    joy_buttons: tuple[int, ...] = parameter(
+    joy_buttons: tuple[int, ...] = fixed(
         BUTTONS,
         Within(-1, 255),
         "indices of the clutch, fixture and mode buttons in an incoming Joy, from 0; -1: no such button",
         length=3,
-        fixed=True,
     )
-    second_publisher: str = parameter(
+    second_publisher: str = fixed(
         "refuse",
         choices=("refuse", "fault"),
-        fixed=True,
         doc="reaction to a second publisher on a topic that the node reads: refuse: its messages are "
         "refused and counted; fault: it is also a fault",
     )
-    owner_silence: float = parameter(
+    owner_silence: float = fixed(
         0.5,
         Within(0.0, 60.0, "s"),
         "time without messages from a topic's publisher after which another publisher is accepted",
-        fixed=True,
         source="assumed",
     )
-    flood_rate: int = parameter(
+    flood_rate: int = fixed(
         5000,
         Within(1, 1_000_000, "1/s"),
         "largest number of messages per second on one topic; messages beyond it are refused",
-        fixed=True,
         source="assumed",
     )
     real_time: RealTimeParameters = field(default_factory=RealTimeParameters)

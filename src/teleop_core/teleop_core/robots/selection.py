@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from teleop_core.base.parameters import parameter
+from teleop_core.base.parameters import fixed
 from teleop_core.robots import load_robot_set
 
 
@@ -10,9 +10,9 @@ from teleop_core.robots import load_robot_set
 class RobotParameters:
     """The arm; all stages of one arm must name the same."""
 
-    robot: str = parameter("rcrt1", fixed=True, doc="slave robot, one of `teleop robot`")
-    geometry: tuple[str, ...] = parameter(
-        (), fixed=True, doc="symbol=value for each length or option of the robot that differs from its default [m, rad]"
+    robot: str = fixed("rcrt1", doc="slave robot, one of `teleop robot`")
+    geometry: tuple[str, ...] = fixed(
+        (), doc="symbol=value for each length or option of the robot that differs from its default [m, rad]"
     )
 
     @property

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from teleop_core.bags.reader import Bag
-from teleop_core.base import ParameterError, RecordingError, TeleopWarning, parameter
+from teleop_core.base import ParameterError, RecordingError, TeleopWarning, fixed
 from teleop_core.graph import topics
 from teleop_core.hand.operators import Motion, Operator, Setting
 from teleop_core.hand.operators.rest import REST_TILT
@@ -33,9 +33,8 @@ _PERIODS = 5.0
 class FileParameters:
     """Parameters of a hand that follows a table."""
 
-    path: str = parameter(
+    path: str = fixed(
         "",
-        fixed=True,
         doc="CSV or Parquet file with a header of t, x, y, z and optionally rx, ry, rz, clutch, "
         "fixture, mode [s, m, rad]",
     )

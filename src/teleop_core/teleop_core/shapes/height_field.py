@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from teleop_core.base.parameters import Within, parameter
+from teleop_core.base.parameters import Within, fixed
 from teleop_core.kernels.geometry import Array
 from teleop_core.shapes import Shape
 from teleop_core.shapes.basis.distance_grid import DistanceGrid, GridRequest, distance_grid
@@ -13,12 +13,10 @@ from teleop_core.shapes.mesh import mesh_distance
 class HeightFieldParameters:
     """A table of heights above the middle."""
 
-    file: str = parameter(
-        "", fixed=True, doc="CSV or .npy file of heights [m], with a row for each x and a column for each y"
-    )
-    spacing: float = parameter(2e-3, Within(1e-5, 0.1, "m"), "distance between neighbouring heights", fixed=True)
-    step: float = parameter(
-        1e-3, Within(5e-5, 5e-3, "m"), "spacing of the grid of distances; smaller details are rounded off", fixed=True
+    file: str = fixed("", doc="CSV or .npy file of heights [m], with a row for each x and a column for each y")
+    spacing: float = fixed(2e-3, Within(1e-5, 0.1, "m"), "distance between neighbouring heights")
+    step: float = fixed(
+        1e-3, Within(5e-5, 5e-3, "m"), "spacing of the grid of distances; smaller details are rounded off"
     )
 
 

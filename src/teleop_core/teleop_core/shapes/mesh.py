@@ -7,7 +7,7 @@ spline, so that the normal, which is the spline's gradient, is continuous.
 import math
 from dataclasses import dataclass
 
-from teleop_core.base import Within, parameter
+from teleop_core.base import Within, fixed
 from teleop_core.kernels import Array, inner, kernel
 from teleop_core.shapes import Shape
 from teleop_core.shapes.basis import directions, distance_grid, spline
@@ -17,19 +17,16 @@ from teleop_core.shapes.basis import directions, distance_grid, spline
 class MeshParameters:
     """A mesh from a file."""
 
-    file: str = parameter(
-        "", fixed=True, doc="file of the mesh: STL, OBJ, PLY, OFF, or another format that trimesh reads"
-    )
-    scale: float = parameter(1e-3, Within(1e-6, 1e3, "m"), "length unit of the file; 0.001 for millimetres", fixed=True)
-    angles: tuple[float, ...] = parameter(
+    file: str = fixed("", doc="file of the mesh: STL, OBJ, PLY, OFF, or another format that trimesh reads")
+    scale: float = fixed(1e-3, Within(1e-6, 1e3, "m"), "length unit of the file; 0.001 for millimetres")
+    angles: tuple[float, ...] = fixed(
         (0.0, 0.0, 0.0),
         Within(-2.0 * math.pi, 2.0 * math.pi, "rad"),
         "rotation of the mesh about its middle: about x, then y, then z of the base",
         length=3,
-        fixed=True,
     )
-    step: float = parameter(
-        1e-3, Within(5e-5, 0.05, "m"), "spacing of the grid of distances; smaller details are rounded off", fixed=True
+    step: float = fixed(
+        1e-3, Within(5e-5, 0.05, "m"), "spacing of the grid of distances; smaller details are rounded off"
     )
 
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from teleop_core.base import ParameterError, Within, parameter
+from teleop_core.base import ParameterError, Within, fixed, parameter
 from teleop_core.graph import DT, RunningStage, Stage, assign, topics
 from teleop_core.kernels import Array, kernel, length, pointer, pose_from_transform, record, records
 from teleop_core.kinematics import FK
@@ -58,23 +58,18 @@ class SlaveParameters(RobotParameters):
     command_timeout: float = parameter(
         0.1, Within(0.002, 5.0, "s"), "if no command arrives for this time, the slave holds the last reference"
     )
-    start: tuple[float, ...] = parameter(
+    start: tuple[float, ...] = fixed(
         (),
         Within(unit="rad or m"),
         "joint positions to which the slave moves from home before it follows; empty: the robot's start",
-        fixed=True,
     )
-    starts_at_home: bool = parameter(
+    starts_at_home: bool = fixed(
         False,
-        fixed=True,
         doc="whether the slave stays at home before it follows, if start is empty; no effect for a "
         "robot from a URDF, which states no home",
     )
-    start_speed: float = parameter(
-        0.5,
-        Within(0.01, 1.0),
-        "share of the joints' speed limits that the move from home to the start uses",
-        fixed=True,
+    start_speed: float = fixed(
+        0.5, Within(0.01, 1.0), "share of the joints' speed limits that the move from home to the start uses"
     )
     interpolation: str = parameter(
         "linear",

@@ -4,7 +4,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from teleop_core.base import Choice, ClosureError, ParameterError, Within, choice, parameter
+from teleop_core.base import Choice, ClosureError, ParameterError, Within, choice, fixed, parameter
 from teleop_core.graph import DT, RunningStage, Stage, assign, topics
 from teleop_core.kernels import Array, fields_of, pointer, record, record_array
 from teleop_core.kinematics import FK, dh_kernels
@@ -41,7 +41,7 @@ class PlantParameters:
 class SlaveSimParameters(RobotParameters):
     """Parameters of :class:`SlaveSim`."""
 
-    seed: int = parameter(1, Within(0), "seed of everything random in the session", fixed=True)
+    seed: int = fixed(1, Within(0), "seed of everything random in the session")
 
     gravity_compensation: str = parameter(
         "published",

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from teleop_core.base.parameters import Choice, Within, build, choice, parameter
+from teleop_core.base.parameters import Choice, Within, build, choice, fixed, parameter
 from teleop_core.base.ranges import LONGEST_DELAY
 from teleop_core.coupling.network import NETWORKS, link
 from teleop_core.coupling.network.deadband import DeadbandParameters
@@ -93,7 +93,7 @@ class WayParameters:
 class NetworkParameters:
     """Parameters of :class:`~teleop_core.coupling.network.network.NetworkLink`."""
 
-    seed: int = parameter(1, Within(0), "seed of everything random in the session", fixed=True)
+    seed: int = fixed(1, Within(0), "seed of everything random in the session")
     preset: str = parameter(
         "own",
         choices=("own", *PRESETS),

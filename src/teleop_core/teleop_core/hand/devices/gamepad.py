@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from teleop_core.base import SessionError, Within, parameter
+from teleop_core.base import SessionError, Within, fixed
 from teleop_core.hand.devices import Reading, pilot
 from teleop_core.hand.operators import Operator
 from teleop_core.hand.operators.remote import AHEAD, make_remote
@@ -27,13 +27,10 @@ _HINTS = {
 class GamepadParameters(pilot.PilotParameters):
     """How a gamepad moves the stylus, and how it displays the force."""
 
-    rumble: float = parameter(
-        1.0, Within(0.0, 1.0), "strength of the rumble at the device's peak force; 0: no rumble", fixed=True
-    )
-    triggers: str = parameter(
+    rumble: float = fixed(1.0, Within(0.0, 1.0), "strength of the rumble at the device's peak force; 0: no rumble")
+    triggers: str = fixed(
         "roll",
         choices=("roll", "jaw"),
-        fixed=True,
         doc="roll: the triggers roll the stylus; jaw: the right trigger closes the jaw, and no "
         "trigger rolls the stylus",
     )

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from teleop_core.base import Within, parameter
+from teleop_core.base import Within, fixed
 from teleop_core.hand.devices import Reading
 from teleop_core.hand.operators.remote import RemoteHand
 from teleop_core.kernels import Array, length, turn_by
@@ -17,25 +17,22 @@ _LONGEST = 0.05  # time beyond this between two readings is not integrated [s]
 class RateParameters:
     """Speeds of the stylus for devices whose deflection commands a velocity."""
 
-    speed: float = parameter(
+    speed: float = fixed(
         0.04,
         Within(1e-3, 0.5, "m/s"),
         "speed of the stylus at full deflection of a stick or cap",
-        fixed=True,
         source="assumed: crosses the Phantom's workspace in 4 s",
     )
-    turn_speed: float = parameter(
+    turn_speed: float = fixed(
         0.6,
         Within(0.01, 6.0, "rad/s"),
         "turning speed of the stylus at full deflection of a stick or cap",
-        fixed=True,
         source="assumed: turns the stylus by a right angle in 2.6 s",
     )
-    dead_zone: float = parameter(
+    dead_zone: float = fixed(
         0.12,
         Within(0.0, 0.9),
         "deflections below this share of the full deflection count as zero",
-        fixed=True,
         source="assumed: sticks of gamepads rest within a tenth of the middle",
     )
 
@@ -44,7 +41,7 @@ class RateParameters:
 class PilotParameters(RateParameters):
     """Motion of the stylus by a device whose deflection commands a velocity."""
 
-    device: str = parameter("", fixed=True, doc="part of the name of the device to use; empty: the first device found")
+    device: str = fixed("", doc="part of the name of the device to use; empty: the first device found")
 
 
 def beyond(rates: Array, dead_zone: float) -> Array:

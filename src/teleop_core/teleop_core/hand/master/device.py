@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from teleop_core.base import Within, parameter
+from teleop_core.base import Within, fixed, parameter
 from teleop_core.kernels import Fields, Quaternion, Vector3, inner, inverse_motion, kernel, product
 from teleop_core.kernels.geometry import (
     Array,
@@ -32,12 +32,11 @@ class DeviceParameters:
         length=3,
         source=_OMNI,
     )
-    start: tuple[float, ...] = parameter(
+    start: tuple[float, ...] = fixed(
         (0.0, 0.0, -0.03),
         Within(-0.5, 0.5, "m"),
         "position of the inkwell relative to the middle of the workspace",
         length=3,
-        fixed=True,
         source="assumed: the inkwell is behind the middle; no source gives the distance",
     )
     position_resolution: float = parameter(
@@ -85,13 +84,9 @@ class DeviceParameters:
     friction: float = parameter(
         0.26, Within(0.0, 5.0, "N"), "backdrive friction; a smaller force does not move the tip", source=_OMNI
     )
-    handle: str = parameter(
-        "", fixed=True, doc="robot whose joints measure the hand's pose, such as mma; empty: the Phantom's joints"
-    )
-    handle_geometry: tuple[str, ...] = parameter(
-        (),
-        fixed=True,
-        doc="symbol=value for each length or option of the handle that differs from its default [m, rad]",
+    handle: str = fixed("", doc="robot whose joints measure the hand's pose, such as mma; empty: the Phantom's joints")
+    handle_geometry: tuple[str, ...] = fixed(
+        (), doc="symbol=value for each length or option of the handle that differs from its default [m, rad]"
     )
 
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from teleop_core.base import Within, parameter
+from teleop_core.base import Within, fixed, parameter
 from teleop_core.graph import DT, Noise, Row, RunningStage, Stage, assign, topics
 from teleop_core.hand.master import contact, hand_mechanics, rendering
 from teleop_core.hand.master.device import (
@@ -39,7 +39,7 @@ _NEAR = 2e-3  # a hand that has moved by no more than this after a silence [m] c
 class HapticMasterParameters:
     """Parameters of :class:`HapticMaster`."""
 
-    seed: int = parameter(1, Within(0), "seed of everything random in the session", fixed=True)
+    seed: int = fixed(1, Within(0), "seed of everything random in the session")
     force_timeout: float = parameter(
         0.1, Within(0.002, 5.0, "s"), "if no servo_cf arrives for this time, the force becomes zero"
     )

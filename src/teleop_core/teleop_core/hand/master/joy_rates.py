@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from teleop_core.base import Within, parameter
+from teleop_core.base import Within, fixed
 from teleop_core.hand.devices.pilot import RateParameters, steer
 from teleop_core.kernels import Array
 
@@ -16,22 +16,17 @@ _LONGEST = 0.1  # time beyond this between two messages is not integrated [s]
 class JoyParameters(RateParameters):
     """How a device that sends rates in Joy messages moves the stylus, in the device's own frame."""
 
-    axes: tuple[int, ...] = parameter(
+    axes: tuple[int, ...] = fixed(
         (0, 1, 2, 3, 4, 5),
         Within(-1, 63),
         "axes of the Joy that move the stylus along x, y, z and turn it about x, y, z; -1: no axis",
         length=6,
-        fixed=True,
     )
-    held_button: int = parameter(
-        -1, Within(-1, 63), "index of the button that must be held to move; -1: no button is needed", fixed=True
+    held_button: int = fixed(
+        -1, Within(-1, 63), "index of the button that must be held to move; -1: no button is needed"
     )
-    reach: float = parameter(
-        0.1,
-        Within(0.001, 1.0, "m"),
-        "largest distance of the stylus from its start, along each axis",
-        fixed=True,
-        source="assumed",
+    reach: float = fixed(
+        0.1, Within(0.001, 1.0, "m"), "largest distance of the stylus from its start, along each axis", source="assumed"
     )
 
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from teleop_core.base import ParameterError, Within, parameter
+from teleop_core.base import ParameterError, Within, fixed, parameter
 from teleop_core.graph import DT, RunningStage, Stage, topics
 from teleop_core.hand.master.joy_rates import JoyParameters, JoyRates
 from teleop_core.kernels import dot, geometry
@@ -37,77 +37,63 @@ _THREE = ("+x", "+y", "+z")
 class MasterBridgeParameters:
     """Parameters of :class:`MasterBridge`."""
 
-    pose_topic: str = parameter(
-        "device/measured_cp", fixed=True, doc="topic on which the device publishes the pose of its stylus"
-    )
-    pose_message: str = parameter(
-        POSE_MESSAGES[0], choices=(*POSE_MESSAGES, RATE_MESSAGE), fixed=True, doc="message type of pose_topic"
+    pose_topic: str = fixed("device/measured_cp", doc="topic on which the device publishes the pose of its stylus")
+    pose_message: str = fixed(
+        POSE_MESSAGES[0], choices=(*POSE_MESSAGES, RATE_MESSAGE), doc="message type of pose_topic"
     )
     joy: JoyParameters = field(default_factory=JoyParameters)
-    device_axes: tuple[str, ...] = parameter(
+    device_axes: tuple[str, ...] = fixed(
         _THREE,
         choices=AXES,
         length=3,
-        fixed=True,
         doc="axes of the device along x (right), y (up) and z (towards the person) of master_base",
     )
-    stylus_axes: tuple[str, ...] = parameter(
-        _THREE, choices=AXES, length=3, fixed=True, doc="axes of the device's stylus along x, y, z of our stylus frame"
+    stylus_axes: tuple[str, ...] = fixed(
+        _THREE, choices=AXES, length=3, doc="axes of the device's stylus along x, y, z of our stylus frame"
     )
-    unit: float = parameter(
-        1.0, Within(1e-6, 10.0, "m"), "length unit of the device; 0.001 for millimetres", fixed=True
+    unit: float = fixed(1.0, Within(1e-6, 10.0, "m"), "length unit of the device; 0.001 for millimetres")
+    handle: str = fixed(
+        "", doc="robot whose tip is the stylus, by name or file, for devices that publish joint positions"
     )
-    handle: str = parameter(
-        "", fixed=True, doc="robot whose tip is the stylus, by name or file, for devices that publish joint positions"
+    handle_geometry: tuple[str, ...] = fixed(
+        (), doc="symbol=value for each length or option of the handle that differs from its default [m, rad]"
     )
-    handle_geometry: tuple[str, ...] = parameter(
-        (),
-        fixed=True,
-        doc="symbol=value for each length or option of the handle that differs from its default [m, rad]",
+    handle_joints: tuple[str, ...] = fixed(
+        (), doc="ours=theirs for each joint that has another name in the device's messages"
     )
-    handle_joints: tuple[str, ...] = parameter(
-        (), fixed=True, doc="ours=theirs for each joint that has another name in the device's messages"
-    )
-    handle_signs: tuple[float, ...] = parameter(
+    handle_signs: tuple[float, ...] = fixed(
         (),
         Within(-1.0, 1.0),
         "sign of each of our joints, 1.0 or -1.0: our position = sign * device position + offset; empty: 1.0",
-        fixed=True,
     )
-    handle_offsets: tuple[float, ...] = parameter(
+    handle_offsets: tuple[float, ...] = fixed(
         (),
         Within(unit="rad or m"),
         "offset of each of our joints: our position = sign * device position + offset; empty: 0.0",
-        fixed=True,
     )
-    buttons_topic: str = parameter(
-        "", fixed=True, doc="topic on which the device publishes its buttons, as sensor_msgs/Joy; empty: no buttons"
+    buttons_topic: str = fixed(
+        "", doc="topic on which the device publishes its buttons, as sensor_msgs/Joy; empty: no buttons"
     )
-    button_places: tuple[int, ...] = parameter(
+    button_places: tuple[int, ...] = fixed(
         (0, 1, 2),
         Within(-1, 63),
         "indices of the clutch, fixture and mode buttons in the device's Joy, from 0; -1: no such button",
         length=3,
-        fixed=True,
     )
-    pose_stamps: str = parameter(
+    pose_stamps: str = fixed(
         "header",
         choices=("header", "sent"),
-        fixed=True,
         doc="timestamp of a pose: header: the stamp of its header; sent: the time when it was sent, "
         "for devices with another clock and for Pose, which has no header",
     )
-    oldest_pose: float = parameter(
+    oldest_pose: float = fixed(
         0.1,
         Within(0.001, 1.0, "s"),
         "largest difference between the stamp of a pose and our clock; poses beyond it are refused",
-        fixed=True,
         source="assumed",
     )
-    force_topic: str = parameter(
-        "",
-        fixed=True,
-        doc="topic on which the device receives forces, as geometry_msgs/WrenchStamped; empty: it gives no force",
+    force_topic: str = fixed(
+        "", doc="topic on which the device receives forces, as geometry_msgs/WrenchStamped; empty: it gives no force"
     )
     force_gain: float = parameter(1.0, Within(0.0, 10.0), "force sent to the device, divided by master/servo_cf")
     largest_force: float = parameter(

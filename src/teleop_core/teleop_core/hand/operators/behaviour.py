@@ -5,7 +5,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from teleop_core.base import Choice, ParameterError, Within, choice, parameter
+from teleop_core.base import Choice, ParameterError, Within, choice, fixed, parameter
 from teleop_core.hand.operators import OPERATORS
 from teleop_core.kernels import Array
 
@@ -17,24 +17,18 @@ PRESS_TIME = 0.1
 class ButtonParameters:
     """When the operator uses the buttons [s]; each press of fixture or mode lasts 0.1 s."""
 
-    clutch: tuple[float, ...] = parameter(
-        (), Within(0.0, None, "s"), "times of press, release, press, release, … of the clutch button", fixed=True
+    clutch: tuple[float, ...] = fixed(
+        (), Within(0.0, None, "s"), "times of press, release, press, release, … of the clutch button"
     )
-    fixture: tuple[float, ...] = parameter(
-        (),
-        Within(0.0, None, "s"),
-        "times of presses of the fixture button; each press switches the fixture on or off",
-        fixed=True,
+    fixture: tuple[float, ...] = fixed(
+        (), Within(0.0, None, "s"), "times of presses of the fixture button; each press switches the fixture on or off"
     )
-    mode: tuple[float, ...] = parameter(
-        (),
-        Within(0.0, None, "s"),
-        "times of presses of the mode button; each press changes between coarse and fine",
-        fixed=True,
+    mode: tuple[float, ...] = fixed(
+        (), Within(0.0, None, "s"), "times of presses of the mode button; each press changes between coarse and fine"
     )
 
-    jaw: tuple[float, ...] = parameter(
-        (), Within(0.0, None, "s"), "times at which the hand closes, opens, closes, opens, … the jaw", fixed=True
+    jaw: tuple[float, ...] = fixed(
+        (), Within(0.0, None, "s"), "times at which the hand closes, opens, closes, opens, … the jaw"
     )
 
     def __post_init__(self) -> None:
@@ -54,19 +48,17 @@ class RoomParameters:
     In a session the default is the range of the haptic master.
     """
 
-    workspace: tuple[float, ...] = parameter(
+    workspace: tuple[float, ...] = fixed(
         (0.16, 0.12, 0.07),
         Within(0.01, 1.0, "m"),
         "width, height and depth of the space in which the tip can move; the same as haptic_master's",
         length=3,
-        fixed=True,
     )
-    start: tuple[float, ...] = parameter(
+    start: tuple[float, ...] = fixed(
         (0.0, 0.0, -0.03),
         Within(-0.5, 0.5, "m"),
         "position of the inkwell relative to the middle of the workspace; the same as haptic_master's",
         length=3,
-        fixed=True,
     )
 
     @property
@@ -83,54 +75,41 @@ class OperatorParameters:
     kind: Choice = choice(
         OPERATORS, "random", fixed=True, doc="kind of operator: a simulated motion, a recording or a person's device"
     )
-    seed: int = parameter(1, Within(0), "seed of everything random in the session", fixed=True)
-    patience: float = parameter(
+    seed: int = fixed(1, Within(0), "seed of everything random in the session")
+    patience: float = fixed(
         10.0,
         Within(0.0, 3600.0, "s"),
         "longest wait for teleop/state to report that the slave follows; then the operator begins anyway",
-        fixed=True,
     )
-    center: tuple[float, ...] = parameter(
-        (0.0, 0.0, 0.0), Within(-0.3, 0.3, "m"), "centre of the motion, first point of a line", length=3, fixed=True
+    center: tuple[float, ...] = fixed(
+        (0.0, 0.0, 0.0), Within(-0.3, 0.3, "m"), "centre of the motion, first point of a line", length=3
     )
-    approach_time: float = parameter(
-        4.0, Within(0.1, 60.0, "s"), "duration of the smooth move from the start to the centre", fixed=True
+    approach_time: float = fixed(
+        4.0, Within(0.1, 60.0, "s"), "duration of the smooth move from the start to the centre"
     )
-    size: tuple[float, ...] = parameter(
+    size: tuple[float, ...] = fixed(
         (0.03, 0.03, 0.03),
         Within(0.0, 0.3, "m"),
         "random: width of the region; circle: diameters along x, y, z; line: vector from end to end",
         length=3,
-        fixed=True,
     )
-    period: float = parameter(
+    period: float = fixed(
         8.0,
         Within(0.1, 600.0, "s"),
         "duration of one round; random: period of the slowest part of the motion; points: duration of each leg",
-        fixed=True,
     )
-    tilt: tuple[float, ...] = parameter(
-        (0.0, 0.0, 0.0),
-        Within(-1.5, 1.5, "rad"),
-        "turn of the stylus at the centre, as a rotation vector",
-        length=3,
-        fixed=True,
+    tilt: tuple[float, ...] = fixed(
+        (0.0, 0.0, 0.0), Within(-1.5, 1.5, "rad"), "turn of the stylus at the centre, as a rotation vector", length=3
     )
-    rotation: float = parameter(
-        0.2, Within(0.0, 1.5, "rad"), "largest random turn of the stylus about each axis", fixed=True
+    rotation: float = fixed(0.2, Within(0.0, 1.5, "rad"), "largest random turn of the stylus about each axis")
+    points: tuple[float, ...] = fixed(
+        (), Within(-0.3, 0.3, "m"), "points: x, y, z of each stop relative to the centre, one stop after the other"
     )
-    points: tuple[float, ...] = parameter(
-        (),
-        Within(-0.3, 0.3, "m"),
-        "points: x, y, z of each stop relative to the centre, one stop after the other",
-        fixed=True,
-    )
-    bag: str = parameter("", fixed=True, doc="bag: recording whose master/measured_cp the hand follows")
-    longest_gap: float = parameter(
+    bag: str = fixed("", doc="bag: recording whose master/measured_cp the hand follows")
+    longest_gap: float = fixed(
         0.1,
         Within(0.0, 60.0, "s"),
         "bag, file: at a longer gap between two samples (and of more than 5 periods) the hand stays in place",
-        fixed=True,
     )
 
     tremor_amplitude: float = parameter(

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from teleop_core.base import ParameterError, Within, parameter
+from teleop_core.base import ParameterError, Within, fixed
 from teleop_core.hand.operators import Motion, Operator, Setting
 from teleop_core.hand.operators.behaviour import OperatorParameters
 from teleop_core.hand.operators.shapes import minimum_jerk
@@ -32,131 +32,107 @@ _PEAK, _HALF_WIDTH, _CUT = 10.0, 1.5, (4.0, 20.0)
 class HumanParameters:
     """How the hand reaches, errs, corrects, rests and trembles."""
 
-    reach: float = parameter(
+    reach: float = fixed(
         0.0105,
         Within(1e-3, 0.3, "m"),
         "median distance from target to target, within the region of operator.size",
-        fixed=True,
         source="assumed: the distances between targets depend on the task",
     )
-    reach_spread: float = parameter(
+    reach_spread: float = fixed(
         0.72,
         Within(0.0, 2.0),
         "standard deviation of the logarithm of the distance from target to target",
-        fixed=True,
         source="assumed: together with reach, fits the figures of people",
     )
-    turn: float = parameter(
+    turn: float = fixed(
         0.3,
         Within(0.0, 2.0),
         "standard deviation of the turn to the next target, divided by operator.rotation",
-        fixed=True,
         source="assumed: fits the figures of people",
     )
-    width: float = parameter(
-        2.6e-3,
-        Within(1e-4, 0.1, "m"),
-        "width of a target in Fitts's law",
-        fixed=True,
-        source="assumed: fits the figures of people",
+    width: float = fixed(
+        2.6e-3, Within(1e-4, 0.1, "m"), "width of a target in Fitts's law", source="assumed: fits the figures of people"
     )
-    tolerance: float = parameter(
+    tolerance: float = fixed(
         2.4e-3,
         Within(1e-4, 0.1, "m"),
         "the hand makes no correction if it is nearer to the target than this",
-        fixed=True,
         source="assumed: a little below width",
     )
-    movement_time: float = parameter(
+    movement_time: float = fixed(
         0.055,
         Within(0.05, 2.0, "s"),
         "duration of a submovement whose index of difficulty is 0",
-        fixed=True,
         source="assumed: fits the figures of people; form of Fitts 1954",
     )
-    time_per_bit: float = parameter(
+    time_per_bit: float = fixed(
         0.195,
         Within(0.0, 2.0, "s"),
         "added duration of a submovement for each bit of its index of difficulty",
-        fixed=True,
         source="assumed: 5 bit/s, as with a mouse (Soukoreff, MacKenzie 2004); 10 bit/s with a pen (Fitts 1954)",
     )
-    time_spread: float = parameter(
+    time_spread: float = fixed(
         0.23,
         Within(0.0, 1.0),
         "standard deviation of the logarithm of a submovement's duration",
-        fixed=True,
         source="assumed: fits the figures of people",
     )
-    shortfall: float = parameter(
+    shortfall: float = fixed(
         0.05,
         Within(0.0, 0.5),
         "share of the distance by which a first submovement aims too short",
-        fixed=True,
         source="assumed: first submovements fall short (Engelbrecht, Berthier and O'Sullivan 2003)",
     )
-    noise_along: float = parameter(
+    noise_along: float = fixed(
         0.05,
         Within(0.0, 0.2, "s"),
         "standard deviation of a submovement's end along its direction, divided by its mean speed",
-        fixed=True,
         source="assumed: ends spread with mean speed (Schmidt et al. 1979; Meyer et al. 1988)",
     )
-    noise_across: float = parameter(
+    noise_across: float = fixed(
         0.018,
         Within(0.0, 0.2, "s"),
         "standard deviation of a submovement's end across its direction, divided by its mean speed",
-        fixed=True,
         source="assumed: smaller than along the direction (Gordon, Ghilardi and Ghez 1994)",
     )
-    reaction_time: float = parameter(
+    reaction_time: float = fixed(
         0.22,
         Within(0.05, 1.0, "s"),
         "time from seeing an error, half way through a submovement, to the start of its correction",
-        fixed=True,
         source="published: 0.19 to 0.26 s (Keele and Posner 1968)",
     )
-    corrections: int = parameter(
-        3,
-        Within(0, 10),
-        "largest number of corrections in one reach",
-        fixed=True,
-        source="assumed: more are hardly ever needed",
+    corrections: int = fixed(
+        3, Within(0, 10), "largest number of corrections in one reach", source="assumed: more are hardly ever needed"
     )
-    dwell_time: float = parameter(
+    dwell_time: float = fixed(
         0.22,
         Within(0.01, 10.0, "s"),
         "median duration of a rest at a target",
-        fixed=True,
         source="assumed: fits the figures of people",
     )
-    dwell_spread: float = parameter(
+    dwell_spread: float = fixed(
         0.4,
         Within(0.0, 2.0),
         "standard deviation of the logarithm of the rest's duration",
-        fixed=True,
         source="assumed: fits the figures of people",
     )
-    passing: float = parameter(
+    passing: float = fixed(
         0.75,
         Within(0.0, 1.0),
         "share of targets at which the hand does not rest",
-        fixed=True,
         source="assumed: fits the figures of people",
     )
-    overlap: float = parameter(
+    overlap: float = fixed(
         0.32,
         Within(0.0, 0.5),
         "at a target without rest, the next reach begins before the last submovement ends, by this "
         "share of its duration",
-        fixed=True,
         source="assumed: Flash and Henis 1991 state that submovements overlap",
     )
-    tremor: float = parameter(
+    tremor: float = fixed(
         63e-6,
         Within(0.0, 5e-3, "m"),
         "RMS tremor of the tip over three axes, from 8 to 12 Hz; the hand trembles at rest too",
-        fixed=True,
         source="fitted: to the tremor of a hand that rests, docs/human_operator.md",
     )
 

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from teleop_core.base import Within, parameter
+from teleop_core.base import Within, fixed
 
 _FITTED = "fitted: to the four times of movement of MacKenzie and Ware 1993"
 
@@ -11,98 +11,77 @@ _FITTED = "fitted: to the four times of movement of MacKenzie and Ware 1993"
 class ObserverParameters:
     """How the operator sees, waits and moves."""
 
-    eye: float = parameter(
+    eye: float = fixed(
         0.13,
         Within(0.0, 1.0, "s"),
         "time from seeing or feeling something to a plan that uses it",
-        fixed=True,
         source="published: 0.110 to 0.163 s in six studies of corrections by sight",
     )
-    reaction: float = parameter(
-        0.25, Within(0.0, 2.0, "s"), "time from a new goal to the first submovement", fixed=True, source=_FITTED
+    reaction: float = fixed(
+        0.25, Within(0.0, 2.0, "s"), "time from a new goal to the first submovement", source=_FITTED
     )
-    least_time: float = parameter(
-        0.06,
-        Within(0.02, 1.0, "s"),
-        "duration of a submovement whose index of difficulty is 0",
-        fixed=True,
-        source=_FITTED,
+    least_time: float = fixed(
+        0.06, Within(0.02, 1.0, "s"), "duration of a submovement whose index of difficulty is 0", source=_FITTED
     )
-    time_per_bit: float = parameter(
+    time_per_bit: float = fixed(
         0.02,
         Within(0.0, 1.0, "s"),
         "added duration of a submovement for each bit of its index of difficulty",
-        fixed=True,
         source=_FITTED,
     )
-    noise: float = parameter(
+    noise: float = fixed(
         0.04,
         Within(0.0, 0.5, "s"),
         "standard deviation of a submovement's end along its direction, divided by its mean speed",
-        fixed=True,
         source=_FITTED + "; linear in speed: Meyer et al. 1988",
     )
-    noise_across: float = parameter(
+    noise_across: float = fixed(
         0.36,
         Within(0.0, 1.0),
         "standard deviation of a submovement's end across its direction, divided by that along it",
-        fixed=True,
         source="assumed: the ratio of the operator human",
     )
-    error_cost: float = parameter(
+    error_cost: float = fixed(
         0.0,
         Within(0.0, 100.0, "s"),
         "cost of an error, as time: the operator presses without seeing the result if the wait would "
         "cost more; 0: never",
         off=0.0,
-        fixed=True,
     )
-    fastest: float = parameter(
+    fastest: float = fixed(
         0.04,
         Within(0.005, 10.0, "m/s"),
         "largest mean speed of a submovement of the hand; the peak speed is 1.9 times as high",
-        fixed=True,
         source="fitted: to 65 mm/s, the 95th percentile of the moving hand's speed, UVA-DSA telesurgery "
         "QoS analysis 2026",
     )
-    longest_wait: float = parameter(
+    longest_wait: float = fixed(
         3.0,
         Within(0.1, 60.0, "s"),
         "longest wait until the display shows the last motion; then the operator goes on. It waits "
         "less once it knows the delay of the display",
-        fixed=True,
         source="assumed: as the longest outage of the UVA-DSA telesurgery QoS analysis 2026",
     )
-    fastest_turn: float = parameter(
-        0.8,
-        Within(0.05, 20.0, "rad/s"),
-        "largest mean angular speed of a turn of the hand",
-        fixed=True,
-        source="assumed",
+    fastest_turn: float = fixed(
+        0.8, Within(0.05, 20.0, "rad/s"), "largest mean angular speed of a turn of the hand", source="assumed"
     )
-    largest_turn: float = parameter(
+    largest_turn: float = fixed(
         1.0,
         Within(0.1, 3.0, "rad"),
         "largest turn of the stylus that the wrist can make",
-        fixed=True,
         source="assumed: wrists turn by 1.3 rad to each side (Boone and Azen 1979), and nobody works at that limit",
     )
-    softness: float = parameter(
+    softness: float = fixed(
         0.003,
         Within(1e-5, 0.1, "m/N"),
         "compliance that the operator expects of an object before it has pressed it",
-        fixed=True,
         source="assumed: the same as task.palpate.yielding",
     )
-    axes: tuple[str, ...] = parameter(
-        ("-z", "-x", "+y"),
-        length=3,
-        fixed=True,
-        doc="axes of the hand along x, y, z of the slave; the same as motion_scaling.axes",
+    axes: tuple[str, ...] = fixed(
+        ("-z", "-x", "+y"), length=3, doc="axes of the hand along x, y, z of the slave; the same as motion_scaling.axes"
     )
-    tool_axes: tuple[str, ...] = parameter(
+    tool_axes: tuple[str, ...] = fixed(
         ("-y", "-x", "-z"),
         length=3,
-        fixed=True,
         doc="axes of the stylus along x, y, z of the tool; motion_scaling.tool_axes after its tool_roll",
     )

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple, cast
 
 import numpy as np
 
-from teleop_core.base import ShapeError, UnknownNameError, Within, parameter
+from teleop_core.base import ShapeError, UnknownNameError, Within, fixed
 from teleop_core.hand.operators import Motion, Operator, Setting, follower, rest
 from teleop_core.kernels import geometry
 
@@ -29,47 +29,41 @@ _FARTHEST = 10.0  # poses farther than this from the master's base are refused [
 class RemoteParameters:
     """How a hand follows the poses that a remote person wants."""
 
-    delay: float = parameter(
+    delay: float = fixed(
         0.045,
         Within(0.005, 0.5, "s"),
         "delay of the stylus behind a commanded motion of constant speed",
-        fixed=True,
         source="assumed: smooths 30 to 60 poses per second; less than a third of the delay that people feel",
     )
-    timeout: float = parameter(
+    timeout: float = fixed(
         0.2,
         Within(0.02, 5.0, "s"),
         "if no pose arrives for this time, the operator lets go of the stylus: the clutch is pressed "
         "until the next pose",
-        fixed=True,
         source="assumed: the time of some six frames of a slow page",
     )
-    speed: float = parameter(
+    speed: float = fixed(
         0.5,
         Within(0.01, 2.5, "m/s"),
         "largest speed of the stylus",
-        fixed=True,
         source="assumed: crosses the Phantom's workspace in a third of a second",
     )
-    acceleration: float = parameter(
+    acceleration: float = fixed(
         30.0,
         Within(0.1, 500.0, "m/s²"),
         "largest acceleration of the stylus",
-        fixed=True,
         source="assumed: three times that of a free fall",
     )
-    turn_speed: float = parameter(
+    turn_speed: float = fixed(
         6.0,
         Within(0.05, 50.0, "rad/s"),
         "largest angular speed of the stylus",
-        fixed=True,
         source="assumed: about one turn a second",
     )
-    turn_acceleration: float = parameter(
+    turn_acceleration: float = fixed(
         300.0,
         Within(1.0, 5000.0, "rad/s²"),
         "largest angular acceleration of the stylus",
-        fixed=True,
         source="assumed: reaches turn_speed in half of the delay",
     )
 

@@ -9,7 +9,7 @@ from typing import cast
 
 import numpy as np
 
-from teleop_core.base import ParameterError, Within, parameter
+from teleop_core.base import ParameterError, Within, fixed
 from teleop_core.hand.operators import Motion, Operator, Setting
 from teleop_core.hand.operators.behaviour import OperatorParameters
 from teleop_core.hand.operators.shapes import minimum_jerk, smooth
@@ -20,31 +20,25 @@ from teleop_core.kernels.geometry import Array
 class TourParameters:
     """Where a tour goes, and how fast."""
 
-    points: tuple[float, ...] = parameter(
-        (),
-        Within(-0.3, 0.3, "m"),
-        "x, y, z of each point relative to the centre, one point after the other",
-        fixed=True,
+    points: tuple[float, ...] = fixed(
+        (), Within(-0.3, 0.3, "m"), "x, y, z of each point relative to the centre, one point after the other"
     )
-    leg_time: float = parameter(
+    leg_time: float = fixed(
         0.7,
         Within(0.05, 60.0, "s"),
         "duration of the move from one point to the next",
-        fixed=True,
         source="assumed: with it, 24 points, their rests and the line back take the published 45 s",
     )
-    rest_time: float = parameter(
+    rest_time: float = fixed(
         0.6,
         Within(0.0, 60.0, "s"),
         "duration of the rest at each point",
-        fixed=True,
         source="assumed: for the same reason as leg_time",
     )
-    trace_time: float = parameter(
+    trace_time: float = fixed(
         13.8,
         Within(0.0, 600.0, "s"),
         "duration of the line back through all points, from the last to the first; 0: no line back",
-        fixed=True,
         source="assumed: for the same reason as leg_time",
     )
 

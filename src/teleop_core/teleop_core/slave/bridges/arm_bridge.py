@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from teleop_core.base import Choice, ParameterError, Within, choice, parameter
+from teleop_core.base import Choice, ParameterError, Within, choice, fixed
 from teleop_core.graph import DT, RunningStage, Stage, topics
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots import load_robot_set
@@ -29,54 +29,48 @@ class BridgeParameters:
     """Parameters of every bridge to a controller."""
 
     kind: Choice = choice(BRIDGES, "joint_state", doc="kind of command that the arm's controller accepts", fixed=True)
-    command_topic: str = parameter(
-        "", fixed=True, doc="topic on which the controller receives commands; empty: the usual topic of its kind"
+    command_topic: str = fixed(
+        "", doc="topic on which the controller receives commands; empty: the usual topic of its kind"
     )
-    state_topic: str = parameter(
-        "", fixed=True, doc="topic on which the arm publishes its JointState; empty: the usual topic of its kind"
+    state_topic: str = fixed(
+        "", doc="topic on which the arm publishes its JointState; empty: the usual topic of its kind"
     )
-    rate: int = parameter(
+    rate: int = fixed(
         500,
         Within(100, 1000, "1/s"),
         "number of commands per second, one of " + ", ".join(map(str, RATES)),
-        fixed=True,
         source="assumed",
     )
-    stamps: str = parameter(
+    stamps: str = fixed(
         "header",
         choices=("header", "sent"),
-        fixed=True,
         doc="timestamp of a sample of the arm: header: the stamp of its header; sent: the time when "
         "it was sent, for arms with another clock",
     )
-    oldest_stamp: float = parameter(
+    oldest_stamp: float = fixed(
         0.1,
         Within(0.001, 1.0, "s"),
         "largest difference between the stamp of a sample and our clock; samples beyond it are refused",
-        fixed=True,
         source="assumed",
     )
-    jump_tolerance: float = parameter(
+    jump_tolerance: float = fixed(
         0.02,
         Within(1e-4, 0.1, "rad or m"),
         "largest joint motion between two samples, added to the motion at twice the rated speed; "
         "samples beyond it are refused",
-        fixed=True,
         source="assumed",
     )
-    arm_timeout: float = parameter(
+    arm_timeout: float = fixed(
         0.3,
         Within(0.02, 5.0, "s"),
         "if no valid sample of the arm arrives for this time, the bridge sends no more commands; the "
         "slave holds earlier, after its command_timeout",
-        fixed=True,
         source="assumed",
     )
-    setpoint_timeout: float = parameter(
+    setpoint_timeout: float = fixed(
         0.1,
         Within(0.005, 5.0, "s"),
         "if no slave/setpoint_js arrives for this time, the bridge sends no more commands",
-        fixed=True,
         source="assumed",
     )
 
@@ -90,32 +84,26 @@ class BridgeParameters:
 class ArmBridgeParameters(RobotParameters, BridgeParameters):
     """Parameters of :class:`ArmBridge`."""
 
-    joints: tuple[str, ...] = parameter(
-        (), fixed=True, doc="ours=theirs for each joint that has another name in the arm's messages"
-    )
-    signs: tuple[float, ...] = parameter(
+    joints: tuple[str, ...] = fixed((), doc="ours=theirs for each joint that has another name in the arm's messages")
+    signs: tuple[float, ...] = fixed(
         (),
         Within(-1.0, 1.0),
         "sign of each of our joints, 1.0 or -1.0: our position = sign * arm position + offset; empty: 1.0",
-        fixed=True,
     )
-    offsets: tuple[float, ...] = parameter(
+    offsets: tuple[float, ...] = fixed(
         (),
         Within(unit="rad or m"),
         "offset of each of our joints: our position = sign * arm position + offset; empty: 0.0",
-        fixed=True,
     )
-    order: tuple[str, ...] = parameter(
+    order: tuple[str, ...] = fixed(
         (),
-        fixed=True,
         doc="names of the arm's joints in the order of its commands, because a forward command "
         "contains no names; empty: the robot's order",
     )
-    start_tolerance: float = parameter(
+    start_tolerance: float = fixed(
         0.02,
         Within(1e-4, 0.1, "rad or m"),
         "the bridge starts to send commands when each joint is nearer to its setpoint than this",
-        fixed=True,
         source="assumed",
     )
 

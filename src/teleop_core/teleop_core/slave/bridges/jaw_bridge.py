@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from teleop_core.base import ParameterError, Within, parameter
+from teleop_core.base import ParameterError, Within, fixed
 from teleop_core.graph import DT, Stage
 from teleop_core.graph.topics import JAW, NO_COMMAND_NS, SLAVE_JAW_MEASURED_JS, SLAVE_JAW_SETPOINT_JS, SLAVE_OPERATION
 from teleop_core.slave.bridges import Command, arm_bridge, leading
@@ -22,23 +22,19 @@ _SAME = 1e-3  # a setpoint that moved by less while the gripper was not commande
 class JawBridgeParameters(arm_bridge.BridgeParameters):
     """Parameters of :class:`JawBridge`."""
 
-    command_topic: str = parameter(
-        "/gripper_controller/commands", fixed=True, doc="topic on which the gripper receives commands"
-    )
-    state_topic: str = parameter("/joint_states", fixed=True, doc="topic on which the gripper publishes its JointState")
-    joint: str = parameter("jaw", fixed=True, doc="name of the joint in the gripper's messages")
-    scale: float = parameter(
+    command_topic: str = fixed("/gripper_controller/commands", doc="topic on which the gripper receives commands")
+    state_topic: str = fixed("/joint_states", doc="topic on which the gripper publishes its JointState")
+    joint: str = fixed("jaw", doc="name of the joint in the gripper's messages")
+    scale: float = fixed(
         1.0,
         Within(-1e4, 1e4, "1 or rad/m"),
         "our angle = scale * gripper position + offset; negative if the gripper's position grows as it closes",
-        fixed=True,
     )
-    offset: float = parameter(0.0, Within(-10.0, 10.0, "rad"), "our angle at the gripper's position 0", fixed=True)
-    speed_limit: float = parameter(
+    offset: float = fixed(0.0, Within(-10.0, 10.0, "rad"), "our angle at the gripper's position 0")
+    speed_limit: float = fixed(
         4.0,
         Within(0.01, 100.0, "rad/s"),
         "rated speed of the gripper; commands exceed it by at most a fifth",
-        fixed=True,
         source="assumed",
     )
 

@@ -6,7 +6,7 @@ It moves the jaw's setpoint as ``slave`` moves the arm's. It receives the jaw's 
 import math
 from dataclasses import dataclass
 
-from teleop_core.base import Within, parameter
+from teleop_core.base import Within, fixed, parameter
 from teleop_core.graph import DT, Row, RunningStage, Stage, assign, topics
 from teleop_core.kernels import Fields, inner, kernel, record
 from teleop_core.slave.operation.states import State
@@ -26,9 +26,7 @@ class JawParameters:
         Within(0.002, 5.0, "s"),
         "if no command or no measured angle of the jaw arrives for this time, the jaw holds its setpoint",
     )
-    upper: float = parameter(
-        0.8, Within(0.05, 3.0, "rad"), "largest commanded angle between the fingers", fixed=True, source="assumed"
-    )
+    upper: float = fixed(0.8, Within(0.05, 3.0, "rad"), "largest commanded angle between the fingers", source="assumed")
     speed_limit: float = parameter(
         4.0, Within(0.01, 100.0, "rad/s"), "largest speed of the jaw's setpoint", source="assumed"
     )

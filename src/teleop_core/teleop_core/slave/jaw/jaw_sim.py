@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from teleop_core.base import ParameterError, Within, parameter
+from teleop_core.base import ParameterError, Within, fixed, parameter
 from teleop_core.graph import DT, Row, RunningStage, Stage, assign, copy, topics
 from teleop_core.kernels import kernel, record
 from teleop_core.slave.jaw.drive import drive
@@ -18,12 +18,11 @@ _OTHERS = (topics.FIRST_JAW_BOARD, topics.SECOND_TRUE_CP, topics.SECOND_JAW_GRIP
 class GripObjectParameters:
     """Objects that the jaw can grip, equally thick from every side; they stand on a flat table."""
 
-    place: tuple[float, ...] = parameter(
+    place: tuple[float, ...] = fixed(
         (),
         Within(-10.0, 10.0, "m"),
         "start position of the middle of the object, half its size above the table; several objects: "
         "one position after the other, with the same z; empty: no object",
-        fixed=True,
     )
     size: float = parameter(0.02, Within(1e-3, 0.2, "m"), "edge length of the object")
     mass: float = parameter(0.05, Within(1e-4, 10.0, "kg"), "mass of the object")
@@ -48,11 +47,8 @@ class GripObjectParameters:
 class PegParameters:
     """Upright pegs of the table, onto which objects can be put."""
 
-    place: tuple[float, ...] = parameter(
-        (),
-        Within(-10.0, 10.0, "m"),
-        "x, y of the axis of each peg, one peg after the other; empty: no pegs",
-        fixed=True,
+    place: tuple[float, ...] = fixed(
+        (), Within(-10.0, 10.0, "m"), "x, y of the axis of each peg, one peg after the other; empty: no pegs"
     )
     height: float = parameter(
         0.015, Within(1e-3, 0.5, "m"), "height by which an object must be lifted to come off a peg", source="assumed"
@@ -78,11 +74,10 @@ class PegParameters:
 class JawSimParameters:
     """Parameters of :class:`JawSim`."""
 
-    upper: float = parameter(
+    upper: float = fixed(
         0.8,
         Within(0.05, 3.0, "rad"),
         "angle between the fingers at the drive's open stop, which is also the start",
-        fixed=True,
         source="assumed",
     )
     effort_limit: float = parameter(
@@ -99,19 +94,17 @@ class JawSimParameters:
     finger_length: float = parameter(
         0.04, Within(1e-3, 0.5, "m"), "distance from the pivot of a finger to its pad", source="assumed"
     )
-    origin: tuple[float, ...] = parameter(
+    origin: tuple[float, ...] = fixed(
         (0.0, 0.0, 0.0),
         Within(-10.0, 10.0, "m"),
         "origin of the board in the base of the first arm; positions of objects and pegs are relative to it",
         length=3,
-        fixed=True,
     )
-    second_base: tuple[float, ...] = parameter(
+    second_base: tuple[float, ...] = fixed(
         (0.0, 0.0, 0.0),
         Within(-10.0, 10.0, "m"),
         "position of the second arm's base in the base of the first arm; their axes are parallel",
         length=3,
-        fixed=True,
     )
     object: GripObjectParameters = field(default_factory=GripObjectParameters)
     pegs: PegParameters = field(default_factory=PegParameters)

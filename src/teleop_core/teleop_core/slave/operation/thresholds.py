@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from teleop_core.base import ParameterError, Within, parameter
+from teleop_core.base import ParameterError, Within, fixed, parameter
 from teleop_core.slave.operation.faults import NAMES
 from teleop_core.slave.operation.states import COMMANDS, Event, command_event
 
@@ -14,9 +14,8 @@ MOST_EVENTS = 64
 class OperationParameters:
     """Limits, faults and states of an arm in operation."""
 
-    starts_enabled: bool = parameter(
+    starts_enabled: bool = fixed(
         True,
-        fixed=True,
         doc="true: the arm enables and homes itself; false: it waits for the commands enable and "
         "home, as hardware does",
     )
@@ -94,10 +93,8 @@ class OperationParameters:
         "if commands are beyond a joint's limit for longer than this, the joint counts as pressed into the limit",
     )
     reported: tuple[str, ...] = parameter((), choices=NAMES, doc="faults that are reported, but do not stop the arm")
-    events: tuple[str, ...] = parameter(
-        (),
-        fixed=True,
-        doc="state commands and their times since the start, as command@seconds: stop@2.5, reset@4, enable@4.1",
+    events: tuple[str, ...] = fixed(
+        (), doc="state commands and their times since the start, as command@seconds: stop@2.5, reset@4, enable@4.1"
     )
 
     def __post_init__(self) -> None:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from teleop_core.base import ParameterError, UnknownNameError, Within, parameter
+from teleop_core.base import ParameterError, UnknownNameError, Within, fixed, parameter
 from teleop_core.graph import DT
 from teleop_core.kernels import Array, pointer
 from teleop_core.robots.arms.as_chain import true_chain
@@ -38,8 +38,8 @@ FAULTS = {
 class HardwareParameters:
     """Simulated effects, values that replace the robot's, and values that no robot file states."""
 
-    without: tuple[str, ...] = parameter(
-        (), choices=tuple(FAULTS), fixed=True, doc="effects that the plant leaves out, to see what each contributes"
+    without: tuple[str, ...] = fixed(
+        (), choices=tuple(FAULTS), doc="effects that the plant leaves out, to see what each contributes"
     )
     coulomb: tuple[float, ...] = parameter(
         (), Within(0.0, None, "N·m or N"), "dry friction of each joint; empty: the robot's"
@@ -53,8 +53,8 @@ class HardwareParameters:
     play: tuple[float, ...] = parameter(
         (), Within(0.0, None, "rad or m"), "half of the backlash behind each encoder; empty: the robot's"
     )
-    weights: tuple[str, ...] = parameter(
-        (), fixed=True, doc="symbol=value for each dynamic parameter that the source does not state; empty: the robot's"
+    weights: tuple[str, ...] = fixed(
+        (), doc="symbol=value for each dynamic parameter that the source does not state; empty: the robot's"
     )
     bristle_frequency: float = parameter(
         250.0,
@@ -87,18 +87,16 @@ class HardwareParameters:
         "effort of the drives, divided by the commanded effort",
         source="assumed: 1; torque constants are known to some 10 %",
     )
-    gear_stiffness: tuple[float, ...] = parameter(
+    gear_stiffness: tuple[float, ...] = fixed(
         (),
         Within(0.0, None, "N·m/rad or N/m"),
         "stiffness of each gear between its motor (with the encoder) and its link; 0 or empty: rigid",
-        fixed=True,
     )
-    motor_inertia: tuple[float, ...] = parameter(
+    motor_inertia: tuple[float, ...] = fixed(
         (),
         Within(1e-12, None, "kg·m² or kg"),
         "inertia of each motor at the output of its gear, a part of the axis's inertia; used for "
         "elastic gears only; empty: the robot's",
-        fixed=True,
     )
 
 

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from teleop_core.base import Choice, ParameterError, Value, Within, choice, parameter
+from teleop_core.base import Choice, ParameterError, Value, Within, choice, fixed, parameter
 from teleop_core.kernels.geometry import Array
 from teleop_core.slave.world import WORLD_OBJECTS
 
@@ -47,26 +47,21 @@ class WorldParameters:
     """Parameters of the object that the tip can touch."""
 
     kind: Choice = choice(WORLD_OBJECTS, "empty", fixed=True, doc="object that the tip can touch", usual=_USUAL)
-    place: tuple[float, ...] = parameter(
+    place: tuple[float, ...] = fixed(
         (),
         Within(-10.0, 10.0, "m"),
         "middle of the object in the slave's base; empty: vertically below the tip at the robot's "
         "start, at the distance gap",
-        fixed=True,
     )
-    base: tuple[float, ...] = parameter(
+    base: tuple[float, ...] = fixed(
         (0.0, 0.0, 0.0),
         Within(-10.0, 10.0, "m"),
         "position of this arm's base in the frame in which place is given, with parallel axes. For a "
         "second arm: its base in the first arm's base, so that both touch the same object",
         length=3,
-        fixed=True,
     )
-    gap: float = parameter(
-        0.01,
-        Within(0.0, 1.0, "m"),
-        "distance from the tip at the robot's start to the object, if place is empty",
-        fixed=True,
+    gap: float = fixed(
+        0.01, Within(0.0, 1.0, "m"), "distance from the tip at the robot's start to the object, if place is empty"
     )
     material: str = parameter(
         "tissue",
@@ -85,23 +80,16 @@ class WorldParameters:
         0.3, Within(0.0, 2.0), "friction force divided by the normal force, if the material is own"
     )
 
-    tool_points: int = parameter(
+    tool_points: int = fixed(
         1,
         Within(1, 16),
         "number of points at which the tool can touch: its tip, and others behind it on the tool's "
         "axis, which is z of the tip",
-        fixed=True,
     )
-    tool_length: float = parameter(
-        0.02,
-        Within(1e-3, 1.0, "m"),
-        "distance from the tip to the last of several contact points",
-        fixed=True,
-        source="assumed",
+    tool_length: float = fixed(
+        0.02, Within(1e-3, 1.0, "m"), "distance from the tip to the last of several contact points", source="assumed"
     )
-    tool_radius: float = parameter(
-        0.0, Within(0.0, 0.1, "m"), "radius of the tool at each of its contact points", fixed=True
-    )
+    tool_radius: float = fixed(0.0, Within(0.0, 0.1, "m"), "radius of the tool at each of its contact points")
 
     puncture_force: float = parameter(
         0.0,
