@@ -12,7 +12,7 @@ from teleop_core.kinematics import FkStatus
 from teleop_core.robots import Robot
 from teleop_core.robots.bodies import Bodies, Joint, Solid, bodies_of
 from teleop_core.robots.bodies.describe import serial_bodies, unknown_bodies
-from teleop_core.robots.bodies.solids import along, capsule
+from teleop_core.robots.solids import along, capsule
 from teleop_machines.mma_models import frames, joints_of_model, loop_closure, model_table
 
 TABLE = {

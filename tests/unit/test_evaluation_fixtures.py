@@ -19,7 +19,6 @@ from teleop_core.coupling.mapping.gains import MotionScalingParameters
 from teleop_core.evaluation import Figure, TableRow, evaluate, study
 from teleop_core.evaluation.command import evaluate_bags
 from teleop_core.evaluation.origin import read_origin
-from teleop_core.evaluation.rows import summary
 from teleop_core.graph import TICK_NS, topics
 from teleop_core.kernels.axes import axis_map
 from teleop_core.kernels.geometry import Array
@@ -243,7 +242,7 @@ def test_fixture_of_an_unknown_shape_leaves_the_rest_of_the_score(
     assert score.fixture.penetration_max_mm is score.fixture.outside_share is None
     assert np.isclose(score.fixture.on_s, 2.0)
     assert told in present(score.fixture.unscored)
-    (row,) = [row for row in summary(score) if row.label == "shape not known"]
+    (row,) = [row for row in score.rows if row.label == "shape not known"]
     assert row.value == described["fixture"]
     assert f"not scored: {score.fixture.unscored}" in figures(bag)["Path in space"].sentence
 
@@ -262,7 +261,7 @@ def test_known_shapes_are_scored_beside_unknown_ones(recipe: Recipe, path: Path)
 
 
 def rows_of(bag: Bag) -> dict[str, TableRow]:
-    return {row.label: row for row in summary(evaluate(bag))}
+    return {row.label: row for row in evaluate(bag).rows}
 
 
 @pytest.mark.parametrize(

@@ -16,7 +16,7 @@ from teleop_core.base.errors import ParameterError, UnknownNameError
 from teleop_core.evaluation.figure import Figure
 from teleop_lab import experiments
 from teleop_lab.experiments import EXACT, Comparison, Experiment, Outcome, Tolerance, absolute, factor, percent
-from teleop_lab.experiments.experiment_table import numbers, summary, text
+from teleop_lab.experiments.outcome import numbers, summary
 from teleop_lab.experiments.page import experiments_page
 
 positive = st.floats(1e-6, 1e6)
@@ -159,10 +159,10 @@ def test_table_shows_marks_notes_and_ours_where_there_is_one() -> None:
         quantity="error", unit="mm", published=0.5, predicted=0.51, ours=0.04, within=percent(15),
         lowest=0.4, highest=0.6, group="coarse", note="by hand",
     )  # fmt: skip
-    shown = text(outcome(row, notes=("mind this",)))
+    shown = str(outcome(row, notes=("mind this",)))
     for part in ("coarse", "error (by hand)", "0.4 … 0.6", "ours", "15 %", "✓", "mind this"):
         assert part in shown
-    assert "ours" not in text(outcome(Comparison(quantity="error", published=0.5, predicted=0.9)))
+    assert "ours" not in str(outcome(Comparison(quantity="error", published=0.5, predicted=0.9)))
 
 
 def test_page_escapes_what_others_wrote_and_asks_nobody() -> None:

@@ -16,7 +16,8 @@ from teleop_core.robots import load_robot
 from teleop_core.session.configuration import configure
 from teleop_core.slave.pair import ArmParameters
 from teleop_core.slave.plants.hardware import faults_of
-from teleop_lab.fitting.fit import FitResult, default_free, fit
+from teleop_lab.fitting.fit import default_free, fit
+from teleop_lab.fitting.fit_result import FitResult
 from teleop_lab.fitting.rest_table import PUBLISHED, RestTable, read_rests
 from teleop_lab.fitting.rests import rest_positions
 

@@ -19,7 +19,6 @@ from patience import wait_until
 from teleop_core.graph.layers import config_folder
 from teleop_lab import Study, read_study, sweep
 from teleop_lab.studies import point, summary
-from teleop_lab.studies.store import Store
 
 if TYPE_CHECKING:
     import xarray
@@ -72,7 +71,7 @@ def test_nothing_is_run_twice(found: Found) -> None:
 
 def test_what_is_missing_failed_or_changed_is_run_and_named(found: Found, tmp_path: Path) -> None:
     store, _ = found
-    kept = Store.open(store, study())
+    kept = study().store(store)
     points = study().points()
     one = kept.result(points[0])
     assert one is not None
@@ -83,7 +82,7 @@ def test_what_is_missing_failed_or_changed_is_run_and_named(found: Found, tmp_pa
     ):
         kept._results[one.name] = change  # as a file from before would be
         assert kept.reason(points[0]) == reason
-    assert Store.open(tmp_path / "new", study()).reason(points[0]) == "missing"
+    assert study().store(tmp_path / "new").reason(points[0]) == "missing"
     wider = study(seeds=(1, 2, 3)).explain(store)
     assert (wider.to_run, wider.why) == (2, {"missing": 2})
     longer = study(settings={"teleop.duration": 2.0}).explain(store)

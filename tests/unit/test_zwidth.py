@@ -5,8 +5,9 @@ import pytest
 from present import present
 from teleop_lab import experiments
 from teleop_lab.experiments import zwidth
+from teleop_lab.experiments.comparison import Comparison
 from teleop_lab.experiments.one_axis import Grip, exact_boundary, sampled_boundary
-from teleop_lab.experiments.outcome import Comparison, Outcome
+from teleop_lab.experiments.outcome import Outcome
 from teleop_lab.experiments.sampled_wall import (
     SampledDevice,
     Wall,

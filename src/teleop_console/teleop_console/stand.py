@@ -8,7 +8,7 @@ from teleop_core.coupling.mapping.gains import MotionScalingParameters
 from teleop_core.kernels.axes import axis_map
 from teleop_core.kernels.geometry import Array, quaternion_from_rotation
 from teleop_core.robots.bodies.meshes import mesh_of
-from teleop_core.robots.bodies.solids import Solid
+from teleop_core.robots.solids import Solid
 
 PUBLISHED_AXES = axis_map("axes", MotionScalingParameters.axes)
 """Rotation (3, 3) from the master's base to the slave's axes; used if a session does not define one."""

@@ -9,7 +9,8 @@ from .experiments import (
 )
 from .fitting import FitError as FitError, FitResult as FitResult, fit_plant as fit_plant
 from .grading import grade as grade
-from .planning.reach import Reach as Reach, reach as reach
+from .planning.reach import reach as reach
+from .planning.reach_result import Reach as Reach
 from .studies import (
     Study as Study,
     Tuning as Tuning,

@@ -11,9 +11,9 @@ from plotly.offline import get_plotlyjs, get_plotlyjs_version
 from teleop_console.report.overview import overview
 from teleop_console.report.packing import Arrays, deflated
 from teleop_console.report.page_template import PAGE, POLICY, TIMES, script, style
+from teleop_console.report.scores_table import html_table
 from teleop_core.evaluation.bands import Band
 from teleop_core.evaluation.figure import Figure, is_against_time
-from teleop_core.evaluation.html_table import html_table
 from teleop_core.evaluation.published import ANGLE_FACTOR, POSITION_SHARE, SOURCE
 from teleop_core.evaluation.rows import is_compared, side_by_side
 from teleop_core.evaluation.score import Score
@@ -76,7 +76,7 @@ def _kept_s(score: Score) -> float:
 
 def _note(scores: Sequence[Score]) -> str:
     """Explanation of the marks, if published figures are shown beside ours."""
-    if not is_compared(side_by_side(scores)):
+    if not is_compared(side_by_side([score.rows for score in scores])):
         return ""
     return (
         f'<p class="facts">Beside the published figures of the RCRT-1 ({escape(SOURCE)}), '

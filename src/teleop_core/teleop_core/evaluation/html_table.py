@@ -1,54 +1,19 @@
-"""HTML table: scores side by side, for the page and for notebooks."""
+"""HTML table: the rows of a score, for notebooks."""
 
 from collections.abc import Sequence
 from html import escape
 from itertools import groupby
-from typing import TYPE_CHECKING
 
-from teleop_core.evaluation.published import published_for
-from teleop_core.evaluation.rows import Line, TableRow, side_by_side
+from teleop_core.evaluation.rows import TableRow, side_by_side
 
-if TYPE_CHECKING:
-    from teleop_core.evaluation.score import Score
-
-_CLASSES = {True: "met", False: "missed", None: "plain"}
 _MARKS = {True: " ✓", False: " ✗", None: ""}
 
 
-def html_table(scores: "Sequence[Score]") -> str:
-    """Table of the page: one column per score, and one column of published figures beside scores that have them."""
-    found = side_by_side(scores)
-    columns = list(zip(*(line.rows for line in found), strict=True))
-    are_compared = [any(row.published for row in rows) for rows in columns]
-    heads, kinds = "", ""
-    for score, is_beside in zip(scores, are_compared, strict=False):
-        mode = published_for(score.session.gain, score.session.robot, score.session.plant)
-        heads += f'<th colspan="{1 + is_beside}">{escape(score.session.place)}</th>'
-        kinds += "<th><small>measured</small></th>"
-        kinds += f"<th><small>published{f', {mode.mode}' if mode else ''}</small></th>" * is_beside
-    lines = [f"<thead><tr><th></th><th></th>{heads}</tr><tr><th></th><th></th>{kinds}</tr></thead>"]
-    for group, members in groupby(found, key=lambda line: line.group):
-        span = 2 + len(scores) + sum(are_compared)
-        lines.append(f'<tr class="group"><th colspan="{span}">{escape(group)}</th></tr>')
-        lines += (_line(line, are_compared) for line in members)
-    return "<table>" + "\n".join(lines) + "</table>"
-
-
-def _line(line: Line, are_compared: Sequence[bool]) -> str:
-    cells = "".join(
-        f'<td class="value {_CLASSES[row.is_met]}">{escape(row.value)}</td>'
-        + f'<td class="published">{escape(row.published)}</td>' * is_beside
-        for row, is_beside in zip(line.rows, are_compared, strict=True)
-    )
-    return f'<tr><td>{escape(line.label)}</td><td class="unit">{escape(line.unit)}</td>{cells}</tr>'
-
-
-def compact_table(score: "Score") -> str:
-    """Table for a notebook, without a style sheet."""
-    session = score.session
-    head = f"<b>{escape(session.place)}</b> · {escape(' · '.join(session.facts))}"
-    lines = [f'<tr><th colspan="4" style="text-align:left">{head}<br>{escape(score.verdict.text)}</th></tr>']
-    for group, members in groupby(side_by_side([score]), key=lambda line: line.group):
+def compact_table(title: str, facts: Sequence[str], verdict: str, rows: Sequence[TableRow]) -> str:
+    """Table of the rows of one score, without a style sheet, below a title, facts and a verdict."""
+    head = f"<b>{escape(title)}</b> · {escape(' · '.join(facts))}"
+    lines = [f'<tr><th colspan="4" style="text-align:left">{head}<br>{escape(verdict)}</th></tr>']
+    for group, members in groupby(side_by_side([rows]), key=lambda line: line.group):
         lines.append(f'<tr><th colspan="4" style="text-align:left">{escape(group)}</th></tr>')
         lines += (_compact_line(line.rows[0]) for line in members)
     return "<table>" + "\n".join(lines) + "</table>"

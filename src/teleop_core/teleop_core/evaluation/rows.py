@@ -2,12 +2,9 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from teleop_core.evaluation.accumulators import Spread
-
-if TYPE_CHECKING:
-    from teleop_core.evaluation.score import Score
 
 MISSING = "–"
 _LEAST = 1e-9  # smaller numbers are rounding errors
@@ -92,21 +89,12 @@ class Line(NamedTuple):
     rows: tuple[TableRow, ...]
 
 
-def summary(score: "Score") -> list[TableRow]:
-    """Rows of a score. Rows of one group are together, at the position of the group's first row."""
-    groups: dict[str, list[TableRow]] = {}
-    for result in score.results:
-        for row in result.rows:
-            groups.setdefault(row.group, []).append(row)
-    return [row for rows in groups.values() for row in rows]
-
-
-def side_by_side(scores: "Sequence[Score]") -> list[Line]:
-    """Lines of a table of several scores; a row that a score lacks is a dash.
+def side_by_side(tables: Sequence[Sequence[TableRow]]) -> list[Line]:
+    """Lines of a table of several scores, from the rows of each; a row that a score lacks is a dash.
 
     Lines without information for all scores are left out: dashes, and delays of zero, as in virtual time.
     """
-    found = [{_place(row): row for row in summary(score)} for score in scores]
+    found = [{_place(row): row for row in rows} for rows in tables]
     places = dict.fromkeys(place for rows in found for place in rows)
     lines = [Line(*place, tuple(rows.get(place) or TableRow(*place, MISSING) for rows in found)) for place in places]
     return [line for line in lines if any(row.value not in _NOTHING for row in line.rows)]

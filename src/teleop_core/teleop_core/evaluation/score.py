@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Generic, NoReturn, TypeVar
 
 from teleop_core.base.errors import EvaluationError, UnknownNameError
 from teleop_core.evaluation.accumulators import Delay, Spread
+from teleop_core.evaluation.html_table import compact_table
 from teleop_core.evaluation.metric import Key
 from teleop_core.evaluation.metrics.counts import Counts, Samples, Ticks, TopicScore
 from teleop_core.evaluation.metrics.fixture import FixtureScore
@@ -218,6 +219,15 @@ class Score:
                 found.setdefault(result.place, {}).update(result.json)
         return dict(found)
 
+    @property
+    def rows(self) -> list[TableRow]:
+        """Rows of the table. Rows of one group are together, at the position of the group's first row."""
+        groups: dict[str, list[TableRow]] = {}
+        for result in self.results:
+            for row in result.rows:
+                groups.setdefault(row.group, []).append(row)
+        return [row for rows in groups.values() for row in rows]
+
     def to_dict(self) -> dict[str, Leaf]:
         """Every value by its key, in one dictionary: a row of a data frame."""
         return _by_key(self.to_json())
@@ -231,9 +241,7 @@ class Score:
         )
 
     def _repr_html_(self) -> str:
-        from teleop_core.evaluation.html_table import compact_table
-
-        return compact_table(self)
+        return compact_table(self.session.place, self.session.facts, self.verdict.text, self.rows)
 
     # -- the metrics of this package, typed ------------------------------------------------------
 

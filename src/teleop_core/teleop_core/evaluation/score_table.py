@@ -27,14 +27,15 @@ def score_tables(scores: Sequence[Score], width: int) -> list[Table]:
         scores: One or more scores.
         width: Width of the terminal, in characters.
     """
-    label = max((len(f"  {line.label} {line.unit} ") for line in side_by_side(scores)), default=0)
+    lines = side_by_side([score.rows for score in scores])
+    label = max((len(f"  {line.label} {line.unit} ") for line in lines), default=0)
     fitting = max(1, (width - label) // COLUMN_WIDTH)
     return [score_table(scores[i : i + fitting]) for i in range(0, len(scores), fitting)]
 
 
 def score_table(scores: Sequence[Score]) -> Table:
     """Table with one column per score; each figure is beside its published value, with a check mark if both agree."""
-    lines = side_by_side(scores)
+    lines = side_by_side([score.rows for score in scores])
     caption = CAPTION if is_compared(lines) else None
     table = Table(box=SIMPLE, caption=caption, caption_justify="left", pad_edge=False, padding=(0, 1, 0, 0))
     table.add_column("", no_wrap=True)

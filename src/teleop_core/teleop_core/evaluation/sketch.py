@@ -1,34 +1,28 @@
 """Sketch: a small picture of a recording for a notebook; needs no plotting library."""
 
+from collections.abc import Mapping
 from html import escape
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from teleop_core.bags.arms import topic_prefix
-from teleop_core.base.errors import TeleopError
 from teleop_core.evaluation.figure import MEASURED, REFERENCE
 from teleop_core.kernels.geometry import Array
 
-if TYPE_CHECKING:
-    from teleop_core.session.recording import Recording
-
 _WIDTH, _HEIGHT, _MARGIN, _POINTS = 260, 200, 26, 600
-_PANELS = (("x", "y"), ("x", "z"), ("y", "z"))
+_PANELS = ((0, 1), (0, 2), (1, 2))
 
 
-def sketch(recording: "Recording") -> str:
-    """Inline SVG with each arm's tip path seen along each axis, and a line of facts."""
-    parts = [f"<p><b>{escape(repr(recording))}</b></p>"]
-    for arm in recording.arms:
-        prefix = topic_prefix(recording.bag, arm)
-        try:
-            wanted = recording[f"{prefix}slave/setpoint_cp"]
-            reached = recording[f"{prefix}slave/measured_cp"]
-        except TeleopError:
-            continue
+def sketch(title: str, paths: Mapping[str, tuple[Array, Array]]) -> str:
+    """Inline SVG with each arm's tip path seen along each axis, below a title.
+
+    Args:
+        title: A line of facts.
+        paths: Positions (N, 3) of each arm's tip [m]: the reference, and measured.
+    """
+    parts = [f"<p><b>{escape(title)}</b></p>"]
+    for arm, (wanted, reached) in paths.items():
         panels = "".join(
-            _panel(column, axes, wanted[axes] * 1e3, reached[axes] * 1e3) for column, axes in enumerate(_PANELS)
+            _panel(column, axes, wanted[:, axes] * 1e3, reached[:, axes] * 1e3) for column, axes in enumerate(_PANELS)
         )
         size = f'width="{3 * _WIDTH}" height="{_HEIGHT}" viewBox="0 0 {3 * _WIDTH} {_HEIGHT}"'
         head = f"<p>{escape(arm)}</p>" if arm else ""
@@ -37,7 +31,7 @@ def sketch(recording: "Recording") -> str:
     return "".join(parts)
 
 
-def _panel(column: int, axes: tuple[str, str], wanted: Array, reached: Array) -> str:
+def _panel(column: int, axes: tuple[int, int], wanted: Array, reached: Array) -> str:
     both = np.concatenate((wanted, reached))
     both = both[np.isfinite(both).all(axis=1)]
     if not len(both):
@@ -54,6 +48,7 @@ def _panel(column: int, axes: tuple[str, str], wanted: Array, reached: Array) ->
         y = 0.5 * _HEIGHT - (thin[:, 1] - middle[1]) * scale
         path = " ".join(f"{a:.1f},{b:.1f}" for a, b in zip(x, y, strict=True) if np.isfinite(a + b))
         lines.append(f'<polyline points="{path}" fill="none" stroke="{color}" stroke-width="{width}"/>')
-    text = f"{axes[0]} {low[0]:.0f} … {high[0]:.0f}, {axes[1]} {low[1]:.0f} … {high[1]:.0f} mm"
+    ranges = (f"{'xyz'[axis]} {low[i]:.0f} … {high[i]:.0f}" for i, axis in enumerate(axes))
+    text = f"{', '.join(ranges)} mm"
     label = f'<text x="{left}" y="{_HEIGHT - 6}" font-size="11" text-anchor="middle">{text}</text>'
     return "".join(lines) + label

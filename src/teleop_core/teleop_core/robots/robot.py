@@ -34,8 +34,8 @@ from teleop_core.robots.drives import Drives, Dynamics, independent_axes, read_o
 from teleop_core.robots.hardware import Hardware
 
 if TYPE_CHECKING:
-    from teleop_core.robots.bodies.body import Bodies
-    from teleop_core.robots.files.visuals import Visual
+    from teleop_core.robots.body import Bodies
+    from teleop_core.robots.visual import Visual
 
 
 class _Start:

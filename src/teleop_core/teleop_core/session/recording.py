@@ -2,6 +2,7 @@
 
 import shutil
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -10,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from teleop_core.bags import layouts, memory, reader, recording
-from teleop_core.bags.arms import arm_names
+from teleop_core.bags.arms import arm_names, topic_prefix
 from teleop_core.bags.series import Series, kind_of
 from teleop_core.bags.writer import BagWriter
 from teleop_core.base.errors import RecordingError, TeleopError, UnknownNameError
@@ -271,7 +272,13 @@ class Recording:
     def _repr_html_(self) -> str:
         from teleop_core.evaluation.sketch import sketch
 
-        return sketch(self)
+        paths = {}
+        for arm in self.arms:
+            prefix = topic_prefix(self._bag, arm)
+            with suppress(TeleopError):
+                wanted, reached = (self[f"{prefix}slave/{name}_cp"] for name in ("setpoint", "measured"))
+                paths[arm] = wanted[["x", "y", "z"]], reached[["x", "y", "z"]]
+        return sketch(repr(self), paths)
 
 
 def _model_of(bag: reader.Bag) -> "Model":

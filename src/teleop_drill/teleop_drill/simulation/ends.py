@@ -4,15 +4,12 @@ from bisect import insort
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 from teleop_core.middleware.ros_messages import write_message
 from teleop_core.middleware.world import Qos, Taken
 from teleop_drill.simulation.machine import Process
-from teleop_drill.simulation.scheduler import Strand
-
-if TYPE_CHECKING:
-    from teleop_drill.simulation.bus import Bus
+from teleop_drill.simulation.scheduler import Scheduler, Strand
 
 _PUBLISH_NS, _TAKE_NS = 12_000, 900
 """Time that the middleware needs to hand over a message, measured with rclpy."""
@@ -36,6 +33,20 @@ class Match:
     """Whether what a latched topic has, this message included, is still to be sent."""
 
 
+class _Carrier(Protocol):
+    """The simulated middleware, as its ends use it: :class:`~teleop_drill.simulation.bus.Bus`."""
+
+    scheduler: Scheduler
+    seen: dict[str, Callable[[Taken], None]]
+    heard: dict[str, Callable[["Reader", Taken], None]]
+
+    def next_gid(self) -> bytes: ...
+    def next_order(self) -> int: ...
+    def carry(self, writer: "Writer", link: Match, taken: Taken) -> None: ...
+    def send_again(self, reader: "Reader", taken: Taken) -> bool: ...
+    def leave_reader(self, reader: "Reader") -> None: ...
+
+
 class Writer:
     """One end of a topic, with the interface of :class:`~teleop_core.middleware.world.Publisher`.
 
@@ -48,7 +59,7 @@ class Writer:
         qos: Its quality.
     """
 
-    def __init__(self, bus: "Bus", process: Process, node: str, topic: str, kind: Any, qos: Qos) -> None:
+    def __init__(self, bus: _Carrier, process: Process, node: str, topic: str, kind: Any, qos: Qos) -> None:
         self._bus, self.process, self.node, self.topic, self.qos = bus, process, node, topic, qos
         self.ros_type = _name_of(kind)
         self.sender, self.born_ns, self._clock = bus.next_gid(), bus.scheduler.now_ns, process.machine.clock
@@ -98,7 +109,7 @@ class Reader:
         node: Name of its node, with the namespace.
     """
 
-    def __init__(self, bus: "Bus", process: Process, kind: Any, topic: str, qos: Qos, node: str) -> None:
+    def __init__(self, bus: _Carrier, process: Process, kind: Any, topic: str, qos: Qos, node: str) -> None:
         self._bus, self.process, self.type, self.topic, self.qos = bus, process, kind, topic, qos
         self.node, self.ros_type, self.sender = node, _name_of(kind), bus.next_gid()
         self.lost, self.born_ns, self.is_open = 0, bus.scheduler.now_ns, True

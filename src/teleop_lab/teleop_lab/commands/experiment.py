@@ -77,7 +77,7 @@ def _outcomes(names: tuple[str, ...], seed: int) -> "list[Outcome]":
 
 
 def _show(outcomes: "list[Outcome]") -> None:
-    from teleop_lab.experiments.experiment_table import show, summary, terminal
+    from teleop_lab.experiments.outcome import show, summary, terminal
 
     console = terminal()
     for outcome in outcomes:

@@ -8,7 +8,7 @@ from teleop_core.base.errors import TeleopError
 from teleop_core.commands.arguments import command, geometry_argument, setting_arguments
 
 if TYPE_CHECKING:
-    from teleop_lab.planning.reach import Reach
+    from teleop_lab.planning.reach_result import Reach
 
 _EPILOG = """\
 shares are of the time: as given, and with a start of the slave, an order of axes and gains that

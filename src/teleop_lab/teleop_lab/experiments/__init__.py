@@ -9,8 +9,9 @@
 from collections.abc import Callable, Iterable
 
 from teleop_lab.experiments.bench import SEEDS, Bench, Session, mean, pooled
+from teleop_lab.experiments.comparison import EXACT, Comparison, Findings, Tolerance, absolute, factor, percent
 from teleop_lab.experiments.experiment import EXPERIMENTS, Experiment, register_experiment
-from teleop_lab.experiments.outcome import EXACT, Comparison, Findings, Outcome, Tolerance, absolute, factor, percent
+from teleop_lab.experiments.outcome import Outcome
 
 __all__ = [
     "EXACT",

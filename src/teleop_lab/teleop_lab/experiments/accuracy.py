@@ -15,7 +15,7 @@ from teleop_lab.calibration.appendix_e import ESCAPE, OFFSET_OF_D3, READ, STEP
 from teleop_lab.drawing import axis, joined, published_points
 from teleop_lab.experiments import conditions, experiment
 from teleop_lab.experiments.bench import Bench
-from teleop_lab.experiments.outcome import Comparison, Findings, absolute
+from teleop_lab.experiments.comparison import Comparison, Findings, absolute
 from teleop_lab.fitting.rests import Mover
 
 DESIRED_MM = np.arange(10.0, 101.0, 10.0)

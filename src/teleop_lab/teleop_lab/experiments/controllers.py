@@ -12,7 +12,7 @@ from teleop_core.robots import load_robot
 from teleop_lab.drawing import DARK, Trace, axis, level, line, points
 from teleop_lab.experiments import experiment, joint_steps
 from teleop_lab.experiments.bench import Bench, Session, Settings, mean, pooled
-from teleop_lab.experiments.outcome import Comparison, Findings, percent
+from teleop_lab.experiments.comparison import Comparison, Findings, percent
 
 _PLANT: Settings = {"plant": "hardware"}
 LAWS: Mapping[str, Settings] = {

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 from teleop_core.evaluation.figure import Figure
 from teleop_lab.experiments.bench import Bench, Settings
+from teleop_lab.experiments.comparison import EXACT, Comparison, Findings, percent
 from teleop_lab.experiments.experiment import Experiment
-from teleop_lab.experiments.outcome import EXACT, Comparison, Findings, percent
 
 if TYPE_CHECKING:
     from xarray import DataArray

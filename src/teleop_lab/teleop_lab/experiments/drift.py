@@ -12,7 +12,7 @@ from teleop_core.kernels.geometry import Array
 from teleop_lab.drawing import axis, joined, level
 from teleop_lab.experiments import experiment, transmission
 from teleop_lab.experiments.bench import Bench
-from teleop_lab.experiments.outcome import Comparison, Findings, absolute
+from teleop_lab.experiments.comparison import Comparison, Findings, absolute
 
 MATERIALS = ("tissue", "silicone", "steel")
 PASSIVITIES = ("none", "tank", "tdpa", "wave")

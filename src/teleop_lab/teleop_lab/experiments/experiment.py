@@ -5,7 +5,8 @@ from dataclasses import dataclass
 
 from teleop_core.base import PartError, Registry
 from teleop_lab.experiments.bench import Bench
-from teleop_lab.experiments.outcome import Findings, Outcome
+from teleop_lab.experiments.comparison import Findings
+from teleop_lab.experiments.outcome import Outcome
 
 _PLACE = "teleop_lab.experiments"
 

@@ -4,7 +4,7 @@ import math
 
 from teleop_lab.experiments import experiment, look_and_move
 from teleop_lab.experiments.bench import Bench
-from teleop_lab.experiments.outcome import Comparison, Findings, percent
+from teleop_lab.experiments.comparison import Comparison, Findings, percent
 
 LAGS = (0.0083, 0.025, 0.075, 0.225)
 """Delays of the screen [s]."""

@@ -7,7 +7,7 @@ from teleop_core.robots import load_robot
 from teleop_lab.drawing import axis, line
 from teleop_lab.experiments import conditions, experiment, master_slave
 from teleop_lab.experiments.bench import Bench, Session, pooled
-from teleop_lab.experiments.outcome import Comparison, Findings, percent
+from teleop_lab.experiments.comparison import Comparison, Findings, percent
 
 _OFF = {"gravity_compensation": "none"}
 _CURVE = 2

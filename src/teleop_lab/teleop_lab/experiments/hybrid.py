@@ -9,8 +9,8 @@ from teleop_core.kernels.geometry import Array, rotation, transform
 from teleop_core.robots import load_robot
 from teleop_lab.drawing import in_space, scene
 from teleop_lab.experiments.bench import Bench
+from teleop_lab.experiments.comparison import Comparison, Findings, absolute
 from teleop_lab.experiments.experiment import Experiment
-from teleop_lab.experiments.outcome import Comparison, Findings, absolute
 
 _PLACE_CM, _TILT = (93.3013, 20.0, 43.6603), math.radians(30.0)
 _LEGS_CM = (22.3607, 26.7095, 26.7095, 22.3607, 19.1569, 19.1569)

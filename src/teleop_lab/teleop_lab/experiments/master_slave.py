@@ -12,7 +12,7 @@ from teleop_core.shapes.basis.drawing import edges_of
 from teleop_lab.drawing import FIXTURE, axis, in_planes, in_space, level, line, scene
 from teleop_lab.experiments import conditions, experiment
 from teleop_lab.experiments.bench import Bench, Session, mean, pooled
-from teleop_lab.experiments.outcome import Comparison, Findings, Tolerance, absolute, factor, percent
+from teleop_lab.experiments.comparison import Comparison, Findings, Tolerance, absolute, factor, percent
 
 MODES = {"coarse_box": COARSE, "fine_box": FINE}
 BOX_MM = {"coarse_box": 30.0, "fine_box": 3.0}

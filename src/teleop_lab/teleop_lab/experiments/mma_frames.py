@@ -6,8 +6,8 @@ from teleop_core.evaluation.figure import FIRST, THIRD, Figure
 from teleop_core.robots import load_robot
 from teleop_lab.drawing import PUBLISHED, in_space, scene
 from teleop_lab.experiments.bench import Bench
+from teleop_lab.experiments.comparison import EXACT, Comparison, Findings, absolute
 from teleop_lab.experiments.experiment import Experiment
-from teleop_lab.experiments.outcome import EXACT, Comparison, Findings, absolute
 from teleop_machines import mma_models, mobility
 
 # Frame: printed model, measured prototype [mm].

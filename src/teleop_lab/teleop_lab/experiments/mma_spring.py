@@ -7,8 +7,8 @@ import numpy as np
 from teleop_core.evaluation.figure import DARK, SECOND, THIRD, Figure
 from teleop_lab.drawing import axis, line, published_points
 from teleop_lab.experiments.bench import Bench
+from teleop_lab.experiments.comparison import EXACT, Comparison, Findings, absolute, percent
 from teleop_lab.experiments.experiment import Experiment
-from teleop_lab.experiments.outcome import EXACT, Comparison, Findings, absolute, percent
 from teleop_machines import mma_balance
 
 _OPEN, _SQUARE = math.radians(135.0), math.radians(90.0)

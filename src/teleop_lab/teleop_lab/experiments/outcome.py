@@ -1,171 +1,27 @@
-"""Outcome: results of an experiment, beside the results that its source printed."""
+"""Outcome: results of an experiment, and its table on the terminal, published beside predicted."""
 
+import io
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from itertools import groupby
 
-from teleop_core.base.errors import ParameterError
+import numpy as np
+from rich.box import SIMPLE
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from teleop_core.base.errors import UnknownNameError
 from teleop_core.evaluation.figure import Figure
+from teleop_core.evaluation.rows import MISSING
+from teleop_lab.experiments.comparison import Comparison, Plain
 
-Plain = str | int | float | bool | None | list["Plain"] | dict[str, "Plain"]
-_KINDS = ("exact", "share", "absolute", "factor")
-_ROUNDING = 1e-9
-BASES = ("printed", "law", "goal")
-"""Origins of the values against which rows are judged."""
-
-
-@dataclass(frozen=True)
-class Tolerance:
-    """How far a prediction may be from a published figure and still agree with it.
-
-    Attributes:
-        kind: "exact" except for rounding errors, "share" of the published figure, "absolute" in the unit of the row,
-            or "factor", which bounds the ratio of prediction and published figure in both directions.
-        amount: Share (0.15), amount in the unit (0.5), or factor above 1 (1.6); 0 for "exact".
-
-    Raises:
-        ParameterError: An unknown kind, or an amount that no prediction can meet.
-    """
-
-    kind: str
-    amount: float = 0.0
-
-    def __post_init__(self) -> None:
-        if self.kind not in _KINDS:
-            raise ParameterError("kind", self.kind, f"one of {', '.join(_KINDS)}")
-        if self.kind == "exact":
-            if self.amount != 0.0:
-                raise ParameterError("amount", self.amount, "0 for a quantity that must be exact")
-            return
-        least = 1.0 if self.kind == "factor" else 0.0
-        if not (math.isfinite(self.amount) and self.amount > least):
-            raise ParameterError("amount", self.amount, f"finite and above {least:g}")
-
-    def allows(self, published: float, predicted: float) -> bool:
-        """Whether both agree."""
-        if self.kind == "factor":
-            if published * predicted <= 0.0:
-                return False
-            return abs(math.log(predicted / published)) <= math.log(self.amount)
-        room = self.amount * (abs(published) if self.kind == "share" else 1.0)
-        # A difference equal to the tolerance, except for rounding, agrees.
-        room += _ROUNDING * (room or max(1.0, abs(published)))
-        return abs(predicted - published) <= room
-
-    def text(self, unit: str) -> str:
-        """For people: "15 %", "0.5 mm", "factor 1.6", "exact"."""
-        if self.kind == "exact":
-            return self.kind
-        if self.kind == "share":
-            return f"{100.0 * self.amount:.3g} %"
-        if self.kind == "factor":
-            return f"factor {self.amount:g}"
-        return f"{self.amount:.3g}{unit if unit == '°' else f' {unit}'.rstrip()}"
-
-
-EXACT = Tolerance("exact")
-
-
-def percent(amount: float) -> Tolerance:
-    """Agreement within so many percent of the published figure."""
-    return Tolerance("share", amount / 100.0)
-
-
-def absolute(amount: float) -> Tolerance:
-    """Agreement within an amount in the unit of the row."""
-    return Tolerance("absolute", amount)
-
-
-def factor(amount: float) -> Tolerance:
-    """Agreement within a factor from either side."""
-    return Tolerance("factor", amount)
-
-
-@dataclass(frozen=True, kw_only=True)
-class Comparison:
-    """One quantity of an experiment; values that do not exist are None.
-
-    Attributes:
-        quantity: Name of the quantity.
-        unit: Its unit; empty for pure numbers.
-        published: Value that the source printed, or a value of another ``basis``.
-        predicted: Value of our model of the source's machine.
-        ours: Value with another controller on the same model.
-        within: Tolerance for agreement of ``predicted`` with ``published``; None if the row is not judged.
-        basis: Origin of ``published``: "printed", a "law" of the source evaluated by us, or a "goal" of our own. Only
-            printed values count as published figures.
-        lowest: Smallest value of several seeds; ``predicted`` is their mean.
-        highest: Largest value of these seeds.
-        group: Heading above the row.
-        note: Remark that a reader of the row needs, such as a misprint.
-
-    Raises:
-        ParameterError: A number is not finite, or the basis is unknown.
-    """
-
-    quantity: str
-    unit: str = ""
-    published: float | None = None
-    predicted: float | None = None
-    ours: float | None = None
-    within: Tolerance | None = None
-    basis: str = "printed"
-    lowest: float | None = None
-    highest: float | None = None
-    group: str = ""
-    note: str = ""
-
-    def __post_init__(self) -> None:
-        if self.basis not in BASES:
-            raise ParameterError("basis", self.basis, f"one of {', '.join(BASES)}")
-        for name in ("published", "predicted", "ours", "lowest", "highest"):
-            value = getattr(self, name)
-            if value is None:
-                continue
-            if not math.isfinite(value):
-                raise ParameterError(f"{name} of {self.quantity}", value, "finite, or None")
-            object.__setattr__(self, name, float(value))  # converts NumPy's types
-
-    @property
-    def difference(self) -> float | None:
-        """Predicted minus published value; None if one of them is missing."""
-        if self.published is None or self.predicted is None:
-            return None
-        return self.predicted - self.published
-
-    @property
-    def agrees(self) -> bool | None:
-        """Whether prediction and publication agree; None where that is not judged."""
-        if self.within is None or self.published is None or self.predicted is None:
-            return None
-        return self.within.allows(self.published, self.predicted)
-
-    def to_json(self) -> dict[str, Plain]:
-        """The row as plain values; numbers are exact."""
-        within: Plain = None
-        if self.within is not None:
-            within = {"kind": self.within.kind, "amount": self.within.amount}
-        return {
-            "group": self.group, "quantity": self.quantity, "unit": self.unit,
-            "published": self.published, "predicted": self.predicted, "ours": self.ours,
-            "difference": self.difference, "within": within, "agrees": self.agrees,
-            "basis": self.basis,
-            "lowest": self.lowest, "highest": self.highest, "note": self.note,
-        }  # fmt: skip
-
-
-class Findings(NamedTuple):
-    """Return value of an experiment's function.
-
-    Attributes:
-        rows: Numbers, published and predicted.
-        figures: Plots for the page, with published points on them where there are any.
-        notes: Sentences that a reader needs so that the numbers do not mislead.
-    """
-
-    rows: tuple[Comparison, ...]
-    figures: tuple[Figure, ...] = ()
-    notes: tuple[str, ...] = ()
+MARKS = {True: "✓", False: "✗", None: ""}
+_COLORS = {True: "green", False: "red", None: "default"}
+_KEPT = {"printed": "published figures agree", "law": "laws hold", "goal": "goals are kept"}
+_WIDTH = 110
+_DIGITS = 6  # decimals, the most that any source prints
 
 
 @dataclass(frozen=True, eq=False)
@@ -211,8 +67,6 @@ class Outcome:
         Raises:
             UnknownNameError: There is no such row; the text lists the existing ones.
         """
-        from teleop_core.base.errors import UnknownNameError
-
         for row in self.rows:
             if row.quantity == quantity and (not group or row.group == group):
                 return row
@@ -233,6 +87,129 @@ class Outcome:
         }
 
     def __str__(self) -> str:
-        from teleop_lab.experiments.experiment_table import text
+        console = Console(file=io.StringIO(), width=_WIDTH, color_system=None, legacy_windows=False)
+        show(self, console)
+        out = console.file
+        assert isinstance(out, io.StringIO)
+        return "\n".join(line.rstrip() for line in out.getvalue().splitlines()).strip("\n")
 
-        return text(self)
+
+def numbers(row: Comparison) -> tuple[str, str, str, str]:
+    """Texts of published, predicted, ours and difference.
+
+    A predicted number has one decimal more than the printed one, so that rounding is visible.
+    """
+    if row.published is None:
+        return "", _plain(row.predicted), _plain(row.ours), ""
+    texts = [_beside(value, row.published) for value in (row.predicted, row.ours)]
+    difference = "" if row.difference is None else _signed(row.difference, row.published)
+    return _printed(row.published), texts[0], texts[1], difference
+
+
+def _printed(published: float) -> str:
+    """A published number as printed, or with four digits if it was computed from printed numbers."""
+    text = f"{published:.9g}"
+    return text if len(text.partition(".")[2]) <= _DIGITS else f"{published:.4g}"
+
+
+def _beside(value: float | None, published: float) -> str:
+    """Text of a number with one decimal more than the printed one, or with three digits if that is more."""
+    if value is None:
+        return ""
+    if 0.0 < abs(published) < 1e-4:
+        return f"{value:.4g}"
+    printed = len(_printed(published).partition(".")[2])
+    size = 0 if abs(value) < 1e-9 else math.floor(math.log10(abs(value)))
+    return f"{value + 0.0:.{max(printed + 1, min(2 - size, printed + 2))}f}"
+
+
+def _plain(value: float | None) -> str:
+    return "" if value is None else f"{value:.4g}"
+
+
+def _signed(difference: float, published: float) -> str:
+    """Text of a difference; zero if it is only rounding."""
+    if abs(difference) <= 1e-12 * max(1.0, abs(published)):
+        return "0"
+    digits = 2 if abs(difference) < 10.0 else int(math.log10(abs(difference))) + 1
+    return f"{difference:+.{digits}g}"
+
+
+def spread(row: Comparison) -> str:
+    """Text with the smallest and largest value of several seeds."""
+    if row.lowest is None or row.highest is None:
+        return ""
+    return f"{row.lowest:.3g} … {row.highest:.3g}"
+
+
+def within(row: Comparison) -> str:
+    """Text of the tolerance."""
+    if row.within is None:
+        return ""
+    return row.within.text(row.unit) + f", {row.basis}" * (row.basis != "printed")
+
+
+def summary(outcomes: Sequence[Outcome]) -> str:
+    """One line: how many figures agree, and how many laws and goals are met."""
+    found = {basis: np.sum([o.count(basis) for o in outcomes], axis=0) for basis in _KEPT}
+    told = [f"{kept} of {of} {_KEPT[b]}" for b, (kept, of) in found.items() if of or b == "printed"]
+    rest = sum(len(o.rows) for o in outcomes) - sum(of for _, of in found.values())
+    return "; ".join((*told, f"{rest} rows are not judged"))
+
+
+def outcome_table(outcome: Outcome) -> Table:
+    """Table of one outcome."""
+    has_ours = any(row.ours is not None for row in outcome.rows)
+    has_spread = any(spread(row) for row in outcome.rows)
+    table = Table(
+        box=SIMPLE,
+        title=f"[bold]{escape(outcome.name)}[/bold]: {escape(outcome.title)}",
+        title_justify="left",
+        pad_edge=False,
+        padding=(0, 1, 0, 0),
+    )
+    table.add_column("", min_width=20)
+    table.add_column("unit", style="dim", no_wrap=True)
+    heads = ["published", "predicted", *["seeds"] * has_spread, *["ours"] * has_ours, "difference"]
+    for head in heads:
+        table.add_column(head, justify="right", no_wrap=True)
+    table.add_column("within", style="dim", no_wrap=True)
+    table.add_column("", no_wrap=True)
+    for group, rows in groupby(outcome.rows, key=lambda row: row.group):
+        if group:
+            table.add_section()
+            table.add_row(f"[bold]{escape(group)}[/bold]")
+        for row in rows:
+            published, predicted, ours, difference = numbers(row)
+            mark = f"[{_COLORS[row.agrees]}]{MARKS[row.agrees]}[/]"
+            cells = [published, predicted, *[spread(row)] * has_spread, *[ours] * has_ours]
+            note = f" [dim]({escape(row.note)})[/dim]" if row.note else ""
+            table.add_row(
+                f"{escape(row.quantity)}{note}",
+                escape(row.unit),
+                *map(escape, cells),
+                escape(difference),
+                escape(within(row)),
+                mark,
+            )
+    return table
+
+
+def show(outcome: Outcome, console: Console) -> None:
+    """Print the table of an outcome, and its notes."""
+    console.print(outcome_table(outcome))
+    told = f"{MARKS[True]} agrees, {MARKS[False]} does not; {outcome.source}"
+    for line in (told, *outcome.notes):
+        console.print(line, markup=False, highlight=False, style="dim")
+    console.print()
+
+
+def terminal() -> Console:
+    """Console on standard output; if this is not a terminal, the console is as wide as a table needs."""
+    console = Console(legacy_windows=False)
+    return console if console.is_terminal else Console(width=_WIDTH, legacy_windows=False)
+
+
+def empty(value: str) -> str:
+    """A dash for a missing number."""
+    return value or MISSING

@@ -10,8 +10,8 @@ from plotly.offline import get_plotlyjs, get_plotlyjs_version
 
 from teleop_console.report import packing, page_template
 from teleop_core.evaluation.figure import Figure, is_against_time
-from teleop_lab.experiments.experiment_table import MARKS, empty, numbers, spread, summary, within
-from teleop_lab.experiments.outcome import BASES, Comparison, Outcome
+from teleop_lab.experiments.comparison import BASES, Comparison
+from teleop_lab.experiments.outcome import MARKS, Outcome, empty, numbers, spread, summary, within
 
 _CLASSES = {True: "met", False: "missed", None: "plain"}
 _STYLE = """

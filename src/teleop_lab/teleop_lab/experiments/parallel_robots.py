@@ -5,8 +5,8 @@ import numpy as np
 from teleop_core.evaluation.figure import FIRST, SECOND, Figure
 from teleop_lab.drawing import axis, line
 from teleop_lab.experiments.bench import Bench
+from teleop_lab.experiments.comparison import EXACT, Comparison, Findings
 from teleop_lab.experiments.experiment import Experiment
-from teleop_lab.experiments.outcome import EXACT, Comparison, Findings
 from teleop_machines import four_bar_loop, mobility
 
 # Mechanism: space, links, joints, freedoms of the joints, and the printed freedom.

@@ -14,9 +14,9 @@ from teleop_core.kernels.axes import axis_map
 from teleop_core.kernels.geometry import Array
 from teleop_lab.drawing import axis, line
 from teleop_lab.experiments.bench import Bench, Session, Settings, mean
+from teleop_lab.experiments.comparison import EXACT, Comparison, Findings
 from teleop_lab.experiments.conditions import OURS, PREDICTED
 from teleop_lab.experiments.experiment import Experiment
-from teleop_lab.experiments.outcome import EXACT, Comparison, Findings
 
 SCENARIO = "points24"
 INNER_MM = 0.5

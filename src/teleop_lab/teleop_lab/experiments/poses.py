@@ -10,8 +10,8 @@ from teleop_core.kernels.geometry import Array
 from teleop_core.robots import Robot, load_robot
 from teleop_lab.drawing import PUBLISHED, in_space, scene
 from teleop_lab.experiments.bench import Bench
+from teleop_lab.experiments.comparison import Comparison, Findings, absolute
 from teleop_lab.experiments.experiment import Experiment
-from teleop_lab.experiments.outcome import Comparison, Findings, absolute
 
 _D = math.pi / 180.0
 _WRIST = 80.214 * _D

@@ -13,7 +13,7 @@ from teleop_core.slave.pair import ArmParameters
 from teleop_lab.drawing import axis, points, published_points
 from teleop_lab.experiments import conditions, experiment
 from teleop_lab.experiments.bench import Bench, Settings
-from teleop_lab.experiments.outcome import Comparison, Findings, factor, percent
+from teleop_lab.experiments.comparison import Comparison, Findings, factor, percent
 from teleop_lab.experiments.pose_measures import accuracy, repeatability
 from teleop_lab.fitting.rest_table import PUBLISHED, RestTable, read_rests
 from teleop_lab.fitting.rests import rest_positions

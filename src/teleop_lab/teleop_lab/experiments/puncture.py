@@ -13,8 +13,8 @@ from teleop_core.hand.operators.shapes import minimum_jerk
 from teleop_core.kernels.geometry import Array
 from teleop_lab.drawing import PUBLISHED, axis, joined
 from teleop_lab.experiments.bench import Bench, Settings
+from teleop_lab.experiments.comparison import Comparison, Findings, absolute
 from teleop_lab.experiments.experiment import Experiment
-from teleop_lab.experiments.outcome import Comparison, Findings, absolute
 from teleop_lab.experiments.transmission import CHANNELS, Way, far_settings
 
 WAYS: tuple[Way, ...] = (

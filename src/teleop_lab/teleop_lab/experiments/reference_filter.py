@@ -11,8 +11,8 @@ from teleop_core.kernels.geometry import Array
 from teleop_core.slave.slave import ReferenceFilterParameters
 from teleop_lab.drawing import axis, level, line, points
 from teleop_lab.experiments.bench import Bench, Session, Settings
+from teleop_lab.experiments.comparison import EXACT, Comparison, Findings, absolute, factor
 from teleop_lab.experiments.experiment import Experiment
-from teleop_lab.experiments.outcome import EXACT, Comparison, Findings, absolute, factor
 
 # Eqs. 6.2.8 and 6.2.9, sign corrected; printed to two digits.
 _COEFFICIENTS = {"of the last output": 0.99, "of the last input": -0.09, "of the input": 0.1}

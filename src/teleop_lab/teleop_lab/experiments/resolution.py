@@ -9,8 +9,8 @@ from teleop_core.kernels.geometry import Array
 from teleop_core.robots import load_robot
 from teleop_lab.drawing import axis, joined, points
 from teleop_lab.experiments.bench import Bench
+from teleop_lab.experiments.comparison import EXACT, Comparison, Findings, percent
 from teleop_lab.experiments.experiment import Experiment
-from teleop_lab.experiments.outcome import EXACT, Comparison, Findings, percent
 
 _DEGREE, _UM = math.pi / 180.0, 1e-6
 # Printed steps of the joints [°] and of the screw [µm]; the source's own appendix A.4 has the

@@ -15,7 +15,7 @@ from teleop_core.slave import pair, trajectory
 from teleop_lab.drawing import axis, level, line
 from teleop_lab.experiments import conditions, experiment
 from teleop_lab.experiments.bench import Bench, Settings
-from teleop_lab.experiments.outcome import Comparison, Findings, factor
+from teleop_lab.experiments.comparison import Comparison, Findings, factor
 from teleop_lab.fitting.rest_table import PUBLISHED, read_rests
 
 # What the text reads from its plots once the tip rests [mm].

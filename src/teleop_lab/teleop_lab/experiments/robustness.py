@@ -12,7 +12,7 @@ from teleop_core.slave.plants.hardware import faults_of
 from teleop_lab.drawing import DARK, axis
 from teleop_lab.experiments import controllers, experiment
 from teleop_lab.experiments.bench import Bench, Settings
-from teleop_lab.experiments.outcome import Comparison, Findings
+from teleop_lab.experiments.comparison import Comparison, Findings
 
 _PLANT: Settings = {"plant": "hardware", "robot": "rcrt1"}
 _SECONDS = 12.0  # duration of each session [s]

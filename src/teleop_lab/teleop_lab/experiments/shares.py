@@ -7,7 +7,7 @@ from teleop_core.slave.plants.hardware import FAULTS
 from teleop_lab.drawing import axis
 from teleop_lab.experiments import conditions, experiment
 from teleop_lab.experiments.bench import Bench, Session, Settings
-from teleop_lab.experiments.outcome import Comparison, Findings
+from teleop_lab.experiments.comparison import Comparison, Findings
 
 
 def _without(bench: Bench, *faults: str) -> Session:

@@ -11,7 +11,7 @@ from teleop_core.hand.master.device import DeviceParameters
 from teleop_lab.drawing import PUBLISHED, axis, joined, line
 from teleop_lab.experiments import experiment, one_axis, transmission
 from teleop_lab.experiments.bench import Bench, Settings
-from teleop_lab.experiments.outcome import Comparison, Findings, percent
+from teleop_lab.experiments.comparison import Comparison, Findings, percent
 
 GRIPS: Mapping[str, one_axis.Grip] = {
     "loose": one_axis.Grip(0.25, 100.0, 5.0),

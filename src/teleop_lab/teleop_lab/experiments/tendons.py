@@ -9,8 +9,8 @@ from teleop_core.kernels.geometry import Array
 from teleop_core.robots.arms.rcrt1_hardware import tendon_joint_angles, tendon_motor_angles
 from teleop_lab.drawing import axis, line
 from teleop_lab.experiments.bench import Bench
+from teleop_lab.experiments.comparison import EXACT, Comparison, Findings, percent
 from teleop_lab.experiments.experiment import Experiment
-from teleop_lab.experiments.outcome import EXACT, Comparison, Findings, percent
 
 # Radii [mm]: 3.5, 2.5, 1.8 and 2.5 are printed, their stars are lost; most likely so.
 _MOTOR5, _JOINT5, _MOTOR6, _JOINT6 = 3.5, 2.5, 1.8, 2.5

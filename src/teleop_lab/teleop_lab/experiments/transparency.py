@@ -10,8 +10,8 @@ from teleop_core.evaluation.figure import FIRST, FIXTURE, MEASURED, SECOND, THIR
 from teleop_core.kernels.geometry import Array
 from teleop_lab.drawing import PUBLISHED, Trace, axis, level, line, points
 from teleop_lab.experiments.bench import Bench
+from teleop_lab.experiments.comparison import Comparison, Findings, absolute, percent
 from teleop_lab.experiments.experiment import Experiment
-from teleop_lab.experiments.outcome import Comparison, Findings, absolute, percent
 from teleop_lab.experiments.transmission import AIR, Cell, Way, measure_cells, predicted_hybrid
 from teleop_lab.experiments.two_port import LINES, Complex, Lag, bandwidth, felt_impedance, llewellyn
 

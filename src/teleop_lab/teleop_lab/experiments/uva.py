@@ -11,9 +11,9 @@ from importlib.resources import files
 from typing import NamedTuple
 
 from teleop_lab.experiments.bench import Bench
+from teleop_lab.experiments.comparison import Comparison, Findings, absolute
 from teleop_lab.experiments.experiment import Experiment
 from teleop_lab.experiments.look_and_move import CYCLE, difficulty, looks
-from teleop_lab.experiments.outcome import Comparison, Findings, absolute
 
 LATENCY = 0.033 + 0.050
 """Latency of the station itself [s]: two frames at 60 Hz, and 50 ms for encoding and decoding the video (Nankaku et

@@ -7,8 +7,8 @@ from teleop_core.kernels.geometry import Array
 from teleop_core.robots import Robot, load_robot
 from teleop_lab.drawing import axis, in_space, line, scene
 from teleop_lab.experiments.bench import Bench
+from teleop_lab.experiments.comparison import Comparison, Findings, percent
 from teleop_lab.experiments.experiment import Experiment
-from teleop_lab.experiments.outcome import Comparison, Findings, percent
 
 _REACH_MM = 460.0
 _SAMPLES, _SLICE_MM = 40_000, 6.0

@@ -12,7 +12,7 @@ from teleop_core.hand.master.device import DeviceParameters
 from teleop_lab.drawing import Trace, axis, level, line, points
 from teleop_lab.experiments import experiment, one_axis, sampled_wall, stability
 from teleop_lab.experiments.bench import Bench
-from teleop_lab.experiments.outcome import Comparison, Findings, absolute, percent
+from teleop_lab.experiments.comparison import Comparison, Findings, absolute, percent
 
 BARE = one_axis.Grip(0.045, 1.0, 2.0)
 """Mass of our device in a hand that holds it as loosely as the parameters allow, and its viscous friction; the

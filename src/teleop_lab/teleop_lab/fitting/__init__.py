@@ -11,7 +11,8 @@ from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
 from teleop_core.session.runner import silent
-from teleop_lab.fitting.fit import LOSSES, FitError, FitResult, Fitted, default_free, fit
+from teleop_lab.fitting.fit import LOSSES, FitError, default_free, fit
+from teleop_lab.fitting.fit_result import FitResult, Fitted
 from teleop_lab.fitting.rest_table import PUBLISHED, RestTable, read_rests
 
 __all__ = [

@@ -6,7 +6,7 @@ only for the gains of the fit.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,7 @@ from teleop_core.robots import hardware, load_robot_set
 from teleop_core.robots.robot import Robot
 from teleop_core.slave import pair, slave_sim
 from teleop_core.slave.plants.hardware import faults_of
+from teleop_lab.fitting.fit_result import FitResult, Fitted
 from teleop_lab.fitting.rest_table import RestTable
 from teleop_lab.fitting.rests import rest_positions
 
@@ -44,83 +45,6 @@ LOSSES: dict[str, Callable[[Array], Array]] = {
 
 class FitError(TeleopError):
     """A fit has no solution: it does not converge, or its parameters cannot be distinguished."""
-
-
-@dataclass(frozen=True)
-class Fitted:
-    """One number with its 95 % confidence interval, in SI units."""
-
-    name: str
-    unit: str
-    value: float
-    low: float
-    high: float
-
-
-@dataclass(frozen=True, eq=False)
-class FitResult:
-    """Result of a fit.
-
-    Attributes:
-        robot: Name of the robot.
-        joint_names: Its joints.
-        table: Name of the table.
-        numbers: Fitted numbers in their order.
-        measured: Mean of rest position minus target in the table (k, n) [rad or m].
-        predicted: The same, simulated with the fitted numbers.
-        measured_spread: Standard deviation (n,) of the runs [rad or m].
-        predicted_spread: The same, simulated.
-        encoder_step: Smallest difference (n,) that is measured [rad or m].
-        one_sided: Axes (n,) that all moves approach from one side. For these axes the distance to the target is
-            fitted, not its sign, because friction and bias cannot be distinguished there.
-    """
-
-    robot: str
-    joint_names: tuple[str, ...]
-    table: str
-    numbers: tuple[Fitted, ...]
-    measured: Array
-    predicted: Array
-    measured_spread: Array
-    predicted_spread: Array
-    encoder_step: Array
-    one_sided: NDArray[np.bool_]
-
-    def value(self, name: str) -> float:
-        """Return a fitted number by its name.
-
-        Raises:
-            UnknownNameError: The number was not fitted; the text lists the fitted ones.
-        """
-        found = {number.name: number.value for number in self.numbers}
-        if name not in found:
-            raise UnknownNameError("fitted number", name, found)
-        return found[name]
-
-    def __str__(self) -> str:
-        from teleop_lab.fitting.report import text
-
-        return text(self)
-
-    def to_json(self) -> dict[str, object]:
-        """The whole result as plain values; numbers are exact, in SI units."""
-        return {
-            "robot": self.robot,
-            "table": self.table,
-            "joints": list(self.joint_names),
-            "numbers": [vars(number) for number in self.numbers],
-            "measured": self.measured.tolist(),
-            "predicted": self.predicted.tolist(),
-            "measured_spread": self.measured_spread.tolist(),
-            "predicted_spread": self.predicted_spread.tolist(),
-            "one_sided": self.one_sided.tolist(),
-        }
-
-    def parameter_file(self) -> str:
-        """ROS 2 parameter file of a slave on the fitted plant."""
-        from teleop_lab.fitting.report import parameter_file
-
-        return parameter_file(self)
 
 
 class _Problem:

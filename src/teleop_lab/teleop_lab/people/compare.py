@@ -48,7 +48,7 @@ def people_dataset(plan: Plan, journal: Journal) -> "xarray.Dataset":
         values = [_mean([trial.get(name) for trial in places.get(place, [])]) for place in every]
         variables[name] = (names, np.array(values).reshape(sizes), {"units": units.get(name, "1")})
     variables["trials"] = (names, np.array([len(places.get(p, [])) for p in every]).reshape(sizes), {})
-    coordinates = swept_coordinates(study)
+    coordinates = swept_coordinates(study.swept)
     coordinates[PARTICIPANT] = list(plan.codes)
     return xarray.Dataset(variables, coordinates, {"scenario": study.scenario or "", "study": plan.people.title})
 

@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Sequence
 from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import plotly.graph_objects as plots
@@ -13,10 +13,8 @@ from teleop_core.evaluation.bands import LIMIT_COLORS
 from teleop_core.graph.topics import Limit
 from teleop_core.kernels.geometry import Array, rotation_vectors
 from teleop_core.robots.dexterity import sample_workspace
-from teleop_lab.planning import asked, reach_table, walk
-
-if TYPE_CHECKING:
-    from teleop_lab.planning.reach import Followed, Reach
+from teleop_lab.planning import asked, walk
+from teleop_lab.planning.reach_result import LABELS, Followed, Reach
 
 COLORS = {Limit.NONE: "#1c7c54", **LIMIT_COLORS}
 """Colours of samples that are followed, and of other samples by their causes."""
@@ -66,7 +64,7 @@ def write_reach_page(reaches: "Sequence[Reach]", file: Path) -> None:
     parts = [_HEAD.format(title=escape(title), style=_STYLE)]
     for reach in reaches:
         parts.append(f"<h1>{escape(reach.path.name)}: reach of {escape(reach.robot.name)}</h1>")
-        parts += [f"<pre>{escape(reach_table.text(reach))}</pre>", _NOTES, '<div class="pair">']
+        parts += [f"<pre>{escape(str(reach))}</pre>", _NOTES, '<div class="pair">']
         kinds = [("as given", reach.given)]
         kinds += [] if reach.is_given else [("proposed", reach.proposed)]
         for name, followed in kinds:
@@ -187,7 +185,7 @@ def _bands(path: asked.AskedPath, walked: walk.Walked) -> Iterable[tuple[Limit, 
 
 
 def _label(cause: Limit) -> str:
-    return "followed" if cause is Limit.NONE else reach_table.LABELS[cause.name.lower()]
+    return "followed" if cause is Limit.NONE else LABELS[cause.name.lower()]
 
 
 def _spread(count: int, most: int) -> Any:

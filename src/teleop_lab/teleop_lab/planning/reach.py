@@ -1,20 +1,20 @@
 """Reach: the share of a hand's motion that a slave can follow, and the settings with which this share is largest."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 from teleop_core.bags import arms, reader
 from teleop_core.base import ParameterError, RecordingError, UnknownNameError
 from teleop_core.graph import Layer, config_folder
 from teleop_core.graph.layers import list_scenarios, load_file, parse_setting, scenario_file, setting
-from teleop_core.robots.robot import Robot
 from teleop_core.session import api, configuration, master_bag, recording, runner
 from teleop_lab.planning.aim import Aim
 from teleop_lab.planning.asked import AskedPath, asked_path
 from teleop_lab.planning.placement import Placement
+from teleop_lab.planning.reach_result import Followed, Reach
 from teleop_lab.planning.search import Search
-from teleop_lab.planning.walk import Walked, Walker
+from teleop_lab.planning.walk import Walker
 
 GOAL = 0.99
 """Default share of the time in which the slave must follow."""
@@ -27,77 +27,6 @@ _EXCERPT_RATE = 20.0  # Hz
 _USUAL_WALKS = 500
 # The short excerpt is easier to follow than the whole path, so the search raises its goal up to this many times.
 _ATTEMPTS = 3
-
-
-@dataclass(frozen=True, eq=False)
-class Followed:
-    """A placement, and how the slave follows the path with it.
-
-    Attributes:
-        placement: Start, turn and gains.
-        session: Walk as in a session: limits cut the hand's motion, and joints have their speed limits.
-        in_place: Walk along the original path: nothing is cut off, and joints are as fast as needed.
-        at_given_gain: Share of the time in which a session would follow with the given gains.
-        misfit: Angle [rad] between the rotation axes of the tool and those of the hand.
-    """
-
-    placement: Placement
-    session: Walked
-    in_place: Walked
-    at_given_gain: float
-    misfit: float
-
-    @property
-    def share(self) -> float:
-        """Share of the time in which a session would follow."""
-        return self.session.share
-
-
-@dataclass(frozen=True, eq=False)
-class Reach:
-    """Share of a motion that a slave can follow.
-
-    Attributes:
-        path: Motion of the hand.
-        robot: The slave.
-        goal: Share of the time in which the slave must follow.
-        given: Result with the given parameters.
-        proposed: Result with the best placement; the given one if that reaches the goal.
-        arm: Namespace of the arm; empty for the default one.
-    """
-
-    path: AskedPath
-    robot: Robot
-    goal: float
-    given: Followed
-    proposed: Followed
-    arm: str = ""
-
-    @property
-    def is_given(self) -> bool:
-        """Whether the given parameters reach the goal, so that no change is needed."""
-        return self.given.placement == self.proposed.placement
-
-    def settings(self) -> dict[str, float | str | list[float] | list[str]]:
-        """Proposed parameters, as ``tc.replay(..., settings=...)`` takes them."""
-        return self.proposed.placement.settings(self.arm)
-
-    def texts(self) -> list[str]:
-        """Proposed parameters as ``key=value`` for ``--set``."""
-        return self.proposed.placement.texts(self.arm)
-
-    def parameter_file(self) -> str:
-        """Proposed parameters as a ROS 2 parameter file for ``--config``."""
-        return self.proposed.placement.parameter_file(self.arm)
-
-    def __str__(self) -> str:
-        from teleop_lab.planning.reach_table import text
-
-        return text(self)
-
-    def __repr__(self) -> str:
-        shares = f"{self.given.share:.1%} as given, {self.proposed.share:.1%} proposed"
-        return f"Reach({self.path.name}, {self.robot.name}: {shares})"
 
 
 def reach(

@@ -1,26 +1,20 @@
 """Dataset: results of a study as named arrays."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from teleop_core.evaluation.score import keys
-from teleop_lab.studies.point import Point, code_digest, own_digest
-from teleop_lab.studies.store import Store
+from teleop_lab.studies.point import Result
 
 if TYPE_CHECKING:
     import xarray
 
-    from teleop_lab.studies.study import Study
 
-
-def swept_coordinates(study: "Study") -> dict[str, object]:
+def swept_coordinates(swept: Mapping[str, Sequence[object]]) -> dict[str, object]:
     """Values of each swept parameter; values that are not plain are converted to texts."""
-    return {
-        name: [v if isinstance(v, int | float | str) else str(v) for v in values]
-        for name, values in study.swept.items()
-    }
+    return {name: [v if isinstance(v, int | float | str) else str(v) for v in values] for name, values in swept.items()}
 
 
 def units_of_scores() -> dict[str, str]:
@@ -28,34 +22,37 @@ def units_of_scores() -> dict[str, str]:
     return {name: key.unit for key in keys() for name in key.names()}
 
 
-def dataset_of(study: "Study", points: Sequence[Point], store: Store) -> "xarray.Dataset":
+def dataset_of(
+    coordinates: Mapping[str, object],
+    metrics: Sequence[str],
+    results: Sequence[Result | None],
+    about: Mapping[str, object],
+) -> "xarray.Dataset":
     """Results as an xarray data set.
 
-    A dimension for each parameter that is swept, and ``seed``; a variable for each score, NaN where
-    it does not apply or the session failed; ``error`` has the reason, and ``seconds`` the duration of the session.
+    It has a variable for each score, NaN where the score does not apply or the session failed. ``error`` is the reason
+    of a failure, and ``seconds`` the duration of the session.
+
+    Args:
+        coordinates: Values of each dimension.
+        metrics: Keys of the scores.
+        results: Result of each point, in the order of the dimensions; None if it is missing.
+        about: Attributes of the data set.
     """
     import xarray
 
-    sizes = [*(len(values) for values in study.swept.values()), len(study.seeds)]
-    results = [store.result(point) for point in points]
-    coordinates = swept_coordinates(study)
-    coordinates["seed"] = list(study.seeds)
+    names = tuple(coordinates)
+    sizes = [len(values) for values in coordinates.values()]  # type: ignore[arg-type]
     units = units_of_scores()
     variables = {}
-    for metric in study.metrics:
+    for metric in metrics:
         numbers = [
             np.nan if result is None or (value := result.scores.get(metric)) is None else value for result in results
         ]
         shaped = np.array(numbers, np.float64).reshape(sizes)
-        variables[metric] = (study.names, shaped, {"units": units.get(metric, "1")})
+        variables[metric] = (names, shaped, {"units": units.get(metric, "1")})
     errors = np.array(["" if r is None else r.error for r in results], object).reshape(sizes)
     took = np.array([0.0 if r is None else r.seconds for r in results]).reshape(sizes)
-    variables["error"] = (study.names, errors, {})
-    variables["seconds"] = (study.names, took, {"units": "s"})
-    about = {
-        "scenario": study.scenario or "",
-        "code": code_digest() + own_digest(),
-        "settings": str(dict(study.settings)),
-        "sessions": len(points),
-    }
+    variables["error"] = (names, errors, {})
+    variables["seconds"] = (names, took, {"units": "s"})
     return xarray.Dataset(variables, coordinates, about)

@@ -2,14 +2,11 @@
 
 import json
 import os
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from teleop_core.base.errors import SessionError
 from teleop_lab.studies.point import Point, Result
-
-if TYPE_CHECKING:
-    from teleop_lab.studies.study import Study
 
 FORMAT = 1
 _ABOUT = "study.json"
@@ -27,20 +24,24 @@ class Store:
         self._results: dict[str, Result] = {}
 
     @staticmethod
-    def open(folder: Path | str | None, study: "Study") -> "Store":
+    def open(folder: Path | str | None, scenario: str | None, names: Sequence[str]) -> "Store":
         """Store of a study, made if it is missing.
+
+        Args:
+            folder: Where the results are kept; None: in memory.
+            scenario: Scenario of the study.
+            names: Names of its dimensions.
 
         Raises:
             SessionError: The store belongs to another study or a newer version, or cannot be written.
         """
         store = Store(None if folder is None else Path(folder))
         if store.folder is not None:
-            store._prepare(study)
+            store._prepare({"format": FORMAT, "scenario": scenario, "dimensions": list(names)})
         return store
 
-    def _prepare(self, study: "Study") -> None:
+    def _prepare(self, about: dict[str, object]) -> None:
         assert self.folder is not None
-        about = {"format": FORMAT, "scenario": study.scenario, "dimensions": list(study.names)}
         file = self.folder / _ABOUT
         try:
             self.folder.mkdir(parents=True, exist_ok=True)

@@ -127,7 +127,7 @@ class Study:
         Raises:
             TeleopError: Some points cannot run; the text names the wrong value.
         """
-        found, code = [], code_digest() + own_digest()
+        found, code = [], _code()
         given = {**self.settings, **chosen}
         made = api.configuration(self.scenario, settings=given)
         insist_on_scores(made, self.metrics)
@@ -150,7 +150,7 @@ class Study:
             TeleopError: As in :meth:`points`, or the store belongs to another study.
         """
         points = self.points()
-        kept = Store.open(store, self) if store is not None else None
+        kept = self.store(store) if store is not None else None
         why: dict[str, int] = {}
         left = 0.0
         for point in points:
@@ -187,23 +187,43 @@ class Study:
         Raises:
             TeleopError: As in :meth:`explain`, before the first session.
         """
-        from teleop_lab.studies.dataset import dataset_of
+        from teleop_lab.studies.dataset import dataset_of, swept_coordinates
         from teleop_lab.studies.workers import in_processes, on_dask
 
         points = self.points()
-        kept = Store.open(store, self)
+        kept = self.store(store)
         to_run = [point for point in points if kept.reason(point)]
         done = len(points) - len(to_run)
         progress(done, len(points))
         if client is not None:
-            results = on_dask(client, self, to_run)
+            results = on_dask(client, to_run, self.metrics, self.parts)
         else:
-            results = in_processes(self, to_run, jobs, kept.folder, recordings)
+            results = in_processes(to_run, self.metrics, self.parts, jobs, kept.folder, recordings)
         for result in results:
             kept.take(result)
             done += 1
             progress(done, len(points))
-        return dataset_of(self, points, kept)
+        about = {
+            "scenario": self.scenario or "",
+            "code": _code(),
+            "settings": str(dict(self.settings)),
+            "sessions": len(points),
+        }
+        coordinates = {**swept_coordinates(self.swept), SEED: list(self.seeds)}
+        return dataset_of(coordinates, self.metrics, [kept.result(point) for point in points], about)
+
+    def store(self, folder: Path | str | None) -> Store:
+        """Store of the study's results, made if it is missing.
+
+        Raises:
+            SessionError: The store belongs to another study or a newer version, or cannot be written.
+        """
+        return Store.open(folder, self.scenario, self.names)
+
+
+def _code() -> str:
+    """Digest of the code that computes the scores, with that of parts of your own."""
+    return code_digest() + own_digest()
 
 
 def sweep(

@@ -132,7 +132,7 @@ class Tuning:
             raise ParameterError("trials", trials, "1 or more")
         optuna = _optuna()
         study = self._study()
-        kept = Store.open(store, study)
+        kept = study.store(store)
         # The random numbers are the same in each call: with the same results the search proposes the same values.
         search = optuna.create_study(
             direction="maximize" if self.is_largest else "minimize", sampler=optuna.samplers.TPESampler(seed=0)
@@ -176,7 +176,7 @@ class Tuning:
                 points.append([])
                 refused.append(" ".join(str(error).split()))
         to_run = {point.name: point for own in points for point in own if kept.reason(point)}
-        for result in in_processes(study, list(to_run.values()), jobs, kept.folder, None):
+        for result in in_processes(list(to_run.values()), study.metrics, study.parts, jobs, kept.folder):
             kept.take(result)
         found = []
         for values, own, why in zip(chosen, points, refused, strict=True):

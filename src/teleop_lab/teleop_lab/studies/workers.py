@@ -21,8 +21,6 @@ from teleop_lab.studies.store import write_result
 if TYPE_CHECKING:
     from distributed import Client
 
-    from teleop_lab.studies.study import Study
-
 BATCH = 100
 """Sessions of a task on a cluster, at most: a scheduler copes with some 0.2 million tasks."""
 _TRIES = 3
@@ -30,7 +28,12 @@ _FOLDER = "teleop_parts_"
 
 
 def in_processes(
-    study: "Study", points: Sequence[Point], jobs: int | None, store: Path | None, recordings: Path | str | None
+    points: Sequence[Point],
+    metrics: Sequence[str],
+    parts: Sequence[Path],
+    jobs: int | None,
+    store: Path | None,
+    recordings: Path | str | None = None,
 ) -> Iterator[Result]:
     """Yield results as they are computed by processes of this machine, each with one session at a time.
 
@@ -43,14 +46,14 @@ def in_processes(
     if getattr(current_process(), "_inheriting", False):
         raise SystemExit(1)  # the caller's program starts processes without a guard; the caller reports this
     place = None if recordings is None else Path(recordings)
-    do = partial(_computed, metrics=tuple(study.metrics), store=store, recordings=place)
+    do = partial(_computed, metrics=tuple(metrics), store=store, recordings=place)
     count = max(1, min(jobs or len(os.sched_getaffinity(0)), len(points)))
     if count == 1:
         yield from map(do, points)
         return
     left = {point.name: point for point in points}
     for _ in range(_TRIES):
-        with ProcessPoolExecutor(count, get_context("spawn"), _begin, (tuple(study.parts),)) as pool:
+        with ProcessPoolExecutor(count, get_context("spawn"), _begin, (tuple(parts),)) as pool:
             try:
                 for result in _as_they_come(pool, do, list(left.values()), 2 * count):
                     del left[result.name]
@@ -96,7 +99,9 @@ def _computed(point: Point, metrics: tuple[str, ...], store: Path | None, record
     return result
 
 
-def on_dask(client: "Client", study: "Study", points: Sequence[Point]) -> Iterator[Result]:
+def on_dask(
+    client: "Client", points: Sequence[Point], metrics: Sequence[str], parts: Sequence[Path]
+) -> Iterator[Result]:
     """Yield results as they are computed by the workers of a Dask cluster, which share no folder with this machine.
 
     Raises:
@@ -110,8 +115,8 @@ def on_dask(client: "Client", study: "Study", points: Sequence[Point]) -> Iterat
         raise SessionError(f"worker {worker} has code {code}, must be ours, {own}")
     if not fit:
         raise SessionError(f"{client.scheduler.address} has no workers")  # type: ignore[union-attr]
-    parts = tuple((part.name, part.read_text("utf-8")) for part in study.parts)
-    do = partial(_batch, metrics=tuple(study.metrics), parts=parts, code=own)
+    texts = tuple((part.name, part.read_text("utf-8")) for part in parts)
+    do = partial(_batch, metrics=tuple(metrics), parts=texts, code=own)
     size = max(1, min(BATCH, len(points) // (4 * len(fit)) or 1))
     batches = [points[at : at + size] for at in range(0, len(points), size)]
     futures = {client.submit(do, batch, pure=False, retries=_TRIES): batch for batch in batches}

@@ -5,10 +5,10 @@ import math
 import numpy as np
 
 from teleop_core.kernels.geometry import Array
-from teleop_core.robots.bodies.body import HERE, Bodies, Body, Joint
 from teleop_core.robots.bodies.frames import pose, tips
-from teleop_core.robots.bodies.solids import ball, capsule, rim
+from teleop_core.robots.body import HERE, Bodies, Body, Joint
 from teleop_core.robots.robot import Robot
+from teleop_core.robots.solids import ball, capsule, rim
 from teleop_machines import hand_grasp, rps3_loop
 from teleop_machines.bodies.planar import pivoted
 

@@ -5,10 +5,10 @@ from collections.abc import Mapping
 import numpy as np
 
 from teleop_core.kernels import Array, kernel, product
-from teleop_core.robots.bodies.body import HERE, Bodies, Body, Coordinates, Joint
 from teleop_core.robots.bodies.frames import pose, tips
-from teleop_core.robots.bodies.solids import ball, capsule, cylinder
+from teleop_core.robots.body import HERE, Bodies, Body, Coordinates, Joint
 from teleop_core.robots.robot import Robot
+from teleop_core.robots.solids import ball, capsule, cylinder
 from teleop_machines.bodies import parallel, planar
 from teleop_machines.scara_stewart_legs import layout
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from teleop_core.kernels import Array, product
 from teleop_core.robots.bodies import chain, frames
-from teleop_core.robots.bodies.body import Bodies, Body, Joint
+from teleop_core.robots.body import Bodies, Body, Joint
 from teleop_core.robots.robot import Robot
 from teleop_machines.bodies.planar import pivoted
 from teleop_machines.mma_models import SHORT_SIDE

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from teleop_core.kernels import Array, arctangent, length, product
-from teleop_core.robots.bodies.body import HERE, Bodies, Body, Joint
 from teleop_core.robots.bodies.frames import tips
-from teleop_core.robots.bodies.solids import Solid, along, ball, capsule, rim
+from teleop_core.robots.body import HERE, Bodies, Body, Joint
 from teleop_core.robots.robot import Robot
+from teleop_core.robots.solids import Solid, along, ball, capsule, rim
 from teleop_machines.rps3_loop import COSINES, SINES
 
 _SHARE = 0.95  # length of a tube as a share of the shortest leg

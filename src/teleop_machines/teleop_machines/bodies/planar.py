@@ -5,10 +5,10 @@ import math
 import numpy as np
 
 from teleop_core.kernels.geometry import Array
-from teleop_core.robots.bodies.body import Bodies, Body, Coordinates, Joint
 from teleop_core.robots.bodies.frames import pose
-from teleop_core.robots.bodies.solids import Solid, ball, capsule, cylinder
+from teleop_core.robots.body import Bodies, Body, Coordinates, Joint
 from teleop_core.robots.robot import Robot
+from teleop_core.robots.solids import Solid, ball, capsule, cylinder
 from teleop_machines.four_bar_loop import FourBar
 
 _UP = np.array([0.0, 0.0, 1.0])

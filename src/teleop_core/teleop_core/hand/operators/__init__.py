@@ -14,7 +14,7 @@ from teleop_core.base import NoParameters, PartError, Registry
 from teleop_core.kernels.geometry import Array
 
 if TYPE_CHECKING:
-    from teleop_core.hand.devices import Device
+    from teleop_core.hand.input_device import Device
 
 __all__ = ["OPERATORS", "Motion", "Operator", "Seen", "Setting", "following", "register_operator"]
 

@@ -5,9 +5,9 @@
 returns the same as a URDF.
 """
 
-from teleop_core.robots.bodies.body import Bodies, Body, Joint
 from teleop_core.robots.bodies.describe import bodies_of
-from teleop_core.robots.bodies.solids import Kind, Role, Solid
 from teleop_core.robots.bodies.urdf import urdf_of
+from teleop_core.robots.body import Bodies, Body, Joint
+from teleop_core.robots.solids import Kind, Role, Solid
 
 __all__ = ["Bodies", "Body", "Joint", "Kind", "Role", "Solid", "bodies_of", "urdf_of"]

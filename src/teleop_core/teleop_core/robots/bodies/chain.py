@@ -7,9 +7,9 @@ from itertools import pairwise
 import numpy as np
 
 from teleop_core.kernels import Array, dot, length
-from teleop_core.robots.bodies.body import HERE, Body, Joint
 from teleop_core.robots.bodies.frames import inverse, moved, product, seen_from
-from teleop_core.robots.bodies.solids import Role, Solid, along, ball, capsule, cylinder
+from teleop_core.robots.body import HERE, Body, Joint
+from teleop_core.robots.solids import Role, Solid, along, ball, capsule, cylinder
 
 # Sine between two axes under which they count as parallel.
 _PARALLEL = 1e-4

@@ -14,12 +14,12 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from teleop_core.kernels import Array, length, rotations_from_quaternions
-from teleop_core.robots.bodies.body import HERE, Bodies, Body, Joint
 from teleop_core.robots.bodies.chain import axes_of, chain, places, tip_of
 from teleop_core.robots.bodies.frames import pose_of, tips
-from teleop_core.robots.bodies.solids import ball, cylinder
+from teleop_core.robots.body import HERE, Bodies, Body, Joint
 from teleop_core.robots.dynamics.followers import followers_of
 from teleop_core.robots.robot import Robot
+from teleop_core.robots.solids import ball, cylinder
 
 _KNOWN: "WeakKeyDictionary[Robot, Bodies]" = WeakKeyDictionary()
 

@@ -9,11 +9,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from teleop_core.kernels import Array, inverse_motion, product, rotations_from_quaternions, transform
-from teleop_core.robots.bodies.body import Bodies
-from teleop_core.robots.bodies.solids import Solid
+from teleop_core.robots.body import Bodies
 from teleop_core.robots.dynamics.chain_dynamics import chain_acceleration, pseudo_inertias
 from teleop_core.robots.dynamics.followers import chain_part, follower_acceleration, followers_of
 from teleop_core.robots.robot import Robot
+from teleop_core.robots.solids import Solid
 
 DENSITY = 1000.0
 """Density [kg/m³] of bodies whose robot has no masses of links, assumed: that of water, which

@@ -6,12 +6,13 @@ import numpy as np
 
 from teleop_core.base import ParameterError, TeleopError, TeleopWarning
 from teleop_core.kernels import product, rotations_from_quaternions
-from teleop_core.robots.bodies.body import HERE
 from teleop_core.robots.bodies.describe import bodies_of
 from teleop_core.robots.bodies.meshes import Mesh, merged, mesh_of
-from teleop_core.robots.bodies.solids import Solid
-from teleop_core.robots.files.visuals import Visual, mesh_file
+from teleop_core.robots.body import HERE
+from teleop_core.robots.files.visuals import mesh_file
 from teleop_core.robots.robot import Robot
+from teleop_core.robots.solids import Solid
+from teleop_core.robots.visual import Visual
 
 
 def looks_of(robot: Robot) -> dict[int, Mesh]:

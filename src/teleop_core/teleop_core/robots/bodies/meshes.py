@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from teleop_core.kernels import Array, product, rotations_from_quaternions
-from teleop_core.robots.bodies.solids import Solid
+from teleop_core.robots.solids import Solid
 
 Faces = NDArray[np.int64]
 Mesh = tuple[Array, Faces]

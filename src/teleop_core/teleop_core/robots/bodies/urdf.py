@@ -13,11 +13,11 @@ from xml.etree import ElementTree as Xml
 import numpy as np
 
 from teleop_core.kernels import Array, product, rotation, rotations_from_quaternions
-from teleop_core.robots.bodies.body import HERE, Bodies, Body, Joint
 from teleop_core.robots.bodies.describe import bodies_of
 from teleop_core.robots.bodies.inertials import DENSITY, has_own_links, inertials_of
-from teleop_core.robots.bodies.solids import Role, Solid
+from teleop_core.robots.body import HERE, Bodies, Body, Joint
 from teleop_core.robots.robot import Robot
+from teleop_core.robots.solids import Role, Solid
 
 COLOURS: dict[Role, tuple[float, float, float]] = {
     "base": (0.30, 0.32, 0.35),

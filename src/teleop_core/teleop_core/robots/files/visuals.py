@@ -4,9 +4,7 @@ import hashlib
 import os
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
 from xml.etree import ElementTree as Xml
 
 import numpy as np
@@ -14,8 +12,8 @@ import numpy as np
 from teleop_core.base import ParameterError
 from teleop_core.kernels import Array, product, rotation, transform
 from teleop_core.robots.files.urdf_tree import Links, UrdfJoint, chain_to, numbers_of, origin_of, tree_of, turn_of_z
+from teleop_core.robots.visual import Visual, VisualKind
 
-VisualKind = Literal["mesh", "box", "cylinder", "sphere"]
 _ENDINGS = (".stl", ".dae", ".obj", ".ply", ".glb", ".gltf", ".off")
 _UP = 4  # folders above that of a URDF in which its meshes may be
 _PACKAGE = "package://"
@@ -26,30 +24,6 @@ _SHAPES: dict[VisualKind, tuple[tuple[str, tuple[float, ...]], ...]] = {
     "sphere": (("radius", (0.0,)),),
 }
 """Attributes of each shape of a visual [m], which are those of :class:`Visual` in this order."""
-
-
-@dataclass(frozen=True, eq=False)
-class Visual:
-    """A shape of a link.
-
-    Attributes:
-        link: Name of the link.
-        joints: Number of movable joints between the base and the link.
-        place: Pose of the shape (4, 4) in the base, with the arm at home [m].
-        kind: Kind of shape.
-        size: For a mesh, scales along x, y and z; for a box x, y, z; for a cylinder radius and length; for a sphere
-            its radius [m].
-        file: Name of a mesh as the file gives it; empty for other kinds.
-        urdf: The file.
-    """
-
-    link: str
-    joints: int
-    place: Array
-    kind: VisualKind
-    size: tuple[float, ...]
-    file: str
-    urdf: Path
 
 
 def mesh_file(name: str, urdf: Path) -> Path:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from teleop_core.base import ShapeError
 from teleop_core.kernels import Array, inner, kernel, multiply_quaternions
-from teleop_core.robots.bodies.solids import Solid
+from teleop_core.robots.solids import Solid
 
 Indices = NDArray[np.int64]
 
@@ -53,7 +53,7 @@ def place(
         coordinates: Coordinates that move the joints (N, m) [rad, m].
         free: Poses (N, k, 7) of the free bodies; (1, 0, 7) if there are none.
         parents: Parent of each body (B,), smaller than its own index; -1 for the base.
-        kinds: Values of :class:`~teleop_core.robots.bodies.body.Joint` (B,).
+        kinds: Values of :class:`~teleop_core.robots.body.Joint` (B,).
         places: Index of each body's coordinate, or of its pose among the free ones (B,).
         origins: Poses (B, 7) in the parents' frames, with all coordinates at zero.
         out: Poses (N, B, 7): x, y, z [m], quaternion w, x, y, z.
