@@ -132,7 +132,7 @@ def test_no_time_is_refused(link: RecordedLink) -> None:
 
 def test_a_recording_cannot_be_commanded(link: RecordedLink) -> None:
     before = link.view()
-    assert link.command("enable") == (False, "a recording cannot be commanded")
+    assert link.command("enable") == (False, "a recording accepts no commands")
     assert "cannot be commanded" in link.change("motion_scaling", "mode", "fine")
     link.press(is_pressed=True)
     link.hold("", np.zeros(7))
@@ -188,7 +188,7 @@ def foreign(small: MemoryBag, lacking: tuple[str, ...], metadata: dict[str, str]
 @pytest.mark.parametrize(
     ("lacking", "metadata", "reason"),
     [
-        ((), {}, "which robot moved"),
+        ((), {}, "does not name its robot"),
         (("slave/measured_js",), {"robot": "rcrt1"}, "lacks slave/measured_js"),
         ((), {"robot": "r2d2"}, "robot cannot be loaded"),
         ((), {"robot": "puma560"}, "lacks joints"),
