@@ -19,7 +19,7 @@ def text(found: "FitResult") -> str:
     lines += [
         f"  {n.name:{width}}  {n.value:10.4g}  [{n.low:9.4g}, {n.high:9.4g}] {n.unit}".rstrip() for n in found.numbers
     ]
-    lines += ["", "rest less target, mean of the runs in encoder counts: measured / simulated"]
+    lines += ["", "rest position minus target, mean of the runs in encoder counts: measured / simulated"]
     lines.append("  point  " + "".join(f"{name:>16}" for name in found.joint_names))
     pairs = zip(found.measured / found.encoder_step, found.predicted / found.encoder_step, strict=True)
     for k, (measured, predicted) in enumerate(pairs):
