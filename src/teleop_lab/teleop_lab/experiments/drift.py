@@ -177,7 +177,7 @@ def _measure(bench: Bench) -> Findings:
 
 DRIFT = experiment.Experiment(
     "drift",
-    "distance of the slave from the hand's command after contacts over a delayed line, by material and passivity",
+    "drift of the slave from its commands after delayed contacts, by material and passivity",
     "compensator of drift of Coelho, Ott, Singh, Lizarralde and Kondak 2019",
     _measure,
 )
