@@ -1,4 +1,4 @@
-"""Ask a platform on legs where it is: one pose, all poses, a path, and legs that close nowhere."""
+"""Compute the pose of a platform on legs: one pose, all poses, a path, and leg lengths without a pose."""
 
 import numpy as np
 
@@ -7,7 +7,7 @@ from teleop_core.robots import FkStatus
 
 
 def main() -> None:
-    """Print what forward kinematics finds of a platform on three legs, and says of it."""
+    """Print the results of forward kinematics of a platform on three legs, with their status."""
     robot = tc.load_robot("rps3")
     for legs in (robot.home, np.array([1.715, 1.165, 1.687]), np.array([0.8, 0.8, 5.0])):
         answer = robot.solve_fk(legs)

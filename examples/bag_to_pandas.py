@@ -20,7 +20,7 @@ def plot(recording: tc.Recording, page: Path) -> None:
 
 
 def main(folder: Path) -> None:
-    """Record ten seconds, print what a data frame makes of them, write the plot."""
+    """Record ten seconds, print the summary of the data frame, and write the plot."""
     tc.run("coarse_box", duration=10.0, out=folder / "bag")
     recording = tc.open_recording(folder / "bag")
     joints = recording["slave/measured_js"].frame()

@@ -1,4 +1,4 @@
-"""Find how an arm was built from measured places of its tip, and lead it by what was found."""
+"""Identify the errors of an arm from measured positions of its tip, and use them to command the arm."""
 
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -11,7 +11,7 @@ from teleop_lab.calibration import appendix_e, calibrate, read_measured, simulat
 
 
 def table_of_poses(path: Path, drawn: Robot, built: Robot) -> None:
-    """Write what an instrument of 0.1 mm says of 40 poses: joints as encoders, place of the tip."""
+    """Write 40 poses as an instrument with 0.1 mm of noise measures them: encoder and tip positions."""
     rng = np.random.default_rng(1)
     joints = rng.uniform(drawn.lower, drawn.upper, (40, drawn.n))
     tips = built.fk(joints)[:, :3, 3] + rng.normal(0.0, 0.1e-3, (40, 3))

@@ -1,8 +1,7 @@
-"""Press silicone through two, three and four channels: near, far, and with a slave that yields.
+"""Press silicone with two, three and four channels: without delay, with delay, and with a slave that yields.
 
-The simulated hand of the scenario ``palpation`` presses a block for 14 s of virtual time. Printed
-is how fast the hand gets, what it and the tip feel at most, and how far the tip then is from where
-the hand leads it.
+The simulated hand of the scenario ``palpation`` presses a block for 14 s of virtual time. The example prints the
+largest speed of the hand, the largest forces on hand and tip, and the distance from the tip to its command.
 """
 
 import sys
@@ -17,14 +16,14 @@ CHANNELS = {
     "three_channel": ("network", "impedance", "passivity"),
     "four_channel": ("network", "impedance", "passivity"),
 }
-"""Architectures, and the stages that they need beside those of every session."""
+"""Architectures, and the stages that they need in addition to those of every session."""
 CALM: dict[str, float | str | bool] = {
     "feedback_timeout": 1.0, "reach_force.is_on": False, "world.material": "silicone",
 }  # fmt: skip
 
 
 def press(kind: str, round_trip: float) -> tuple[float, ...]:
-    """Fastest hand [m/s], most force on hand and tip [N], way from the command to the tip [m]."""
+    """Largest speed of the hand [m/s], largest forces on hand and tip [N], distance from the command to the tip [m]."""
     late = dict.fromkeys(("network.there.least_delay", "network.back.least_delay"), 0.5 * round_trip)
     settings = CALM | late | {"reflection.architecture": kind.partition(",")[0]}
     session = tc.run("palpation", duration=14.0, stages=CHANNELS[kind], settings=settings)

@@ -1,4 +1,4 @@
-"""Hold the hand, or the slave too, in shapes that are made of others."""
+"""Keep the hand, or also the slave, inside shapes that are combined from other shapes."""
 
 import teleop_core as tc
 
@@ -9,7 +9,7 @@ SHAPES: dict[str, tuple[str, ...]] = {
 
 
 def main() -> None:
-    """Print how far the slave leaves each shape, by whom it holds."""
+    """Print how far the slave leaves each shape, for fixtures that act on the hand, on the slave, or on both."""
     for kind, parts in SHAPES.items():
         for side in ("hand", "both"):
             settings = {"fixture": kind, f"fixture.{kind}.parts": parts, "fixture.side": side}

@@ -1,6 +1,6 @@
-"""Compare control laws on the plant that predicts the built arm: error, and what it costs.
+"""Compare control laws on the plant that predicts the built arm: tracking error and control effort.
 
-`teleop experiment controllers` does it with several hands, steps and rests, and draws it.
+`teleop experiment controllers` does this with several hands, steps and rest positions, and draws the results.
 """
 
 import sys
@@ -20,13 +20,13 @@ LAWS = {
 
 
 def main(duration: float = 46.0) -> None:
-    """Print a row for each law; errors are those that the encoders see."""
+    """Print a row for each law; errors are measured at the encoders."""
     drives = tc.load_robot("rcrt1").drives
     assert drives is not None
     print(f"{'law':22} {'RMS':>7} {'max':>7}  effort jumps by (RMS of a tick)")
     for law, what in LAWS.items():
         recording = tc.run("coarse_box", duration=duration, plant="hardware", controller=law)
-        # A measured pose is told a tick after the setpoint that it was sampled with.
+        # A measured pose is published one tick after the setpoint with which it was sampled.
         wanted, seen = (recording["slave/setpoint_cp"].part(slice(-1)), recording["slave/measured_cp"])
         follows = wanted.stamp_ns > 1
         places = ["x", "y", "z"]

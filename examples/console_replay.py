@@ -1,4 +1,4 @@
-"""Show a recording on a page of your own making: what `teleop console BAG` does, in a few lines."""
+"""Show a recording on your own page, like `teleop console BAG`, in a few lines."""
 
 import tempfile
 from pathlib import Path
@@ -12,7 +12,7 @@ from teleop_console.server import ConsoleServer
 
 
 def main() -> None:
-    """Serve a page on a free port, draw some times of a recording, and say what is shown."""
+    """Serve a page on a free port, draw some times of a recording, and print the shown data."""
     with tempfile.TemporaryDirectory() as folder:
         bag = Path(folder) / "bag"
         tc.run("coarse_box", duration=4.0, out=bag)

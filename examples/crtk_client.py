@@ -1,7 +1,7 @@
-"""A CRTK client with rclpy alone: waits for an arm, moves its tip by 10 mm, and comes back.
+"""A CRTK client that uses only rclpy: waits for an arm, moves its tip by 10 mm, and moves it back.
 
 Start an arm first, ``teleop live --composed --out bags/crtk`` or ``ros2 run teleop_core slave``
-on the same ROS domain, and make CRTK's messages if ROS does not bring them: ``make crtk_msgs``.
+on the same ROS domain, and build CRTK's messages if ROS does not contain them: ``make crtk_msgs``.
 """
 
 import sys
@@ -22,7 +22,7 @@ WAY = 0.01  # [m]
 
 
 class Client(Node):
-    """What a stock client has: the newest state and setpoint, and a move that it waits for."""
+    """The data of an ordinary client: the newest state and setpoint, and a move whose end it awaits."""
 
     def __init__(self, arm: str) -> None:
         super().__init__("crtk_client")
@@ -34,16 +34,16 @@ class Client(Node):
         self.move_cp = self.create_publisher(PoseStamped, f"{arm}/move_cp", 10)
 
     def take_state(self, state: OperatingState) -> None:
-        """Remember the newest state, and whether there was a busy one."""
+        """Store the newest state, and whether any state was busy."""
         self.state = state
         self.was_busy = self.was_busy or state.is_busy
 
     def take_setpoint(self, setpoint: PoseStamped) -> None:
-        """Remember the newest setpoint."""
+        """Store the newest setpoint."""
         self.setpoint = setpoint
 
     def wait(self, condition: Callable[[], bool], what: str, seconds: float = 20.0) -> None:
-        """Spin until something is so."""
+        """Spin until a condition is true."""
         end = time.monotonic() + seconds
         while not condition():
             if time.monotonic() > end:
@@ -51,14 +51,14 @@ class Client(Node):
             rclpy.spin_once(self, timeout_sec=0.1)
 
     def is_ready(self) -> bool:
-        """Whether the arm would take a move."""
+        """Whether the arm accepts a move now."""
         state = self.state
         if state is None or self.setpoint is None:
             return False
         return bool(state.state == "ENABLED" and state.is_homed and not state.is_busy)
 
     def move(self, goal: PoseStamped) -> bool:
-        """Go there; whether the arm set out."""
+        """Move to the goal; return whether the arm started to move."""
         self.was_busy = False
         goal.header.stamp = self.get_clock().now().to_msg()
         self.move_cp.publish(goal)

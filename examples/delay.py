@@ -6,7 +6,7 @@ import teleop_core as tc
 
 
 def main() -> None:
-    """Print how much later the slave's references come, and what that costs."""
+    """Print the added delay of the slave's references, and the resulting error."""
     recordings = [tc.run("coarse_box", duration=15.0, delays=delays) for delays in ({}, {"slave/servo_jp": 0.02})]
     stamps = [recording["slave/setpoint_js"].stamp_ns for recording in recordings]
     behind = (recordings[0]["slave/setpoint_js"].log_ns - stamps[1]) * 1e-6

@@ -1,7 +1,7 @@
-"""Touch tissue that is far away: what each kind of passivity makes of a late force.
+"""Touch tissue over a delayed line, with each kind of passivity.
 
-The simulated hand of the scenario ``palpation`` presses a block for 20 s of virtual time. Printed
-is how fast the hand gets once it leads the slave, and what it and the tip feel.
+The simulated hand of the scenario ``palpation`` presses a block for 20 s of virtual time. The example prints the
+largest speed of the hand after it engages the slave, and the forces on hand and tip.
 """
 
 import sys
@@ -14,7 +14,7 @@ QUIET = {"feedback_timeout": 1.0, "reach_force.is_on": False, "gimbal_noise": 0.
 
 
 def touch(passivity: str, round_trip: float, material: str = "tissue") -> tuple[float, ...]:
-    """Fastest hand [m/s], root mean square of its push, and most and RMS of the tip's force [N]."""
+    """Largest speed of the hand [m/s], RMS of its force, and largest and RMS force on the tip [N]."""
     late = dict.fromkeys(("network.there.least_delay", "network.back.least_delay"), 0.5 * round_trip)
     settings = QUIET | late | {"reflection.passivity": passivity, "world.material": material}
     session = tc.run("palpation", duration=20.0, stages=["network", "passivity"], settings=settings)
@@ -26,7 +26,7 @@ def touch(passivity: str, round_trip: float, material: str = "tissue") -> tuple[
 
 
 def rms(sizes: np.ndarray) -> float:
-    """Root mean square of what is not zero."""
+    """Root mean square of the values that are not zero."""
     return float(np.sqrt((sizes[sizes > 0.0] ** 2).mean())) if sizes.any() else 0.0
 
 

@@ -1,10 +1,9 @@
-"""Put drives of your own in the place of the simulated ones: a plain ROS 2 node.
+"""Replace the simulated drives by your own drives: a plain ROS 2 node.
 
-The arm's server keeps all of the operation: states, emergency stop, limits, faults, motion to
-goals. Drives need no part of this package, only three topics: they hold the joints at
-``slave/setpoint_js``, tell in ``slave/measured_js`` where these are, and brake where
-``slave/operation`` says so. Start the server, in another terminal or in the background, then the
-drives, and let the arm be tested::
+The stage ``slave`` still does everything else: states, emergency stop, limits, faults, motion to goals. Drives need no
+part of this package, only three topics: they hold the joints at ``slave/setpoint_js``, publish the joint positions on
+``slave/measured_js``, and brake when ``slave/operation`` requires it. Start the stage in another terminal or in the
+background, then the drives, and test the arm::
 
     slave &
     python examples/foreign_slave.py &
@@ -23,12 +22,12 @@ from rclpy.qos import qos_profile_action_status_default, qos_profile_sensor_data
 from rclpy.signals import SignalHandlerOptions
 from sensor_msgs.msg import JointState
 
-# Where the arm, an RCRT-1, stands when it is switched on [rad, m]: not at home.
+# Joint positions of the arm, an RCRT-1, when it is switched on [rad, m]; it is not at home.
 STANDS = {"theta1": 0.1, "theta2": 1.9, "d3": 0.4, "theta4": 0.0, "theta5": 0.1, "theta6": 0.0}
-# A tenth above the rated speeds, which setpoints keep [rad/s, m/s].
+# Speed limits, a tenth above the rated speeds, which setpoints never exceed [rad/s, m/s].
 FASTEST = {"theta1": 3.4, "theta2": 3.4, "d3": 0.068, "theta4": 8.0, "theta5": 15.0, "theta6": 15.0}
-RATE = 500.0  # samples a second; the server takes any rate
-BANDWIDTH = 200.0  # of each joint's loop [rad/s]
+RATE = 500.0  # samples per second; the slave accepts any rate
+BANDWIDTH = 200.0  # bandwidth of each joint's loop [rad/s]
 
 
 class Drives(Node):
@@ -39,7 +38,7 @@ class Drives(Node):
         quality = qos_profile_sensor_data  # best effort: only the newest sample matters
         self._sender = self.create_publisher(JointState, "slave/measured_js", 10)  # for anybody
         self.create_subscription(JointState, "slave/setpoint_js", self._follow, quality)
-        latched = qos_profile_action_status_default  # reliable; the last one comes late too
+        latched = qos_profile_action_status_default  # reliable; a late subscriber receives the last message
         self.create_subscription(DiagnosticArray, "slave/operation", self._obey, latched)
         self.setpoint, self.is_braked = dict(STANDS), False
         self.place, self.speed = dict(STANDS), dict.fromkeys(STANDS, 0.0)
@@ -47,16 +46,16 @@ class Drives(Node):
         self.create_timer(1.0 / RATE, self._tick)
 
     def _follow(self, message: JointState) -> None:
-        """Take the newest setpoints; real drives would get them here."""
+        """Receive the newest setpoints; real drives would get them here."""
         self.setpoint.update(zip(message.name, message.position, strict=True))
 
     def _obey(self, message: DiagnosticArray) -> None:
-        """Hear whether the brakes are to hold the arm."""
+        """Receive whether the brakes must hold the arm."""
         values = {entry.key: entry.value for entry in message.status[0].values}
         self.is_braked = float(values["is_braked"]) > 0.0
 
     def _tick(self) -> None:
-        """Move on by all steps that are due, and tell where the joints are, as encoders do."""
+        """Make all steps that are due, and publish the joint positions, as encoders do."""
         due = round(RATE * (time.monotonic() - self.begun)) - self.steps
         for _ in range(due):
             self._step()
@@ -76,8 +75,8 @@ class Drives(Node):
 
 
 def main() -> int:
-    """Be an arm until it is told to end."""
-    ended = threading.Event()  # asked between two turns: an exception would come anywhere
+    """Run the arm until the program is told to end."""
+    ended = threading.Event()  # checked between two turns, because an exception could interrupt any statement
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: ended.set())
     rclpy.init(signal_handler_options=SignalHandlerOptions.NO)

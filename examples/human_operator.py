@@ -1,11 +1,11 @@
-"""Compare how simulated hands move with how people do: `human`, and the smooth `random` one."""
+"""Compare the motion of simulated hands, `human` and the smooth `random`, with that of people."""
 
 import numpy as np
 
 import teleop_core as tc
 
 SEEDS = (1, 2, 3)
-# Lowest and highest of surgeons at the masters of a da Vinci (JIGSAWS) and of another user of one.
+# Smallest and largest values of surgeons at a da Vinci (JIGSAWS) and of another user of a da Vinci.
 # Median speed: from medians per task of 46 tracks of JIGSAWS to the hand that the UVA-DSA
 # telesurgery QoS analysis 2026 ships, while it moves.
 PEOPLE = {
@@ -33,7 +33,7 @@ def measured(operator: str) -> dict[str, list[float | None]]:
 
 
 def main() -> None:
-    """Print a table: what people do, and what the operators do."""
+    """Print a table with the figures of people and of the operators."""
     table = {operator: measured(operator) for operator in ("human", "random")}
     print(f"{'':24}{'people':>18}{'human':>18}{'random':>18}")
     for name, (low, high) in PEOPLE.items():

@@ -11,7 +11,7 @@ import teleop_exchange
 
 
 def record_elsewhere(file: Path) -> None:
-    """Write what a motion capture system might: irregular times in ms, places in mm, angles."""
+    """Write a file like that of a motion capture system: irregular times in ms, positions in mm, angles."""
     rng = np.random.default_rng(7)
     times = np.cumsum(rng.uniform(9.0, 11.0, 1000))
     phase = 2e-3 * np.pi * times
@@ -31,7 +31,7 @@ def record_elsewhere(file: Path) -> None:
 
 
 def main() -> None:
-    """Import, replay and export; print what comes of it."""
+    """Import, replay and export; print the results."""
     with tempfile.TemporaryDirectory() as folder:
         place = Path(folder)
         record_elsewhere(place / "hand.csv")
@@ -41,7 +41,7 @@ def main() -> None:
         teleop_exchange.export_recording(answer, place / "answer.parquet", rate=100.0)
         table = pd.read_parquet(place / "answer.parquet")
         print(f"answer.parquet: {len(table)} rows, {len(table.columns)} columns")
-        table = table[table["teleop/state.is_following"] == 1.0]  # before, the arm gets ready
+        table = table[table["teleop/state.is_following"] == 1.0]  # before this time the arm moves to its start
         for topic in ("master/measured_cp", "slave/measured_cp"):
             columns = [f"{topic}.{axis}" for axis in "xyz"]
             width = (table[columns].max() - table[columns].min()).max()

@@ -1,4 +1,4 @@
-"""Let a program learn to lead the arm to a goal: soft actor-critic of Stable-Baselines3.
+"""Let a program learn to move the arm to a goal: soft actor-critic of Stable-Baselines3.
 
 pip install stable-baselines3                      # with PyTorch, some gigabytes
 python examples/learn_reach.py 30000               # steps of 20 ms; some seven minutes
@@ -14,7 +14,7 @@ EPISODES = 50
 
 
 def success(model: Any, env: Any) -> float:
-    """Share of episodes with new goals in which the tip gets there within 10 s."""
+    """Share of episodes with new goals in which the tip reaches the goal within 10 s."""
     reached = 0
     for seed in range(EPISODES):
         seen, _ = env.reset(seed=10_000 + seed)
@@ -27,7 +27,7 @@ def success(model: Any, env: Any) -> float:
 
 
 def main(steps: int) -> None:
-    """Learn, and print how often it gets there before and after."""
+    """Learn, and print the share of reached goals before and after."""
     try:
         from stable_baselines3 import SAC
     except ImportError:

@@ -1,4 +1,4 @@
-"""Stop an arm in full motion, see how far it moves, and let it go on; in virtual time."""
+"""Stop an arm in full motion, measure its stopping distance, and let it continue; in virtual time."""
 
 import numpy as np
 
@@ -7,7 +7,7 @@ from teleop_core.slave.operation import State
 
 
 def main() -> None:
-    """Print the states of a session that is stopped, and how far the setpoint moved in them."""
+    """Print the states of a stopped session, and the distance that the setpoint moved in each."""
     events = ("stop@3.0", "reset@4.0", "enable@4.1", "pause@6.0", "resume@6.5")
     recording = tc.run("free_motion", duration=8.0, settings={"operation.events": events, "slave.starts_at_home": True})
     setpoint = recording["slave/setpoint_cp"]

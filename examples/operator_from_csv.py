@@ -1,4 +1,4 @@
-"""Lead the hand along a table of numbers, such as a motion that was recorded elsewhere."""
+"""Move the hand along a table of numbers, such as a motion that another system recorded."""
 
 import csv
 import tempfile
@@ -10,7 +10,7 @@ import teleop_core as tc
 
 
 def write_table(path: Path) -> None:
-    """Write a circle of 20 mm in four seconds; columns that are left out are zero."""
+    """Write a circle of 20 mm in four seconds; missing columns are zero."""
     times = np.linspace(0.0, 4.0, 81)
     angle = 2.0 * np.pi * times / 4.0
     with path.open("w", newline="") as file:
@@ -22,12 +22,12 @@ def write_table(path: Path) -> None:
 
 
 def main() -> None:
-    """Run five seconds of it and print how far the hand and the slave went."""
+    """Run five seconds of the motion, and print the distances that hand and slave moved."""
     with tempfile.TemporaryDirectory() as folder:
         table = Path(folder, "circle.csv")
         write_table(table)
         recording = tc.run(operator=table, duration=5.0)
-    # The slave moves to where it starts first; the hand waits for that.
+    # The slave first moves to its start; the hand waits until then.
     state = recording["teleop/state"]
     begin = state.time[state["is_following"] > 0.0][0]
     for topic in ("master/measured_cp", "slave/measured_cp"):

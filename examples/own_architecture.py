@@ -1,4 +1,4 @@
-"""Let the hand feel the slave by a law of your own: the force, and a spring where the tip lags."""
+"""Let the hand feel the slave by your own law: the force, and a spring if the tip lags."""
 
 from dataclasses import dataclass
 
@@ -12,7 +12,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, kw_only=True)
 class BothParameters:
-    """What ``--set reflection.both.slack=...`` sets; the push gets these in their order."""
+    """Parameters for ``--set reflection.both.slack=...``; the push gets them as numbers in their order."""
 
     stiffness: float = tc.parameter(300.0, tc.Within(0.0, 5000.0, "N/m"), "of the spring")
     slack: float = tc.parameter(2e-3, tc.Within(0.0, 0.1, "m"), "lag that is not felt")
@@ -20,7 +20,7 @@ class BothParameters:
 
 @tc.kernel
 def both_push(numbers: Array, memory: Array, felt: Array, away: Array, period: float, out: Array) -> None:
-    """Push by the force on the tip, and by a spring where the tip lags by more than the slack."""
+    """Push with the force on the tip, and with a spring if the tip lags by more than the slack."""
     length = (away[0] ** 2 + away[1] ** 2 + away[2] ** 2) ** 0.5
     share = max(length - numbers[1], 0.0) / length if length > 0.0 else 0.0
     for i in range(3):
@@ -31,7 +31,7 @@ tc.register_architecture(tc.Architecture("both", BothParameters, both_push))
 
 
 def main() -> None:
-    """Print what the hand feels in free motion, and of silicone that the slave presses."""
+    """Print the force on the hand in free motion, and while the slave presses silicone."""
     for kind in ("unilateral", "position_force", "position_position", "both"):
         settings = {"reflection.architecture": kind, "world.material": "silicone"}
         recording = tc.run("palpation", duration=14.0, settings=settings)

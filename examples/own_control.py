@@ -1,4 +1,4 @@
-"""Add a button of your own to the console's page: gentle limits for the arm, and back.
+"""Add your own button to the console's page: it switches to a low speed limit of the arm, and back.
 
 teleop console --parts examples/own_control.py --set operator=remote
 """
@@ -8,11 +8,11 @@ from teleop_console.controls import CONTROLS, Answers
 from teleop_console.link import SessionLink
 
 GENTLE, USUAL = 0.02, 0.0
-"""Largest speeds of the tip [m/s]; 0: what its joints make."""
+"""Largest speeds of the tip [m/s]; 0: limited only by the joints."""
 
 
 def be_gentle(link: SessionLink, arm: str) -> Answers:
-    """Limit the speed of the tip, or go back to the usual limit, while the session runs."""
+    """Limit the speed of the tip, or restore the usual limit, while the session runs."""
     node = f"{arm}/slave" if arm else "slave"
     known = link.parameters().get((node, "operation.tool_speed"))
     speed = USUAL if known is not None and known.value == GENTLE else GENTLE
@@ -27,7 +27,7 @@ teleop_console.register_control(
 
 
 def main() -> None:
-    """Tell which buttons the page has now."""
+    """Print the names of the page's buttons."""
     print("buttons:", ", ".join(CONTROLS))
 
 

@@ -1,4 +1,4 @@
-"""Control the slave's joints by a law of your own: PD that feeds the setpoint's speed forward."""
+"""Control the slave's joints by your own law: PD with feedforward of the setpoint's speed."""
 
 from dataclasses import dataclass
 
@@ -12,7 +12,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, kw_only=True)
 class FollowingParameters:
-    """What ``--set controller.following.bandwidth=...`` sets."""
+    """Parameters for ``--set controller.following.bandwidth=...``."""
 
     bandwidth: float = tc.parameter(80.0, tc.Within(1.0, 200.0, "rad/s"), "double pole")
 
@@ -29,7 +29,7 @@ def control(
     gains: Array, memory: Array, setpoint: Array, measured: Array, feedforward: Array,
     limit: Array, dt: float, effort: Array,
 ) -> None:  # fmt: skip
-    """Pull to the setpoint and to its speed; memory holds the last setpoint and error."""
+    """Write efforts that reduce the errors of position and speed; ``memory`` has the last setpoint and error."""
     for i in range(effort.shape[0]):
         error = setpoint[i] - measured[i]
         speed = (setpoint[i] - memory[i, 0]) / dt

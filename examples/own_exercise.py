@@ -1,6 +1,6 @@
-"""Break a session in a way of your own: an exercise of the drill, in one file.
+"""Inject your own fault into a session: an exercise of the drill, in one file.
 
-Run it here, or have the command know it: ``teleop --parts examples/own_exercise.py drill shaken``.
+Run this file, or add the exercise to the command: ``teleop --parts examples/own_exercise.py drill shaken``.
 """
 
 import math
@@ -15,14 +15,14 @@ AMPLITUDE, FREQUENCY = 0.0003, 10.0  # m, Hz
 
 
 def shake(rig: Rig) -> None:
-    """Let the hand swing across its way for a second, as hands that tremble do."""
+    """Let the hand oscillate across its path for a second, like a trembling hand."""
     rig.mark()  # the fault begins
     rig.distort(hand.shaken(AMPLITUDE, FREQUENCY))
     rig.wait(1.0)
 
 
 def steady(rig: Rig) -> None:
-    """Take it back."""
+    """End the oscillation."""
     rig.distort(hand.faithful)
 
 
@@ -41,13 +41,13 @@ SHAKEN = register_exercise(
 
 
 def main() -> int:
-    """Do it in a session of its own; 0 if the arm did what was expected."""
+    """Run the exercise in its own session; return 0 if the arm reacted as expected."""
     from teleop_drill.nodes.drill import drill  # needs ROS
 
     with tempfile.TemporaryDirectory() as folder:
         (outcome,) = drill([SHAKEN], Path(folder) / "drill", print, is_composed=True)
     print(f"went {1e3 * outcome.measured('path_m').value:.0f} mm, {outcome.state_text}")
-    print("\n".join(outcome.failures()))  # what the recording lacks is known at the end
+    print("\n".join(outcome.failures()))  # missing messages of the recording are known only at the end
     return len(outcome.failures())
 
 

@@ -1,4 +1,4 @@
-"""Hold the hand in a shape of your own: an upright pill, as a compiled kernel."""
+"""Keep the hand inside your own shape: an upright pill, as a compiled kernel."""
 
 import math
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, kw_only=True)
 class PillParameters:
-    """What ``--set fixture.pill.radius=...`` sets; the distance gets the numbers in this order."""
+    """Parameters for ``--set fixture.pill.radius=...``; the distance gets them as numbers in this order."""
 
     radius: float = tc.parameter(0.012, tc.Within(1e-4, 0.5, "m"), "of sides and ends")
     height: float = tc.parameter(0.01, tc.Within(0.0, 0.5, "m"), "without its ends")
@@ -21,7 +21,7 @@ class PillParameters:
 
 @tc.kernel
 def pill_distance(offset: Array, numbers: Array, out: Array) -> float:
-    """Write the way from the middle line, of any length; return how far a point is outside."""
+    """Write the vector from the middle line to the point, of any length; return the distance outside the pill."""
     out[0], out[2] = offset[0], offset[2]
     out[1] = offset[1] - min(max(offset[1], -0.5 * numbers[1]), 0.5 * numbers[1])
     from_line = math.sqrt(out[0] ** 2 + out[1] ** 2 + out[2] ** 2)
@@ -31,7 +31,7 @@ def pill_distance(offset: Array, numbers: Array, out: Array) -> float:
 
 
 def pill_outline(p: PillParameters) -> Array:
-    """Draw its silhouette around the middle; y is up."""
+    """Silhouette of the pill around its middle; y is up."""
     angle = np.linspace(0.0, np.pi, 21)
     half = np.stack((p.radius * np.cos(angle), 0.5 * p.height + p.radius * np.sin(angle)), axis=1)
     loop = np.concatenate((half, -half, half[:1]))
@@ -43,7 +43,7 @@ tc.register_shape(PILL)
 
 
 def main() -> None:
-    """Print how far hand and slave went through the wall of box, sphere and pill."""
+    """Print how far hand and slave moved beyond the walls of box, sphere and pill."""
     for fixture in ("box", "sphere", "pill"):
         recording = tc.run("coarse_box", duration=20.0, fixture=fixture)
         depth = recording.score().value("fixture.penetration_max_mm")

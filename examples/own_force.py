@@ -1,4 +1,4 @@
-"""Let a second source push the hand: damping, added to what the fixture does."""
+"""Let a second source push the hand: a damping that is added to the force of the fixture."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -16,7 +16,7 @@ DAMPING_CF = tc.Topic(
 
 @dataclass(frozen=True, kw_only=True)
 class DampingParameters:
-    """What ``--set hand_damping.damping=...`` sets."""
+    """Parameters for ``--set hand_damping.damping=...``."""
 
     damping: float = tc.parameter(10.0, tc.Within(0.0, 50.0, "N·s/m"), "of the hand")
 
@@ -36,7 +36,7 @@ tc.register_stage(DAMPING)
 
 
 def main() -> None:
-    """Print the hand's fastest motion and the largest force, without and with the damping."""
+    """Print the largest speed of the hand and the largest force, without and with the damping."""
     for name, stages in (("alone", []), ("damped", [DAMPING])):
         recording = tc.run("free_motion", duration=15.0, stages=stages)
         speed = np.linalg.norm(recording["master/measured_cv"][["vx", "vy", "vz"]], axis=1)

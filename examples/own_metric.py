@@ -1,4 +1,4 @@
-"""Measure something of your own on every recording: how smooth the slave's reference is."""
+"""Add your own score to every recording: the smoothness of the slave's reference."""
 
 import numpy as np
 
@@ -9,14 +9,14 @@ from teleop_core.graph.topics import SLAVE_SETPOINT_CP
 
 
 class JerkMetric(tc.Metric):
-    """Third derivative of the setpoint's place."""
+    """Third derivative of the setpoint's position."""
 
     name, topics = "jerk", (SLAVE_SETPOINT_CP,)
     rms = figure("m/s^3", "root mean square of the jerk of the slave's setpoint")
     _squares, _count = 0.0, 0
 
     def add(self, window: Window) -> None:
-        """Take one window; three samples before it are needed for its first one."""
+        """Process one window; its first sample needs the three samples before the window."""
         series, own = window.around(SLAVE_SETPOINT_CP), window.own(SLAVE_SETPOINT_CP)
         first = max(own.start - 3, 0)
         place, time = series.values[first : own.stop, :3], series.log_ns[first : own.stop] * 1e-9

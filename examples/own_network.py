@@ -1,4 +1,4 @@
-"""Put a network of your own between both sides: a radio that fades in and out."""
+"""Put your own network between both sides: a radio link that fades in and out."""
 
 import math
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, kw_only=True)
 class FadingParameters:
-    """What ``--set network.there.fading.period=...`` sets; the draw gets these in their order."""
+    """Parameters for ``--set network.there.fading.period=...``; the draw gets them as numbers in their order."""
 
     period: float = tc.parameter(2.0, tc.Within(0.01, 60.0, "s"), "from fade to fade")
     worst: float = tc.parameter(0.9, tc.Within(0.0, 1.0), "share of packets lost in a fade")
@@ -21,7 +21,7 @@ class FadingParameters:
 
 @tc.kernel
 def fading_draw(numbers: Array, memory: Array, chances: Array, now: float) -> float:
-    """Lose a share of the packets that swings between none and the worst."""
+    """Lose a share of the packets that varies periodically between zero and the largest loss."""
     lost = 0.5 * numbers[1] * (1.0 - math.cos(2.0 * math.pi * now / numbers[0]))
     return -1.0 if chances[0] < lost else 0.0
 
@@ -30,7 +30,7 @@ tc.register_network(tc.Network("fading", FadingParameters, fading_draw))
 
 
 def main() -> None:
-    """Print the age of what the slave gets, and how much never arrives."""
+    """Print the age of the received packets, and the share of lost packets."""
     for worst in (0.0, 0.5, 0.99):
         settings: dict[str, str | float] = {"network.there.kind": "fading", "network.there.fading.worst": worst}
         recording = tc.run("free_motion", duration=6.0, stages="network", settings=settings)

@@ -1,6 +1,6 @@
-"""Make a person who sees: a hand that goes on by what it sees missing, as late as it sees it.
+"""Simulate a person who sees: the hand moves by the remaining distance that it sees, with the delay of the picture.
 
-Only who sees can be slowed down by a delay.
+A delay slows down only an operator who sees.
 """
 
 from collections.abc import Callable
@@ -12,14 +12,14 @@ import teleop_core as tc
 
 # The slave's x, y, z are the master's -z, -x, +y.
 MASTER_OF_SLAVE = np.array([[0.0, 0.0, -1.0], [-1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]).T
-WAY = np.array([-0.02, 0.015, 0.015])  # from where the tip begins to the goal [m]
-RATE = 2.0  # share of what is missing that the hand goes in a second [1/s]
+WAY = np.array([-0.02, 0.015, 0.015])  # vector from the start of the tip to the goal [m]
+RATE = 2.0  # speed of the hand divided by the remaining distance [1/s]
 NEAR = 0.5e-3  # there [m]
-LOOKS = 1.0  # for which the person looks on before the hand moves [s]
+LOOKS = 1.0  # time for which the person watches before the hand moves [s]
 
 
 def make(_: object, setting: tc.Setting) -> Callable[[NDArray[np.float64]], NDArray[np.float64]]:
-    """Motion of one session: it reads what is seen at the time that it is asked."""
+    """Motion of one session; it reads the seen values at each call."""
     seen, place = setting.seen, np.zeros(3)
     assert seen is not None
     goal: list[NDArray[np.float64]] = []
@@ -35,11 +35,11 @@ def make(_: object, setting: tc.Setting) -> Callable[[NDArray[np.float64]], NDAr
     return motion
 
 
-SEEING = tc.Operator("seeing", make, ahead=1)  # asked for one tick at a time
+SEEING = tc.Operator("seeing", make, ahead=1)  # called for one tick at a time
 
 
 def reached(delay: float) -> float:
-    """Time [s] to the goal, to stay, if the tip is seen so late [s]."""
+    """Time [s] until the tip stays at the goal, if it is seen with a delay [s]."""
     delays = [f"slave/measured_cp@operator={delay}"] if delay else []
     recording = tc.run(operator=SEEING, duration=9.0, settings={"tremor_amplitude": 0.0, "teleop.delays": delays})
     state = recording["teleop/state"]
@@ -52,7 +52,7 @@ def reached(delay: float) -> float:
 
 
 def main() -> None:
-    """Print how long the same way takes with what is seen ever later."""
+    """Print the time for the same distance with increasing delay of the picture."""
     for delay in (0.0, 0.2, 0.4):
         print(f"seen {1e3 * delay:3.0f} ms late: {reached(delay):.2f} s to the goal")
 

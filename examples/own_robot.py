@@ -25,7 +25,7 @@ GANTRY = tc.register_robot(tc.robot_from_table(TABLE))
 
 
 def main() -> None:
-    """Print what the robot is and how well it follows."""
+    """Print the description of the robot, and its tracking error."""
     robot = tc.load_robot("gantry")
     tip = robot.fk(robot.home)
     answer = robot.ik(tip, seed=robot.home)

@@ -1,7 +1,7 @@
-"""Put a stage of your own between two others: no pose moves faster than a limit.
+"""Put your own stage between two others: it limits the speed of poses.
 
-It stands between motion_scaling and inverse_kinematics, and nothing else changes: it says which
-topic it answers to and that its readers read its answer in that topic's place.
+The stage is inserted between motion_scaling and inverse_kinematics; nothing else changes. It declares its input topic,
+and that the readers of this topic read the stage's output instead.
 """
 
 import math
@@ -19,27 +19,27 @@ LIMITED = tc.Topic("slave/limited_cp", tc.Kind.POSE, passed_on("slave/servo_cp")
 
 @dataclass(frozen=True, kw_only=True)
 class LimitParameters:
-    """What ``--set velocity_limit.speed=...`` sets."""
+    """Parameters for ``--set velocity_limit.speed=...``."""
 
     speed: float = tc.parameter(0.02, tc.Within(1e-4, 10.0, "m/s"), "largest speed")
 
 
 class LimitState(tc.Fields):
-    """What it remembers from tick to tick."""
+    """Memory of the stage from tick to tick."""
 
     held: tc.Vector3
     has_begun: int
 
 
 class LimitRow(tc.Row):
-    """Its topics: those that there are, and one of its own."""
+    """Topics of the stage: existing ones, and its own one."""
 
     slave_limited_cp: NDArray[np.float64]
 
 
 @tc.kernel
 def limit(p: LimitParameters, s: LimitState, row: LimitRow, dt: float) -> None:
-    """Go towards the pose commanded, no farther in a tick than the speed allows."""
+    """Move towards the commanded pose, in each tick no farther than the speed limit allows."""
     wanted, limited = row.slave_servo_cp, row.slave_limited_cp
     if s.has_begun == 0:
         for i in range(3):
@@ -64,7 +64,7 @@ tc.register_stage(VELOCITY_LIMIT)
 
 
 def main() -> None:
-    """Run it as a kernel and as plain Python: the same bits, in another time."""
+    """Run the stage as a kernel and as plain Python; both give the same bits, but need different times."""
     results = []
     for stage in (VELOCITY_LIMIT, replace(VELOCITY_LIMIT, step=limit.py_func)):
         tc.run("free_motion", duration=0.1, stages=[stage])  # what is compiled once

@@ -1,4 +1,4 @@
-"""Set a task of your own, and see how a simulated person does it: one corner after another."""
+"""Define your own task for a simulated person: reach one corner after another."""
 
 from dataclasses import dataclass
 
@@ -13,7 +13,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, kw_only=True)
 class CornersParameters:
-    """What ``--set task.corners.side=...`` sets; the kernel gets them as numbers."""
+    """Parameters for ``--set task.corners.side=...``; the kernel gets them as numbers."""
 
     side: float = tc.parameter(0.02, tc.Within(1e-3, 0.2, "m"), "of the square")
     width: float = tc.parameter(0.003, tc.Within(1e-4, 0.1, "m"), "of a corner")
@@ -22,8 +22,8 @@ class CornersParameters:
 
 @tc.kernel
 def corners(numbers: Array, memory: Array, scene: Array, state: Array) -> None:
-    """Count a corner as soon as the tip is there, and ask for the next one."""
-    if state[0] == 0.0:  # no goal yet: remember where the tip begins
+    """Count a corner as soon as the tip has reached it, and set the next one as goal."""
+    if state[0] == 0.0:  # no goal yet: store the start of the tip
         for i in range(3):
             memory[i] = scene[1 + i]
     elif attempts.is_at_goal(scene, state):
@@ -42,7 +42,7 @@ tc.register_task(tc.Task("corners", CornersParameters, corners))
 
 
 def main() -> None:
-    """Print how long a corner takes, by how late the person sees the slave."""
+    """Print the time per corner for several delays of the picture."""
     for latency in (0.033, 0.233):
         recording = tc.run("point", duration=12.0, task="corners", display__latency=latency)
         score = recording.score()

@@ -1,4 +1,4 @@
-"""Take the tremor out of the hand by a filter of your own, and see what a low-pass costs."""
+"""Remove the tremor of the hand by your own filter, and measure the delay of a low-pass."""
 
 import math
 from dataclasses import dataclass
@@ -13,14 +13,14 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, kw_only=True)
 class LowPassParameters:
-    """What ``--set tremor_filter.low_pass.corner=...`` sets; the filter gets it as a number."""
+    """Parameters for ``--set tremor_filter.low_pass.corner=...``; the filter gets them as numbers."""
 
     corner: float = tc.parameter(3.0, tc.Within(0.1, 25.0, "Hz"), "what is faster goes")
 
 
 @tc.kernel
 def low_pass(numbers: Array, memory: Array, value: float, period: float) -> float:
-    """Follow the value by two lags in a row, at any period."""
+    """Return the value after two first-order lags in series, for any period."""
     share = 1.0 - math.exp(-2.0 * math.pi * numbers[0] * period)
     memory[0] += share * (value - memory[0])
     memory[1] += share * (memory[0] - memory[1])
@@ -31,7 +31,7 @@ tc.register_tremor_filter(tc.TremorFilter("low_pass", LowPassParameters, low_pas
 
 
 def main() -> None:
-    """Print for this filter and the built-in ones how much tremor they leave, and their delay."""
+    """Print the remaining tremor and the delay of this filter and of the built-in filters."""
     for kind in ("low_pass", "notch", "band_stop", "kalman", "wflc"):
         recording = tc.run("human", duration=12.0, stages="tremor_filter", settings={"tremor_filter.kind": kind})
         score = recording.score()

@@ -1,4 +1,4 @@
-"""Touch an object of your own: a lying ring, as a compiled kernel."""
+"""Touch your own object: a horizontal ring, as a compiled kernel."""
 
 import math
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, kw_only=True)
 class RingParameters:
-    """What ``--set world.ring.radius=...`` sets; the distance gets the numbers in this order."""
+    """Parameters for ``--set world.ring.radius=...``; the distance gets them as numbers in this order."""
 
     radius: float = tc.parameter(0.02, tc.Within(1e-3, 1.0, "m"), "of its middle line")
     thickness: float = tc.parameter(0.02, tc.Within(1e-3, 1.0, "m"), "of its wire")
@@ -21,7 +21,7 @@ class RingParameters:
 
 @tc.kernel
 def ring_distance(offset: Array, numbers: Array, out: Array) -> float:
-    """Write the way from the ring's middle line; return how far a point is outside of its wire."""
+    """Write the vector from the ring's middle line to the point; return the distance outside the wire."""
     x, y, z = offset[0], offset[1], offset[2]
     from_axis = max(math.sqrt(x * x + y * y), 1e-9)
     aside = from_axis - numbers[0]
@@ -32,7 +32,7 @@ def ring_distance(offset: Array, numbers: Array, out: Array) -> float:
 
 
 def ring_outline(p: RingParameters) -> Array:
-    """Draw its middle line."""
+    """Middle line of the ring."""
     angle = np.linspace(0.0, 2.0 * np.pi, 41)
     return p.radius * np.stack((np.cos(angle), np.sin(angle), np.zeros(41)), axis=1)
 
@@ -42,7 +42,7 @@ tc.register_shape(RING)
 
 
 def main() -> None:
-    """Print how hard the same hand presses the slave onto a box, a ball and the ring."""
+    """Print the force with which the same hand presses the slave onto a box, a ball and the ring."""
     for name, place in (
         ("box", [0.241, -0.236, -0.087]),
         ("sphere", [0.241, -0.236, -0.087]),

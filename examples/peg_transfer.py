@@ -11,7 +11,7 @@ CASES: dict[str, dict[str, float]] = {
 
 
 def main() -> None:
-    """Print for each case how many blocks arrived and how hard a peg was pulled at."""
+    """Print for each case the number of transferred blocks and the largest force on a peg."""
     print(f"{'':34}{'transferred':>12}{'dropped':>9}{'time, s':>9}{'pull, N':>9}{'slips':>7}")
     for name, settings in CASES.items():
         score = tc.run("peg_transfer", settings=settings).score()

@@ -1,10 +1,10 @@
-"""Pick a block up with the jaw, carry it, and set it down; with slippery fingers it is lost."""
+"""Pick up a block with the jaw, carry it, and set it down; slippery fingers lose it."""
 
 import teleop_core as tc
 
 
 def main() -> None:
-    """Print for three frictions of the fingers where the block ends, and what the jaw did."""
+    """Print the final position of the block and the counts of the jaw, for three frictions of the fingers."""
     for friction in (0.5, 0.065, 0.05):
         picked = tc.run("pick", settings={"jaw_sim.object.friction": friction})
         score, block = picked.score(), picked["slave/jaw/object_cp"]

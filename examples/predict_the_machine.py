@@ -1,4 +1,4 @@
-"""Fit a plant to where a machine came to rest, and predict how that machine follows a hand."""
+"""Fit a plant to rest positions of a machine, and predict how the machine follows a hand."""
 
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -12,7 +12,7 @@ PUBLISHED = {"coarse_box": 0.338, "fine_box": 0.293}  # Vongbunyong 2008, table 
 
 def main() -> None:
     """Fit to tables 7.1-7.6, predict table 8.2, and try another control law on the same plant."""
-    found = lab.fit_plant(free=FREE)  # rows of joints at rest; a CSV file of yours as well
+    found = lab.fit_plant(free=FREE)  # rows of joint positions at rest; your own CSV file works as well
     for number in found.numbers:
         print(f"{number.name} = {number.value:.3g} ({number.low:.3g} to {number.high:.3g})")
 

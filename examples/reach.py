@@ -1,11 +1,11 @@
-"""Ask what a slave can follow of a hand that moves and turns far, and let it follow."""
+"""Compute how much of a large hand motion a slave can follow, and let the slave follow it."""
 
 import teleop_core as tc
 import teleop_lab as lab
 
 
 def main() -> None:
-    """Print the share of the time that is followed as it is, and as proposed."""
+    """Print the share of the time in which the slave follows, with the given and the proposed settings."""
     hand = tc.run(
         duration=30.0,
         robot="rcrt1",
@@ -13,7 +13,7 @@ def main() -> None:
         operator__size=(0.25, 0.25, 0.2),
         operator__rotation=1.2,
         operator__period=6.0,
-        reach_force__is_on=False,  # the hand is not to be held back
+        reach_force__is_on=False,  # no force must hold back the hand
     )
     reach = lab.reach(hand)
     print(reach)

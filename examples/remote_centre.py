@@ -1,10 +1,10 @@
-"""Let the tool pass through a port, and see how far its shaft passes from it, with and without."""
+"""Let the tool pass through a port; measure how far its shaft misses the port, with and without a remote centre."""
 
 import teleop_core as tc
 
 
 def main() -> None:
-    """Print for two centres how well the tool keeps to them, and how far the tip lags."""
+    """Print the distance of the shaft from two centres, and the lag of the tip."""
     free = tc.run("coarse_box", duration=10.0)
     error = free.score().position_error_mm
     print(f"free: tip {error.rms:.2f} mm from its setpoint")

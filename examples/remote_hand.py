@@ -1,6 +1,6 @@
-"""Be the hand: say now and then where the stylus shall be, let go, take it again elsewhere.
+"""Act as the hand: send wanted poses of the stylus at irregular times, release it, and grip it again at another pose.
 
-A live session takes the same from the topic operator/servo_cp, at any rate.
+A live session accepts the same poses on the topic operator/servo_cp, at any rate.
 """
 
 import numpy as np
@@ -17,17 +17,17 @@ class Dragging:
         self._due = 0.0
 
     def __call__(self, hand: tc.RemoteHand, time: float) -> None:
-        """Say where the stylus shall be, if it is time for that and it is held."""
+        """Send the wanted pose of the stylus, if a pose is due and the stylus is held."""
         if time < self._due or 2.0 < time < 4.0:
             return  # after a fifth of a second of silence the clutch is pressed
         self._due = time + 1.0 / RATE
         way = 0.01 * (1.0 - np.cos(np.pi * time))
-        offset = 0.0 if time < 3.0 else 0.05  # the second grip is elsewhere: nothing jumps
+        offset = 0.0 if time < 3.0 else 0.05  # the second grip is at another pose, and the stylus does not jump
         hand.want(np.array([offset + way, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]))
 
 
 def main() -> None:
-    """Print how far stylus and slave went while held, let go, and held again."""
+    """Print the distances that stylus and slave moved while the stylus was held, released, and held again."""
     settings = {"haptic_master.device.friction": 0.0, "slave.starts_at_home": True}
     recording = tc.run(operator=tc.remote_operator("dragging", Dragging()), duration=6.5, settings=settings)
     state = recording["teleop/state"]

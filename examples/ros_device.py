@@ -1,12 +1,12 @@
-"""Put a device of your own in the place of the simulated master: a plain ROS 2 node.
+"""Replace the simulated master by your own device: a plain ROS 2 node.
 
 Start the rest of the graph first, in other terminals or in the background::
 
     motion_scaling & inverse_kinematics & slave & slave_sim &
 
-The device needs no part of this package, only the topics: it sends its pose and its buttons, and
-gets the force that it should apply. It rests until teleop/state says that the slave, which moves to
-where it starts first, follows.
+The device needs no part of this package, only the topics: it sends its pose and its buttons, and receives the force
+that it should apply. It rests until teleop/state reports that the slave follows; before that, the slave moves to its
+start.
 """
 
 import math
@@ -23,7 +23,7 @@ SECONDS = 4.0
 
 
 class Device(Node):
-    """A stylus that goes 20 mm to the left and back, over and over."""
+    """A stylus that moves 20 mm to the left and back, repeatedly."""
 
     def __init__(self) -> None:
         super().__init__("my_device")
@@ -32,7 +32,7 @@ class Device(Node):
         self._buttons = self.create_publisher(Joy, "master/buttons", quality)
         self.create_subscription(WrenchStamped, "master/servo_cf", self._push, quality)
         self.create_subscription(PoseStamped, "slave/measured_cp", self._look, quality)
-        latched = qos_profile_action_status_default  # reliable; the last one comes late too
+        latched = qos_profile_action_status_default  # reliable; a late subscriber receives the last message
         self.create_subscription(DiagnosticArray, "teleop/state", self._know, latched)
         self.forces, self.seen, self.ticks = 0, list[float](), 0
         self.is_followed = False
@@ -50,21 +50,21 @@ class Device(Node):
         self._buttons.publish(buttons)
 
     def _push(self, message: WrenchStamped) -> None:
-        """Get a force [N]; a real device would apply it to the hand."""
+        """Receive a force [N]; a real device would apply it to the hand."""
         self.forces += 1
 
     def _look(self, message: PoseStamped) -> None:
-        """See where the slave is: the master's x is the slave's -y."""
+        """Receive the pose of the slave; the master's x is the slave's -y."""
         if self.is_followed:
             self.seen.append(float(message.pose.position.y))
 
     def _know(self, message: DiagnosticArray) -> None:
-        """Hear what the slave does: ALIGNING, FOLLOWING or CLUTCHED."""
+        """Receive the state of the slave: ALIGNING, FOLLOWING or CLUTCHED."""
         self.is_followed = message.status[0].message.startswith("FOLLOWING")
 
 
 def main() -> int:
-    """Lead the slave for some seconds; print how far it went and how often forces came back."""
+    """Move the slave for some seconds; print its distance and the number of received forces."""
     rclpy.init()
     device = Device()
     begin = device.get_clock().now().nanoseconds

@@ -1,6 +1,6 @@
 """Drill a bridge before there is an arm: a model of its controller, on a simulated machine.
 
-It has a delay, an order of joints and a mistake. Put a bridge of yours in the place of ``bridge``.
+The model has a delay, its own order of joints, and a fault. Replace ``bridge`` by your own bridge.
 """
 
 import tempfile
@@ -19,18 +19,18 @@ from teleop_drill.simulation.world import SimulatedWorld
 
 ROBOT = load_robot("rcrt1")
 COMMANDS = "/forward_position_controller/commands"
-ORDER = ROBOT.joint_names[::-1]  # of the controller, which counts from the tool on
+ORDER = ROBOT.joint_names[::-1]  # joint order of the controller, which counts from the tool
 PERIOD, RATE = 0.002, 150.0  # s; 1/s
 
 
 @dataclass
 class Controller:
-    """Model of a controller that takes arrays of positions, and says where its joints are.
+    """Model of a controller that receives arrays of positions, and publishes its joint positions.
 
     Attributes:
-        delay_ns: From a command to its effect [ns].
-        coasts: For how long it goes on at the last speed where commands cease [s].
-        order: Of the joints in its commands.
+        delay_ns: Delay from a command to its effect [ns].
+        coasts: Time for which the arm continues at its last speed when commands end [s].
+        order: Order of the joints in its commands.
     """
 
     delay_ns: int = 5_000_000
@@ -38,7 +38,7 @@ class Controller:
     order: tuple[str, ...] = ORDER
 
     def run(self, world: SimulatedWorld) -> int:
-        """Be the process of the controller."""
+        """Run the process of the controller."""
         self.world, node, executor = world, world.node("controller"), world.executor()
         self.place = dict(zip(ROBOT.joint_names, ROBOT.home.tolist(), strict=True))
         self.coming, self.taken_ns = [(0, self.place)], 0
@@ -50,13 +50,13 @@ class Controller:
             executor.spin_once()
 
     def take(self, message: Float64MultiArray) -> None:
-        """Note a command, which takes effect later."""
+        """Store a command, which takes effect later."""
         self.taken_ns = self.world.time_ns()
         goal = dict(zip(self.order, message.data, strict=True))
         self.coming.append((self.taken_ns + self.delay_ns, goal))
 
     def cycle(self) -> None:
-        """Go a period on, and say where the joints are."""
+        """Advance by one period, and publish the joint positions."""
         now_ns = self.world.time_ns()
         while len(self.coming) > 1 and self.coming[1][0] <= now_ns:
             self.coming.pop(0)
@@ -72,12 +72,12 @@ class Controller:
 
 
 def bridge(world: SimulatedWorld) -> int:
-    """Be the process of the bridge."""
+    """Run the process of the bridge."""
     return run_node(world, "arm_bridge", kind="forward_command", order=ORDER)
 
 
 def main() -> None:
-    """Drill the bridge with a sound controller, and with one that coasts."""
+    """Drill the bridge with a correct controller, and with a controller that coasts."""
     rows = chosen(("stop_topic", "freeze_slave_sim"), is_composed=False)
     for name, model in {"sound": Controller(), "coasts": Controller(coasts=0.4)}.items():
         print(f"{name}:")

@@ -1,4 +1,4 @@
-"""Ask what a delay and a gain cost: sessions over named values and seeds, as an xarray data set."""
+"""Measure the effect of a delay and a gain: sessions over named values and seeds, as an xarray data set."""
 
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -7,7 +7,7 @@ from teleop_lab import Study
 
 
 def main() -> None:
-    """Print what it costs, run it, print the means; a second run would run nothing."""
+    """Print the cost, run the sessions, and print the means; a second call would run no session."""
     study = Study(
         "point",
         {"display.latency": (0.033, 0.333), "coarse_gain": (0.5, 1.0)},

@@ -1,4 +1,4 @@
-"""Lean on walls: how far the hand gets out by how far it aims, and what walls give back."""
+"""Press against walls: the distance of the hand beyond a wall for several aims, and the energy that walls return."""
 
 import warnings
 
@@ -12,7 +12,7 @@ BOX_MM = 30.0
 
 
 def scores(aim_mm: float, wall: str) -> dict[str, object]:
-    """Overshoot and energy in the box of coarse_box, of a hand that aims so far beyond walls."""
+    """Overshoot and energy in the box of coarse_box, for a hand that aims beyond the walls by ``aim_mm``."""
     side = 1e-3 * (BOX_MM + 2.0 * aim_mm)
     score = tc.run(
         "coarse_box", duration=25.0, operator="random", operator__period=10.0,
@@ -34,7 +34,7 @@ def scores(aim_mm: float, wall: str) -> dict[str, object]:
 
 def main() -> None:
     """Print the overshoot by aim for the damped wall, then all walls at the scenario's own aim."""
-    warnings.simplefilter("ignore")  # that some walls are stiffer than the device
+    warnings.simplefilter("ignore")  # the warning that some walls are stiffer than the device
     rows = [scores(aim, "damped") for aim in AIMS_MM]
     rows += [scores(2.0, wall) for wall in WALLS[1:]]
     print(pd.DataFrame(rows).round(2).to_string(index=False))

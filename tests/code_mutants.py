@@ -219,7 +219,7 @@ CODE_MUTANTS = (
     _mutant("force_turned", "a force along the tip's axes is turned the other way",
             "kernels/geometry.py", "((turn.T * force)", "((turn * force)", "geometry"),
     _mutant("version_beside", "what another version keeps meanwhile ends a program",
-            "kernels/numba_private.py", "except _BROKEN:  # by another", "except EOFError:  # by",
+            "kernels/numba_private.py", "except _BROKEN:  # written", "except EOFError:  # written",
             "kernel_cache"),
     _mutant("kernels_kept", "kernels are thrown away while they are used", "kernels/store.py",
             "if index.stat().st_mtime < oldest:", "if index.stat().st_mtime > oldest:",

@@ -62,7 +62,7 @@ def test_every_experiment_runs_to_its_end_and_agrees_as_it_did(name: str, bench:
 def is_clearly_worse_without_under_the_sources_controller(outcome: experiments.Outcome) -> None:
     """What is further said of an arm that does not hold its own weight."""
     for mode in ("coarse", "fine"):
-        ratio = outcome.row("without over with", f"position error, RMS, {mode}")
+        ratio = outcome.row("error without compensation divided by the error with it", f"position error, RMS, {mode}")
         assert present(ratio.predicted) > 1.5
         assert present(ratio.ours) < 1.1
 

@@ -139,7 +139,7 @@ def test_a_mesh_that_is_touched_is_kept_before_those_that_are_only_looked_at(
     ball = tmp_path / "ball.stl"
     trimesh.creation.box((50.0, 50.0, 30.0)).export(ball)
     settings = {"world": "mesh", "world.mesh.file": str(ball)}
-    with pytest.warns(UserWarning, match=r"digests of 0\.stl, 1\.stl, 2\.STL, 3\.obj"):
+    with pytest.warns(UserWarning, match=r"of 0\.stl, 1\.stl, 2\.STL, 3\.obj it keeps only digests"):
         recording = recorded(tmp_path, arm(tmp_path), settings=settings)
     assert kept(recording.metadata) == [recording.metadata["mesh_file"]]
 

@@ -139,7 +139,7 @@ def led_arm(common_peer: "Peer") -> RealArm:
     ("how", "words"),
     [
         ("names", "it lacks slide"),
-        ("strange", "heard are left_finger"),
+        ("strange", "contain only left_finger"),
         ("stale", "differ from our clock by at most 0.1 s"),
         ("back", "stamps must rise"),
         ("mute", "no valid sample"),

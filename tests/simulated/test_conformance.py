@@ -59,7 +59,7 @@ def test_faults_are_found_by_looking(fault: str, topic: str, note: str) -> None:
     [
         ("moves paused", "state_command", "while PAUSED"),
         ("any word", "state_command", "no command changed the state"),
-        ("never busy", "move_jp", "never rose"),
+        ("never busy", "move_jp", "never became true"),
     ],
 )
 def test_faults_are_found_by_trying(fault: str, topic: str, note: str) -> None:
@@ -74,7 +74,7 @@ def test_faults_are_found_by_trying(fault: str, topic: str, note: str) -> None:
         ("frozen", ("measured_js", "servo_jp", "move_jp"), "measured_js by 0"),
         ("scaled", ("measured_js", "servo_jp", "move_jp"), "measured_js by 0.00"),
         ("late", ("measured_js", "servo_jp", "move_jp"), "setpoint"),
-        ("speeds", ("measured_js",), "add up to another way"),
+        ("speeds", ("measured_js",), "the integral of its speeds differs"),
     ],
 )
 def test_an_arm_that_lies_about_where_it_is_is_found_by_moving_it(

@@ -66,7 +66,7 @@ def test_a_signal_ends_a_drill_where_it_waits_and_what_was_measured_is_kept(tmp_
 
     found = simulated_drill(rows, tmp_path, say)
     assert [one.exercise.name for one in found] == [rows[0].name], said
-    assert said[3:] == ["goes on until it waits", "stopped: interrupted; what was measured until now:"]
+    assert said[3:] == ["goes on until it waits", "stopped: interrupted; results until now:"]
 
 
 def test_a_drill_whose_environment_another_drill_has_left_breaks_its_stage(

@@ -33,7 +33,7 @@ def test_own_page_is_answered_by_any_name_of_the_loopback(host: str) -> None:
 )  # fmt: skip
 def test_name_that_is_not_ours_is_refused_though_it_leads_here(host: str | list[str]) -> None:
     origin = f"http://{host}" if isinstance(host, str) else "http://localhost:8080"
-    assert "not known by that name" in ask(LOCAL, host=host, is_socket=True, origin=origin)
+    assert "does not have this host name" in ask(LOCAL, host=host, is_socket=True, origin=origin)
 
 
 @pytest.mark.parametrize(

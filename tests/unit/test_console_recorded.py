@@ -128,13 +128,13 @@ def test_impossible_speeds_and_no_time_are_refused(link: RecordedLink, speed: fl
 
 def test_a_recording_cannot_be_commanded(link: RecordedLink) -> None:
     before = link.view()
-    assert link.command("enable") == (False, "a recording cannot be commanded")
-    assert "cannot be commanded" in link.change("motion_scaling", "mode", "fine")
+    assert link.command("enable") == (False, "a recording accepts no commands")
+    assert "accepts no commands" in link.change("motion_scaling", "mode", "fine")
     link.press(is_pressed=True)
     link.hold("", np.zeros(7))
     link.let_go("")
     link.press_button("", "mode")
-    with pytest.raises(tc.TeleopError, match="cannot be commanded"):
+    with pytest.raises(tc.TeleopError, match="accepts no commands"):
         link.save("again")
     after = link.view()
     assert before.arms[""].state == after.arms[""].state
@@ -184,7 +184,7 @@ def foreign(small: MemoryBag, lacking: tuple[str, ...], metadata: dict[str, str]
 @pytest.mark.parametrize(
     ("lacking", "metadata", "reason"),
     [
-        ((), {}, "which robot moved"),
+        ((), {}, "does not name its robot"),
         (("slave/measured_js",), {"robot": "rcrt1"}, "lacks slave/measured_js"),
         ((), {"robot": "r2d2"}, "robot cannot be loaded"),
         ((), {"robot": "puma560"}, "lacks joints"),

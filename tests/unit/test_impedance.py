@@ -219,6 +219,6 @@ def test_a_slave_that_measures_no_force_cannot_yield() -> None:
     told = tuple(topic for topic in SLAVE_SIM.writes if topic.name != "slave/measured_cf")
     dumb = replace(SLAVE_SIM, writes=told)
     stages = build_graph(stages=["impedance"]).stages
-    with pytest.raises(PartError, match="given slave/measured_cf, which no stage writes"):
+    with pytest.raises(PartError, match="given slave/measured_cf, but no stage writes it"):
         Graph(tuple(dumb if stage.name == "slave_sim" else stage for stage in stages))
     assert IMPEDANCE.needs[0].name == "slave/measured_cf"  # its node answers nothing before

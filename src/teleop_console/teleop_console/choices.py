@@ -83,7 +83,7 @@ def _operators() -> Mapping[str, str]:
     return {**told, **{name: told.get(name, "") for name in OPERATORS}}
 
 
-_OF_SCENARIO = "as the scenario says"
+_OF_SCENARIO = "as in the scenario"
 FIELDS = (
     Field("scenario", "Scenario", "none: the defaults", "", list_scenarios),
     Field("operator", "Operator", "the scenario's own, simulated", "operator", _operators),

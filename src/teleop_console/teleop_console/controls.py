@@ -99,7 +99,7 @@ INITIALIZE = _built_in("Initialize", "release, reset, enable and home", commands
 START = _built_in("Start", "follow the stylus", commands("enable"))
 PAUSE = _built_in("Pause", "hold still until Start", commands("pause"))
 HOME = _built_in("Home", "move smoothly to the home posture", commands("home"))
-RELEASE = _built_in("Release", "lets the emergency stop go; then Initialize", _release)
+RELEASE = _built_in("Release", "releases the emergency stop; then press Initialize", _release)
 MODE = _built_in("mode", "the mode button of the stylus", _pressed("mode"), mode_text)
 FIXTURE = _built_in("fixture", "the fixture button of the stylus", _pressed("fixture"), fixture_text)
 

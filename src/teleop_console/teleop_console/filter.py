@@ -24,12 +24,12 @@ BYTES_RATE, BYTES_BURST = 1e6, 2e6
 PICTURE = (180, 240)
 """Height and width of the picture that the console may request from a browser [px]."""
 
-UNKNOWN = "no message that this page sends"
+UNKNOWN = "not a message that this page sends"
 WATCHES = "a page that watches cannot do this; take control first"
 NOTHING_THERE = "for an element that does not exist, is inactive or hidden"
 NO_VALUE = "a value that the element cannot have"
 NO_TURN = "a quaternion that is not of unit length"
-NOT_ASKED = "a picture that nobody asked for"
+NOT_ASKED = "a picture that the console did not request"
 FLOOD = f"more than {RATE:g} messages or {BYTES_RATE / 1e6:g} MB a second; it was cut off"
 
 _Name = Annotated[str, Meta(max_length=200)]

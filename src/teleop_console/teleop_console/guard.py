@@ -81,7 +81,7 @@ class Guard:
         """Why a request is refused; empty if it is answered."""
         hosts, origins = request.header("Host"), request.header("Origin")
         if len(hosts) != 1 or not self._is_ours(hosts[0]):
-            return "this page is not known by that name"
+            return "the console does not have this host name"
         is_foreign = (request.is_socket or bool(origins)) and not _is_same(origins, hosts[0])
         if is_foreign or not _is_visit(request):
             return "only the console's own page may do this"

@@ -16,7 +16,7 @@ Setting = bool | int | float | str | tuple[bool, ...] | tuple[int, ...] | tuple[
 """Value of a parameter."""
 
 
-REFUSED = "a recording cannot be commanded"
+REFUSED = "a recording accepts no commands"
 """Answer of a link to commands that it does not support."""
 
 

@@ -75,9 +75,9 @@ class Panel:
             self.stylus_folder = self._gui.add_folder("small steps", expand_by_default=False)
         with self._gui.add_folder("recording"):
             self._name = self._gui.add_text("name", "run_1", hint="letters, digits, . _ -")
-            self._button("Save as", "closes the recording under this name", self._save)
+            self._button("Save as", "closes the recording and gives it this name", self._save)
             self._saved = self._gui.add_markdown("")
-            self._button("Mark", "notes in the recording, and on the timeline, that something happens now", self._mark)
+            self._button("Mark", "adds a mark at the present time to the recording and the timeline", self._mark)
         self._told = self._gui.add_markdown("")
 
     def _add_controls(self, folder: str) -> None:
@@ -112,7 +112,9 @@ class Panel:
 
     def _add_scores(self) -> None:
         self._live = self._gui.add_markdown("")
-        again = self._gui.add_button("begin anew", hint="the figures, not the recording", color="gray")
+        again = self._gui.add_button(
+            "begin anew", hint="resets the figures; the recording does not change", color="gray"
+        )
         again.on_click(lambda _: self._begin_scores())
         self._score = self._button("Score the last saved recording", "evaluate", self._evaluate)
         self._score.disabled = True

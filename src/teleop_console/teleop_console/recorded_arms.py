@@ -108,7 +108,7 @@ def _robot(bag: Bag, configuration: Configuration | None, arm: str) -> Robot:
         name = str(configuration.value("robot", arm) or name)
         geometry = tuple(configuration.value("geometry", arm) or ())
     if not name:
-        missing = "does not say which robot moved, as recordings of other systems do"
+        missing = "does not name its robot, like recordings of other systems"
         cure = "`teleop import` makes a recording of the hand that can be replayed"
         raise RecordingError(bag.path, f"{missing}; {cure}")
     try:

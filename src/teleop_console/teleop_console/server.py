@@ -61,7 +61,7 @@ def _refusal(host: str, port: int, error: OSError) -> Exception:
         free = free_port(host)
         return SessionError(f"port {port} is taken by {owner(port)}; {free} is free: --port {free}")
     if error.errno == errno.EACCES:
-        return SessionError(f"port {port} is not allowed to you, take one above 1023")
+        return SessionError(f"you may not use port {port}; choose one above 1023")
     return ParameterError("host", host, f"an address of this machine ({error.strerror})")
 
 

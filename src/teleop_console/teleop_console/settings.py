@@ -55,10 +55,10 @@ class SettingsPanel:
         self.known: Parameters = {}
         self._listeners: list[Callable[[Parameters], None]] = []
         self._wanted: dict[tuple[str, str], Setting] = {}
-        self._told = self._gui.add_markdown("parameters are being asked for …")
+        self._told = self._gui.add_markdown("loading the parameters …")
         self._search = self._gui.add_text("search", "", hint="words of names, stages and meanings")
         self._choice = self._gui.add_dropdown("show", (_USED,), hint="stage and group")
-        self._only = self._gui.add_checkbox("changed only", False, hint="other than the defaults")
+        self._only = self._gui.add_checkbox("changed only", False, hint="parameters that differ from their defaults")
         self._folder = self._gui.add_folder("values")
         reset = self._gui.add_button("Reset these", hint="to the defaults", color="gray")
         self._failed = self._gui.add_markdown("", visible=False)
@@ -93,7 +93,7 @@ class SettingsPanel:
             return len(before) > len(self._of_session)
         groups = sorted({_group(*key) for key in self.known})
         self._choice.options = (_USED, *groups)
-        about = "hover over one for its meaning, bounds and default"
+        about = "hover over a parameter for its meaning, bounds and default"
         self._told.content = f"{len(self.known)} parameters; {about}. {LATER} takes a new session"
         self._show()
         return False

@@ -176,7 +176,7 @@ def _arm_lines(view: View, name: str, arm: ArmView) -> list[str]:
     signal = _SIGNALS[State(int(arm.operation["state"]))] if arm.operation else "idle"
     text = arm.operation_text or "waits for the arm"
     if not view.is_fresh:
-        text, signal = "nothing comes from the session", "wrong"
+        text, signal = "no messages from the session", "wrong"
     head, _, rest = text.partition(",") if text[:1].isupper() else (text, "", "")
     label = f'<span class="t-muted">{html.escape(name)}</span> ' if name else ""
     first = f'{label}<b class="t-{signal}">● {html.escape(head)}</b>'

@@ -23,9 +23,9 @@ from teleop_console.stylus import GRIP
 
 _SHOWN = (
     ("frames", "axes", "axes of all bodies"),
-    ("ghost", "ghost", "the commanded posture: where the setpoints are"),
-    ("reach", "reach", "where the tip can be: some thousand postures within the limits"),
-    ("paths", "paths", "of the tip, wanted and measured, 10 s"),
+    ("ghost", "ghost", "the commanded posture, at the setpoints"),
+    ("reach", "reach", "reachable positions of the tip, from some thousand postures within the limits"),
+    ("paths", "paths", "paths of the tip, wanted and measured, of the last 10 s"),
 )
 
 
@@ -45,7 +45,7 @@ class ViewTab:
             self._camera("Work", "styli, and all that the tips have met: fixtures, objects, goals", None)
             self._camera("Whole", "all arms and their masters", scene.whole)
             self._camera("From the tool", "goes with the first arm's tool until another is chosen", scene.tool, True)
-            self._camera("Microscope", "fixed, over where the tip starts", scene.microscope)
+            self._camera("Microscope", "fixed camera above the start of the tip", scene.microscope)
         with gui.add_folder("show"):
             for label, what, hint in _SHOWN:
                 self._box(label, what == "paths", partial(scene.show, what), hint)

@@ -325,7 +325,7 @@ class Graph:
         return None
 
     def _goes_on(self, topic: Topic) -> bool:
-        """Whether a topic leads to the slave, not back to the master."""
+        """Whether the topic is part of the path from master to slave, not of the path back."""
         return topic.kind is not Kind.REPORT and (
             topic.stamp.is_in_force or any(link.topic == topic and not link.is_late for link in self.links)
         )

@@ -39,16 +39,16 @@ class Runner(Protocol):
 
     @property
     def lead(self) -> int:
-        """Ticks before it can follow commands, such as those of a move to its start."""
+        """Ticks before the stage can follow commands, such as those of a move to its start."""
 
     def prepare(self, ticks: int) -> None:
-        """Get ready for the next ``ticks`` steps, ``ahead`` at most."""
+        """Prepare the next ``ticks`` steps, at most ``ahead``."""
 
     def reset(self) -> None:
         """Back to the state before the first step."""
 
     def retune(self, parameters: Any) -> None:
-        """Take new parameters from the next step on, without a jump of its outputs."""
+        """Use new parameters from the next step on, without a jump of the outputs."""
 
     def step(self) -> None:
         """Make one step."""
@@ -63,13 +63,13 @@ class Runner(Protocol):
         """Present parameters; called only if the stage changes its parameters by itself."""
 
     def fall_silent(self) -> None:
-        """Make outputs safe when the topic that it answers has fallen silent."""
+        """Make outputs safe when the topic that the stage answers has fallen silent."""
 
     def concerns(self) -> list[str]:
-        """What is wrong now, in words, for people; asked once a second."""
+        """Sentences for people on what is wrong with the stage now; called once a second."""
 
     def described(self) -> dict[str, str]:
-        """Names and texts that its report contains in addition to its numbers."""
+        """Names and texts that the report of the stage contains in addition to its numbers."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -240,34 +240,34 @@ class RunningStage:
 
     @property
     def lead(self) -> int:
-        """Ticks before it can follow commands: none."""
+        """Ticks before the stage can follow commands; 0 by default."""
         return 0
 
     def prepare(self, ticks: int) -> None:
-        """Get ready for the next ``ticks`` steps; nothing to do here."""
+        """Prepare the next ``ticks`` steps; does nothing by default."""
 
     def reset(self) -> None:
         """Back to the state before the first step."""
 
     def retune(self, parameters: Any) -> None:
-        """Take new parameters from the next step on."""
+        """Use new parameters from the next step on."""
 
     def examine(self, parameters: Any) -> None:
-        """Try parameters before they are taken; nothing to do here."""
+        """Try parameters before :meth:`retune`; does nothing by default."""
 
     def present(self) -> Any:
         """Present parameters of a stage that changes them by itself."""
         raise NotImplementedError
 
     def fall_silent(self) -> None:
-        """Make outputs safe when the topic that it answers has fallen silent; nothing here."""
+        """Make outputs safe when the topic that the stage answers has fallen silent; does nothing by default."""
 
     def concerns(self) -> list[str]:
-        """What is wrong now, in words: nothing."""
+        """Sentences for people on what is wrong with the stage now; none by default."""
         return []
 
     def described(self) -> dict[str, str]:
-        """Names and texts that its report contains in addition to its numbers; none by default."""
+        """Names and texts that the report contains in addition to its numbers; none by default."""
         return {}
 
     def step(self) -> None:

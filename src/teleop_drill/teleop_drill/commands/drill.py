@@ -34,7 +34,7 @@ these sessions alone, and keeps the machine's cores busy for seconds. Exit code 
 
 def add(commands: Any) -> None:
     """Add the command's parser."""
-    text = "break a running session in all known ways, and measure what the arm does"
+    text = "inject all known faults into a running session, and measure the reaction of the arm"
     parser = command(commands, "drill", _run, text, _EPILOG)
     parser.add_argument("names", nargs="*", metavar="NAME", help="faults (default: all)")
     parser.add_argument("--composed", action="store_true", help="all nodes in one process")

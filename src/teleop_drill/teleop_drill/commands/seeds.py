@@ -72,8 +72,8 @@ def _run_many(first: int, count: int, json_file: Path | None, processes: Process
             for line in told(found, shrink(found, one.law), one.law):
                 console.print(line, highlight=False, markup=False, soft_wrap=True)
     for title, (head, *rows) in (
-        ("how often a fault met a state of the arm", coverage.table()),
-        ("how often a law was looked at under a fault", coverage.laws()),
+        ("number of times that a fault happened in a state of the arm", coverage.table()),
+        ("number of checks of a law under a fault", coverage.laws()),
     ):
         columns = [Column(name, overflow="fold", justify="right") for name in head[1:]]
         faults = Column(head[0], no_wrap=True)

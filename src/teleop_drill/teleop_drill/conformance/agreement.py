@@ -71,7 +71,7 @@ def follows(name: str, measured: Trail, wanted: Trail, least: float) -> str:
     best = int(np.argmin([float(np.mean(one**2)) if len(one) >= _FEW else np.inf for one in off]))
     share = max(float(np.max(np.abs(off[best]))) / wanted.way, 1.0 - measured.way / wanted.way)
     if share > SHARE:
-        ways = f"its setpoint moved by {wanted.way:.3g}, {name} by {measured.way:.3g}"
+        ways = f"the setpoint moved by {wanted.way:.3g}, but {name} by {measured.way:.3g}"
         return f"{ways}: {share:.0%} off"
     if lags[best] > LATEST:
         return f"{name} is {lags[best]:.2g} s behind its setpoint, at most {LATEST:g}"
@@ -91,7 +91,7 @@ def adds_up(trail: Trail, least: float) -> str:
         return ""  # the motion ended before filtered velocities were available
     share = float(np.max(np.abs(_differences(went, moved)))) / trail.way
     if share > SHARE:
-        return f"its speeds add up to another way than its places: {share:.0%} off"
+        return f"the integral of its speeds differs from the change of its positions by {share:.0%}"
     return ""
 
 
@@ -114,7 +114,7 @@ def obeys(joints: Trail, tip: Trail, fk: Callable[[Vectors], Vectors], least: fl
     differences = _differences(_smooth(grid, model), _smooth(grid, tip))
     off = float(np.max(np.abs(differences), initial=0.0))
     if off > SHARE * max(model.way, tip.way):
-        return f"forward kinematics of measured_js moved the tip {1e3 * off:.2g} mm elsewhere"
+        return f"the motion of the tip differs from forward kinematics of measured_js by {1000.0 * off:.2g} mm"
     return ""
 
 

@@ -16,17 +16,17 @@ from teleop_drill.drill.numbers import Numbers
 class Master(Enum):
     """Kind of operator that moves the hand."""
 
-    DEVICE = "the simulated device of the session, a stage like all others"
-    DRILL = "the drill itself, which publishes what a device would"
+    DEVICE = "the simulated device of the session"
+    DRILL = "the drill itself, which publishes the samples of a device"
 
 
 class Motion(Enum):
     """Allowed motion of the arm under a fault."""
 
-    RESTS = "it comes to rest by itself"
-    HOLDS = "it goes to the last sound command, and stays there as if clutched"
-    LED = "it goes where the drill's own commands lead it"
-    GOES_ON = "it goes on, within what the hand asks for"
+    RESTS = "the arm comes to rest by itself"
+    HOLDS = "the arm moves to the last valid command and stays there, as with the clutch pressed"
+    LED = "the arm follows the drill's own commands"
+    GOES_ON = "the arm continues to move, within the motion that the hand commands"
 
 
 class Cure(Enum):

@@ -126,12 +126,12 @@ def _always(exercise: Exercise, seen: Seen, numbers: Numbers) -> Iterator[Measur
     text = "a setpoint {0:.2g} rad or m beyond its joint's limit"
     yield Measured("beyond_limit", text, outside, _ROUNDING, scale=1.0)
     measured = measure.tips(robot.fk, seen.measured_js, robot.n)
-    text = "measured_js and the true tip tell ways {0:.2f} mm apart, at most {1:.2f}"
+    text = "the paths by measured_js and of the true tip differ by {0:.2f} mm, at most {1:.2f}"
     way = measure.travel(seen.true_cp, seen.begin_ns, seen.end_ns)
     most = measure.RESOLUTION + 0.1 * (0.0 if math.isnan(way) else way)
     yield Measured("apart_m", text, measure.apart(measured, seen.true_cp), most)
     # While the arm is silent, its motion is unknown; the slave stops an arm that is silent for longer.
-    text = "the tip or the joints fell silent {0:.0f} ms before the setpoints, at most {1:.0f}"
+    text = "messages of the tip or the joints ended {0:.0f} ms before the setpoints, at most {1:.0f}"
     silence = max(measure.silence(one, setpoints) for one in (seen.true_cp, seen.measured_js))
     yield Measured("silent_s", text, silence, numbers.command_timeout + late(seen, numbers))
 
@@ -155,7 +155,7 @@ def _told(exercise: Exercise, seen: Seen, numbers: Numbers) -> Iterator[Measured
     """Check the times at which the slave reported the fault and ``diagnostics`` warned of it."""
     if exercise.told is not None:
         most = seen.deaf + exercise.told(numbers) + late(seen, numbers)
-        text = "slave/operation told after {0:.0f} ms, at most {1:.0f}"
+        text = "slave/operation reported after {0:.0f} ms, at most {1:.0f}"
         yield Measured("told_s", text, seen.since(seen.told_ns), most)
     if exercise.warns:
         most = exercise.allowed(numbers) + WARNED + late(seen, numbers)
@@ -173,7 +173,7 @@ def _stops(exercise: Exercise, seen: Seen, numbers: Numbers) -> Iterator[Measure
         return
     if None not in exercise.states:  # an arm that has ended sends nothing
         yield from _rests(exercise, seen, numbers, going)
-    text = "a joint braked with {0:.2f} of what its drive can do, at least {1:.2f}"
+    text = "a joint braked with {0:.2f} of its drive's deceleration, at least {1:.2f}"
     stopping = seen.setpoint_js.within(0, seen.end_ns)
     share = measure.ramp(stopping, numbers.braking, numbers.tick)
     yield Measured("braking_share", text, share, least=_FULL, scale=1.0)
@@ -259,5 +259,5 @@ def _goes_on(exercise: Exercise, seen: Seen, numbers: Numbers) -> Iterator[Measu
     yield Measured("travel_m", text, measure.travel(seen.true_cp, begin_ns, end_ns), bound)
     went = measure.path(seen.true_cp, begin_ns, end_ns)
     least = _LEAST * speed * max(0.0, elapsed - stands - numbers.filter_time - late(seen, numbers))
-    text = "the tip went {0:.0f} mm, at least {1:.0f}: it did not follow"
+    text = "the tip moved {0:.0f} mm, at least {1:.0f}: the arm did not follow"
     yield Measured("path_m", text, went, least=least)

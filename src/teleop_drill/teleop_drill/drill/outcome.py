@@ -51,7 +51,7 @@ class Outcome:
 
     def note_loss(self, seconds: float) -> None:
         """Note the time of messages that the drill's own tap received and that are missing in the recording [s]."""
-        text = "{0:.2f} s of a topic that the drill heard are not recorded, at most {1:.2f} s"
+        text = "{0:.2f} s of a topic that the drill received are not recorded, at most {1:.2f} s"
         most = self.exercise.lost
         self.measures["lost_s"] = Measured("lost_s", text, seconds, most, scale=1.0)
 
@@ -63,14 +63,14 @@ class Outcome:
             found.append(f"{_state(self.state)}, not {wanted}")
         if asked.faults and self.fault not in asked.faults:
             wanted = " or ".join(fault.word for fault in asked.faults)
-            found.append(f"told {self.fault.word}, not {wanted}")
+            found.append(f"reported {self.fault.word}, not {wanted}")
         if asked.said and self.note != asked.said:
             found.append(f"answered {self.note or 'nothing'!r}, not {asked.said!r}")
         found += [one.failure for one in self.measures.values() if one.failure]
         if not self.is_recorded:
             found.append(f"recording: {self.recording}")
         if math.isnan(self.recovered):
-            found.append("it did not recover")
+            found.append("the arm did not recover")
         elif self.cure not in asked.cures:
             wanted = " or ".join(cure.value for cure in asked.cures)
             found.append(f"recovered by {self.cure.value}, not {wanted}")

@@ -15,11 +15,11 @@ from teleop_drill.nodes.conformance_watch import Watch
 
 Report = Callable[[str], None]
 NEVER_TRIED = {
-    "servo_jf": "efforts are not safe to try from outside",
-    "servo_cf": "forces are not safe to try from outside",
-    "free": "an arm that is let go may fall",
-    "move_cr": "CRTK does not say in which frame",
-    "servo_cr": "CRTK does not say in which frame",
+    "servo_jf": "effort commands are not safe to test from outside",
+    "servo_cf": "force commands are not safe to test from outside",
+    "free": "an arm without control may fall",
+    "move_cr": "CRTK does not define the frame",
+    "servo_cr": "CRTK does not define the frame",
 }
 
 
@@ -60,9 +60,7 @@ def _insist_on_one(findings: dict[str, Finding]) -> None:
     pair = [findings[name] for name in ("measured_js", "measured_cp")]
     if all(found.verdict is Verdict.ABSENT for found in pair):
         row = pair[0].row
-        findings[row.name] = Finding(
-            row, Verdict.FAILED, "no publisher", "neither measured_js nor measured_cp is there"
-        )
+        findings[row.name] = Finding(row, Verdict.FAILED, "no publisher", "neither measured_js nor measured_cp exists")
 
 
 def _commands(findings: dict[str, Finding]) -> Iterable[tuple[str, CrtkTopic]]:

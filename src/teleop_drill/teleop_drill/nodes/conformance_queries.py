@@ -44,7 +44,7 @@ def _listen(arm: Arm, row: CrtkTopic, ends: list[Endpoint]) -> Finding:
     rate = (tap.count - before) / looked
     arm.untap(row.name)
     if not messages:
-        return Finding(row, Verdict.FAILED, "no message", f"nothing came within {_FIRST:g} s")
+        return Finding(row, Verdict.FAILED, "no message", f"no message came within {_FIRST:g} s")
     found = f"{rate:.0f} Hz" if rate > 0 else "1 message"
     faults = [*_stamps(row, messages, arm.world.time_ns()), *_content(row, messages)]
     if faults:
@@ -52,7 +52,7 @@ def _listen(arm: Arm, row: CrtkTopic, ends: list[Endpoint]) -> Finding:
     if len(ends) > 1:
         return Finding(row, Verdict.NOTED, found, f"{len(ends)} publishers: who speaks for the arm?")
     if not any(end.is_reliable for end in ends):
-        note = "offered best effort: stock clients, which are reliable, get nothing"
+        note = "offered best effort: ordinary clients, which are reliable, receive nothing"
         return Finding(row, Verdict.FAILED, found, note)
     return Finding(row, Verdict.OK, found)
 
@@ -68,7 +68,7 @@ def _stamps(row: CrtkTopic, messages: list[Any], now_ns: int) -> list[str]:
         return ["its stamps go back"]
     age = 1e-9 * (now_ns - stamps[-1])
     if row.name.startswith("measured") and not -_OLD < age < _OLD + _LOOK:
-        return [f"its stamp is {age:.3g} s old: another clock, or none"]
+        return [f"its stamp is {age:.3g} s old: the sender uses another clock or none"]
     if row.name.startswith("measured") and len(stamps) > 2 and stamps[0] == stamps[-1]:
         return ["its stamp does not move"]
     return []
@@ -101,7 +101,7 @@ def _joints(row: CrtkTopic, message: Any, vectors: dict[str, np.ndarray]) -> lis
     names = list(message.name)
     sizes = {len(values) for values in vectors.values() if len(values)}
     if not sizes:
-        return ["it holds no numbers"]
+        return ["it contains no numbers"]
     if len(sizes) > 1 or (names and {len(names)} != sizes):
         return [f"its vectors have different lengths: {sorted(sizes | {len(names)})}"]
     if not names and row.name == "measured_js":

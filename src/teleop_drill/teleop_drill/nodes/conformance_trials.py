@@ -44,14 +44,14 @@ class Trials:
         """Reason why no trial is possible; empty if trials are possible."""
         state = self.arm.newest("operating_state", 3.0)
         if state is None:
-            return "no operating_state: whether it may be moved is not known"
+            return "no operating_state: it is unknown whether the arm may be moved"
         if state.state != "ENABLED" or not state.is_homed:
             homed = "homed" if state.is_homed else "not homed"
-            return f"it is {state.state}, {homed}: enable and home it first"
+            return f"the arm is {state.state}, {homed}: enable and home it first"
         if state.is_busy:
-            return "it is busy: wait until it is not"
+            return "the arm is busy: wait until its motion has ended"
         if self.arm.newest("setpoint_js") is None and self.arm.newest("measured_js") is None:
-            return "neither setpoint_js nor measured_js: where it is, is not known"
+            return "neither setpoint_js nor measured_js: the arm's position is unknown"
         self._start = self.joints()
         return ""
 
@@ -94,7 +94,7 @@ class Trials:
         self._say("no such command")
         arm.pause(0.3)
         if self._state() != "ENABLED":
-            return Verdict.FAILED, "a word that is no command changed the state"
+            return Verdict.FAILED, "a text that is no command changed the state"
         if not self._reaches("pause", "PAUSED"):
             return Verdict.FAILED, f"pause: {self._state()} in place of PAUSED after {_STATE:g} s"
         before = self.joints()
@@ -131,7 +131,7 @@ class Trials:
             if outcome is not None:
                 self._joint = joint, sign
                 return outcome
-        return Verdict.FAILED, "no joint moves, neither way"
+        return Verdict.FAILED, "no joint moves in either direction"
 
     def _move(self, name: str, begin: Array, goal: Array, sent: Array) -> Outcome | None:
         """Result of a move of joints; None if nothing moved."""
@@ -151,7 +151,7 @@ class Trials:
             if outcome is not None:
                 self._axis = axis, sign
                 return outcome
-        return Verdict.FAILED, "the tip moves along no axis, neither way"
+        return Verdict.FAILED, "the tip moves along no axis in either direction"
 
     def _off(self, where: Callable[[], Array], goal: Array) -> float:
         return float(np.abs(where() - goal).max())
@@ -171,7 +171,7 @@ class Trials:
             return Verdict.FAILED, f"{off():.2g} short of its goal after {_PATIENCE:g} s"
         self.arm.wait(lambda: tap.read(watch) > 0 and not tap.newest.is_busy and busy[0], 2.0)
         if not busy[0]:
-            return Verdict.FAILED, "is_busy never rose: who waits for the move waits without end"
+            return Verdict.FAILED, "is_busy never became true: clients that wait for the move wait without end"
         return (Verdict.FAILED, "still busy at its goal") if tap.newest.is_busy else _OK
 
     def _candidates(self, known: tuple[int, float], count: int) -> list[tuple[int, float]]:
@@ -193,7 +193,7 @@ class Trials:
             if outcome is not None:
                 self._joint = joint, sign
                 return outcome
-        return Verdict.FAILED, "no joint follows, neither way"
+        return Verdict.FAILED, "no joint follows in either direction"
 
     def _along_joint(self, begin: Array, joint: int, sign: float) -> float:
         return float(sign * (self.joints() - begin)[joint] / TURN)
@@ -212,7 +212,7 @@ class Trials:
             if outcome is not None:
                 self._axis = axis, sign
                 return outcome
-        return Verdict.FAILED, "the tip follows along no axis, neither way"
+        return Verdict.FAILED, "the tip follows along no axis in either direction"
 
     def _along_axis(self, begin: Array, axis: int, sign: float) -> float:
         return float(sign * (self.place()[0] - begin)[axis] / WAY)
@@ -233,7 +233,7 @@ class Trials:
                 return None
         self.arm.wait(lambda: abs(where()) < _NEAR, 1.0)
         if farthest < 1.0 - _MOVED:
-            return Verdict.FAILED, f"followed {farthest:.0%} of the way"
+            return Verdict.FAILED, f"followed {farthest:.0%} of the distance"
         rest = abs(where())
         return (Verdict.FAILED, f"{rest:.0%} of the way off in the end") if rest > _NEAR else _OK
 
@@ -247,7 +247,7 @@ class Trials:
             outcome = self._run(name, message, self.arm.message(name), where)
             if outcome is not None:
                 return outcome
-        return Verdict.FAILED, "no joint runs, neither way"
+        return Verdict.FAILED, "no joint reacts to a speed in either direction"
 
     def run_tip(self, name: str) -> Outcome:
         """Run the tip at a speed, then fall silent: it must come to rest by itself."""
@@ -258,7 +258,7 @@ class Trials:
             outcome = self._run(name, message, self.arm.message(name), where)
             if outcome is not None:
                 return outcome
-        return Verdict.FAILED, "the tip runs along no axis, neither way"
+        return Verdict.FAILED, "the tip reacts to a speed along no axis in either direction"
 
     def _run(self, name: str, message: Any, halt: Any, where: Callable[[], float]) -> Outcome | None:
         """Result of half a second at a speed of twice the displacement per second."""
@@ -277,8 +277,8 @@ class Trials:
             halt.velocity = [0.0] * len(self._start)
         self.arm.send(name, halt)
         if drift > _STILL:
-            return Verdict.NOTED, "goes on a second after the last message: it has no watchdog"
-        return _OK if 0.3 < went < 3.0 else (Verdict.FAILED, f"ran {went:.0%} of the way asked for")
+            return Verdict.NOTED, "still moves a second after the last message: the arm has no watchdog"
+        return _OK if 0.3 < went < 3.0 else (Verdict.FAILED, f"moved {went:.0%} of the commanded distance")
 
     def hold(self) -> Outcome:
         """Hold: nothing moves, and it stays enabled."""

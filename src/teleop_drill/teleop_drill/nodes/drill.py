@@ -156,7 +156,7 @@ class _Drill:
         except (KeyboardInterrupt, SessionError) as error:
             if not outcomes:
                 raise
-            self._say(f"stopped: {str(error) or 'interrupted'}; what was measured until now:")
+            self._say(f"stopped: {str(error) or 'interrupted'}; results until now:")
             self.is_over = True
         finally:
             self._close()
@@ -204,7 +204,7 @@ class _Drill:
         rig.wait(_MEASURED)
         found = self._scheduling = rig.tap.scheduling(since_ns)
         late = f"{1e3 * found.usual:.2f} ms usually, {1e3 * found.worst:.1f} ms at worst"
-        self._say(f"this machine is late by {late}; twice the worst is granted to every time")
+        self._say(f"wake-ups on this machine are late by {late}; every time limit is extended by twice the worst")
 
     def _await_following(self, rig: LiveRig) -> None:
         """Wait until the slave follows, and help it; raises SessionError if it does not follow."""

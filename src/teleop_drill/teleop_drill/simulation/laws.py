@@ -156,14 +156,14 @@ class Laws:
         self._count("tool speed")
         most = self._numbers.tool_speed
         if way > most * DT * (1.0 + _CURVED):
-            self._break("tool speed", f"the tip was sent at {way / DT:.3g} m/s, at most {most:.3g}")
+            self._break("tool speed", f"the setpoint of the tip moved at {way / DT:.3g} m/s, at most {most:.3g}")
         self._count("speed")
         if (step > self._longest_step).any():
             speed = step / DT
             joint = int(np.argmax(speed / self._numbers.speed_limit))
             self._break(
                 "speed",
-                f"joint {joint + 1} was sent at {speed[joint]:.3g}, beyond its drive's "
+                f"the setpoint of joint {joint + 1} moved at {speed[joint]:.3g}, beyond its drive's "
                 f"{self._numbers.speed_limit[joint]:.3g}",
             )
         if step.max() > _SLACK * DT:
@@ -186,7 +186,7 @@ class Laws:
         age = 1e-9 * (self._scheduler.now_ns + epoch_ns - stamp_ns)
         self._old = self._old + 1 if age > _OLD + self._late() else 0
         if self._old > _JOINING:
-            self._break("age", f"moves by a command that is {age:.2f} s old")
+            self._break("age", f"follows a command that is {age:.2f} s old")
 
     # -- now and then ----------------------------------------------------------------------------
 
@@ -220,12 +220,12 @@ class Laws:
         if moves and state != State.ENABLED and in_force > self._braking + 0.3:
             self._break("motion", f"moves {in_force:.2f} s after it became {State(state).name}")
         if state != State.ENABLED and slave.stage.operation["is_busy"]:
-            self._break("motion", f"has a move to go on with while it is {State(state).name}")
+            self._break("motion", f"has an unfinished move while it is {State(state).name}")
         self._count("told")
         told = self._stage.operation.get("state")
         if in_force > _TELL and told != state:
             was = "nothing" if told is None else State(int(told)).name
-            self._break("told", f"is {State(state).name} for {in_force:.2f} s and has told {was}")
+            self._break("told", f"is {State(state).name} for {in_force:.2f} s but has reported {was}")
 
     def _judge_stop(self, slave: Any, process: Process) -> None:
         """A pressed stop is in force soon, and never lost.
@@ -332,4 +332,4 @@ class Laws:
         if seconds is None:
             told = self._stage.operation
             name = State(int(told["state"])).name if told else "nothing"
-            self._break("recovery", f"does not follow {bound:g} s after the cure; it says {name}")
+            self._break("recovery", f"does not follow {bound:g} s after the cure; its state is {name}")

@@ -57,7 +57,7 @@ class Owner:
         begins, self._is_driven = is_driven and not self._is_driven, is_driven
         silence_ns = now_ns - self.followed_ns
         if begins and self._in_row >= _STREAM and silence_ns < self._timeout_ns:
-            return f"is driven {1e-6 * silence_ns:.0f} ms after a command of a stream"
+            return f"follows a speed command {1e-06 * silence_ns:.0f} ms after a command of a stream"
         last_ns, self._new_ns = self._new_ns, 0
         if stamp_ns not in {NO_COMMAND_NS, self._stamp_ns}:
             self._in_row = self._in_row + 1 if silence_ns < self._timeout_ns else 0
@@ -68,7 +68,7 @@ class Owner:
     def _judge_sender(self, stamp_ns: int) -> str:
         sender, before = self._senders.get(stamp_ns), self._leader
         if sender is None:
-            return f"follows a command of stamp {stamp_ns}, which nobody has sent"
+            return f"follows a command of stamp {stamp_ns}, which no process has sent"
         self._leader = sender
         writers = {one.sender: one for one in self._bus.writers.get(_TOPIC, ())}
         if not any(one.node == _SLAVE for one in self._bus.readers.get(_TOPIC, ())):
@@ -76,7 +76,7 @@ class Owner:
             return "" if is_inside else "follows another process than its own"
         silence_ns = self._silences.get(stamp_ns, _SILENCE_NS)
         if before in writers and before != sender and silence_ns < _SILENCE_NS:
-            return f"follows a second sender {1e-6 * silence_ns:.0f} ms after the first one spoke"
+            return f"follows a second sender {1e-06 * silence_ns:.0f} ms after a message of the first one"
         return ""
 
     def _note_sent(self, taken: Taken) -> None:

@@ -199,7 +199,7 @@ def _total_rows(robot: Robot, longer: dict[str, Array], exact: dict[str, Array])
     """All readings of the ruler (along y from home) minus the readings that models predict."""
     read = np.concatenate([which.read_mm for which in AXES.values()])
     drawn = {name: readings(robot, which, longer_d3(robot, 0.0)) for name, which in AXES.items()}
-    group = "all readings of the ruler, less what is expected of it"
+    group = "all readings of the ruler, minus their expected values"
     return [
         Comparison(
             quantity=f"RMS, {text}",
@@ -225,14 +225,14 @@ def _figure(name: str, which: Axis, exact: Array, longer: Array) -> Figure:
     ]
     for trace in traces[1:3]:
         trace |= {"mode": "lines", "line": {**trace["line"], "dash": "dash"}}
-    layout = {"xaxis": axis("desired way", "mm"), "yaxis": axis("desired less measured", "mm")}
+    layout = {"xaxis": axis("desired way", "mm"), "yaxis": axis("desired minus measured", "mm")}
     sentence = f"Error of moves along {name} against a ruler, published and predicted."
     return Figure(f"Accuracy along {name}", sentence, traces, layout, 320)
 
 
 ACCURACY = experiment.Experiment(
     "accuracy",
-    "moves of the slave alone, measured with a ruler: what its encoders do not see",
+    "moves of the slave alone, measured with a ruler: errors that its encoders do not measure",
     "Vongbunyong 2008, appendix E, tables E.1-E.4",
     _measure,
 )

@@ -48,7 +48,7 @@ class Tracking(NamedTuple):
         true_rms: Error of the true tip [µm].
         true_spread: Error of the true tip about its mean [µm]; calibration would remove the mean.
         effort: Root mean square over joints and time of the effort over the drive's limit [%].
-        chatter: The same of its change from tick to tick [%].
+        chatter: Change of this effort from tick to tick [%].
     """
 
     rms: float
@@ -104,8 +104,8 @@ _TRACKED: tuple[tuple[str, str, str, Callable[..., float]], ...] = (
     ("largest", "tracking error at the encoders, max", "µm", mean),
     ("true_spread", "error of the true tip about its mean, RMS", "µm", pooled),
     ("true_rms", "error of the true tip, RMS", "µm", pooled),
-    ("effort", "effort over the drives' limits, RMS", "%", pooled),
-    ("chatter", "its change from tick to tick, RMS", "%", pooled),
+    ("effort", "effort divided by the drives' limits, RMS", "%", pooled),
+    ("chatter", "change of this effort from tick to tick, RMS", "%", pooled),
 )
 
 
@@ -185,7 +185,7 @@ def _trade_figure(scenario: str, found: Mapping[str, list[Tracking]]) -> Figure:
         "shapes": [shape],
         "annotations": [{**note, "y": float(np.log10(GOAL_UM))}],
     }
-    sentence = "Error against noise of the effort, a point for each hand: better is lower and left."
+    sentence = "Error against noise of the effort, with a point for each hand; lower and farther left is better."
     return Figure(f"Error and its price, {MODES[scenario].mode}", sentence, traces, layout, 420)
 
 

@@ -53,7 +53,9 @@ def _delays(bench: Bench) -> Findings:
     looks = (some - none) / DELAYS[1]
     pressing, group = "press in targets on a ring", "follow a point that wanders: order"
     rows = [
-        Comparison(quantity="looks in an attempt: its lengthening per delay", predicted=looks, group=pressing),
+        Comparison(
+            quantity="looks in an attempt: increase of its time divided by the delay", predicted=looks, group=pressing
+        ),
         Comparison(quantity="time of an attempt, not late", unit="s", predicted=none, group=pressing),
     ]
     for delay, time in zip(DELAYS[2:], pressed[2:], strict=True):
@@ -126,7 +128,7 @@ def _figure(score: Scores) -> Figure:
         "xaxis": {"title": {"text": "scale from hand to slave"}},
         "yaxis": {"title": {"text": "effective width [mm]"}},
     }
-    sentence = "Where a press lands spreads less with a smaller scale, late or not."
+    sentence = "The end points of presses spread less with a smaller scale, with and without delay."
     return Figure("Spread of the end points by scale", sentence, traces, layout)
 
 
@@ -138,13 +140,13 @@ _SCALING_NOTES = (
 
 DELAY = Experiment(
     "delay",
-    "what a late line does to an operator who sees: times, errors and deviations",
+    "effect of a delayed line on an operator who sees: times, errors and deviations",
     "Ferrell 1965; Korte et al. 2014 (order of errors and deviations)",
     _delays,
 )
 SCALING_UNDER_DELAY = Experiment(
     "scaling_under_delay",
-    "whether a smaller scale from hand to slave lowers the errors that a late line causes",
+    "whether a smaller scale from hand to slave reduces the errors that a delayed line causes",
     "Richter, Orosco and Yip 2019 (order)",
     _scaling,
 )

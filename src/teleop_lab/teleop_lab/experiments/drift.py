@@ -128,7 +128,9 @@ def _rows(found: Mapping[Job, Drift]) -> tuple[Comparison, ...]:
             ]  # fmt: skip
         rows += [
             Comparison(quantity="drift, peak", unit="mm", predicted=1e3 * drift.peak, group=group),
-            Comparison(quantity="energy out less in, both ports", unit="mJ", predicted=1e3 * drift.given, group=group),
+            Comparison(
+                quantity="energy out minus energy in, both ports", unit="mJ", predicted=1e3 * drift.given, group=group
+            ),
             Comparison(quantity="force on the tip, peak", unit="N", predicted=drift.force, group=group),
         ]
     return tuple(rows)
@@ -175,7 +177,7 @@ def _measure(bench: Bench) -> Findings:
 
 DRIFT = experiment.Experiment(
     "drift",
-    "by how much the slave is off the hand after contacts far away, by material and passivity",
+    "drift of the slave from its commands after delayed contacts, by material and passivity",
     "compensator of drift of Coelho, Ott, Singh, Lizarralde and Kondak 2019",
     _measure,
 )

@@ -72,7 +72,7 @@ def _measure(bench: Bench) -> Findings:
 
 FITTS = experiment.Experiment(
     "fitts",
-    "times to press in targets that are seen late, of people and of the operator who sees",
+    "times to press inside targets that are seen late, of people and of the operator `observer`",
     "MacKenzie and Ware 1993",
     _measure,
 )

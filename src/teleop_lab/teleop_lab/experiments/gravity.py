@@ -36,7 +36,12 @@ def _measure(bench: Bench) -> Findings:
                 group=group,
             ),
             Comparison(quantity="without", unit="mm", predicted=without, ours=ours_off, group=group),
-            Comparison(quantity="without over with", predicted=without / with_it, ours=ours_off / ours, group=group),
+            Comparison(
+                quantity="error without compensation divided by the error with it",
+                predicted=without / with_it,
+                ours=ours_off / ours,
+                group=group,
+            ),
         ]
         figures.append(_figure(printed.mode, on[0], off[0]))
     return Findings((*rows, *_effort_rows()), tuple(figures), _NOTES)
@@ -86,7 +91,7 @@ def _figure(mode: str, on: Session, off: Session) -> Figure:
 
 GRAVITY = experiment.Experiment(
     "gravity",
-    "what compensation of gravity on axis 2 does for the errors",
+    "effect of gravity compensation on axis 2 on the errors",
     "Vongbunyong 2008, sections 4.6, 6.1 and 7.6",
     _measure,
 )

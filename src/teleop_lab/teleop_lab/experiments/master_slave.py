@@ -114,7 +114,9 @@ def _measure(bench: Bench) -> Findings:
     ours = {name: [figures_of(s) for s in bench.sessions(name, conditions.OURS)] for name in MODES}
     rows = [row for name in MODES for row in _mode_rows(name, found[name], ours[name])]
     ratios, others = (_ratios(which) for which in (found, ours))
-    rows.append(_row("position RMS, fine over coarse", "", round(_RATIO, 3), ratios, others, absolute(0.12), "both"))
+    rows.append(
+        _row("position RMS, fine divided by coarse", "", round(_RATIO, 3), ratios, others, absolute(0.12), "both")
+    )
     drawn = [figure for name in MODES for figure in _figures(name, sessions[name][0])]
     drawn.append(_both_boxes({name: several[0] for name, several in sessions.items()}))
     return Findings(tuple(rows), tuple(drawn), _NOTES)
@@ -204,7 +206,7 @@ def _plane_figure(mode: str, found: Drawn) -> Figure:
         (found.center + edges_of(found.size), "box", FIXTURE, 2.0),
     )
     traces, layout = in_planes("xyz", groups, "mm")
-    return Figure(f"Path per plane, {mode}", "The same along each axis.", traces, layout, 400)
+    return Figure(f"Path per plane, {mode}", "The same path, seen along each axis.", traces, layout, 400)
 
 
 def _place_figure(mode: str, found: Drawn) -> Figure:
@@ -216,7 +218,7 @@ def _place_figure(mode: str, found: Drawn) -> Figure:
             (found.measured, "measured", MEASURED, 1.2),
         ):
             traces.append({**line(times, path[::_CURVE, row], name, color, width), **place})
-    sentence = "Place of the slave against time."
+    sentence = "Position of the slave against time."
     return Figure(f"x, y and z, {mode}", sentence, traces, layout, 480)
 
 

@@ -115,7 +115,7 @@ def _figure(spring: mma_balance.ShoulderSpring) -> Figure:
         published_points(np.array([-45.0, 0.0]), np.array([1.0349, 1.1926]), "published", "N·m"),
     ]
     layout = {"xaxis": axis("link 2 (0 level, -90 upright)", "°"), "yaxis": axis("torque", "N·m")}
-    sentence = "Torque about the shoulder: what gravity asks for and what the spring gives."
+    sentence = "Torque about the shoulder: torque of gravity, and torque of the spring."
     return Figure("Balance of the shoulder", sentence, traces, layout, 340)
 
 

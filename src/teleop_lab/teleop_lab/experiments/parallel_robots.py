@@ -54,7 +54,7 @@ def _figure() -> Figure:
     first, second = np.degrees(closure.phi1).T
     traces = [line(around, first, "one assembly", FIRST, 2.0, "°"), line(around, second, "the other", SECOND, 2.0, "°")]
     layout = {"xaxis": axis("theta1", "°"), "yaxis": axis("phi1", "°")}
-    sentence = "Rocker over crank of the 4-bar, in both assemblies."
+    sentence = "Angle of the rocker against that of the crank of the 4-bar, in both assemblies."
     return Figure("4-bar", sentence, traces, layout, 320)
 
 

@@ -148,8 +148,8 @@ def _measure(bench: Bench) -> Findings:
 
 
 _GROUPS = {
-    "seen": "a hand that sees: it aims again, by what it missed the first time",
-    "blind": "a hand that does not: friction of the device holds it back",
+    "seen": "a hand that sees: it repeats the task, with its aim corrected by the first errors",
+    "blind": "a hand that does not see: friction of the device holds it back",
 }
 _NOTES = (
     "The source gives neither places nor the size of the circles: a grid of 6 by 4 points at "

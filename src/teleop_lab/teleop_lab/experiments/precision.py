@@ -134,7 +134,7 @@ def _joint_figures(predicted: Rests) -> list[Figure]:
             published_points(place, printed.off[..., joint].mean(axis=1) / step, "published", "counts"),
             points(place, predicted.off[..., joint].mean(axis=1) / step, "predicted", SECOND, "counts"),
         ]
-        layout = {"xaxis": axis("point"), "yaxis": axis("rest less target", "counts")}
+        layout = {"xaxis": axis("point"), "yaxis": axis("rest position minus target", "counts")}
         name = robot.joint_names[joint]
         sentence = f"Where {name} rests, mean of ten runs: friction stops it short of its target."
         figures.append(Figure(f"Rest of {name}", sentence, traces, layout, 300))
@@ -180,8 +180,11 @@ def _measure_repeatability(bench: Bench) -> Findings:
 
 
 PRECISION = experiment.Experiment(
-    "precision", "six points, ten moves from home to each: how far the tip rests off", _SOURCE, _measure_precision
+    "precision", "six points, ten moves from home to each: errors of the tip at rest", _SOURCE, _measure_precision
 )
 REPEATABILITY = experiment.Experiment(
-    "repeatability", "the same moves: how much the rests of ten runs differ", _SOURCE, _measure_repeatability
+    "repeatability",
+    "the same moves as in `precision`: spread of the rest positions of ten runs",
+    _SOURCE,
+    _measure_repeatability,
 )

@@ -174,7 +174,7 @@ def _figure(found: Mapping[Job, Puncture]) -> Figure:
             trips, overshoots = np.array(kept).T
             traces.append(joined(trips, overshoots, f"{way[0]}, {way[1]}", color, "mm"))
     layout = {"xaxis": axis("round trip", "ms"), "yaxis": axis("overshoot", "mm")}
-    sentence = "How far the tip goes behind the membrane before the hand that felt it has stopped."
+    sentence = "Distance of the tip behind the membrane when the hand, after it felt the puncture, has stopped."
     return Figure("Overshoot of a puncture", sentence, traces, layout, 420)
 
 
@@ -209,7 +209,7 @@ def _measure(bench: Bench) -> Findings:
 
 PUNCTURE = Experiment(
     "puncture",
-    "what the hand feels of a puncture, and how far the tip overshoots, by architecture and delay",
+    "force of a puncture at the hand, and overshoot of the tip, by architecture and delay",
     "membrane of Okamura, Simone and O'Leary 2004; reaction of Keele and Posner 1968",
     _measure,
 )

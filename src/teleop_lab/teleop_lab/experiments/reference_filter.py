@@ -156,7 +156,7 @@ def _jitter_figure(session: Session) -> Figure:
         "annotations": [note for _, note in drawn],
     }
     sentence = "Reference of joint 5 around its mean with the stylus at rest, as figure 6.11."
-    return Figure("What the filter leaves of the jitter", sentence, traces, layout, 340)
+    return Figure("Jitter that remains after the filter", sentence, traces, layout, 340)
 
 
 def _gain_figure() -> Figure:
@@ -166,12 +166,12 @@ def _gain_figure() -> Figure:
         points(np.array([50.0]), np.array([0.1]), "published", "#111", "", 0),
     ]
     layout = {"xaxis": axis("frequency", "Hz", type="log"), "yaxis": axis("gain", type="log")}
-    return Figure("Gain of the filter", "Gain over frequency.", traces, layout, 300)
+    return Figure("Gain of the filter", "Gain against frequency.", traces, layout, 300)
 
 
 FILTER = Experiment(
     "filter",
-    "the low-pass on the references: coefficients, gain, and what it leaves of the jitter",
+    "the low-pass on the references: coefficients, gain, and remaining jitter",
     "Vongbunyong 2008, eqs. 6.2.8-6.2.9, figure 6.11",
     _measure,
 )

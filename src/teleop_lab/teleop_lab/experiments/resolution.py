@@ -109,8 +109,8 @@ def _figure(steps: dict[str, float]) -> Figure:
     ]
     for trace in traces[:2]:
         trace["mode"] = "lines"
-    layout = {"xaxis": axis("reach", "mm"), "yaxis": axis("way of one step", "µm", rangemode="tozero")}
-    sentence = "What one encoder step moves the tip, over its distance from the shoulder."
+    layout = {"xaxis": axis("reach", "mm"), "yaxis": axis("distance of one step", "µm", rangemode="tozero")}
+    sentence = "Motion of the tip by one encoder step, against its distance from the shoulder."
     return Figure("Resolution of the tip", sentence, traces, layout, 340)
 
 

@@ -123,7 +123,7 @@ def _measure(bench: Bench) -> Findings:
     )
     for text, unit, printed_of, number in (
         ("largest error", "mm", _LARGEST_MM, 0),
-        ("time of it", "s", _PEAK_S, 1),
+        ("time of this error", "s", _PEAK_S, 1),
         ("settled at", "s", _SETTLED_S, 2),
     ):
         rows += [
@@ -159,7 +159,7 @@ def _error_figure(point: int, found: Response) -> Figure:
     traces.append(line(times, np.linalg.norm(off, axis=1), "distance", MEASURED, 1.6))
     shape, note = level(_AT_REST_MM[point - 1], "published, at rest")
     layout = {"xaxis": time_axis(), "yaxis": axis("error of the tip", "mm"), "shapes": [shape], "annotations": [note]}
-    sentence = f"Reached less wanted: {_rest_mm(found):.3f} mm at rest."
+    sentence = f"Reached minus wanted position: {_rest_mm(found):.3f} mm at rest."
     title = f"Point {point}: error (of figures 7.3-7.15)"
     return Figure(title, sentence, traces, layout, 320)
 
@@ -173,7 +173,7 @@ def _place_figure(point: int, found: Response) -> Figure:
             (found.reached_mm, "reached", MEASURED, 1.2),
         ):
             traces.append({**line(found.times[::_CURVE], path[::_CURVE, row], name, color, width), **place})
-    sentence = "Way of the tip from home."
+    sentence = "Displacement of the tip from home."
     return Figure(f"Point {point}: displacement (of figures 7.3-7.15)", sentence, traces, layout, 400)
 
 

@@ -120,7 +120,7 @@ def _measure(bench: Bench) -> Findings:
                 quantity=law,
                 unit="ms",
                 predicted=delay_margin(bench, law),
-                group="delay margin: efforts may be so late",
+                group="delay margin: largest delay of efforts",
             )
         )
     rows += [
@@ -128,7 +128,7 @@ def _measure(bench: Bench) -> Findings:
             quantity=law,
             unit="",
             predicted=gain_margin(bench, law),
-            group="gain margin: drives may give so many times as much",
+            group="gain margin: largest factor of the drives' effort",
             note="at most 10 tried",
         )
         for law in LAWS
@@ -160,7 +160,7 @@ def _figure(found: Mapping[tuple[str, str], tuple[float, float] | None]) -> Figu
         for law, color in zip(LAWS, _COLORS, strict=True)
     ]
     layout = {"barmode": "group", "xaxis": {"automargin": True}, "yaxis": axis("tracking error, RMS", "µm", type="log")}
-    sentence = "Tracking error of each law on plants that differ; what has no bar is refused."
+    sentence = "Tracking error of each law on plants that differ; a law without a bar is refused."
     return Figure("Laws on other plants", sentence, traces, layout, 460)
 
 

@@ -50,13 +50,13 @@ def _figure(whole: tuple[float, float], alone: dict[str, tuple[float, float]]) -
         traces.append({"type": "bar", "orientation": "h", "name": place, "x": less, "y": names,
                        "marker": {"color": color}, "hovertemplate": "%{x:.3f} mm"})  # fmt: skip
     layout = {"xaxis": axis("error that goes with it", "mm"), "yaxis": {"automargin": True}, "barmode": "group"}
-    sentence = "By how much the RMS error of coarse_box falls when one fault is switched off."
-    return Figure("What each fault adds", sentence, traces, layout, 380)
+    sentence = "Decrease of the RMS error of coarse_box if one fault is switched off."
+    return Figure("Contribution of each fault", sentence, traces, layout, 380)
 
 
 SHARES = experiment.Experiment(
     "shares",
-    "what each fault of the plant adds to the errors in coarse_box",
+    "contribution of each fault of the plant to the errors in coarse_box",
     "of our model; Vongbunyong 2008 names the faults in chapter 8",
     _measure,
 )

@@ -178,13 +178,13 @@ def _figure(found: Mapping[tuple[str, float], tuple[float, ...]]) -> Figure:
             traces.append(joined(delays, tdpa, "with TDPA, stiffest tried", DARK, "N/m"))
             traces.append(joined(delays, spring, "medium, position_position", THIRD, "N/m"))
     layout = {"xaxis": axis("the force comes later by", "ms"), "yaxis": axis("stiffness", "N/m", type="log")}
-    sentence = "Below its line a hand stays calm, above it it is thrown by what it feels late."
-    return Figure("How stiff a thing may be", sentence, traces, layout, 460)
+    sentence = "Below its line a hand is stable; above the line the delayed force throws the hand."
+    return Figure("Largest stable stiffness of an object", sentence, traces, layout, 460)
 
 
 STABILITY = experiment.Experiment(
     "stability",
-    "how stiff a thing may be whose force comes late, by grip, architecture and passivity",
+    "largest stable stiffness of an object whose force is delayed, by grip, architecture and passivity",
     "exact boundary of one axis",
     _measure,
 )

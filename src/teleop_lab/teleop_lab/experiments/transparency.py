@@ -244,7 +244,7 @@ def _stability_figure(cells: Cells, arm: Complex) -> Figure:
         "shapes": [shape],
         "annotations": [note],
     }
-    sentence = "Below 1 some passive hand and world swing up; no passivity is on."
+    sentence = "Below 1, some passive hand and world can become unstable; all without passivity."
     return Figure("Absolute stability", sentence, traces, layout, 460)
 
 
@@ -262,7 +262,7 @@ def _known_figure(known: Cell) -> Figure:
 
 TRANSPARENCY = Experiment(
     "transparency",
-    "what the hand feels of the world, and absolute stability, by architecture, passivity, delay",
+    "impedance that the hand feels, and absolute stability, by architecture, passivity and delay",
     "two-ports of Lawrence 1993; criterion of Llewellyn 1952",
     _measure,
 )

@@ -69,7 +69,7 @@ class FitResult:
         lines = [f"{self.robot} from {self.table}, 95 % intervals", ""]
         for n in self.numbers:
             lines.append(f"  {n.name:{width}}  {n.value:10.4g}  [{n.low:9.4g}, {n.high:9.4g}] {n.unit}".rstrip())
-        lines += ["", "rest less target, mean of the runs in encoder counts: measured / simulated"]
+        lines += ["", "rest position minus target, mean of the runs in encoder counts: measured / simulated"]
         lines.append("  point  " + "".join(f"{name:>16}" for name in self.joint_names))
         pairs = zip(self.measured / self.encoder_step, self.predicted / self.encoder_step, strict=True)
         for k, (measured, predicted) in enumerate(pairs):
