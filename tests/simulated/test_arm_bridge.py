@@ -9,7 +9,7 @@ import pytest
 from std_msgs.msg import Float64MultiArray, String
 
 from simulated_arms import controller
-from teleop_core.graph.topics import SLAVE_MEASURED_JS, SLAVE_SETPOINT_JS
+from teleop_core.graph.topics import SLAVE_MEASURED_JS
 from teleop_core.kernels.geometry import Array
 from teleop_core.middleware.world import Qos
 from teleop_core.robots import load_robot
@@ -36,9 +36,8 @@ NAMED: dict[str, Any] = {
 class RealArm:
     """A controller, its bridge and the server that leads it."""
 
-    def __init__(self, peer: "Peer", kind: str) -> None:
-        self.peer, self.kind = peer, kind
-        self.measured, self.setpoint = map(peer.listen, (SLAVE_MEASURED_JS, SLAVE_SETPOINT_JS))
+    def __init__(self, peer: "Peer") -> None:
+        self.peer, self.measured = peer, peer.listen(SLAVE_MEASURED_JS)
         self.witnessed = [math.nan, 0.0]
         peer.ros.create_subscription(Float64MultiArray, "/witness", self._see, Qos())
         self._misbehave = peer.ros.create_publisher(String, "/misbehave", Qos())
@@ -88,14 +87,15 @@ class RealArm:
 def real_arm(peer: Any, kind: str = "joint_state") -> RealArm:
     """A real arm of a kind that stands off its home, led from there."""
     peer.foreign("controller", controller(kind))
-    arm = RealArm(peer, kind)
+    arm = RealArm(peer)
     peer.start("arm_bridge", kind=kind, **NAMED)
     peer.start("slave", has_arm=False, operation__longest_outage=0.0)
     return arm
 
 
-def assert_is_led_home_without_a_jump(arm: RealArm) -> None:
-    peer = arm.peer
+@pytest.mark.parametrize("kind", KINDS)
+def test_an_arm_of_each_kind_is_led_home_without_a_jump(peer: "Peer", kind: str) -> None:
+    arm = real_arm(peer, kind)
     peer.wait(lambda: arm.is_at(ROBOT.home), "an arm at home")
     first, largest = arm.witness()
     assert first <= 2.5  # 1.2 of a rated speed, over two periods at most
@@ -103,11 +103,6 @@ def assert_is_led_home_without_a_jump(arm: RealArm) -> None:
     assert np.abs(arm.measured.values[0][:6] - STANDS).max() < 0.05  # it stood there
     peer.wait(lambda: not arm.says("sends no commands"), "a bridge that leads")
     peer.wait(lambda: peer.status("arm_bridge").number("commands") > 100, "commands")
-
-
-@pytest.mark.parametrize("kind", KINDS)
-def test_an_arm_of_each_kind_is_led_home_without_a_jump(peer: "Peer", kind: str) -> None:
-    assert_is_led_home_without_a_jump(real_arm(peer, kind))
 
 
 def test_an_arm_that_jumps_is_told_nothing_more_and_begins_anew_after_the_fault(peer: "Peer") -> None:

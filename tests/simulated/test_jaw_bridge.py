@@ -7,7 +7,7 @@ import pytest
 from std_msgs.msg import Float64MultiArray
 
 from simulated_arms import controller
-from teleop_core.graph.topics import SLAVE_JAW_MEASURED_JS, SLAVE_JAW_SERVO_JP, SLAVE_JAW_SETPOINT_JS
+from teleop_core.graph.topics import SLAVE_JAW_MEASURED_JS, SLAVE_JAW_SERVO_JP
 from teleop_core.middleware.world import Qos
 
 if TYPE_CHECKING:
@@ -26,7 +26,6 @@ class Gripper:
     def __init__(self, peer: "Peer") -> None:
         self.peer, self.witnessed = peer, [0.0, 0.0]
         self.measured = peer.listen(SLAVE_JAW_MEASURED_JS)
-        self.setpoint = peer.listen(SLAVE_JAW_SETPOINT_JS)
         peer.ros.create_subscription(Float64MultiArray, "/witness", self._see, Qos())
 
     def _see(self, message: Any) -> None:

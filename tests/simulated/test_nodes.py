@@ -238,6 +238,9 @@ def test_a_new_gain_is_used_from_the_next_sample_on(peer: "Peer") -> None:
     peer.start("motion_scaling", feedback_timeout=5.0)
     where, pose = [0.4, 0.0, -0.2, 1.0, 0.0, 0.0, 0.0], list(REST)
 
+    fresh = {topics.SLAVE_SETPOINT_CP: where, topics.MASTER_MEASURED_CP: pose}
+    stamp = peer.feed(lambda: answers.take() >= 3, "motion_scaling at work", fresh)
+
     def moved() -> float:
         """Slave travel of one millimetre of master travel along x."""
         nonlocal stamp
@@ -248,8 +251,6 @@ def test_a_new_gain_is_used_from_the_next_sample_on(peer: "Peer") -> None:
         stamp = peer.feed(lambda: answers.take() and answers.stamps[-1] > last, "answer", new, after=last)
         return float(np.linalg.norm(answers.values[-1][:3] - before[:3]))
 
-    fresh = {topics.SLAVE_SETPOINT_CP: where, topics.MASTER_MEASURED_CP: pose}
-    stamp = peer.feed(lambda: answers.take() >= 3, "motion_scaling at work", fresh)
     assert moved() == pytest.approx(1e-3, rel=1e-6)
     assert peer.set("motion_scaling", coarse_gain=0.25)[0].successful
     assert moved() == pytest.approx(0.25e-3, rel=1e-6)

@@ -2,6 +2,7 @@
 
 import signal
 from collections.abc import Callable
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -129,6 +130,11 @@ def test_an_arm_that_waits_for_people_moves_when_it_is_enabled_and_homed(peer: "
     streamer.until(streamer.moves, "motion again")
 
 
+def is_refused(peer: "Peer", arm: str) -> bool:
+    """Whether an arm does not resume, for it is at a fault."""
+    return "FAULT" in command(peer, "resume", arm)[1]
+
+
 def test_every_arm_in_a_namespace_has_its_own_commands_and_one_stop_for_all(peer: "Peer") -> None:
     peer.start("slave", arm="left")
     peer.start("slave", arm="right")
@@ -137,7 +143,7 @@ def test_every_arm_in_a_namespace_has_its_own_commands_and_one_stop_for_all(peer
     assert command(peer, "resume", "/left")[0]
     found_button(peer, readers=4).publish(Bool(data=True))
     for arm in ("/left", "/right"):
-        peer.wait(lambda arm=arm: "FAULT" in command(peer, "resume", arm)[1], f"{arm} stopped")
+        peer.wait(partial(is_refused, peer, arm), f"{arm} stopped")
 
 
 @pytest.fixture

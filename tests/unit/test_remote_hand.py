@@ -36,11 +36,11 @@ class Run:
 
     def __init__(self, hand: RemoteHand | None = None, **parameters: float) -> None:
         self.hand = hand or RemoteHand(RemoteParameters(**parameters))
-        self.rows, self.last = np.zeros((0, 13)), 0.0
+        self.rows, self.ticks, self.last = np.zeros((0, 13)), 0, 0.0
 
     def for_time(self, duration: float, wanted: Callable[..., Any] | None = None, period: float = 0.02) -> Array:
         """Go on; ``wanted(time)`` says what pose comes every so often, or None for silence."""
-        due = 0.0
+        due, came = 0.0, []
         for _ in range(round(duration / DT / AHEAD)):
             if wanted is not None and self.time >= due:
                 given = wanted(self.time)
@@ -48,13 +48,15 @@ class Run:
                     self.hand.want(given)
                     self.last = self.time
                 due = self.time + period
-            times: Any = (len(self.rows) + 1 + np.arange(AHEAD)) * DT
-            self.rows = np.vstack((self.rows, self.hand.motion(times)))
+            times: Any = (self.ticks + 1 + np.arange(AHEAD)) * DT
+            came.append(self.hand.motion(times))
+            self.ticks += AHEAD
+        self.rows = np.vstack((self.rows, *came))
         return self.rows
 
     @property
     def time(self) -> float:
-        return len(self.rows) * DT
+        return self.ticks * DT
 
     @property
     def way(self) -> Array:

@@ -25,24 +25,15 @@ def session(kind: str) -> tc.VirtualTime:
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_session_of_single_steps_is_that_of_a_run_to_the_bit(kind: str) -> None:
-    run, stepped = session(kind), session(kind)
-    block = run.run(1500)
-    rows = np.array([stepped.run(1)[0] for _ in range(1500)])
-    assert rows.dtype == block.dtype
-    for name in present(block.dtype.names):
-        np.testing.assert_array_equal(rows[name], block[name], err_msg=name)
-
-
-@pytest.mark.parametrize("kind", KINDS)
-def test_a_session_that_is_begun_again_repeats_itself_to_the_bit(kind: str) -> None:
-    own = session(kind)
+def test_a_session_of_single_steps_and_one_that_is_begun_again_are_that_of_a_run_to_the_bit(kind: str) -> None:
+    own, stepped = session(kind), session(kind)
     first = own.run(1500)
     own.reset()
     assert own.now_ns == 0
-    second = own.run(1500)
-    for name in present(first.dtype.names):
-        np.testing.assert_array_equal(second[name], first[name], err_msg=name)
+    for other in (np.array([stepped.run(1)[0] for _ in range(1500)]), own.run(1500)):
+        assert other.dtype == first.dtype
+        for name in present(first.dtype.names):
+            np.testing.assert_array_equal(other[name], first[name], err_msg=name)
 
 
 def test_what_a_program_says_between_two_steps_holds_from_the_next_one_on() -> None:

@@ -210,7 +210,7 @@ def halves(own_parts: None, tmp_path: Path) -> Any:
         file.write_text(HALVES.format(share=share, words=words))
 
     write(0.5)
-    return (lambda **more: study(metrics=["halves.share"], parts=(file,), **more)), write
+    return lambda: study(swept={}, metrics=["halves.share"], parts=(file,)), write
 
 
 def test_a_measure_of_ones_own_that_was_changed_is_measured_again(halves: Any, tmp_path: Path) -> None:
@@ -222,7 +222,7 @@ def test_a_measure_of_ones_own_that_was_changed_is_measured_again(halves: Any, t
     write(0.5, "Other words for the same.")
     assert made().explain(store).to_run == 0
     write(0.25)
-    assert made().explain(store).why == {"changed code": 4}
+    assert made().explain(store).why == {"changed code": 2}
     assert set(made().run(store, jobs=1)["halves.share"].values.ravel()) == {0.25}
     write(0.125)
     assert set(made().run(store, jobs=2)["halves.share"].values.ravel()) == {0.125}
