@@ -117,7 +117,10 @@ class Answers:
         return self.form.paths | self.strip.paths
 
     def to(self, request: Request) -> Response:
-        """Answer to a request for one of :attr:`paths`, from any thread; all except files require one of our pages."""
+        """Answer a request for one of :attr:`paths`; may be called from any thread.
+
+        Files are given to anyone. Every other path is answered only if the request comes from a page of this server.
+        """
         path = urlsplit(request.path).path
         if len(request.header(OWN_PAGE)) != 1 and path not in self._files:
             return answer_of(http.HTTPStatus.FORBIDDEN)

@@ -35,10 +35,10 @@ def grade(
     recordings: Path | str | None = None,
     say: Callable[[str], object] = lambda _: None,
 ) -> "pandas.DataFrame":
-    """Figures of every episode, the oddest first.
+    """Numbers of every episode; the oddest episodes come first.
 
-    The oddness of a figure is its deviation from the median of all episodes, in robust standard deviations (1.4826
-    times the median absolute deviation). The oddness of an episode is that of its oddest figure. It shows which
+    The oddness of a number is its deviation from the median of all episodes, in robust standard deviations (1.4826
+    times the median absolute deviation). The oddness of an episode is that of its oddest number. It shows which
     episodes to look at, not which are wrong.
 
     Args:

@@ -24,7 +24,7 @@ class Worker(Protocol):
     """Thread that writes."""
 
     def start(self) -> None:
-        """Begin."""
+        """Start the thread."""
 
     def join(self) -> None:
         """Wait until the thread has ended."""

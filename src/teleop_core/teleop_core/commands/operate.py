@@ -29,7 +29,7 @@ commands: release, """ + ", ".join(STATE_COMMANDS)
 
 
 def add(commands: Any) -> None:
-    """Add the parsers of both commands."""
+    """Add the parsers of ``teleop stop`` and ``teleop operate``."""
     text = "emergency stop of the arms that run here"
     stop = command(commands, "stop", _stop, text, _STOP)
     text = "enable, home, pause or reset arms, or show their states"

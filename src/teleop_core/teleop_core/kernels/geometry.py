@@ -76,7 +76,7 @@ def invert_quaternion(quaternion: Array, inverse: Array) -> None:
 
 @kernel
 def rotate_by_vector(quaternion: Array, rx: float, ry: float, rz: float, rotated: Array) -> None:
-    """Write ``quaternion`` turned by a rotation vector [rad] in its own frame into ``rotated``."""
+    """Rotate ``quaternion`` by a rotation vector [rad] in its own frame; the result is written to ``rotated``."""
     angle = math.sqrt(rx * rx + ry * ry + rz * rz)
     half = 0.5 * angle
     # sin(x)/x loses no digits above this bound; below it 1 is exact to rounding.

@@ -21,9 +21,12 @@ from teleop_core.kinematics import REACHED, IkStatus, is_askable, pose_residual
 from teleop_core.kinematics.damped import ZERO, damped_move, free_joints, pose_error
 
 _ROUNDS, _PATH_ROUNDS = 60, 12  # largest numbers of rounds of one search
-_DAMPING, _HOPELESS = 1e-2, 1e10  # damping per squared error: at the start, and where no step improves the result
-_STARTS, _MOST_STARTS = 24, 120  # further searches if the search from the seed fails; and if all fail
-_CLOSE, _LONG_ROUNDS = 1e-8, 1000  # squared error in a flat valley, where the descent needs more rounds
+_DAMPING = 1e-2  # damping divided by squared error, at the start
+_HOPELESS = 1e10  # above this ratio no step improves the result, and the descent ends
+_STARTS = 24  # further searches if the search from the seed fails
+_MOST_STARTS = 120  # searches in all, if these fail too
+_CLOSE = 1e-8  # below this squared error the descent is in a flat valley
+_LONG_ROUNDS = 1000  # rounds of the descent in a flat valley
 _ALL_STARTS = 200  # searches for all branches
 _SAME = 1e-6  # joint vectors this close count as equal [rad, m]
 _NEAR = 0.02  # pivot below which small moves need large joint moves

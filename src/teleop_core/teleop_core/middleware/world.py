@@ -105,7 +105,7 @@ class Thread(Protocol):
         """Number of the thread in the operating system."""
 
     def start(self) -> None:
-        """Begin."""
+        """Start the thread."""
 
     def join(self, timeout: float | None = None) -> None:
         """Wait for its end, at most for ``timeout`` [s]."""

@@ -96,10 +96,11 @@ def start_of(robot: arm.Arm) -> Array:
 def start_posture(robot: arm.Arm) -> Array:
     """Posture from which the tip has room in all directions, by a deterministic rule.
 
-    Home is taken if it has enough room: a rotation by 30 degrees and a move by reach/15. Otherwise the candidates are
-    the examined postures with the tool attitude of home, if some of them can rotate and move by 30 degrees, or else
-    all examined postures. Of the candidates within :data:`EQUAL` of the largest room, the nearest to home is taken,
-    measured by the largest share of a joint's range.
+    Home is taken if the tip can rotate by 30 degrees and move by reach/15 there. Otherwise the candidates are the
+    examined postures whose tool has the same orientation as at home, if one of these has as much room; if none has,
+    the candidates are all examined postures. Candidates with at least :data:`EQUAL` of the largest room count as equal.
+    Of these, the one nearest to home is taken: the one whose largest joint motion, as a share of the joint's range, is
+    smallest.
 
     Args:
         robot: The arm.

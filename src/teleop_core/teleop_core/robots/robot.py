@@ -236,9 +236,9 @@ class Robot:
         """Pose of the tip in the base, and whether the loops close there.
 
         Args:
-            q: Joint vector (n,) [rad, m]; limits are not applied. Several of them, (N, n), are
-                answered as by :meth:`solve_fk_batch`, which has the type for it.
-            seed: ``T_base_tip`` (4, 4) whose assembly to stay in; None for home's.
+            q: Joint vector (n,) [rad, m]; limits are not applied. Many joint vectors (N, n) give the result of
+                :meth:`solve_fk_batch`, which declares its type.
+            seed: Pose ``T_base_tip`` (4, 4). The solution stays in the assembly of this pose; None: in that of home.
             search: Whether to search for another assembly if the one next to the seed does not close; a tick of a
                 session never searches.
 
@@ -247,7 +247,7 @@ class Robot:
             error comes back with its status and residual.
 
         Raises:
-            ShapeError: Another shape.
+            ShapeError: ``q`` or ``seed`` has a wrong shape.
             ParameterError: NaN, infinity, or a seed that is not a rigid transform.
         """
         joints = checked_array("q", q, (self.n,))
@@ -278,7 +278,7 @@ class Robot:
             is NOT_CLOSED, and no other assembly is searched. Later poses start from the last pose that closed.
 
         Raises:
-            ShapeError: Another shape.
+            ShapeError: ``q`` or ``seed`` has a wrong shape.
             ParameterError: NaN, infinity, or a seed that is not a rigid transform.
         """
         joints = checked_array("q", q, (self.n,)).reshape(-1, self.n)

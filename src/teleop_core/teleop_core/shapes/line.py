@@ -34,9 +34,10 @@ class LineParameters:
 
 @kernel
 def rod_distance(offset: Array, numbers: Array, out: Array) -> float:
-    """Write the vector from a line's nearest point (3,); return the distance [m] of a point (3,) outside.
+    """Distance [m] of a point from the surface of a rod; negative inside.
 
-    ``numbers``: radius, length of the line, its direction.
+    ``offset`` (3,) is the point, relative to the middle of the rod. ``out`` (3,) receives the vector from the nearest
+    point of the rod's axis to the point. ``numbers`` are the rod's radius and length [m], and its direction.
     """
     axis = directions.unit(numbers[2], numbers[3], numbers[4])
     along = directions.between_ends(directions.part_along(offset, axis), numbers[1])

@@ -242,7 +242,7 @@ class Bus:
                     room = reader.wake_up(since_ns, room)
 
     def _leave(self, process: Process, *, is_orderly: bool) -> None:
-        """A process has ended: its own ends are removed at once, and other processes notice it later."""
+        """Remove the writers and readers of a process that has ended; other processes notice its end later."""
         for reader in [r for rs in self.readers.values() for r in rs if r.process is process]:
             self.leave_reader(reader)
         writers = [w for ws in self.writers.values() for w in ws if w.process is process]

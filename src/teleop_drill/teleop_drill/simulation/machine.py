@@ -74,7 +74,7 @@ class Process(Turns):
         self.main = machine.scheduler.spawn(self, "main", self._run)
 
     def start(self) -> None:
-        """Begin."""
+        """Start the process."""
         self.main.start()
 
     def stop(self) -> None:

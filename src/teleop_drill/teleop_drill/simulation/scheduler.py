@@ -85,7 +85,7 @@ class Strand:
         self._joined: list[Strand] = []
 
     def start(self) -> None:
-        """Begin."""
+        """Start the strand."""
         self._has_begun = True
         self._scheduler.wake(self)
 

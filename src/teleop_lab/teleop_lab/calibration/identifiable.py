@@ -18,9 +18,10 @@ from teleop_core.kernels.geometry import Array
 from teleop_lab.calibration.model import FRAME, Model
 
 WORST_CONDITION = 100.0
-# Motion of the tip [m] per metre of an entry, or per arm length times angle, below which the entry has no effect.
-# Second: share of a column below which its part independent of other columns is rounding.
-_NOTHING, _SAME = 1e-9, 1e-6
+# An error has no effect if it moves the tip by less than this: per metre, or per radian times arm length [1].
+_NOTHING = 1e-9
+# If less than this share of a column is independent of the other columns, that share is a rounding error.
+_SAME = 1e-6
 # Order in which entries are left out: links before offsets, and the frame last.
 _LINK, _OFFSET, _FRAME = 1.0, 0.2, 0.01
 

@@ -75,7 +75,9 @@ def _grouped(file: Path, numbers: Array, n: int) -> RestTable:
         if len(rows) < 2:
             raise TeleopError(f"{file}: point {point:g} has {len(rows)} run; a spread needs two")
         if np.ptp(rows[:, 1 : n + 1], axis=0).any():
-            raise TeleopError(f"{file}: point {point:g} has several targets; give each its point")
+            raise TeleopError(
+                f"{file}: point {point:g} has several targets; give each target a point number of its own"
+            )
         targets.append(rows[0, 1 : n + 1])
         rests.append(rows[:, n + 1 :])
     if not targets:

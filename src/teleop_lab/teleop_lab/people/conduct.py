@@ -56,7 +56,7 @@ def score_all(plan: Plan, journal: Journal) -> None:
 
 
 def scores_of(plan: Plan, bag: Path) -> tuple[dict[str, float | None], str]:
-    """Scores of a recording that the study compares, and its verdict, or the reason why it has no scores."""
+    """Scores of one recording that the study compares, and its verdict; without scores, the reason for that."""
     try:
         score = open_recording(bag).score()
         return {metric: score.value(metric) for metric in plan.study.metrics}, score.verdict.text

@@ -99,7 +99,7 @@ class Study:
         if not len(self.seeds) or len(set(self.seeds)) < len(self.seeds) or min(self.seeds) < 0:
             raise ParameterError("seed", tuple(self.seeds), "whole numbers >= 0 that differ")
         if not len(self.metrics):
-            raise ParameterError("metrics", (), "at least one key of a score, as task.time_s")
+            raise ParameterError("metrics", (), "at least one key of a score, for example task.time_s")
         measured = [key for key in keys() if key not in SESSION_KEYS]
         for metric in self.metrics:
             if not any(key.covers(tuple(metric.split("."))) for key in measured):

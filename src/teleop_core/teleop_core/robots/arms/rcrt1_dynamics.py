@@ -31,10 +31,10 @@ LINKS = {
     "I3xx": 0.061, "I3yy": 0.061, "I3zz": 5.378e-4, "I3xz": -3.0e-3,
     "m2": 1.704, "m3": 0.789, "G2x": 0.031842, "G2z": 0.03594, "G3x": 0.014664, "G3z": -0.264245,
     "m2b_L0b": 0.0,  # static moment of the four-bar's link 2b [kg·m], not given
-    # Reflected motor inertias: 81.6 taken as 1e-3 kg·m² at the output, as the catalogue does.
+    # Reflected motor inertias: the source prints 81.6 without a unit; the unit of the catalogue is 1e-3 kg·m².
     "J1": 0.0816, "J2": 0.0816,
     "J3": 6.627e-7 * (2.0 * math.pi / 1e-3) ** 2,  # motor and screw through a 1 mm lead [kg]
-    "J4": 6.5e-8 * 141.0**2, "J5": 6.5e-8 * 76.0**2, "J6": 6.5e-8 * 76.0**2,  # assumed rotor
+    "J4": 6.5e-8 * 141.0**2, "J5": 6.5e-8 * 76.0**2, "J6": 6.5e-8 * 76.0**2,  # the rotor inertia is assumed
     "g": 9.81,
 }  # fmt: skip
 # The other inertias of link 1 have no effect, because it turns about its y axis alone; Iyz is -∫yz dm.

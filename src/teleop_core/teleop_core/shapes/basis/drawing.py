@@ -24,7 +24,7 @@ def edges_of(size: tuple[float, ...] | Array) -> Array:
 
 
 def great_circles(radius: float) -> Array:
-    """Three circles (N, 3) [m] around the middle; every one passes through two poles."""
+    """Points (N, 3) [m] of one line through three circles about the origin, which are at right angles to each other."""
     angle = np.linspace(0.0, 2.0 * math.pi, 41)
     circle = np.stack((np.cos(angle), np.sin(angle), np.zeros_like(angle)), axis=1)
     return radius * with_lifts([np.roll(circle, turn, axis=1) for turn in range(3)])

@@ -12,7 +12,7 @@ MOST_EVENTS = 64
 
 @dataclass(frozen=True, kw_only=True)
 class OperationParameters:
-    """Limits, faults and states of an arm in operation."""
+    """Thresholds at which an arm in operation is limited, reports a fault or changes its state."""
 
     starts_enabled: bool = fixed(
         True,
