@@ -53,10 +53,10 @@ def thinned(samples: Rows, begin: float, end: float, pixels: int, *, is_held: bo
     low, high = np.fmin.reduceat(values, begins), np.fmax.reduceat(values, begins)
     gaps = np.flatnonzero(np.logical_or.reduceat(is_after, begins))
     shown = (np.insert(one, gaps, np.nan) for one in (at[begins], low, high))
-    return dict(zip(("times", "low", "high"), map(_plain, shown), strict=True))
+    return dict(zip(("times", "low", "high"), map(_short_numbers, shown), strict=True))
 
 
-def _plain(values: Array) -> list[object]:
+def _short_numbers(values: Array) -> list[object]:
     """Numbers as JSON has them, short."""
     return [float(f"{value:.7g}") if math.isfinite(value) else None for value in values.tolist()]
 

@@ -40,7 +40,7 @@ class ParameterEvents:
         found = (*event.new_parameters, *event.changed_parameters)
         with self._lock:
             for one in found:
-                value = _plain(from_message(one.value))
+                value = _setting_of(from_message(one.value))
                 self._changed[event.node.strip("/"), one.name] = value
 
 
@@ -77,7 +77,9 @@ class ParameterClient:
         answer = self._ask(GetParameters, name, "get_parameters", request)
         found = zip(names, answer.values, strict=True)
         return {
-            one: _plain(from_message(value)) for one, value in found if value.type != ParameterType.PARAMETER_NOT_SET
+            one: _setting_of(from_message(value))
+            for one, value in found
+            if value.type != ParameterType.PARAMETER_NOT_SET
         }
 
     def change(self, name: str, parameter: str, value: Setting) -> str:
@@ -114,7 +116,7 @@ def call(world: World, client: Client, request: object, patience: float) -> Any:
     return asked.result()
 
 
-def _plain(value: Any) -> Setting:
+def _setting_of(value: Any) -> Setting:
     return value if isinstance(value, bool | int | float | str) else tuple(value or ())
 
 

@@ -115,7 +115,7 @@ class _ArmBag(Bag):
         self.path, self.start_ns, self.end_ns = bag.path, bag.start_ns, bag.end_ns
         self.topics: dict[str, TopicInfo] = {}
         for name, info in bag.topics.items():
-            plain = name if name == DIAGNOSTICS.name else self._plain(name)
+            plain = name if name == DIAGNOSTICS.name else self._own_name(name)
             if plain is not None:
                 self.topics[plain] = info
         self.metadata = self._metadata(bag.metadata)
@@ -123,13 +123,13 @@ class _ArmBag(Bag):
     def _metadata(self, texts: dict[str, str]) -> dict[str, str]:
         """Metadata of this arm; texts of the arm itself replace texts for all arms."""
         common = texts if self._prefix != self._base else {}
-        own = {self._plain(f"{self._base}{name}"): text for name, text in texts.items()}
+        own = {self._own_name(f"{self._base}{name}"): text for name, text in texts.items()}
         return {
             **{name: text for name, text in common.items() if name not in self._foreign},
             **{name: text for name, text in own.items() if name is not None},
         }
 
-    def _plain(self, name: str) -> str | None:
+    def _own_name(self, name: str) -> str | None:
         """Name without the arm's prefix; None if the name belongs to another arm."""
         below = tuple(p for p in self._prefixes if p != self._prefix and p.startswith(self._prefix))
         is_own = name.startswith(self._prefix) and not name.startswith(below)
@@ -163,7 +163,7 @@ class _ArmBag(Bag):
         found = self._bag.reports(self._recorded(topic))
         if self._recorded(topic) != DIAGNOSTICS.name:
             return found
-        named = [(self._plain(report.name.strip("/")), report) for report in found]
+        named = [(self._own_name(report.name.strip("/")), report) for report in found]
         return [report._replace(name=name) for name, report in named if name is not None]
 
     def raw(self, topics: Iterable[Topic | str] | None = None) -> Iterator[tuple[str, str, int, bytes]]:

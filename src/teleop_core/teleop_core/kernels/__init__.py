@@ -104,7 +104,7 @@ def kernel(function: Callable[P, R_co]) -> Kernel[P, R_co]:
         KernelError: The function cannot be compiled. This is raised not here, but when the kernel is first called,
             compiled for other arguments or made a pointer.
     """
-    return _compiler.dispatcher(function) if IS_COMPILED else _plain(function)
+    return _compiler.dispatcher(function) if IS_COMPILED else _uncompiled(function)
 
 
 def inner(function: Callable[P, R_co]) -> Kernel[P, R_co]:
@@ -112,7 +112,7 @@ def inner(function: Callable[P, R_co]) -> Kernel[P, R_co]:
 
     A call from Python raises TypeError, except in pure-Python mode.
     """
-    return _compiler.dispatcher(function, is_inner=True) if IS_COMPILED else _plain(function)
+    return _compiler.dispatcher(function, is_inner=True) if IS_COMPILED else _uncompiled(function)
 
 
 def is_kernel(value: object) -> bool:
@@ -141,7 +141,7 @@ def kernel_from_source(text: str, name: str, names: Mapping[str, object]) -> Any
         if all(before[known] is value for known, value in names.items()):
             return made
     function = _executed(text, name, names, key)
-    made = _compiler.generated_dispatcher(function) if IS_COMPILED else _plain(function)
+    made = _compiler.generated_dispatcher(function) if IS_COMPILED else _uncompiled(function)
     _written[key] = (dict(names), made)
     return made
 
@@ -157,7 +157,7 @@ def _executed(text: str, name: str, names: Mapping[str, object], key: str) -> Fu
     return function
 
 
-def _plain(function: Any) -> Any:
+def _uncompiled(function: Any) -> Any:
     function.py_func = function
     return function
 

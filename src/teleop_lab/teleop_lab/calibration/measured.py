@@ -113,10 +113,10 @@ def read_measured(path: Path, robot: Robot) -> Measured:
 
     with damage_told(path, "is no table of text with a head ({})"):
         frame = pd.read_csv(path, sep=None, engine="python", comment="#", skipinitialspace=True)
-    found = {_plain(name): name for name in map(str, frame.columns)}
+    found = {_letters_of(name): name for name in map(str, frame.columns)}
     joints, slides = np.empty((len(frame), robot.n)), _slides(robot)
     for i, name in enumerate(robot.joint_names):
-        column = found.get(_plain(name), found.get(f"q{i + 1}"))
+        column = found.get(_letters_of(name), found.get(f"q{i + 1}"))
         if column is None:
             raise _missing(path, f"joint {name} (or q{i + 1})", frame.columns)
         joints[:, i] = _numbers(path, frame, column, _LENGTHS if name in slides else _ANGLES)
@@ -129,7 +129,7 @@ def read_measured(path: Path, robot: Robot) -> Measured:
     return Measured(joints=joints, points=points)
 
 
-def _plain(name: str) -> str:
+def _letters_of(name: str) -> str:
     return re.sub(r"[^0-9a-z]+", "", without_unit(name)[0].lower())
 
 

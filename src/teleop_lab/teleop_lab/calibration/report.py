@@ -92,14 +92,14 @@ def content(calibration: "Calibration") -> dict[str, object]:
         "true": None if truth is None else truth.named(),
         "true_sums": dict(calibration.equivalent) or None,
         "accuracy": [
-            {"where": one.where, "before": _plain(one.before), "after": _plain(one.after)}
+            {"where": one.where, "before": _dicts_of(one.before), "after": _dicts_of(one.after)}
             for one in (calibration.fitted, calibration.tried)
             if one is not None
         ],
     }
 
 
-def _plain(spreads: object) -> dict[str, dict[str, float]]:
+def _dicts_of(spreads: object) -> dict[str, dict[str, float]]:
     return {name: one._asdict() for name, one in spreads.items()}  # type: ignore[attr-defined]
 
 

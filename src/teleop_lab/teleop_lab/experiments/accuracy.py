@@ -14,7 +14,7 @@ from teleop_core.slave.pair import ArmParameters
 from teleop_lab.calibration.appendix_e import ESCAPE, OFFSET_OF_D3, READ, STEP
 from teleop_lab.drawing import axis, joined, published_points
 from teleop_lab.experiments import conditions, experiment
-from teleop_lab.experiments.bench import Bench
+from teleop_lab.experiments.bench import Bench, rms
 from teleop_lab.experiments.comparison import Comparison, Findings, absolute
 from teleop_lab.fitting.rests import Mover
 
@@ -154,7 +154,7 @@ def _measure(bench: Bench) -> Findings:
                 group=f"summary of {name}, table E.4",
             )
             for quantity, printed, value in (
-                ("RMS", which.rms, _rms(error)),
+                ("RMS", which.rms, rms(error)),
                 ("S.D.", which.deviation, float(np.std(error, ddof=1))),
                 ("largest", which.largest, float(np.abs(error).max())),
             )
@@ -191,10 +191,6 @@ def _errors(which: Axis, read_mm: Array) -> Array:
     return DESIRED_MM - moved(read_mm, which.escape_mm)
 
 
-def _rms(values: Array) -> float:
-    return float(np.sqrt(np.mean(np.square(values))))
-
-
 def _total_rows(robot: Robot, longer: dict[str, Array], exact: dict[str, Array]) -> list[Comparison]:
     """All readings of the ruler (along y from home) minus the readings that models predict."""
     read = np.concatenate([which.read_mm for which in AXES.values()])
@@ -205,7 +201,7 @@ def _total_rows(robot: Robot, longer: dict[str, Array], exact: dict[str, Array])
             quantity=f"RMS, {text}",
             unit="mm",
             group=group,
-            predicted=_rms(read - np.concatenate(list(expected.values()))),
+            predicted=rms(read - np.concatenate(list(expected.values()))),
         )
         for text, expected in (
             ("arm as drawn", drawn),

@@ -248,6 +248,11 @@ def mean(values: Iterable[float]) -> float:
     return float(np.mean(list(values)))
 
 
+def rms(values: Array) -> float:
+    """Root mean square of an array of any shape."""
+    return float(np.sqrt(np.mean(np.square(values))))
+
+
 def pooled(values: Iterable[float]) -> float:
     """Root mean square of the root mean squares of sessions of equal length."""
-    return float(np.sqrt(np.mean(np.square(list(values)))))
+    return rms(np.array(list(values)))

@@ -11,7 +11,7 @@ from teleop_core.kernels.geometry import Array
 from teleop_core.robots import load_robot
 from teleop_lab.drawing import DARK, Trace, axis, level, line, points
 from teleop_lab.experiments import experiment, joint_steps
-from teleop_lab.experiments.bench import Bench, Session, Settings, mean, pooled
+from teleop_lab.experiments.bench import Bench, Session, Settings, mean, pooled, rms
 from teleop_lab.experiments.comparison import Comparison, Findings, percent
 
 _PLANT: Settings = {"plant": "hardware"}
@@ -68,12 +68,12 @@ def tracking_of(session: Session) -> Tracking:
     error, off = np.linalg.norm(seen - wanted, axis=1), true - wanted
     share = _effort_shares(session)[kept]
     return Tracking(
-        _rms(error),
+        rms(error),
         float(error.max()),
-        _rms(np.linalg.norm(off, axis=1)),
-        _rms(np.linalg.norm(off - off.mean(axis=0), axis=1)),
-        100.0 * _rms(share),
-        100.0 * _rms(np.diff(share, axis=0)),
+        rms(np.linalg.norm(off, axis=1)),
+        rms(np.linalg.norm(off - off.mean(axis=0), axis=1)),
+        100.0 * rms(share),
+        100.0 * rms(np.diff(share, axis=0)),
     )
 
 
@@ -83,10 +83,6 @@ def _effort_shares(session: Session) -> Array:
     assert robot.drives is not None
     efforts = session["slave/measured_js"][[f"{name}.effort" for name in robot.joint_names]]
     return efforts / robot.drives.effort_limit
-
-
-def _rms(values: Array) -> float:
-    return float(np.sqrt(np.mean(np.square(values))))
 
 
 def compared(bench: Bench, scenario: str, law: str) -> list[Session]:

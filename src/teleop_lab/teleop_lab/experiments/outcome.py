@@ -100,7 +100,7 @@ def numbers(row: Comparison) -> tuple[str, str, str, str]:
     A predicted number has one decimal more than the printed one, so that rounding is visible.
     """
     if row.published is None:
-        return "", _plain(row.predicted), _plain(row.ours), ""
+        return "", _four_digits(row.predicted), _four_digits(row.ours), ""
     texts = [_beside(value, row.published) for value in (row.predicted, row.ours)]
     difference = "" if row.difference is None else _signed(row.difference, row.published)
     return _printed(row.published), texts[0], texts[1], difference
@@ -123,7 +123,7 @@ def _beside(value: float | None, published: float) -> str:
     return f"{value + 0.0:.{max(printed + 1, min(2 - size, printed + 2))}f}"
 
 
-def _plain(value: float | None) -> str:
+def _four_digits(value: float | None) -> str:
     return "" if value is None else f"{value:.4g}"
 
 

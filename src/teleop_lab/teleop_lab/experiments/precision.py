@@ -1,6 +1,5 @@
 """Precision and repeatability: six points, ten moves from home to each (section 7.3)."""
 
-import math
 from typing import NamedTuple
 
 import numpy as np
@@ -12,7 +11,7 @@ from teleop_core.session.configuration import configure
 from teleop_core.slave.pair import ArmParameters
 from teleop_lab.drawing import axis, points, published_points
 from teleop_lab.experiments import conditions, experiment
-from teleop_lab.experiments.bench import Bench, Settings
+from teleop_lab.experiments.bench import Bench, Settings, rms
 from teleop_lab.experiments.comparison import Comparison, Findings, factor, percent
 from teleop_lab.experiments.pose_measures import accuracy, repeatability
 from teleop_lab.fitting.rest_table import PUBLISHED, RestTable, read_rests
@@ -79,23 +78,19 @@ def _rests(rests: tuple[Array, ...], targets: Array) -> Rests:
     return Rests(off, 1e3 * errors, 1e3 * tips, 1e3 * aims)
 
 
-def _rms(values: Array) -> float:
-    return math.sqrt(float(np.mean(values**2)))
-
-
 def _measure_precision(bench: Bench) -> Findings:
     predicted, ours = simulated_rests(bench, conditions.PREDICTED), simulated_rests(bench, conditions.OURS)
     rows = [
         Comparison(quantity="precision: largest error", unit="mm", published=_PRECISION_MM,
             predicted=predicted.errors_mm.max(), ours=ours.errors_mm.max(), within=percent(15.0)),
-        Comparison(quantity="RMS of all runs", unit="mm", published=_rms(published_rests().errors_mm),
-            predicted=_rms(predicted.errors_mm), ours=_rms(ours.errors_mm), within=percent(15.0)),
+        Comparison(quantity="RMS of all runs", unit="mm", published=rms(published_rests().errors_mm),
+            predicted=rms(predicted.errors_mm), ours=rms(ours.errors_mm), within=percent(15.0)),
     ]  # fmt: skip
-    for k, (rms, _, largest, _) in enumerate(_SUMMARY):
+    for k, (printed, _, largest, _) in enumerate(_SUMMARY):
         group = f"point {k + 1}"
         rows += [
-            Comparison(quantity="RMS", unit="mm", published=rms, predicted=_rms(predicted.errors_mm[k]),
-                ours=_rms(ours.errors_mm[k]), within=percent(15.0), group=group),
+            Comparison(quantity="RMS", unit="mm", published=printed, predicted=rms(predicted.errors_mm[k]),
+                ours=rms(ours.errors_mm[k]), within=percent(15.0), group=group),
             Comparison(quantity="largest", unit="mm", published=largest,
                 predicted=predicted.errors_mm[k].max(), ours=ours.errors_mm[k].max(), group=group),
         ]  # fmt: skip

@@ -69,7 +69,7 @@ LEVELS = (
 )
 
 
-def _plain(primitive: Primitive, level: Level) -> float:
+def _unscaled_time(primitive: Primitive, level: Level) -> float:
     """Time of a primitive at a level [s], before the common scale factor is applied.
 
     Each look takes a cycle, the station's latency and the delay. Lost motion must be repeated. An outage costs its
@@ -97,8 +97,8 @@ def predict() -> dict[str, dict[str, dict[str, float]]]:
     slower = sum((22.1, 24.4, 26.6, 36.2, 27.1, 34.1, 47.9, 28.9, 47.4, 64.3)) / 10.0 / TOTAL
     normal = LEVELS[0]
     models = {
-        "looks": _plain,
-        "constant": lambda p, level: _plain(p, normal) * (1.0 if level is normal else slower),
+        "looks": _unscaled_time,
+        "constant": lambda p, level: _unscaled_time(p, normal) * (1.0 if level is normal else slower),
         "mackenzie": _mackenzie,
     }
     found = {}
