@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from rclpy.logging import get_logger
 
-from teleop_console.status import RESTS
 from teleop_core.base.errors import SessionError
 from teleop_core.graph.topics import HAND_BUTTONS
+from teleop_core.hand.input_device import UNHELD
 from teleop_core.hand.operators import OPERATORS
 from teleop_core.hand.operators.remote import AHEAD, RemoteHand
 from teleop_core.middleware.ros import ROS
@@ -63,7 +63,7 @@ def test_a_gamepad_moves_the_hand_while_it_is_held_and_is_let_go_of_when_it_is_l
     hand = RemoteHand()
     clock, device = Clock(hand), opened(hand, force=0.5, speed=0.1)
     try:
-        assert device.concerns()[0].endswith(RESTS)
+        assert device.concerns()[0].endswith(UNHELD)
         assert "Virtual" in device.values()["hand"]
         pad.move("left x", 1.0)
         pad.press("right shoulder")
@@ -75,7 +75,7 @@ def test_a_gamepad_moves_the_hand_while_it_is_held_and_is_let_go_of_when_it_is_l
         pad.press("right shoulder")
         clock.until(lambda: hand.is_held, "a second grip")
         pad.unplug()
-        clock.until(lambda: "gone; waits for it" in str(device.concerns()), "a lost gamepad")
+        clock.until(lambda: "disconnected; waits for it" in str(device.concerns()), "a lost gamepad")
         clock.until(lambda: clock.row[6] == 1.0, "a pressed clutch")
     finally:
         device.close()
@@ -88,10 +88,10 @@ def test_a_gamepad_that_comes_back_is_taken_again(pad: VirtualPad) -> None:
     clock, device = Clock(hand), opened(hand)
     try:
         pad.unplug()
-        clock.until(lambda: "gone" in device.concerns()[0], "a lost gamepad")
+        clock.until(lambda: "disconnected" in device.concerns()[0], "a lost gamepad")
         other = VirtualPad()
         try:
-            clock.until(lambda: "gone" not in device.concerns()[0], "the gamepad is back")
+            clock.until(lambda: "disconnected" not in device.concerns()[0], "the gamepad is back")
             other.press("left shoulder")
             clock.until(lambda: hand.is_held, "a grip")
         finally:

@@ -11,8 +11,8 @@ import pytest
 
 import teleop_core as tc
 from peers import at_rest
-from teleop_console.status import RESTS
 from teleop_core.graph.topics import HAND_BUTTONS, HAND_SERVO_CP, SLAVE_MEASURED_CP
+from teleop_core.hand.input_device import UNHELD
 from teleop_core.nodes.children import environment
 
 if TYPE_CHECKING:
@@ -30,7 +30,7 @@ def test_a_recorded_hand_that_is_played_is_the_operator(
     slave = {"starts_at_home": True, "operation": {"longest_outage": 0.0}}
     compose(operator={"kind": "elsewhere"}, slave=slave)
     tips = peer.listen(SLAVE_MEASURED_CP)
-    peer.wait(lambda: peer.status("haptic_master").message.endswith(RESTS), "a free stylus")
+    peer.wait(lambda: peer.status("haptic_master").message.endswith(UNHELD), "a free stylus")
     peer.wait(at_rest(tips), "rest")
     tips.forget()
     command = [sys.executable, "-m", "teleop_core.commands.cli", "play", str(bag), "--topics",

@@ -8,7 +8,6 @@ import pytest
 from numpy.typing import ArrayLike
 
 from peers import at_rest
-from teleop_console.status import RESTS
 from teleop_core.graph.topics import (
     MASTER_BUTTONS,
     MASTER_MEASURED_CP,
@@ -16,6 +15,7 @@ from teleop_core.graph.topics import (
     OPERATOR_SERVO_CP,
     SLAVE_MEASURED_CP,
 )
+from teleop_core.hand.input_device import UNHELD
 from teleop_core.hand.operators.rest import rest_pose
 from teleop_core.kernels.geometry import Array
 
@@ -70,7 +70,7 @@ def is_held(peer: "Peer") -> Callable[[], object]:
 
 
 def test_the_slave_goes_with_a_person_holds_without_and_no_grip_makes_it_jump(peer: "Peer", session: object) -> None:
-    peer.wait(lambda: peer.status("operator").message.endswith(RESTS), "a hand that waits")
+    peer.wait(lambda: peer.status("operator").message.endswith(UNHELD), "a hand that waits")
     peer.wait_value("operator", "has_begun", lambda n: n == 1)
     tips, person = peer.listen(SLAVE_MEASURED_CP), Person(peer)
     person.hold([0.0, 0.0, 0.0], is_held(peer), "a grip")

@@ -12,7 +12,8 @@ import pytest
 import teleop_console
 from teleop_console.link import View
 from teleop_console.look import CURVES, MEANINGS, ROLES, Color
-from teleop_console.status import RESTS, status_html
+from teleop_console.status import status_html
+from teleop_core.hand.input_device import UNHELD
 from teleop_core.kernels.geometry import Array
 
 COLOR = re.compile(r"#[0-9a-fA-F]{6}\b|rgba?\(|\(\d{2,3}, \d{1,3}, \d{2,3}\)")
@@ -98,7 +99,7 @@ def test_colors_of_the_page_stand_in_one_table() -> None:
 
 
 def test_a_hand_that_rests_is_information_and_no_warning() -> None:
-    news = (f"operator: waits for operator/servo_cp: {RESTS}", "ik: 3 late ticks")
+    news = (f"operator: waits for operator/servo_cp: {UNHELD}", "ik: 3 late ticks")
     page = status_html(View(news=news, is_fresh=True), "coarse_box", "")
     rests, late = re.findall(r'<span class="t-(\w+)">(.) (?:operator|ik)', page)
     assert (rests, late) == (("muted", "ℹ"), ("held", "⚠"))

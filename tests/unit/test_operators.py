@@ -263,7 +263,7 @@ WRONG: dict[str, tuple[Callable[[], object], str]] = {
     "answers no number": (partial(stepped, lambda times: np.full((len(times), 3), np.nan)), "at 0.001 s"),
     "answers words": (partial(stepped, lambda times: "up"), "numbers"),
     "raises": (partial(stepped, lambda times: {}["up"]), "KeyError"),  # type: ignore[index]
-    "is made by a number": (partial(put_together, make=5), "make can be called"),
+    "is made by a number": (partial(put_together, make=5), "callable make"),
     "is made of too little": (partial(put_together, make=lambda parameters: None), "make(parameters, setting)"),
     "is asked for no tick": (partial(put_together, ahead=0), ">= 1 tick"),
     "has parameters of no dataclass": (partial(put_together, parameters=dict), "dataclass"),

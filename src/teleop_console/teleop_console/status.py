@@ -6,6 +6,7 @@ import math
 from teleop_console.answers import Situation
 from teleop_console.link import ArmView, View
 from teleop_core.graph.topics import SLAVE_JAW_MEASURED_JS, TASK_STATE
+from teleop_core.hand.input_device import UNHELD
 from teleop_core.hand.tasks import Act, Miss
 from teleop_core.slave.operation import Fault, State
 
@@ -29,8 +30,6 @@ _MISSED = {
     Miss.DROP: "dropped",
     Miss.WRONG: "on the wrong goal",
 }
-RESTS = "nobody holds the stylus"
-"""End of the status line of a hand's node while no person holds the stylus."""
 
 
 def situation(view: View) -> Situation:
@@ -168,7 +167,7 @@ def status_html(view: View, title: str, doing: str, step: str = "") -> str:
 
 def _news_line(text: str) -> str:
     """A warning; a hand that rests is no more than information."""
-    signal, mark = ("muted", "ℹ") if text.endswith(RESTS) else ("held", "⚠")
+    signal, mark = ("muted", "ℹ") if text.endswith(UNHELD) else ("held", "⚠")
     return f'<span class="t-{signal}">{mark} {html.escape(text)}</span>'
 
 

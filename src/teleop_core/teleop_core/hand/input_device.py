@@ -26,6 +26,8 @@ class Reading(NamedTuple):
     jaw: float | None = None
 
 
+UNHELD = "nobody holds the stylus"
+"""End of a node's concern while no person moves the stylus; the console shows such a concern as no warning."""
 NOTHING = Reading(np.zeros(6))
 """Reading of an untouched device."""
 

@@ -5,8 +5,8 @@ from concurrent.futures import Future
 from typing import Any
 
 from teleop_core.base.errors import SessionError, TeleopError
-from teleop_core.hand.devices import Device
 from teleop_core.hand.devices.pilot import Pilot, PilotParameters
+from teleop_core.hand.input_device import UNHELD, Device
 from teleop_core.hand.operators.remote import RemoteHand
 from teleop_core.nodes.loop import Loop
 
@@ -57,10 +57,10 @@ class DeviceHand:
             raise SessionError(f"the device does not open within {_OPENING:g} s") from error
 
     def concerns(self) -> list[str]:
-        """Texts about a lost device, and about a stylus that no person holds."""
+        """Texts about a lost device, and about a stylus that nobody holds."""
         if self._lost:
             return [f"{self._lost}; waits for it"]
-        return [] if self._hand.is_held else ["waits for a hand: no person holds the stylus"]
+        return [] if self._hand.is_held else [f"waits for a hand: {UNHELD}"]
 
     def values(self) -> dict[str, str]:
         """The device, and whether the stylus is held."""

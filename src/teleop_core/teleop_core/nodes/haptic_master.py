@@ -3,6 +3,7 @@
 from typing import Any
 
 from teleop_core.graph.topics import HAND_SERVO_CP, MASTER_CONTACT, MASTER_SERVO_CF, OPERATION, SLAVE_OPERATION, Topic
+from teleop_core.hand.input_device import UNHELD
 from teleop_core.hand.master.haptic_master import HapticMasterParameters
 from teleop_core.nodes.crtk import Condition, OperatingState, is_installed
 from teleop_core.nodes.operation import StopInput
@@ -114,7 +115,7 @@ class HapticMasterNode(TickingNode):
         """Texts about a stylus that nobody holds, and about motors that are too warm."""
         found = []
         if not self.stage.is_held:
-            found.append(f"waits for {HAND_SERVO_CP.name}: nobody holds the stylus")
+            found.append(f"waits for {HAND_SERVO_CP.name}: {UNHELD}")
         if doubted := self.stage.doubted_force:
             bound = self.parameters.force_range
             found.append(f"gives no force: received {doubted:.3g} N, allowed are {bound:g} N: a force sensor is faulty")

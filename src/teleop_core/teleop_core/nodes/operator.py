@@ -7,6 +7,7 @@ import numpy as np
 
 from teleop_core.base.errors import PartError
 from teleop_core.graph import topics
+from teleop_core.hand.input_device import UNHELD
 from teleop_core.hand.operators import OPERATORS
 from teleop_core.hand.operators.behaviour import OperatorParameters
 from teleop_core.hand.operators.follower import MOST
@@ -61,7 +62,7 @@ class HandInput:
         """Text about a stylus that no hand holds."""
         if self._poses is None or self._hand.is_held:
             return []
-        return [f"waits for {topics.OPERATOR_SERVO_CP.name}: nobody holds the stylus"]
+        return [f"waits for {topics.OPERATOR_SERVO_CP.name}: {UNHELD}"]
 
     def values(self) -> dict[str, str]:
         """Whether a hand holds the stylus, and the sender of the poses."""
