@@ -98,7 +98,7 @@ class Distribution:
         return int(self.counts.sum())
 
     def quantile_us(self, share: float) -> int | None:
-        """Quantile: smallest duration [µs] that at least a share (0 to 1) of the durations does not exceed."""
+        """Quantile [µs]: the smallest duration for which at least a share (0 to 1) of all durations is not longer."""
         if not len(self.counts):
             return None
         rank = max(1, math.ceil(share * self.count))
@@ -112,13 +112,13 @@ class Distribution:
     def histogram(self, width_us: int) -> tuple[Array, Array]:
         """Share of the durations per bin, for drawing.
 
-        Bins reach to the 99th percentile; longer durations are counted in the last bin.
+        The last bin contains the 99th percentile and all longer durations.
 
         Args:
             width_us: Width of each bin, [µs].
 
         Returns:
-            Middles of the bins, shape (n,), [ms]; shares in per cent, shape (n,).
+            Middle of each bin [ms], shape (n,); share of the durations in each bin [%], shape (n,).
         """
         low, high = int(self.values_us[0]), self.quantile_us(0.99)
         assert high is not None

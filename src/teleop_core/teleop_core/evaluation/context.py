@@ -31,7 +31,7 @@ class Context:
     Attributes:
         bag: The recording; it contains this arm only, under the plain names.
         arm: Name of the arm; empty for the default arm of a recording that names no arms.
-        history: Values of teleop/state at all times.
+        history: Values of ``teleop/state`` over time.
         origin: The session that was recorded: graph, streams, chain of stages, map of axes.
         robot: Name of the robot; None if unknown.
         span: Scored part of the recording; None for the whole recording.
@@ -84,7 +84,7 @@ class Context:
 
     @property
     def topics(self) -> list[Topic]:
-        """Streams in the windows: all streams that were requested and recorded."""
+        """Streams that the windows contain: all streams that were requested and recorded."""
         return list(self._read.values())
 
     def shared(self, kind: Callable[["Context"], Shared]) -> Shared:

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from _typeshed import DataclassInstance
 
 Values: TypeAlias = "Mapping[str, object] | DataclassInstance"
-"""Results of a metric: a mapping of names to values, which may be such mappings themselves; or a dataclass."""
+"""Results of a metric: a dataclass, or a mapping of names to values. A value may itself be such a mapping."""
 Leaf: TypeAlias = float | int | str | None
 Plain: TypeAlias = "dict[str, Plain] | Leaf"
 

@@ -160,10 +160,11 @@ def span_of(bag: Bag, seconds: Seconds | None) -> Span | None:
 
     Args:
         bag: The recording.
-        seconds: Begin and end [s] since the first message; an end after the last message is reduced to it.
+        seconds: Begin and end [s] since the first message; an end after the last message is reduced to the time of
+            that message.
 
     Raises:
-        ParameterError: The span is empty, not finite, or begins after the end.
+        ParameterError: The span is empty, is not a number, or begins after the recording ends.
     """
     if seconds is None:
         return None

@@ -8,7 +8,10 @@ from teleop_core.graph.topics import DISPLAY_MEASURED_CP, NO_COMMAND_NS
 
 
 class DisplayMetric(Metric):
-    """Age of the displayed slave pose, from its measurement to the end of each frame; None without a display."""
+    """Mean age of the slave pose on the display, and rate of the frames; None without a display.
+
+    The age counts from the measurement of the pose until the next frame replaces the pose.
+    """
 
     name, topics = "display", (DISPLAY_MEASURED_CP,)
     age_mean_ms = figure("ms", "mean age of the frame on the screen", "age of what is seen, mean")

@@ -32,7 +32,7 @@ class _Path(NamedTuple):
 
     @property
     def shown(self) -> figure.Numbers:
-        """Measured points of the time that is drawn, NaN elsewhere, shape (N, 3)."""
+        """Measured points, shape (N, 3); NaN at times that are not drawn."""
         if self.during is None:
             return self.measured
         ends = np.array(self.during).ravel()
@@ -65,7 +65,7 @@ class PathMetric(Metric):
         return {}
 
     def figures(self) -> list[figure.Figure]:
-        """Paths in space and per plane, and positions against time."""
+        """Plots of the paths in space and per plane, and of the positions against time."""
         outlines = outlines_of(self._context)
         path = self._path(outlines)
         return [
@@ -122,7 +122,7 @@ class PathMetric(Metric):
         return figure.Figure("Position against time", sentence, traces, layout, 640)
 
     def _interesting(self, outlines: list[Outline]) -> list[float]:
-        """Time [s] that is shown first: the time with a fixture on, else the time since the slave began to follow."""
+        """Interval [s] shown first: the time with a fixture on, else the time since the slave began to follow."""
         bag, history = self._context.bag, self._context.history
         if outlines:
             return [outlines[0].begin_s, outlines[-1].end_s]
@@ -191,7 +191,7 @@ def _line3(points: figure.Numbers, name: str, color: str, width: int, *, hidden:
 
 
 def _in_planes(path: _Path, outlines: list[Outline]) -> figure.Figure:
-    """The same paths seen along each axis; behind them the whole path, or the time spent in each area."""
+    """Plots of the paths seen along each axis; the background is the whole path, or the time spent in each area."""
     shown = path.shown
     fixtures = largest(outlines)
     every = np.concatenate([shown, path.reference[np.isfinite(shown[:, 0])], *(outline.points for outline in fixtures)])

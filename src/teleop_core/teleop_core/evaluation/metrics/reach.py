@@ -1,4 +1,4 @@
-"""Reach: share of the time in which the slave could follow the hand, and the causes of the rest."""
+"""Reach: share of the time in which the slave could follow the hand, and why it could not follow otherwise."""
 
 import math
 from dataclasses import dataclass
@@ -15,11 +15,11 @@ from teleop_core.kernels.geometry import Array
 
 GROUP = "slave follows the hand"
 COMPARABLE = 0.99
-"""Smallest share of followed time for a comparison with published figures."""
+"""Smallest share of followed time at which values are compared with published values."""
 _RESIDUAL = SLAVE_REACH.columns.index("position_residual")
 _LIMIT = SLAVE_REACH.columns.index("limit")
-# One more cause besides the limits: the slave is being aligned, or no command came for longer than this time [s].
-_ALIGNING, _SILENT_S = len(Limit), 0.5
+_ALIGNING = len(Limit)  # one more cause besides the limits: the slave is being aligned
+_SILENT_S = 0.5  # a longer time without a command counts as alignment [s]
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,7 @@ class ReachMetric(Metric):
         self._distance, self._angle = Moments(), Moments()
         self._stamps = context.shared(StampTallies)
         self._interpolation = context.origin.interpolation
-        self._time = np.zeros(len(Limit) + 1)  # time in each limit, and while aligning [s]
+        self._time = np.zeros(len(Limit) + 1)  # time at each limit, then time of alignment [s]
         self._longest_s = self._open_s = 0.0
         self._last: tuple[int, int] | None = None  # stamp [ns] of the last command, and its limit
 
@@ -137,7 +137,7 @@ class ReachMetric(Metric):
         return period_us * 1e-3 if is_slow else 0.0
 
     def rows(self) -> list[TableRow]:
-        """Shares in percent, the longest stretch, residuals, and whether figures are comparable."""
+        """Rows of tables; shares are in percent."""
         score = self.values()
         return [
             TableRow(GROUP, "followed, time", "%", _percent(score.followed_share)),
