@@ -11,13 +11,12 @@ from pathlib import Path
 
 _LONGEST = 0.2
 """Largest time between two calls of :meth:`Chances.look` that counts [s]. If more time has passed, the caller itself
-had no processor, or was
-stopped together with the process."""
+had no processor, or was stopped together with the process."""
 
 
 @dataclass(frozen=True)
 class _Account:
-    """Time that a thread ran, and waited for a processor [s]; whether it is ready to run."""
+    """Time for which a thread ran, time for which it waited for a processor [s], and whether it is ready to run."""
 
     ran: float
     waited: float
@@ -52,7 +51,7 @@ class Chances:
             if thread not in before:
                 continue
             got = account.ran - before[thread].ran
-            waits = account.is_ready and got <= 0.0  # the kernel updates its account when it runs again
+            waits = account.is_ready and got <= 0.0  # the kernel updates an account when its thread runs again
             waited = max(waited, elapsed if waits else account.waited - before[thread].waited)
             ran = got if thread == self._worker else ran
         return max(elapsed - waited, ran, 0.0)

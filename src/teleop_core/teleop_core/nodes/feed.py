@@ -16,10 +16,10 @@ from teleop_core.middleware.world import Line, Listener, World
 
 MOST = 16 << 20
 """Largest queue for a recorder that reads nothing [bytes]; about 7 s of a session of one arm."""
-_HEAD = struct.Struct("<IHHIq")  # size, topic, word, number, time [ns]
+_HEAD = struct.Struct("<IHHIq")  # head of a frame: size, topic, word, number, time [ns]
 _NAMES, _MESSAGE, _JOINED, _LEFT, _END = 0, 1, 2, 3, 4
 _AGAIN_NS = 1_000_000_000  # time between two searches for a recorder
-_READ = 1 << 20  # bytes at once
+_READ = 1 << 20  # largest number of bytes per read
 
 
 class Channel:
@@ -47,7 +47,7 @@ class Channel:
             self.tell()
 
     def tell(self) -> None:
-        """Tell it again to a new recorder."""
+        """Tell a new recorder whether this process sends the topic."""
         if self._feed.is_open:
             word = _JOINED if self._is_inside else _LEFT
             self._feed.put(self._index, word, time_ns=self._feed.world.time_ns())
@@ -124,11 +124,11 @@ class Fed(Protocol):
         """Receive a message; ``lost`` messages before it were lost."""
 
     def join(self, is_inside: bool, since_ns: int) -> None:
-        """Receive messages sent from ``since_ns`` on [ns] from the feed, or from the middleware again."""
+        """Receive messages sent since ``since_ns`` [ns] from the feed if ``is_inside``, else from the middleware."""
 
 
 class FeedReader:
-    """The recorder's ends of all feeds of its machine. It accepts only loops of the same user.
+    """The recorder's side of all feeds of its machine. It accepts only loops of the same user.
 
     Args:
         channels: Receiver of the messages of each topic, by its name.
@@ -146,7 +146,7 @@ class FeedReader:
             self._opened = world.listen(world.feed_place())
 
     def drain(self) -> None:
-        """Hand on all that has come."""
+        """Pass on all received messages."""
         while self._opened is not None and (line := self._opened.accept()) is not None:
             self._loops.append(_Source(line, self._channels, self._world))
         for one in self._loops:
@@ -173,7 +173,7 @@ class _Source:
         self.is_open, self.has_ended = True, False
 
     def drain(self) -> None:
-        """Hand on all that has come."""
+        """Pass on all received messages."""
         while self.is_open:
             try:
                 data = self._line.recv(_READ)
@@ -189,7 +189,7 @@ class _Source:
         self._hand_on()
 
     def close(self) -> None:
-        """Give its topics back to the middleware."""
+        """Close the feed; the recorder receives its topics by the middleware again."""
         self._line.close()
         self.is_open = False
         for channel in self._channels:

@@ -29,7 +29,7 @@ class CrtkMaster:
 
     @property
     def is_enabled(self) -> bool:
-        """Whether its motors may push."""
+        """Whether the device's motors may push."""
         return self._state is State.ENABLED and not self._is_stopped
 
     def request(self, name: str) -> tuple[Answer, str]:
@@ -72,7 +72,7 @@ _PRESSED = OPERATION.index("is_pressed")
 
 
 class HapticMasterNode(TickingNode):
-    """One sample of the device per millisecond, stamped with its nominal time."""
+    """Publishes one sample of the device per millisecond, stamped with the nominal time of the tick."""
 
     def setup(self, parameters: HapticMasterParameters) -> None:
         """Make the device and open its topics."""

@@ -17,7 +17,8 @@ _NOWHERE = np.zeros(7)
 class LiveModel:
     """Frames of the robots of a running session.
 
-    The robot's description is sent with the first joints that match the robot. If the recorder records the session of
+    The robot's description is sent with the first joint positions that match the robot. If the recorder records the
+    session of
     another robot, that robot is thus not drawn as this one.
 
     Args:
@@ -58,7 +59,7 @@ class LiveModel:
 
 
 class ModelTopics:
-    """Publishers of the frames whose message types are installed: ``tf2_msgs`` is part of ROS.
+    """Publishers of the model's topics whose message types are installed; ``tf2_msgs`` is installed only with ROS.
 
     Args:
         node: Node that owns the publishers.

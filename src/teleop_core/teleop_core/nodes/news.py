@@ -7,7 +7,7 @@ from teleop_core.graph.stage import Stage
 from teleop_core.middleware.world import Owner
 from teleop_core.nodes.streams import Input
 
-_CALM_NS = 1_000_000_000  # time after which the same trouble is logged again [ns]
+_CALM_NS = 1_000_000_000  # shortest time between two log lines about trouble [ns]
 _COMMANDS = ("servo_", "move_", "interpolate_")
 
 
@@ -58,7 +58,7 @@ class Commanders:
 
 
 class Trouble:
-    """Log of the reasons why a bridge holds.
+    """Log of the reasons why a bridge does not move the arm.
 
     Each reason is logged once, even if numbers in it change. When all reasons are gone, this is logged too.
 

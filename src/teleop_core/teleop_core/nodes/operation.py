@@ -1,4 +1,4 @@
-"""Operation on topics and services: the emergency stop of all arms, and the commands of each."""
+"""Operation on topics and services: the emergency stop of all arms, and the commands of each arm."""
 
 from collections.abc import Callable, Iterable
 from functools import partial
@@ -107,7 +107,7 @@ class StopInput:
 
         Args:
             now_ns: Time of any monotonic clock [ns].
-            is_idle: Whether a possible press before a new button's first message would stop nothing.
+            is_idle: Whether the arm is idle, so that a press before a new button's first message had nothing to stop.
         """
         found: list[bool] = []
         self._ticks += 1
@@ -143,7 +143,7 @@ class StopInput:
         return self._presses.lost
 
     def holders(self, silent_since_ns: int = 0) -> tuple[bytes, ...]:
-        """Buttons that hold the stop pressed, or have been silent since ``silent_since_ns``."""
+        """Buttons that are pressed, or have been silent since ``silent_since_ns``."""
         presses = self._presses
         return tuple(dict.fromkeys((*presses.holders, *presses.silent(silent_since_ns))))
 
@@ -152,7 +152,7 @@ class StopInput:
         self._look_up()
 
     def names(self, buttons: Iterable[bytes]) -> str:
-        """Names of buttons, for people; takes longer than a tick."""
+        """Names of buttons, as text for users; takes longer than a tick."""
         there = self._look_up()
         return " and ".join(self._names.get(one, "a button") + ("" if one in there else " (gone)") for one in buttons)
 
@@ -206,7 +206,7 @@ class CommandServices:
     Args:
         node: Node that owns the services; its ``lock`` is held while a command is processed.
         arm: Receiver of the commands.
-        stop: Its emergency stop.
+        stop: Emergency stop of the arm.
         holders: Returns the buttons that are pressed or missing now.
     """
 

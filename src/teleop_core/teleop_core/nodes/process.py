@@ -27,7 +27,7 @@ def run(make_crew: Callable[[], Crew]) -> int:
         make_crew: Class of the node, or of a crew of several nodes.
 
     Returns:
-        Exit code: 0; 1 after a failure at work; 2 if a parameter or file is wrong.
+        Exit code: 0 without a failure; 1 after a failure at work; 2 if a parameter or file is wrong.
     """
     signals, parent = signal_pipe(), Parent.of_environment()
     try:

@@ -59,7 +59,7 @@ class QualityOverrides:
         self._used: set[str] = set()
 
     def apply(self, name: str, side: Side, base: Qos) -> Qos:
-        """QoS of one end of a topic with its full name, after overrides."""
+        """QoS of a publisher or subscription after overrides; ``name`` is the full name of its topic."""
         for key, (policy, value) in self._values.items():
             if key.startswith(f"{PREFIX}{name}.{side}."):
                 base = replace(base, **{policy: value})

@@ -27,8 +27,9 @@ from teleop_core.nodes.streams import Output
 from teleop_core.session.links import link_texts
 
 _AFTER_NS = 700_000
-"""Phase of the slave's side within the millisecond. The hand's side has phase 0; its commands have arrived by then,
-even at the p99 of its lateness."""
+"""Phase of the slave's side within the millisecond [ns]. The hand's side has phase 0. Even at the p99 of the lateness
+of the
+hand's side, its commands arrive before this phase."""
 
 
 class TeleopSession:
@@ -131,9 +132,8 @@ class TeleopSession:
             for node in self._stages:
                 if node.is_at_work:
                     node.tick(tick_ns)
-                    # Messages with the longest path to their reader are sent first: the slave's setpoint, the master's
-                    # sample
-                    # last.
+                    # Messages with the longest path to their reader are sent first: the slave's setpoint first, the
+                    # master's sample last.
                     waiting[:0] = self._pending
                     self._pending.clear()
             for output, data, sent_ns in waiting:
