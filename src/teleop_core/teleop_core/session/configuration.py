@@ -1,4 +1,4 @@
-"""Configuration: layers of files and settings become one checked group per stage of the graph."""
+"""Configuration: layers of files and settings become one checked parameter group per stage of the graph."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass

@@ -54,7 +54,7 @@ def passive_note(device: DeviceParameters, fixture: gains.FixtureParameters, del
     Args:
         device: The device.
         fixture: The wall.
-        delay: Delay of its force in addition to the tick [s].
+        delay: Delay of the wall's force in addition to the tick [s].
     """
     wall = walls.WALLS[fixture.wall]
     stiffness = wall.spring(fixture.stiffness, fixture.max_force)

@@ -48,9 +48,9 @@ class Samples(NamedTuple):
         moves: Positions (N, 3) [m], in the master's axes.
         turns: Rotations since the first sample, quaternions (N, 4) in the master's axes, without jumps of sign.
         pressed_at: Times (K,) [s] at which buttons change.
-        pressed: Values of clutch, fixture and mode from these times on (K, 3).
+        pressed: Values of clutch, fixture and mode (K, 3), each valid from its time in ``pressed_at``.
         closed_at: Times (M,) [s] at which the closing of the jaw changes.
-        closed: Closing of the jaw from these times on (M, 1), 0 open to 1 closed.
+        closed: Closing of the jaw (M, 1), 0 open to 1 closed, each valid from its time in ``closed_at``.
     """
 
     at: Array
