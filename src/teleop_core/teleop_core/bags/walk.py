@@ -1,4 +1,5 @@
-"""Walking through MCAP records. These functions are compiled, since they process every message of a recording."""
+"""Walk: finds the records of an MCAP file. The functions are compiled, since they process every message
+of a recording."""
 
 import numpy as np
 from mcap.opcode import Opcode
@@ -9,8 +10,8 @@ from teleop_core.kernels import inner, kernel
 
 Rows = NDArray[np.int64]
 _MESSAGE = int(Opcode.MESSAGE)
-_MESSAGE_HEAD = 22
-OPCODE, BEGIN, SIZE, CHANNEL, LOG = range(5)
+_MESSAGE_HEAD = 22  # bytes of a message record before its CDR
+OPCODE, BEGIN, SIZE, CHANNEL, LOG = range(5)  # columns of ``Rows``
 
 
 @inner
