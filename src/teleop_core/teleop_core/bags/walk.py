@@ -1,5 +1,7 @@
-"""Walk: finds the records of an MCAP file. The functions are compiled, since they process every message
-of a recording."""
+"""Walk: finds the records of an MCAP file.
+
+The functions are compiled, since they process every message of a recording.
+"""
 
 import numpy as np
 from mcap.opcode import Opcode

@@ -80,7 +80,7 @@ def parse(text: str) -> Any:
         raise UnreadableError(_told(error)) from error
     except UnreadableError:
         raise
-    # What constructors of explicit tags raise, such as of "!!int x", is of many kinds.
+    # Constructors of explicit tags, such as "!!int x", raise exceptions of many kinds.
     except (yaml.YAMLError, ValueError, TypeError, KeyError, AttributeError, IndexError) as error:
         raise UnreadableError(f"is not YAML: {' '.join(str(error).split())}") from error
 
