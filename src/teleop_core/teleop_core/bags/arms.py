@@ -149,13 +149,13 @@ class _ArmBag(Bag):
             raise RecordingError(self.path, f"{arm} {error.reason}") from None
 
     def read_many(self, topics: Iterable[Topic | str], joint_names: tuple[str, ...] | None = None) -> dict[str, Series]:
-        """See :meth:`Bag.read_many`; only topics of this arm."""
+        """See :meth:`~teleop_core.bags.reader.Bag.read_many`; only topics of this arm."""
         return self._renamed(self._bag.read_many(self._wanted(topics), joint_names))
 
     def blocks(
         self, topics: Iterable[Topic | str], joint_names: tuple[str, ...] | None = None
     ) -> Iterator[dict[str, Series]]:
-        """See :meth:`Bag.blocks`; only topics of this arm."""
+        """See :meth:`~teleop_core.bags.reader.Bag.blocks`; only topics of this arm."""
         yield from map(self._renamed, self._bag.blocks(self._wanted(topics), joint_names))
 
     def reports(self, topic: Topic | str) -> list[Report]:
@@ -168,7 +168,7 @@ class _ArmBag(Bag):
         return [report._replace(name=name) for name, report in named if name is not None]
 
     def raw(self, topics: Iterable[Topic | str] | None = None) -> Iterator[tuple[str, str, int, bytes]]:
-        """See :meth:`Bag.raw`; only topics of this arm."""
+        """See :meth:`~teleop_core.bags.reader.Bag.raw`; only topics of this arm."""
         if topics is None:
             topics = [name for name, info in self.topics.items() if info.count]
         for name, ros_type, log_ns, data in self._bag.raw(self._wanted(topics)):

@@ -61,7 +61,7 @@ class NodeParameters:
     real_time: RealTimeParameters = field(default_factory=RealTimeParameters)
 
     def sender(self) -> Sender:
-        """New :class:`Sender`, which checks the sender of an input topic."""
+        """New object that checks the sender of an input topic."""
         return Sender(self.flood_rate, self.owner_silence)
 
     def feeds(self, port: str) -> list[tuple[str, float]]:
