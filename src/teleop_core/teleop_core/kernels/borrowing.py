@@ -1,9 +1,10 @@
 """Borrowing: switches reference counting of array arguments off in kernels that make no arrays.
 
-Compiled code counts the references to each array, so that the last holder frees it. A kernel that gets twenty arrays
+Compiled code counts the references to each array, so that the array is freed with its last reference. A kernel that
+gets twenty arrays
 in a tuple increments and decrements all counts in each call. In a tick of a session this happened six hundred times
-and took a quarter of the time. If all arrays of a kernel come from its caller, the caller keeps them until the kernel
-returns, so no counting is needed.
+and took a quarter of the time. If all arrays of a kernel come from its caller, the caller refers to them until the
+kernel returns, so no counting is needed.
 """
 
 from typing import Any
@@ -42,7 +43,7 @@ class _Borrowing(AnalysisPass):
 
 
 class Pipeline(Compiler):
-    """numba's compiler with this additional step."""
+    """numba's compiler with the additional step :class:`_Borrowing`."""
 
     def define_pipelines(self) -> list[Any]:
         """Steps of the compiler."""
@@ -82,7 +83,7 @@ def _is_plain(state: Any, line: Any) -> bool:
 
 
 def _called(state: Any, call: Any) -> object:
-    """Python function that is called, if numba supports this function itself."""
+    """Python function that a call names, if numba itself supports this function."""
     return getattr(state.typemap[call.func.name], "typing_key", None)
 
 
@@ -97,7 +98,7 @@ def _is_plain_call(state: Any, call: Any) -> bool:
 
 
 def _is_index(kind: Any) -> bool:
-    """Whether an index gives a view: numbers and slices do, index arrays do not."""
+    """Whether an index gives a view: numbers and slices give views, index arrays give copies."""
     parts: Any = kind if isinstance(kind, types.BaseTuple) else (kind,)
     views = types.Integer | types.SliceType | types.EllipsisType | types.NoneType
     return all(isinstance(part, views) for part in parts)

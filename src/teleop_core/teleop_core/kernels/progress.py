@@ -60,5 +60,5 @@ def in_work() -> str:
 
 
 def compiled_count() -> int:
-    """Number of kernels that this process has compiled, those inside others included."""
+    """Number of kernels that this process has compiled, including kernels that other kernels call."""
     return _progress.done
