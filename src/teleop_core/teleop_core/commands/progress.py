@@ -29,7 +29,7 @@ class Progress:
 
     @property
     def seconds(self) -> float:
-        """Time of the ticks so far."""
+        """Simulated time of the ticks so far [s]."""
         from teleop_core.graph.signals import DT
 
         return round(self.ticks * DT, 9)
@@ -59,7 +59,7 @@ def say_work(say: Callable[[str], None] | None = None) -> bool:
     """Show current one-time work, such as compiling kernels; return whether there was any.
 
     Args:
-        say: Shows a text that replaces the last one; None prints a line.
+        say: Function that shows a text in place of the last text; None prints a line.
     """
     from teleop_core.kernels.progress import in_work
 
