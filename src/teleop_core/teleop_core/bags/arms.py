@@ -1,9 +1,9 @@
 """Arms: a recording of several arms, seen as one recording per arm.
 
-Topics of the default arm have the plain names; those of an arm called ``left`` are below ``left/``.
-The metadata entry ``arms`` lists the names of the arms, separated by blanks, the default arm first. Robot and seed of
-a further arm are in the entries ``left/robot`` and ``left/seed``. All arms share the topic ``diagnostics``, in which
-the nodes of an arm are called ``left/slave``.
+Topics of the default arm have the plain names; those of an arm called ``left`` are below ``left/``. The metadata entry
+``arms`` lists the names of the arms, separated by blanks, the default arm first. Robot and seed of a further arm are
+in the entries ``left/robot`` and ``left/seed``. All arms share the topic ``diagnostics``, in which the nodes of an arm
+are called ``left/slave``.
 
 If the recorder ran in a namespace, all topics are below that namespace, which the metadata contain under
 ``namespace``. The names of the arms do not contain the namespace: topics of the arm ``left`` in ``/lab`` are below

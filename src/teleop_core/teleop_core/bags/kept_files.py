@@ -10,8 +10,7 @@ contain the digests of all other files:
 
 The entry that has a digest as its name contains the packed bytes of the file. The entry is stored once for all arms,
 up to a total size of all files. If a file is missing or has changed since the recording, its recorded bytes are
-written to a temporary folder,
-and that copy is used instead.
+written to a temporary folder, and that copy is used instead.
 """
 
 import base64

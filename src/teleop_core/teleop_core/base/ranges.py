@@ -1,8 +1,8 @@
 """Ranges: allowed values of numbers from users and files, by their unit, declared once for all readers.
 
 Parameters, arms that are read from files, and traces of networks are checked against these ranges. A number beyond
-``most`` is
-impossible for any arm and is refused. A number beyond ``usual`` gives a warning, because it probably has another unit.
+``most`` is impossible for any arm and is refused. A number beyond ``usual`` gives a warning, because it probably has
+another unit.
 """
 
 import math

@@ -2,9 +2,8 @@
 
 All values except the tremor are computed from positions at :data:`RATE`, so that recordings of any rate can be
 compared. Positions are interpolated linearly to 30 Hz; velocities are central differences of the interpolated
-positions. Smoothness is
-computed for windows of :data:`WINDOW`. Gaps divide the motion into stretches (:func:`stretches`); nothing is computed
-across a gap.
+positions. Smoothness is computed for windows of :data:`WINDOW`. Gaps divide the motion into stretches
+(:func:`stretches`); nothing is computed across a gap.
 """
 
 import itertools

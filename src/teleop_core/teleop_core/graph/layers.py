@@ -222,8 +222,7 @@ def parse_setting(text: str) -> Layer:
 
     The key is ``stage.name``, or a bare name, which sets the parameter in every stage that has it; the prefix ``arm/``
     restricts the setting to that arm. The name of a group with a ``kind`` chooses the kind: ``fixture=sphere``. A list
-    is written [1, 2]. Whole
-    numbers are accepted for real numbers.
+    is written [1, 2]. Whole numbers are accepted for real numbers.
 
     Raises:
         TeleopError: There is no "=", or the value is not YAML.

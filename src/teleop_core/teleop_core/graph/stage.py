@@ -84,8 +84,7 @@ class Stage:
         step: ``step(parameters, state, signals, dt)``, a kernel or a plain function: ``parameters`` and ``state`` are
             records with a field for each parameter and each entry of ``state``.
         state: Memory of the stage from step to step, which is zero at the start: a class of
-            :class:`~teleop_core.kernels.fields.Fields`,
-            or fields as :class:`numpy.dtype` takes them.
+            :class:`~teleop_core.kernels.fields.Fields`, or fields as :class:`numpy.dtype` takes them.
         make: Function that makes the :class:`Runner` from the parameters and the length of a tick [s]; it replaces
             ``step`` and ``state``.
         late: Topics of ``reads`` whose values from the end of the last tick are read. A cycle of stages needs one.

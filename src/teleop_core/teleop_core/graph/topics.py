@@ -275,8 +275,7 @@ SLAVE_REACH = Topic(
 )  # fmt: skip
 """How far inverse kinematics can follow a command. In order: the status (:class:`~teleop_core.kinematics.IkStatus`),
 the limit (:class:`Limit`), the joint at its limit (-1: none), the residual of the solution [m, rad], and the
-correction in slave_base [m, rad] that would bring the command within the arm's reach, without
-a time limit.
+correction in slave_base [m, rad] that would bring the command within the arm's reach, without a time limit.
 """
 SLAVE_SETPOINT_JS = Topic("slave/setpoint_js", Kind.JOINTS, in_force("slave/servo_jp"), "slave_base")
 SLAVE_SETPOINT_CP = Topic("slave/setpoint_cp", Kind.POSE, in_force("slave/servo_jp"), "slave_base")

@@ -10,8 +10,8 @@ only other kernels call it::
 
 A kernel is compiled when it is first called, for the types of that call, and stored on disk. The stored code becomes
 invalid when one of its sources changes: the kernel's file, a kernel that it calls, the value of a constant in one of
-them, numba or this package. There is no ``fastmath`` and no reordering: results are the same in all modes,
-and on every x86-64 processor since 2013 with the same C library.
+them, numba or this package. There is no ``fastmath`` and no reordering: results are the same in all modes, and on
+every x86-64 processor since 2013 with the same C library.
 
 With ``NUMBA_DISABLE_JIT=1`` in the environment all kernels stay Python functions: a debugger steps
 through them, coverage counts their lines, and everything is some hundred times slower.
@@ -168,8 +168,7 @@ def pointer(function: Callable[P, R], signature: Any) -> Callable[P, R]:
     A plain Python function also works, if the signature has only float64, int64, bool and C-contiguous float64 arrays
     (n,) or (n, m), and returns void, float64 or int64. A Python function gets views of the kernel's arrays and may
     write to them. If it raises an exception, the kernel continues with 0, and :func:`raise_pending` raises the first
-    such exception
-    after the block.
+    such exception after the block.
 
     With three arrays as arguments, the call of a compiled kernel takes 0.005 µs. The call of a Python function takes
     0.5 µs plus its own work: with ``out[:] = a * b`` 1.2 µs in all. Making the pointer of a Python function takes 40
@@ -206,9 +205,8 @@ def bound(compiled: Callable[P, R], *arguments: P.args, **_: P.kwargs) -> Callab
     """Kernel with bound arguments, whose types are therefore not checked at each call.
 
     The bound arguments stay the same objects. Numbers keep their present value; pass changing values in arrays and
-    records. With function pointers among
-    the arguments this saves two thirds of the time of a call. The kernel is compiled here, so that a mistake in it is
-    reported here.
+    records. With function pointers among the arguments this saves two thirds of the time of a call. The kernel is
+    compiled here, so that a mistake in it is reported here.
 
     Args:
         compiled: A kernel; a plain Python function is bound unchanged.

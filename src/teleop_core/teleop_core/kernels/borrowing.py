@@ -1,10 +1,9 @@
 """Borrowing: switches reference counting of array arguments off in kernels that make no arrays.
 
 Compiled code counts the references to each array, so that the array is freed with its last reference. A kernel that
-gets twenty arrays
-in a tuple increments and decrements all counts in each call. In a tick of a session this happened six hundred times
-and took a quarter of the time. If all arrays of a kernel come from its caller, the caller refers to them until the
-kernel returns, so no counting is needed.
+gets twenty arrays in a tuple increments and decrements all counts in each call. In a tick of a session this happened
+six hundred times and took a quarter of the time. If all arrays of a kernel come from its caller, the caller refers to
+them until the kernel returns, so no counting is needed.
 """
 
 from typing import Any

@@ -1,7 +1,7 @@
 """Geometry: rotations, poses and transforms as small compiled kernels.
 
-A *pose* is a row of seven numbers, position x, y, z [m] and unit quaternion w, x, y, z. A
-*transform* is a (4, 4) homogeneous matrix; ``T_base_tip`` maps tip coordinates to base coordinates.
+A *pose* is a row of seven numbers, position x, y, z [m] and unit quaternion w, x, y, z. A *transform* is a (4, 4)
+homogeneous matrix; ``T_base_tip`` maps tip coordinates to base coordinates.
 """
 
 import math
@@ -184,8 +184,7 @@ def is_rigid(transform: Array) -> bool:
     """Whether a (4, 4) matrix is finite and contains a right-handed rotation, within 1e-6.
 
     The rotation is right-handed if two columns are perpendicular unit vectors and the third is their cross product. A
-    NaN or
-    infinity anywhere makes a comparison fail.
+    NaN or infinity anywhere makes a comparison fail.
     """
     first, second, cosine, third = -1.0, -1.0, 0.0, 0.0
     for i in range(3):

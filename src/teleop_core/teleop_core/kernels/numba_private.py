@@ -76,8 +76,8 @@ class Dispatcher(CPUDispatcher):
     """Compiles a kernel once, as fast as numba allows.
 
     Literal numbers in a call are treated as any number of their type; numba itself would compile again for each value.
-    The cache is opened when the kernel is first compiled, because all constants of its module have their
-    values by then.
+    The cache is opened when the kernel is first compiled, because all constants of its module have their values by
+    then.
     """
 
     _has_cache = False

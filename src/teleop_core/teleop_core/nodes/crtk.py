@@ -1,9 +1,8 @@
 """CRTK: operating state and state commands of an arm, as the Collaborative Robotics Toolkit defines them.
 
-``operating_state`` (crtk_msgs/OperatingState) is sent when it changes and once a second;
-``state_command`` (crtk_msgs/StringStamped) takes the commands of
-:mod:`teleop_core.slave.operation.states`. Both need the package crtk_msgs; without it, an arm has only its services
-and reports.
+``operating_state`` (crtk_msgs/OperatingState) is sent when it changes and once a second; ``state_command``
+(crtk_msgs/StringStamped) takes the commands of :mod:`teleop_core.slave.operation.states`. Both need the package
+crtk_msgs; without it, an arm has only its services and reports.
 """
 
 from collections import deque

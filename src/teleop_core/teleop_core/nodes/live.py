@@ -46,8 +46,7 @@ end [s]."""
 
 _TRANSPORT = dict.fromkeys(Processes, 0.3e-3) | {Processes.NODES: 1.4e-3}
 """Time from a sample of the device to the force on the device [s], as measured by `make bench`. With one process per
-node,
-it is the time of two of the three hops from master to slave; otherwise, the time within a process."""
+node, it is the time of two of the three hops from master to slave; otherwise, the time within a process."""
 _PRIORITY = 20
 """SCHED_FIFO priority of loops if a session does not set one and the system allows it."""
 _NEWS_PERIOD = 5.0  # time between two lines about a node that starts slowly [s]

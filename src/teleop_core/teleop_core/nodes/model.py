@@ -18,8 +18,7 @@ class LiveModel:
     """Frames of the robots of a running session.
 
     The robot's description is sent with the first joint positions that match the robot. If the recorder records the
-    session of
-    another robot, that robot is thus not drawn as this one.
+    session of another robot, that robot is thus not drawn as this one.
 
     Args:
         model: Model that is drawn.

@@ -108,8 +108,7 @@ class RemoteControl(Guest):
         """Reset and enable, or resume, every arm; returns the arms' answers.
 
         An arm that was stopped before it was homed is then homed. The method waits for an arm whose stop is being
-        released.
-        An arm whose stop stays pressed answers with the pressed buttons.
+        released. An arm whose stop stays pressed answers with the pressed buttons.
         """
         self.look()
         self._until(lambda: not any(arm.values["is_pressed"] for arm in self.arms.values()), must=False)
@@ -134,8 +133,8 @@ class RemoteControl(Guest):
         """Send a state command to an arm; returns whether it was accepted, and the arm's answer.
 
         Args:
-            name: One of :data:`~teleop_core.slave.operation.states.COMMANDS`, or ``release``, which
-                overrides the stop buttons that are pressed.
+            name: One of :data:`~teleop_core.slave.operation.states.COMMANDS`, or ``release``, which overrides the stop
+                buttons that are pressed.
             arm: Namespace of the arm.
 
         Raises:

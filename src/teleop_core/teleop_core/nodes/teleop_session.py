@@ -28,8 +28,7 @@ from teleop_core.session.links import link_texts
 
 _AFTER_NS = 700_000
 """Phase of the slave's side within the millisecond [ns]. The hand's side has phase 0. Even at the p99 of the lateness
-of the
-hand's side, its commands arrive before this phase."""
+of the hand's side, its commands arrive before this phase."""
 
 
 class TeleopSession:

@@ -33,8 +33,8 @@ class Stream:
 
     Attributes:
         topic: Name of the topic.
-        columns: Names of the columns: ``x y z qw qx qy qz`` of a pose, ``fx`` of a force, the
-            joints' names, ``<joint>.velocity`` of a joint state, the fields of ``teleop/state``.
+        columns: Names of the columns: ``x y z qw qx qy qz`` of a pose, ``fx`` of a force, the joints' names,
+            ``<joint>.velocity`` of a joint state, the fields of ``teleop/state``.
         stamp_ns: Stamps of the headers (N,) [ns].
         log_ns: Times of recording (N,) [ns].
         values: Rows (N, columns) in SI units.

@@ -12,9 +12,8 @@ from teleop_core.kernels.geometry import Array
 
 TOUCH_J = 14e-6
 """A contact that absorbs less energy than this counts as a touch [J]. The limit is the energy that the device's dry
-friction,
-0.26 N, dissipates over one encoder step, 0.055 mm. In a touch, a force that begins and ends one period late may return
-tenths of a microjoule more than it absorbed, whatever the law of the wall."""
+friction, 0.26 N, dissipates over one encoder step, 0.055 mm. In a touch, a force that begins and ends one period late
+may return tenths of a microjoule more than it absorbed, whatever the law of the wall."""
 _NUMBER, _TAKEN, _RETURNED, _FRICTION, _MOST = range(len(MASTER_CONTACT.columns))
 
 

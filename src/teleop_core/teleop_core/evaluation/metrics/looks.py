@@ -12,8 +12,8 @@ class LooksMetric(Metric):
     """Number of times the hand begins to move after a rest of at least 0.1 s.
 
     0.1 s is the shortest time in which a person can use what was seen. A look itself is not recorded. It is inferred
-    from the hand's motion, for persons and for simulated operators.
-    Submovements without such a rest between them count as one look.
+    from the hand's motion, for persons and for simulated operators. Submovements without such a rest between them
+    count as one look.
     """
 
     name, topics = "looks", (MASTER_MEASURED_CP,)
