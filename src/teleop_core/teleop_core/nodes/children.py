@@ -33,8 +33,8 @@ _STILL_STARTING = 60.0  # longest silence of a starting process [s]; the interpr
 def environment(domain: int | None = None) -> dict[str, str]:
     """Environment variables of the nodes. By default, nodes communicate within this machine only, in a free domain.
 
-    Variables that this process needs too are also set in its own environment. The domain is not, because one process
-    may run several sessions.
+    Variables that this process needs too are also set in its own environment. The domain is not set there, because one
+    process may run several sessions.
 
     Args:
         domain: ROS domain; None for the domain in ``ROS_DOMAIN_ID``, or for a free domain if this is not set.

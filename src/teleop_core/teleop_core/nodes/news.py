@@ -58,7 +58,7 @@ class Commanders:
 
 
 class Trouble:
-    """Log of the reasons why a bridge does not move the arm.
+    """Log of the reasons why a bridge passes on no motion.
 
     Each reason is logged once, even if numbers in it change. When all reasons are gone, this is logged too.
 
