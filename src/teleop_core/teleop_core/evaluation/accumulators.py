@@ -1,6 +1,6 @@
 """Accumulators: statistics of a stream that is passed in parts.
 
-Their memory does not grow with the number of samples, so a recording of any length can be scored.
+The memory of an accumulator does not grow with the number of samples, so a recording of any length can be scored.
 """
 
 import math
@@ -66,7 +66,7 @@ class Moments:
         self.count = total
 
     def spread(self) -> Spread:
-        """Statistics of all samples so far."""
+        """Spread of all samples added so far."""
         if not self.count:
             return Spread(None, None, None)
         sd = math.sqrt(self._deviations / (self.count - 1)) if self.count > 1 else None
@@ -105,7 +105,7 @@ class Distribution:
         return int(self.values_us[np.searchsorted(np.cumsum(self.counts), rank)])
 
     def delay(self) -> Delay:
-        """Median, 99th percentile and maximum."""
+        """Median, 99th percentile and maximum of the durations added so far, [ms]."""
         median, p99, largest = (self.quantile_us(share) for share in (0.5, 0.99, 1.0))
         return Delay(_ms(median), _ms(p99), _ms(largest))
 

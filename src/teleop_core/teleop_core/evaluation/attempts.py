@@ -15,7 +15,7 @@ _ATTEMPTS, _SUCCESSES = (TASK_STATE.columns.index(name) for name in ("attempts",
 
 
 class Attempts:
-    """Attempts at the goals of a task: the samples of ``task/state`` at which the number of attempts rises.
+    """Accumulates the attempts at a task's goals; an attempt is a sample of ``task/state`` that counts one more.
 
     Attributes:
         successes: Number of attempts that reached their goal; None without a task.

@@ -29,7 +29,7 @@ class Context:
     """One arm of one recording.
 
     Attributes:
-        bag: The recording; it contains this arm only, under the plain names.
+        bag: The recording; it contains only this arm, and its topics have plain names.
         arm: Name of the arm; empty for the default arm of a recording that names no arms.
         history: Values of ``teleop/state`` over time.
         origin: The session that was recorded: graph, streams, chain of stages, map of axes.
@@ -70,7 +70,7 @@ class Context:
         Streams that the recording lacks have no samples.
 
         Args:
-            topics: Streams, under their plain names.
+            topics: Streams, with their plain names.
 
         Raises:
             EvaluationError: The recording is already being read; streams must be requested while a metric is

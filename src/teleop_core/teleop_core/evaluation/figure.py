@@ -48,10 +48,10 @@ def line(x: Numbers, y: Numbers, name: str, color: str, width: float, unit: str 
 
 
 def time_axis() -> dict[str, Any]:
-    """Axis of time from the start of the recording.
+    """Time axis that begins at the start of the recording.
 
-    A page links all axes made by this function: they show the same time interval, zoom to single samples, and have
-    bands where the slave was limited. Such axes are marked by ``uirevision`` of plotly.js.
+    A page links all axes made by this function: they show the same time interval, can zoom to single samples, and show
+    bands where the slave was limited. The attribute ``uirevision`` of plotly.js marks such an axis.
     """
     return {"title": {"text": "time [s]"}, "uirevision": _TIME}
 
@@ -71,7 +71,7 @@ def force_figure(title: str, sentence: str, times: Numbers, values: Numbers, of:
 
 
 def is_against_time(figure: Figure) -> bool:
-    """Whether a plot has an axis of :func:`time_axis`."""
+    """Whether a plot has an axis that was made by :func:`time_axis`."""
     axes = (axis for name, axis in figure.layout.items() if name.startswith("xaxis"))
     return any(isinstance(axis, dict) and axis.get("uirevision") == _TIME for axis in axes)
 

@@ -81,8 +81,8 @@ class Metric(ABC):
     :meth:`~teleop_core.evaluation.context.Context.shared` (for the recording) and
     :meth:`~teleop_core.evaluation.windows.Window.once` (for a window).
 
-    The shortest metric declares each value as a :func:`figure`, which is None until it is set. It needs neither
-    ``keys`` nor :meth:`values`::
+    The shortest metric declares each value as a :func:`figure`, which is None until it is set. Such a metric needs
+    neither ``keys`` nor :meth:`values`::
 
         class PeakMetric(tc.Metric):
             name, topics = "peak", (SLAVE_TRUE_CF,)
@@ -112,7 +112,7 @@ class Metric(ABC):
     declared: ClassVar[tuple[Field[Any], ...]] = ()
 
     def __init_subclass__(cls) -> None:
-        """Make the keys for the figures of a subclass, and set each figure to None."""
+        """Make the keys for the fields that a subclass made by :func:`figure`, and set each field to None."""
         super().__init_subclass__()
         found = {name: one for name, one in vars(cls).items() if isinstance(one, Field)}
         for name, one in found.items():
@@ -226,5 +226,5 @@ class SpreadMetric(Metric):
         return self._error.spread()
 
     def rows(self) -> list[TableRow]:
-        """Root mean square and maximum."""
+        """Rows of the root mean square and the maximum."""
         return error_rows(self.group, self.label, self.unit, self.values())

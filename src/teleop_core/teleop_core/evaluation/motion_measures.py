@@ -51,10 +51,10 @@ def stretches(times: Array, gap: float = GAP) -> list[slice]:
 
 
 def resampled(times: Array, rows: Array, rate: float = RATE) -> Array:
-    """Rows at equal intervals from the first time on, linearly interpolated, shape (M, columns).
+    """Rows at equal intervals from the first time on, shape (M, columns); they are interpolated linearly.
 
     Args:
-        times: Rising times (N,) [s], at least one.
+        times: Increasing times (N,) [s], at least one.
         rows: Samples (N, columns).
         rate: Samples per second of the result [Hz].
     """
@@ -64,7 +64,7 @@ def resampled(times: Array, rows: Array, rate: float = RATE) -> Array:
 
 
 def velocities(position: Array) -> Array:
-    """Central differences of positions (N, 3), one-sided at both ends; [m/s] for [m]."""
+    """Velocities (N, 3) [m/s] of positions (N, 3) [m]: central differences, one-sided at both ends."""
     if len(position) < 2:
         return np.zeros_like(position)
     found: Array = np.gradient(position, 1.0 / RATE, axis=0)
@@ -143,7 +143,7 @@ def velocity_spectrum(parts: Iterable[Array]) -> tuple[Array, Array]:
     """Power density of velocity, summed over its axes: Welch's mean of overlapping segments.
 
     Args:
-        parts: Velocities (N, 3) [m/s] of each stretch; short ones are padded with zeros.
+        parts: Velocities (N, 3) [m/s] of each stretch; short stretches are padded with zeros.
 
     Returns:
         Frequencies (129,) [Hz] and densities (129,) [m²/s]; zeros without motion.

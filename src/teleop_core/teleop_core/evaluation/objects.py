@@ -49,7 +49,7 @@ class ObjectMetric(Metric):
 
     @abstractmethod
     def meet(self, shape: Any, ways: Array, wrench: Array) -> None:
-        """Process some samples of the tip.
+        """Process samples of the tip's position and of the wrench on the tip.
 
         Args:
             shape: Parameters of the object, of type ``kind``.

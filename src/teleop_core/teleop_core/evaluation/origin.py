@@ -30,7 +30,8 @@ class Origin:
     """Session in which a recording was made, from the view of one arm, whose topics have plain names.
 
     Attributes:
-        graph: Graph of the session; the built-in stages if it is unknown or a stage is not installed.
+        graph: Graph of the session; the graph of the built-in stages if the graph is unknown or a stage is not
+            installed.
         axes: Rotation (3, 3) from the master's base to the slave's axes.
         operator: Stored parameters of the stage ``operator``, by names.
         interpolation: Interpolation of the slave between commands; None if not stored.
@@ -67,7 +68,7 @@ class Origin:
 
     @property
     def streams(self) -> tuple[topics.Topic, ...]:
-        """Topics of an arm with one message per step."""
+        """Topics of this arm that have one message per step."""
         return tuple(topic for topic in self.graph.streams if not topic.arm)
 
     @property
@@ -89,7 +90,7 @@ class Origin:
 
     @property
     def played(self) -> frozenset[str]:
-        """Names of topics that were taken from a file, as a replay does."""
+        """Names of the topics that a replay took from a file."""
         stages = (member.stage for member in self.graph.played(self.begin) if not member.arm)
         return frozenset(topic.name for stage in stages for topic in stage.writes)
 
@@ -169,7 +170,7 @@ def _graph(layer: Layer) -> Graph:
 
 
 def _said(layer: Layer, stage: str, arm: str) -> dict[str, object]:
-    """Values stored for a stage: those for all arms, overridden by those of one arm."""
+    """Values stored for a stage; values for one arm override values for all arms."""
     return layer.get(stage, {}) | layer.get(f"{arm}/{stage}", {})
 
 

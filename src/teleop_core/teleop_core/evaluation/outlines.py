@@ -26,8 +26,8 @@ class Outline:
     """A fixture that was on for a while.
 
     Attributes:
-        begin_s: Time at which it was switched on, since the start of the recording, [s].
-        end_s: Time at which it was switched off, [s].
+        begin_s: Time at which the fixture was switched on, since the start of the recording, [s].
+        end_s: Time at which the fixture was switched off, [s].
         kind: Name of the fixture's kind.
         points: One line along the fixture's edges in the slave's base, shape (N, 3), [mm]; NaN interrupts the line.
         walls: Positions of the walls on each axis (3, 2) [mm]: the first wall in negative and in positive direction
@@ -42,7 +42,7 @@ class Outline:
 
     @property
     def size(self) -> list[float]:
-        """Size along the three axes, [mm]; empty for a shape that is open on a side."""
+        """Size along the three axes, [mm]; empty for a shape that has no wall in some direction."""
         if not np.isfinite(self.walls).all():
             return []
         extent: list[float] = (np.nanmax(self.points, axis=0) - np.nanmin(self.points, axis=0)).tolist()
@@ -103,7 +103,7 @@ def _around(fixture: ReportedFixture, gain: float, axes: Array) -> tuple[Array, 
     Both are relative to the fixture's middle.
     """
     points = fixture.outline(gain, axes)
-    if fixture.size:  # a box, of which only the size is reported
+    if fixture.size:  # a box: only its size is reported
         return points, np.stack((points.min(axis=0), points.max(axis=0)), axis=1)
     walls = np.full((3, 2), np.nan)
     for axis in range(3):

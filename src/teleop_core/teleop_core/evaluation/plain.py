@@ -20,7 +20,7 @@ def plain(values: Values) -> dict[str, Plain]:
     """Values as dictionaries, texts and numbers; numbers that are not finite become None.
 
     Raises:
-        TypeError: A value has another type.
+        TypeError: A value has a type that JSON cannot contain.
     """
     entries: Iterator[tuple[object, object]]
     if isinstance(values, Mapping):

@@ -190,7 +190,7 @@ def _named(place: str, part: Accumulator | type[Metric]) -> Iterator[None]:
         yield
     except (RecordingError, PartError):
         raise
-    except Exception as error:  # a metric may be from any user
+    except Exception as error:  # a user's metric can raise any exception
         name = getattr(part, "name", type(part).__name__)
         reason = " ".join(f"{type(error).__name__}: {error}".split())
         raise EvaluationError(f"{place}: the metric {name!r} failed with {reason}") from error

@@ -1,4 +1,4 @@
-"""Tracking: the slave's poses, the poses it should have had, and the errors between them."""
+"""Tracking: the slave's poses, the poses that it should have had, and the errors between both."""
 
 from dataclasses import dataclass
 

@@ -58,7 +58,7 @@ class ArmBridgeNode(TickingNode):
         self._trouble.tell(self.stage.concerns())
 
     def _listen(self) -> None:
-        if not self._has_server:  # a server that is discovered late would continue without the arm
+        if not self._has_server:  # a server that is discovered after the first message would miss the arm
             self._has_server = self._setpoint.publishers() > 0
         while (taken := self._arm.take()) is not None:
             message = read_message(taken.data, self._arm.type)

@@ -108,11 +108,11 @@ class CoreNode(TunedNode):
         """Close everything that :meth:`setup` opened, except topics."""
 
     def concerns(self) -> list[str]:
-        """Texts about everything that is wrong now."""
+        """Texts about all current problems of the node."""
         return []
 
     def values(self) -> dict[str, str]:
-        """Names and texts of the node's own values in its report, in addition to those of all nodes."""
+        """Names and texts of the node's own values in its report, in addition to the values that every node reports."""
         return {}
 
     def news(self, word: str) -> str:
@@ -325,7 +325,7 @@ class CoreNode(TunedNode):
                 self.ended.set_result(None)
 
     def _deactivate(self) -> None:
-        if self.is_at_work:  # a supervisor may have shut it down already
+        if self.is_at_work:  # a supervisor may have shut the node down already
             self.ros.trigger("deactivate")
 
     def finish(self) -> None:

@@ -1,6 +1,7 @@
 """Chances: the time for which a process could have worked, from the kernel's accounting of its threads.
 
-On a busy machine a healthy thread may get no processor for a second. Judged by the clock alone, it would seem to hang.
+On a busy machine a healthy thread may get no processor for a second. Judged by the clock alone, the thread would seem
+to hang.
 Therefore the time for which a thread waited for a processor does not count here.
 """
 
@@ -61,14 +62,14 @@ class Chances:
         return {thread: one for thread in names if (one := self._account(thread)) is not None}
 
     def _threads(self) -> list[int]:
-        """All threads of the process; empty after its end."""
+        """Numbers of all threads of the process; empty after the process has ended."""
         try:
             return [int(path.name) for path in self._folder.iterdir()]
         except OSError:
             return []
 
     def _account(self, thread: int) -> _Account | None:
-        """Account of one thread; None if it has ended, or the system keeps none."""
+        """Account of one thread; None if the thread has ended, or the system has no account."""
         folder = self._folder / str(thread)
         try:
             ran, waited, _ = map(int, (folder / "schedstat").read_text().split())

@@ -60,7 +60,7 @@ def free_domain() -> str:
     """Number of a DDS domain without participants on this machine.
 
     The first participant of domain d listens on UDP port 7410 + 250 d (DDSI-RTPS 2.5, 9.6.1.1).
-    Until then, a TCP socket with the same port number keeps other sessions away.
+    Until then, a TCP socket with the same port number prevents other sessions from choosing the domain.
     """
     for domain in random.SystemRandom().sample(range(1, 102), 101):
         port = 7410 + 250 * domain
@@ -115,7 +115,7 @@ class Child:
         self._line, theirs = socket.socketpair()
         self._line.setblocking(False)
         self._text = b""
-        # Closed together with this process: no other process has this file.
+        # The system closes this file when this process ends, because no other process opens it by name.
         self._log = cast("IO[bytes]", tempfile.TemporaryFile())  # noqa: SIM115
         is_side = bool(nodes) and tuple(nodes) != (name,)
         ours = [SESSION, *nodes] if is_side else [stage]

@@ -44,7 +44,7 @@ _LATCHED = Qos(depth=10, is_latched=True)
 class OperatingState:
     """Topics of the operating state of one arm, served by the executor.
 
-    The node's loop calls :meth:`note` and never publishes here itself, so that no slow reader blocks it.
+    The node's loop calls :meth:`note` and never publishes these topics itself, so that no slow reader blocks the loop.
 
     Args:
         node: Node that owns the topics; its ``lock`` is held while a command is processed.
@@ -67,7 +67,7 @@ class OperatingState:
         self._timer = node.ros.create_timer(_PERIOD, self._send)
 
     def note(self, stamp_ns: int) -> None:
-        """Let the current condition be sent soon, with its stamp [ns]; may be called from any thread."""
+        """Let the executor send the current condition soon, with a stamp [ns]; may be called from any thread."""
         self._changes.append((stamp_ns, self._condition()))
         self._guard.trigger()
 

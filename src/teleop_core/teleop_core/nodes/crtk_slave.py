@@ -58,7 +58,7 @@ class CrtkSlave:
         self._measured = Measured(node, stage)
 
     def note(self, stamp_ns: int) -> None:
-        """Let a changed operating state be sent, with its stamp [ns]; called from the node's loop."""
+        """Let the executor send a changed operating state with a stamp [ns]; called from the node's loop."""
         if self._state is not None:
             self._state.note(stamp_ns)
 
@@ -93,7 +93,7 @@ class CrtkSlave:
             (
                 "servo_jr",
                 _JOINTS,
-                False,  # not streamed: each command counts
+                False,  # not streamed, because each command counts
                 lambda m: self._locked(motion.servo_by, self._of(m), now()),
             ),
             ("servo_jv", _JOINTS, True, lambda m: self._locked(motion.drive_joints, self._of(m, "velocity"), now())),

@@ -12,7 +12,7 @@ from teleop_core.nodes.loop import Loop
 
 PERIOD = 0.01
 """Time between two readings of the device [s]."""
-_RUMBLES = 5  # readings from one rumble to the next
+_RUMBLES = 5  # number of readings from one rumble to the next
 _AGAIN = 1.0  # time between two attempts to find a lost device [s]
 _OPENING = 20.0  # a device that takes longer to open counts as hung [s]
 
@@ -63,7 +63,7 @@ class DeviceHand:
         return [] if self._hand.is_held else ["waits for a hand: no person holds the stylus"]
 
     def values(self) -> dict[str, str]:
-        """The device, and whether the stylus is held."""
+        """Name of the device, and whether a person holds the stylus."""
         name = self._device.name if self._device is not None else ""
         return {"hand": name, "hand.is_held": str(int(self._hand.is_held))}
 

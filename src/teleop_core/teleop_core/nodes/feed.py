@@ -1,7 +1,7 @@
 """Feed: sends messages from a loop to the recorder of the same machine, without the middleware.
 
 A loop writes all messages of a tick to a socket at once, and never waits. Messages that the socket does not accept are
-queued, up to :data:`MOST` bytes. Further messages are lost; the recorder detects this by the numbers of later
+queued, at most :data:`MOST` bytes. Further messages are lost; the recorder detects this by the numbers of later
 messages. A loop looks for a recorder once a second. Without a feed, and from other machines, the recorder gets
 messages by the middleware.
 """
@@ -63,7 +63,7 @@ class Feed:
     Attributes:
         world: As given.
         channels: Channel of each topic, by its name.
-        waiting: Bytes that are still to be written.
+        waiting: Queued bytes that are not written yet.
         is_open: Whether a recorder listens.
     """
 
@@ -97,7 +97,7 @@ class Feed:
             del self.waiting[:written]
 
     def close(self) -> None:
-        """Write as much of the rest as the socket accepts, and disconnect from the recorder."""
+        """Write as much of the queue as the socket accepts, and disconnect from the recorder."""
         if self._line is not None:
             self.put(0, _END)
             with suppress(OSError):

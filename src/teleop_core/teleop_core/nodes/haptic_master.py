@@ -11,7 +11,7 @@ from teleop_core.slave.operation.states import TABLE, Answer, Event, State, answ
 
 
 class CrtkMaster:
-    """Operating state of the device in the hand.
+    """Operating state of the haptic device.
 
     The device is enabled from the start and needs no homing, because its encoders are absolute. In all states except
     ENABLED its motors give no force, and the hand moves it freely. An emergency stop of the session sets the state
@@ -100,7 +100,7 @@ class HapticMasterNode(TickingNode):
             self._press(is_pressed=pressed)
         was_pressed = self._operation[_PRESSED]
         super().read_ports(trigger)
-        if was_pressed and not self._operation[_PRESSED]:  # released, or overridden at the slave
+        if was_pressed and not self._operation[_PRESSED]:  # the stop was released, or overridden at the slave
             self._stop.release()
             self._press(is_pressed=False)
         if not self._crtk.is_enabled:

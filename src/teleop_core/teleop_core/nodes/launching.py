@@ -69,7 +69,7 @@ class Process:
 
 
 def processes(given: Mapping[str, str], namespace: str = "") -> list[Process]:
-    """Processes of a session, the recorder first and masters last, so that no message is missed.
+    """Processes of a session. The recorder is the first and masters are the last, so that no message is missed.
 
     Args:
         given: Arguments by name, as in :data:`COMMON` and in the arguments of one launch file.

@@ -68,7 +68,7 @@ def live(
 
     Args:
         configuration: Configuration of the session, with its duration.
-        out: Directory of the recording, made here.
+        out: Directory of the recording, which is created.
         console: Console that shows the progress.
         processes: Distribution of the nodes over processes.
         without: Nodes that are not started because other nodes replace them, for example an arm bridge instead of
@@ -122,7 +122,7 @@ _UNGRANTED = (
 def _priority(configuration: Configuration, processes: Processes) -> int | None:
     """Priority of the loops; None: as configured.
 
-    With one process per node it stays 0, because these processes together need more than two processors.
+    With one process per node the priority stays 0, because these processes together need more than two processors.
     """
     if configuration.groups[SESSION].real_time.priority >= 0 or processes is Processes.NODES:
         return None

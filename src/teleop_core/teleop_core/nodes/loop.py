@@ -24,7 +24,7 @@ class Loop:
 
     Attributes:
         name: Name of the thread.
-        turns: Number of turns taken.
+        turns: Number of finished turns.
         patience: As given.
         is_running: Whether the loop continues; False after it was asked to stop.
         is_ready: Whether the loop is prepared for its turns.
@@ -65,11 +65,11 @@ class Loop:
 
     @property
     def thread(self) -> int:
-        """Number of its thread in the operating system; 0 before the thread has begun."""
+        """Number of the loop's thread in the operating system; 0 before the thread has begun."""
         return self._thread.native_id or 0
 
     def place(self) -> str:
-        """Current position of its thread in the code: the innermost calls, the most recent call last."""
+        """Current position of the loop's thread in the code: the innermost calls, the most recent call last."""
         frame = sys._current_frames().get(self._thread.ident or 0)
         if frame is None:
             return "  it has ended"

@@ -35,7 +35,7 @@ class LiveModel:
         self._described.clear()
 
     def messages(self, newest: Newest) -> list[tuple[Topic, bytes, int]]:
-        """Messages that are due: topic, bytes, and the time of arrival [ns] of the newest drawn sample."""
+        """Messages that are due, each as topic, bytes, and time of arrival [ns] of the newest drawn sample."""
         latest_ns = max(map(newest.received_ns, self._read), default=0)
         if not latest_ns or latest_ns // self._period_ns == self._slot:
             return []

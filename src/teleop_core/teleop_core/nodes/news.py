@@ -17,8 +17,8 @@ def introduction(stage: Stage, inputs: Iterable[Input], outputs: Iterable[str], 
     Args:
         stage: Stage of the node in the graph.
         inputs: Inputs that the node reads.
-        outputs: Names of the topics that it writes.
-        robot: Name of its robot; empty without a robot.
+        outputs: Names of the topics that the node writes.
+        robot: Name of the node's robot; empty without a robot.
     """
     read = ", ".join(f"/{entry.topic.name}" for entry in inputs) or "nothing"
     written = ", ".join(f"/{name}" for name in outputs) or "nothing"

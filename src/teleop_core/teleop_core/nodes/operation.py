@@ -23,7 +23,8 @@ _LOOK = 0.1
 _GRACE_NS = 500_000_000
 """A button that has sent nothing for this time after its discovery counts as pressed [ns].
 
-A button that repeats its state is heard within this time, because reader and sender discover each other within about a
+A button that repeats its state is received within this time, because reader and sender discover each other within
+about a
 tenth of a second.
 """
 _BYTES = 5
@@ -38,7 +39,7 @@ class StopButton:
     """Emergency stop button: publishes its state, also to readers that are discovered later.
 
     Args:
-        owner: Node that owns it.
+        owner: Node that owns the button.
     """
 
     def __init__(self, owner: Owner) -> None:
@@ -77,7 +78,7 @@ class StopButton:
 
 
 class StopInput:
-    """The emergency stop, read in every tick, which takes 1 µs and needs no executor.
+    """Reader of the emergency stop in every tick; reading takes 1 µs and needs no executor.
 
     The first reader is read in every tick, the other two in every fourth tick. No press is lost: readers keep all
     messages, and missing messages count as a press (:class:`~teleop_core.slave.operation.presses.Presses`). Missing
@@ -89,7 +90,7 @@ class StopInput:
         owner: Node that owns it; its executor looks for buttons that send nothing.
 
     Attributes:
-        has_new: Whether a new button was heard; reset it before calling :meth:`learn`.
+        has_new: Whether a message of a new button was received; reset it before calling :meth:`learn`.
     """
 
     def __init__(self, owner: Owner) -> None:

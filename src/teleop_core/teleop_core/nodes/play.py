@@ -44,7 +44,7 @@ def play(
         topics: Topics to publish; None for all, except ``/tf`` if its type is not installed.
         rate: Speed relative to real time, > 0.
         console: Console that shows the progress, if it is a terminal.
-        world: World in which it is published.
+        world: World in which the recording is published.
         interrupt: Object that ends the playback, in addition to signals of this process.
 
     Returns:

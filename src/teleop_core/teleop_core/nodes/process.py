@@ -21,7 +21,7 @@ from teleop_core.nodes.watch import Crew, Watch, signal_pipe
 def run(make_crew: Callable[[], Crew]) -> int:
     """Run one node, or several together, until a signal or the parent's end.
 
-    SIGINT, SIGTERM, SIGHUP and SIGQUIT end it in order.
+    SIGINT, SIGTERM, SIGHUP and SIGQUIT end the nodes in order.
 
     Args:
         make_crew: Class of the node, or of a crew of several nodes.

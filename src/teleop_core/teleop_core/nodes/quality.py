@@ -1,6 +1,7 @@
 """Quality: QoS of topics, by default and with ``qos_overrides`` parameters.
 
-Overrides are those of ROS: ``qos_overrides./slave/measured_js.publisher.reliability: best_effort`` in a parameter file
+The overrides have the form that ROS defines: ``qos_overrides./slave/measured_js.publisher.reliability: best_effort``
+in a parameter file
 or after ``--ros-args -p`` changes one policy of a node's publisher or subscription of a topic. The topic has its full
 name.
 """
@@ -77,7 +78,7 @@ class QualityOverrides:
 
 
 NO_OVERRIDES = QualityOverrides({})
-"""Overrides of a node that was given none."""
+"""Overrides of a node without given overrides."""
 
 
 def _checked(name: str, value: object) -> tuple[str, Any]:

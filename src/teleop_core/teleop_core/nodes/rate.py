@@ -59,7 +59,7 @@ class Recent:
         self._count = 0
 
     def put(self, number: float) -> None:
-        """Add a number in place of the oldest one."""
+        """Add a number, which replaces the oldest number."""
         self._numbers[self._count % len(self._numbers)] = number
         self._count += 1
 
@@ -85,8 +85,8 @@ class Schedule:
         max_catch_up: Largest number of missed ticks that are executed in one wake-up; further missed ticks are dropped
             and counted.
         period_ns: Time between two ticks [ns].
-        phase_ns: Times of all ticks modulo the period, which keeps loops of one machine in order [ns]; None: the phase
-            of the start.
+        phase_ns: Times of all ticks modulo the period [ns]. Different phases keep the loops of one machine in order.
+            None: the phase of the start.
     """
 
     def __init__(

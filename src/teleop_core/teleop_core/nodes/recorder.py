@@ -132,7 +132,7 @@ class _Channel:
         """Count a message, by its publisher and its number in the publisher's sequence.
 
         A restarted node sends for 0.1 s, rarely 1 s, before the recorder discovers it. Messages that a late publisher
-        sent before its first recorded one therefore count as lost.
+        sent before its first recorded message therefore count as lost.
         """
         self.received += 1
         if (last := self._numbers.get(sender)) is None:
@@ -214,7 +214,7 @@ class RecorderNode(CoreNode):
         return Configuration.from_layers([layer], parameters.scenario)
 
     def _model_of(self, configuration: Configuration, parameters: RecorderParameters) -> LiveModel:
-        """Model whose frames are recorded in addition to the topics; without frames if the robot is not installed."""
+        """Model whose frames are recorded in addition to the topics; it has no frames if the robot is not installed."""
         try:
             return LiveModel(Model(configuration, parameters.tf_rate, self.arm))
         except TeleopError as error:

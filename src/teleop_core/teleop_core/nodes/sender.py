@@ -28,7 +28,7 @@ class Sender:
 
     Args:
         limit: Largest number of messages per second; further messages are refused as a flood.
-        silence: Time without a message after which another sender may take the topic [s].
+        silence: Time without a message after which another sender may become the owner of the topic [s].
 
     Attributes:
         gaps: Messages of the owner that did not arrive.
@@ -89,13 +89,13 @@ class Sender:
         self._owner = b""
 
     def note_stamp(self, stamp_ns: int, now_ns: int) -> None:
-        """Note the age of a valid message; ``now_ns`` is the time of the system's clock [ns]."""
+        """Store the age of a valid message; ``now_ns`` is the time of the system's clock [ns]."""
         self.newest_age_ns = now_ns - stamp_ns
         self.ages.put(self.newest_age_ns)
         self.fault = None
 
     def note_old(self, stamp_ns: int, last_ns: int) -> None:
-        """Note a message whose stamp is not newer than the last one."""
+        """Count a message whose stamp is not newer than the last stamp."""
         if stamp_ns < last_ns:
             self.reordered += 1
             self.fault = StampFault.BACKWARDS

@@ -70,7 +70,8 @@ class SlaveNode(TickingNode):
     def read_ports(self, trigger: Topic | None = None) -> None:
         """Update the signals, and answer every sample of the arm.
 
-        The next step answers the newest sample. If several samples came meanwhile, the older ones are answered here.
+        The next step answers the newest sample. If several samples came meanwhile, this method answers the older
+        samples.
         After a standstill of the loop, the stop has priority: only the last of the queued samples are answered.
         """
         measured, *others = self.ports.inputs[SLAVE_MEASURED_JS.name]
@@ -91,7 +92,7 @@ class SlaveNode(TickingNode):
 
     def advance(self, now_ns: int) -> None:
         """Read the emergency stop, then make one step. Several late steps also read the stop before each step."""
-        with self.lock:  # held for both: a reset in between would treat a silent button as released
+        with self.lock:  # locked for both: a reset in between would treat a silent button as released
             is_idle = self._state[0] == State.DISABLED
             for is_pressed in self._stop.take(now_ns, is_idle=is_idle):
                 heard_ns = self._stop.heard_ns
@@ -169,7 +170,7 @@ class SlaveNode(TickingNode):
         log.error(text) if is_bad else log.info(text)
 
     def concerns(self) -> list[str]:
-        """Texts with the reasons why the arm holds still, and about stop buttons that send nothing."""
+        """Texts with the reasons why the arm does not move, and about stop buttons that send nothing."""
         return [*self._standstills(), *self._unknown_buttons()]
 
     def _unknown_buttons(self) -> list[str]:

@@ -1,7 +1,7 @@
 """Start: starts the node of any stage, of this package or of a user, from the command line.
 
 ``ros2 run teleop_core slave_sim`` starts a built-in stage by the name of its executable;
-``ros2 run teleop_core stage NAME`` starts any registered one, such as that of another package.
+``ros2 run teleop_core stage NAME`` starts any registered stage, such as a stage of another package.
 """
 
 import sys

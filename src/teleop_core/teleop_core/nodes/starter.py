@@ -1,4 +1,4 @@
-"""Starter: a process that has loaded all modules that nodes need, and starts each node as a copy of itself.
+"""Starter: a process that has loaded all modules that nodes need, and starts each node as a copy of the starter.
 
 Python, numba, the middleware and a node's kernels take two seconds of processor time and 200 MB to load. A copy of a
 process that has loaded them begins at once, and shares that memory as long as it does not write to it. The starter
@@ -324,7 +324,7 @@ def _load(configuration: str) -> None:
         return
     load_own_parts()
     typestore()
-    inspect.getmodule(inspect.currentframe())  # rclpy needs it for a node's first log line
+    inspect.getmodule(inspect.currentframe())  # rclpy needs this for a node's first log line
     loaded = Configuration.from_layers([parse_text(configuration, "the configuration")])
     for member in loaded.graph.members:
         node_class(member.stage)

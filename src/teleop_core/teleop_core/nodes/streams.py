@@ -26,14 +26,14 @@ _WAITING = 20
 """Smallest queue length for a late reader [messages]. A longer queue is used if a late sender may catch up more ticks
 than this in one wake-up."""
 _PRESSES = 500
-"""Queue length for buttons [messages]: a press is not lost even if the reader stands still for half a second."""
+"""Queue length for buttons [messages]: a press is not lost even if the reader reads nothing for half a second."""
 
 
 def message_type(ros_type: str) -> Any:
     """Class of a message, from a name like ``sensor_msgs/msg/JointState``.
 
     Raises:
-        MessageTypeError: Its package is not installed.
+        MessageTypeError: The package of the message is not installed.
         AttributeError: The package has no such message.
     """
     package, _, name = ros_type.split("/")
@@ -114,7 +114,7 @@ class Input:
         self._layout = None if is_report else messages.layout(topic, joint_names)
         self._buttons = buttons
         self._has_own_order = topic.kind is not Kind.BUTTONS or buttons == messages.BUTTONS
-        messages.read_reports(messages.report(0, "", 0, "", {}))  # loads the message types, 60 ms
+        messages.read_reports(messages.report(0, "", 0, "", {}))  # loads the message types, which takes 60 ms
         self._delay_ns = round(delay * 1e9)
         self._held: deque[tuple[int, int, messages.Values]] = deque()
         self.received, self.refused = 0, Counter[messages.Refusal]()
@@ -125,7 +125,7 @@ class Input:
 
     @property
     def conflict(self) -> bool:
-        """Whether a second publisher was heard although that is a fault; reset by :meth:`forget`."""
+        """Whether a second publisher sent a message although this is a fault; reset by :meth:`forget`."""
         return self._is_fault and self.sender.conflict
 
     @property
@@ -275,8 +275,8 @@ class Output:
     Attributes:
         sent: Number of sent messages.
         inputs: Readers of the topic in this process, which get the values directly.
-        tap: Called with the bytes of every message and the time at which it was sent [ns], instead of a subscription
-            in this process.
+        tap: Function that is called with the bytes of every message and the time of sending [ns]; it replaces a
+            subscription in this process.
         pending: Queue of messages that the session will :meth:`publish`; None to publish at once.
     """
 

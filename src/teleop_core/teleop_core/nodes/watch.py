@@ -32,7 +32,7 @@ class Crew(Protocol):
 
     @property
     def nodes(self) -> tuple[CoreNode, ...]:
-        """The nodes."""
+        """Nodes of the process, in the order in which they are started."""
         ...
 
     def watched(self) -> list[tuple[Loop, int]]:
@@ -47,7 +47,7 @@ class Crew(Protocol):
 def signal_pipe() -> int:
     """Pipe to which the signals of :data:`ENDS` are written.
 
-    Thus no work is interrupted halfway, and the middleware still exists for an orderly end. A handler in Python would
+    A pipe interrupts no work halfway, and the middleware still exists for an orderly end. A handler in Python would
     not run while the main thread waits in C code. Signals that are ignored from the start stay ignored, such as SIGHUP
     under ``nohup``.
     """

@@ -61,7 +61,8 @@ class Asked:
         hands = hand.values[partner[partner != NONE]]
         rows = self._history.at(stamps).rows
         is_held = (rows[:, STATE["is_following"]] == 0.0) | (rows[:, STATE["is_clutched"]] > 0.0)
-        # A sequence begins with the sample after a held sample: this first sample only latches the alignment.
+        # A sequence begins with the sample after a sample at which the slave is held. This first sample only latches
+        # the alignment.
         was_held = np.concatenate(([np.isnan(self._cut).any()], is_held[:-1]))
         asked = np.empty((len(stamps), 7))
         places = hands[:, :3] @ self._origin.axes.T

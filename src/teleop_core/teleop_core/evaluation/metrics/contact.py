@@ -19,7 +19,7 @@ _NUMBER, _TAKEN, _RETURNED, _FRICTION, _MOST = range(len(MASTER_CONTACT.columns)
 
 @dataclass(frozen=True)
 class ContactScore:
-    """Energy of the contacts of the hand with walls; None if there was no contact, or contacts were not recorded."""
+    """Energies of the hand's contacts with walls; values are None without contacts or if none were recorded."""
 
     count: int | None = figure(
         "1",
@@ -34,7 +34,7 @@ class ContactScore:
     )
     feeding: int | None = figure("1", "number of contacts in which the wall returned more energy than it absorbed")
     feeding_device: int | None = figure(
-        # Only in this case the hand gets more energy than it spent.
+        # Only in such a contact the hand receives more energy than it spent.
         "1",
         "number of contacts that returned more energy than the wall and the device's dry friction absorbed",
     )

@@ -30,7 +30,7 @@ class DisplayMetric(Metric):
             return
         logs = np.append(self._log_ns, shown.log_ns[is_new])
         stamps = np.append(self._stamp_ns, shown.stamp_ns[is_new])
-        first = int(self._frames == 0)  # no frame was shown before the first one
+        first = int(self._frames == 0)  # no frame was shown before the first frame
         until = 1e-9 * np.diff(logs)[first:]
         # The age grows from the arrival of a frame to the arrival of the next frame.
         ages = 1e-9 * (logs[:-1] - stamps[:-1])[first:] + 0.5 * until

@@ -19,7 +19,7 @@ class ForceMetric(Metric):
 
     def __init__(self, context: Context) -> None:
         self._context, self._magnitude = context, Moments()
-        # x, y, z and magnitude, [N].
+        # Columns: x, y, z and magnitude of the force, [N].
         self._trace = Envelope(context.bag.start_ns, context.bag.end_ns, columns=4)
 
     def add(self, window: Window) -> None:

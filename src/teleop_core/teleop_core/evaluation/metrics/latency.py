@@ -20,7 +20,7 @@ ASKED = "asked"
 
 
 class LatencyMetric(Metric):
-    """Delays of every stage.
+    """Delay of each stage of the chain.
 
     The delay of a stage is the time from the first arrival of its input at the recorder to the first arrival of its
     output with the same stamp. The delay of the first stage is measured from the stamp itself, so it includes the
@@ -70,7 +70,7 @@ class LatencyMetric(Metric):
         return found
 
     def rows(self) -> list[TableRow]:
-        """One row per stage."""
+        """One row per stage: median, 99th percentile and maximum of the stage's delay."""
         rows = []
         for stage, delay in self.values().items():
             known = (delay.median, delay.p99, delay.max)

@@ -33,7 +33,7 @@ class WayScore:
 
 @dataclass(frozen=True)
 class NetworkScore:
-    """Both directions of the network."""
+    """Scores of both directions of the network."""
 
     there: WayScore
     back: WayScore
@@ -73,7 +73,7 @@ class _Ages:
 
 
 def _clock_ahead_ns(window: Window, logs: Integers) -> Integers:
-    """Offset of the slave's clock at the given times (N,) [ns], positive if it was ahead; 0 if unknown."""
+    """Offset of the slave's clock at the given times (N,) [ns]; positive if the clock was ahead, 0 if unknown."""
     told, column = window.around(NETWORK_STATE), NETWORK_STATE.columns.index("clock_ahead")
     if not len(told) or told.values.shape[1] <= column:
         return np.zeros_like(logs)

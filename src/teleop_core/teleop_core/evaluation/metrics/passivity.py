@@ -84,7 +84,7 @@ class _Port:
         return PortScore(into, out, withheld, _MJ * self._least)
 
     def line(self) -> tuple[Array, Rows]:
-        """Times [s], and energies in, out, received from the other side and withheld [mJ]."""
+        """Times [s]; and energies [mJ]: in, out, received from the other side, and withheld."""
         return self._trace.line()
 
 

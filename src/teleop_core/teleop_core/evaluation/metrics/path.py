@@ -50,7 +50,7 @@ class PathMetric(Metric):
         self._context = context
         self._error = context.shared(position_error.PositionErrorMetric)
         self._fixture = context.shared(fixture.FixtureMetric)
-        # x, y, z of command, setpoint and measured, [mm].
+        # Columns: x, y, z of the command, of the setpoint and of the measured pose, [mm].
         self._position = Envelope(context.bag.start_ns, context.bag.end_ns, columns=9)
 
     def add(self, window: Window) -> None:
@@ -156,7 +156,7 @@ def _in_space(path: _Path, outlines: list[Outline], sentence: str) -> figure.Fig
             (path.measured, "measured", figure.MEASURED),
         )
     )
-    measured |= {"showlegend": False}  # the colour bar explains its colours
+    measured |= {"showlegend": False}  # the colour bar explains the colours of this line
     measured["line"] |= {"colorscale": "Viridis", "showscale": True, "colorbar": _TIME_BAR}
     traces = [
         {**figure.along(whole, path.times, path.during, whole=True), "opacity": 0.5, "hoverinfo": "skip"},
@@ -244,7 +244,7 @@ def _surroundings(
 def _plane_axes(
     plot: int, across: str, up: str, width: list[float] | None, height: list[float] | None
 ) -> dict[str, Any]:
-    """Two axes of the same scale."""
+    """Layout of a plot whose two axes have the same scale."""
     suffix = figure.axis_suffix(plot)
     return {
         f"xaxis{suffix}": {"title": {"text": f"{across} [mm]"}, "constrain": "domain", "range": width},

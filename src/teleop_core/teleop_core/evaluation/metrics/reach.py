@@ -24,7 +24,7 @@ _SILENT_S = 0.5  # a longer time without a command counts as alignment [s]
 
 @dataclass(frozen=True)
 class ReachScore:
-    """How well the slave followed, since it first followed; None if slave/reach was not recorded."""
+    """How well the slave followed after it began to follow; values are None if slave/reach was not recorded."""
 
     followed_share: float | None = figure(
         "1",
@@ -83,7 +83,7 @@ class ReachMetric(Metric):
         self._add_times(found.stamp_ns, np.where(follows, found.values[:, _LIMIT], _ALIGNING))
 
     def _add_times(self, stamp_ns: Integers, limits: Array) -> None:
-        """Add commands. Each counts until the next command; a long time without a command counts as alignment."""
+        """Add commands. Each command counts until the next one; a long time without a command counts as alignment."""
         kinds = limits.astype(np.int64)
         if self._last is not None:
             stamp_ns = np.concatenate(([self._last[0]], stamp_ns))

@@ -39,7 +39,7 @@ class _Presses:
 
 
 class TouchMetric(Metric):
-    """Touches of the tip with the world, and their forces; None if no forces were recorded.
+    """Touches of the tip with the world, and forces of these touches; None if no forces were recorded.
 
     The true force is used if it was recorded, so that noise and bias of a sensor do not count as touches.
     """
