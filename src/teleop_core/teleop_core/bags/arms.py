@@ -100,7 +100,7 @@ def _base(bag: Bag) -> str:
 
 
 class _ArmBag(Bag):
-    """View of one arm.
+    """Recording of one arm: a view of a recording of several arms.
 
     Args:
         bag: The whole recording.

@@ -109,7 +109,7 @@ Messages = tuple[list[Stretch], list[Single]]
 
 
 class _Scratch:
-    """Memory that is reused, because to allocate memory takes longer than to fill it."""
+    """Memory that is reused, because allocating memory takes longer than filling it."""
 
     def __init__(self) -> None:
         self._bytes: Bytes = np.empty(0, np.uint8)

@@ -9,14 +9,14 @@ from teleop_core.base.errors import RecordingError
 
 
 def end(path: Path, file: McapFile, start_ns: int, stopped: OSError | None, given: int = 0) -> Exception | None:
-    """Finish a recording's file and directory, even if they were moved while it was written.
+    """Finish a recording's file and directory, even if they were moved during the recording.
 
     Args:
         path: Path at which the directory was made.
         file: The file in the directory; it contains whole chunks only.
         start_ns: Log time at which the session started, [ns].
         stopped: Error that prevented the writing of a chunk; None if all chunks were written.
-        given: Number of messages that should have been written.
+        given: Number of messages that callers passed to the writer, after decimation.
 
     Returns:
         Error to raise in the caller of the writer; None if the recording is complete and at ``path``.

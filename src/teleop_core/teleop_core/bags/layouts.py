@@ -26,7 +26,7 @@ SECOND_NS = 1_000_000_000
 
 
 class Layout:
-    """Bytes of every message of one stream.
+    """Template for the bytes of every message of one stream.
 
     Attributes:
         kind: Kind of the values.

@@ -34,10 +34,10 @@ class Shape(IntEnum):
 
 @dataclass(frozen=True, eq=False)
 class Marker:
-    """One shape.
+    """One shape that RViz or Foxglove draws.
 
     Attributes:
-        name: Namespace of the marker, which is different for each marker of a topic.
+        name: Namespace of the marker, different for each marker of a topic.
         frame: Frame in which pose and points are given.
         shape: Type of the shape; a cube or sphere fills the box of size ``scale``.
         pose: Pose of the shape (7,): x, y, z [m], quaternion w, x, y, z.

@@ -59,7 +59,7 @@ class Contents:
 
 
 class McapSource:
-    """An MCAP file.
+    """Reader of one MCAP file.
 
     Args:
         path: The file.

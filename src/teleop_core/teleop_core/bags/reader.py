@@ -66,7 +66,7 @@ def _messages(place: int, records: mcap_source.Records, channels: frozenset[int]
 __all__ = ["Bag", "Series", "TopicInfo", "recover"]
 
 _LATEST_NS = 2**62
-"""Log times from this one on [ns], in the year 2116, are invalid. Differences of valid log times fit into 64 bits."""
+"""First invalid log time [ns], in the year 2116. Differences of earlier log times fit into 64 bits."""
 
 
 @dataclass(frozen=True)

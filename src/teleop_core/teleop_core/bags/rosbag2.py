@@ -23,7 +23,7 @@ _QUALITIES = {
 
 
 def offered_qos(quality: Quality) -> list[dict[str, Any]]:
-    """Quality of service of a topic's publisher, as rosbag2 writes it since version 9."""
+    """Quality of service of a topic's publisher, in the form of rosbag2 metadata since version 9."""
     reliability, durability, depth = _QUALITIES[quality]
     profile = {
         "history": "keep_last",

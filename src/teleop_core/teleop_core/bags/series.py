@@ -69,7 +69,8 @@ class Column:
 
     Args:
         name: Topic.
-        kind: Kind of the values. For joints of a topic that this package does not define, the first message decides.
+        kind: Kind of the values. For joints of a topic that this package does not define, the first message determines
+            the kind.
         joint_names: Wanted order of the joints; empty for the order in the first message.
 
     Attributes:

@@ -75,7 +75,7 @@ def walk(data: Bytes, begin: int, end: int) -> tuple[Rows, int]:
     Args:
         data: Read-only bytes.
         begin: Position at which the first record begins.
-        end: Position behind which no record is read.
+        end: Position at which reading ends; records beyond this position are not read.
 
     Returns:
         Rows of (opcode, begin of the payload, its size, channel, log time [ns]), shape (n, 5), and the position at

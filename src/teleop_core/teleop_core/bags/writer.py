@@ -29,7 +29,7 @@ Block = Mapping[Topic, tuple[Stamps, Values, Stamps]]
 
 
 class _Channel:
-    """A topic that may be recorded: ``every`` is 0 if it is not recorded, ``seen`` counts all its messages."""
+    """A topic that may be recorded. ``every`` is 0 if it is not recorded; ``seen`` counts all its messages."""
 
     __slots__ = ("every", "layout", "number", "recorded", "seen")
 

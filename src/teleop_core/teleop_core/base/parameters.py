@@ -267,7 +267,7 @@ def build(group: type[Group], values: Mapping[str, object], prefix: str = "") ->
     Args:
         group: Dataclass whose fields come from :func:`parameter` or are such groups.
         values: Values by their dotted names; lists are converted to tuples.
-        prefix: Dotted path of this group, put before names in errors.
+        prefix: Dotted path of this group; errors show it before each name.
 
     Returns:
         The group.

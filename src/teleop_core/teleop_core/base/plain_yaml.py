@@ -43,10 +43,10 @@ class _Loader(getattr(yaml, "CSafeLoader", yaml.SafeLoader)):  # type: ignore[mi
 
 
 class _Dumper(getattr(yaml, "CSafeDumper", yaml.SafeDumper)):  # type: ignore[misc]
-    """Writes equal parts in full instead of as references, which rcl cannot read."""
+    """Writer that repeats equal parts in full; it writes no references to earlier parts: rcl cannot read them."""
 
     def ignore_aliases(self, data: Any) -> bool:
-        """Never write a reference to an earlier part."""
+        """Return True: equal parts are never written as references."""
         return True
 
 

@@ -47,7 +47,7 @@ LATEST_S = 4e9
 
 
 def range_of(unit: str) -> Range:
-    """Range of a unit; for ``rad or m`` the wider range, for an unknown unit any number."""
+    """Range of a unit; for ``rad or m`` the wider of both ranges; for an unknown unit, the range of all numbers."""
     parts = [RANGES.get(part, Range(math.inf)) for part in unit.split(" or ")]
     return max(parts, key=lambda part: part.most)
 

@@ -36,7 +36,7 @@ class Registry(Generic[Part]):
         kinds: Name of the kind in the plural; the entry-point group is ``<package>.<kinds>``.
         builtin: Maps names to import paths ``module:attribute`` in the package.
         check: Returns a part if it is valid, else raises :class:`~teleop_core.base.errors.PartError`.
-        trial: Tries a part that is not from the package, and raises the same errors as ``check``.
+        trial: Makes a trial run of a part that is not from the package, and raises the same errors as ``check``.
         package: Package that owns the registry.
         others: Alternative to a name, for messages: "FILE.urdf".
         base: Registry whose parts are also parts of this registry.
@@ -80,7 +80,7 @@ class Registry(Generic[Part]):
         return tuple(dict.fromkeys((*self._builtin, *base, *self._entries(), *self._parts)))
 
     def find(self, name: str) -> Part:
-        """Part with a name.
+        """The part with the given name.
 
         Raises:
             UnknownNameError: There is no such part; the error lists the alternatives.

@@ -1,4 +1,4 @@
-"""Progress of a long command: a bar on a terminal, a line a minute when piped."""
+"""Progress of a long command: a bar on a terminal, or one line per minute if the output is piped."""
 
 import sys
 import threading
@@ -29,7 +29,7 @@ class Progress:
 
     @property
     def seconds(self) -> float:
-        """Simulated time of the ticks so far [s]."""
+        """Simulated time of all ticks so far [s]."""
         from teleop_core.graph.signals import DT
 
         return round(self.ticks * DT, 9)

@@ -17,7 +17,7 @@ __all__ = ["BUILT_IN", "DEVICE", "HAND", "RECORDER_NAME", "Delay", "Graph", "Lin
 BUILT_IN = ("operator", "haptic_master", "motion_scaling", "inverse_kinematics", "slave", "slave_sim")
 """Names of the stages that every arm has."""
 HAND, DEVICE = BUILT_IN[:2]
-"""Stages at whose recorded output a replay can begin."""
+"""Stages from whose recorded output a replay can start."""
 RECORDER_NAME = "recorder"
 _WAYS = {"first": 0, "second": 1}  # maps prefixes of ports between arms to the index of the arm that writes
 
@@ -274,7 +274,7 @@ class Graph:
         return tuple(ordered)
 
     def played(self, begin: str) -> tuple[Member, ...]:
-        """Stages whose topics a replay takes from a recording, arm by arm.
+        """Stages whose topics are taken from a recording in a replay, arm by arm.
 
         Args:
             begin: The last of these stages: :data:`HAND`, :data:`DEVICE`, or empty for none.
@@ -300,7 +300,7 @@ class Graph:
         return tuple(found)
 
     def links_of(self, member: Member) -> tuple[Link, ...]:
-        """Links that end at a stage."""
+        """Links whose reader is the given stage."""
         return tuple(link for link in self.links if link.reader == member)
 
     def chain(self, arm: str = "") -> tuple[tuple[str, Topic], ...]:

@@ -14,7 +14,7 @@ from teleop_core.graph.stage import STAGES
 
 @dataclass(frozen=True, kw_only=True)
 class RealTimeParameters:
-    """Requests of a live node to the operating system; a refusal is reported, and the node continues."""
+    """Real-time privileges that a live node requests; if one is refused, the node reports the refusal and continues."""
 
     priority: int = fixed(
         -1,
@@ -115,7 +115,7 @@ def scenario_file(name: str) -> Path:
     """File of a scenario.
 
     Raises:
-        UnknownNameError: No such scenario; the alternatives are listed.
+        UnknownNameError: There is no such scenario; the error lists the alternatives.
     """
     files = _scenarios()
     if name not in files:

@@ -66,7 +66,7 @@ class Runner(Protocol):
         """Make outputs safe when the topic that the stage answers has fallen silent."""
 
     def concerns(self) -> list[str]:
-        """Sentences for users about current problems of the stage; called once a second."""
+        """Sentences for users about current problems of the stage; this method is called once per second."""
 
     def described(self) -> dict[str, str]:
         """Names and texts that the report of the stage contains in addition to its numbers."""
@@ -205,7 +205,7 @@ class Stage:
         return tuple(dict.fromkeys((*self.reads, *self.writes)))
 
     def run(self, parameters: Any, dt: float = DT) -> Runner:
-        """Make the running stage.
+        """Make the object that runs this stage in a session.
 
         Args:
             parameters: An instance of the stage's parameter group.

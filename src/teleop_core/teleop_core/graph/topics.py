@@ -124,7 +124,7 @@ class Kind(Enum):
 
 
 JAW = ("jaw",)
-"""Name of the one joint of a jaw."""
+"""Name of the only joint of a jaw."""
 _COLUMNS = {
     Kind.POSE: ("x", "y", "z", "qw", "qx", "qy", "qz"),
     Kind.TWIST: ("vx", "vy", "vz", "wx", "wy", "wz"),
@@ -157,17 +157,17 @@ SAMPLED = Stamp("sampling time")
 
 
 def passed_on(topic: str) -> Stamp:
-    """Rule: the stamp is the stamp of the message of ``topic`` that is answered."""
+    """Rule: the stamp is copied from the message of ``topic`` that this message answers."""
     return Stamp(f"of the {topic} it answers", topic)
 
 
 def in_force(topic: str) -> Stamp:
-    """Rule: the stamp is the stamp of the message of ``topic`` that is in force."""
+    """Rule: the stamp is copied from the message of ``topic`` that is in force."""
     return Stamp(f"of the {topic} in force", topic, is_in_force=True)
 
 
 def arrived(topic: str) -> Stamp:
-    """Rule: the stamp is the stamp of the newest message of ``topic`` that came through the network."""
+    """Rule: the stamp is copied from the newest message of ``topic`` that came through the network."""
     return Stamp(f"of the {topic} that arrived last", topic, is_in_force=True)
 
 
@@ -181,8 +181,8 @@ class Topic:
 
     Attributes:
         name: Name below the arm's namespace, such as ``slave/servo_cp``.
-        kind: Kind of its values.
-        stamp: Meaning of the stamp in its header.
+        kind: Kind of the topic's values.
+        stamp: Meaning of the stamp in the header of a message.
         frame_id: Frame of the header, below the arm's namespace.
         quality: QoS of the topic.
         columns: Names of the numbers in reports and in messages of :attr:`Kind.NUMBERS`; empty for other kinds.
@@ -207,7 +207,7 @@ class Topic:
 
     @property
     def ros_type(self) -> str:
-        """Name of its ROS message type."""
+        """Name of the topic's ROS message type."""
         return self.message or self.kind.ros_type
 
     def of_arm(self, arm: str) -> "Topic":
@@ -392,7 +392,7 @@ FIRST_JAW_BOARD = replace(SLAVE_JAW_BOARD, name=f"first/{SLAVE_JAW_BOARD.name}")
 """Port of the second arm at which the first arm's topic arrives; see :meth:`Graph.links`."""
 FIRST_JAW_GRIP = replace(SLAVE_JAW_GRIP, name=f"first/{SLAVE_JAW_GRIP.name}")
 SECOND_TRUE_CP = replace(SLAVE_TRUE_CP, name=f"second/{SLAVE_TRUE_CP.name}")
-"""Port of the first arm at which the second arm's topic arrives; the next topic is such a port, too."""
+"""Port of the first arm at which the second arm's topic arrives. The next constant declares another such port."""
 SECOND_JAW_GRIP = replace(SLAVE_JAW_GRIP, name=f"second/{SLAVE_JAW_GRIP.name}")
 NETWORK_JAW_SERVO_JP = Topic(
     "network/jaw_servo_jp", Kind.NUMBERS, arrived("slave/jaw/servo_jp"), "slave_base", columns=JAW

@@ -49,7 +49,7 @@ __all__ = [
 ]
 
 SUPPORTED = ((0, 68), (0, 69))
-"""First supported version of numba, and first later version that is not supported; the same as in setup.py."""
+"""The first supported version of numba and the first later version that is unsupported. Also declared in setup.py."""
 
 
 def check_version(found: str = numba.__version__) -> None:

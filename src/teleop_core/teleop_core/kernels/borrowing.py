@@ -59,7 +59,7 @@ def _takes_room(state: Any) -> bool:
 
 
 def _borrows(state: Any) -> bool:
-    """Whether a function neither makes nor passes on any array."""
+    """Whether a function neither makes arrays nor stores or returns references to arrays."""
     if _is_held(state, state.return_type):
         return False
     lines = [line for block in state.func_ir.blocks.values() for line in block.body]
@@ -67,7 +67,7 @@ def _borrows(state: Any) -> bool:
 
 
 def _is_plain(state: Any, line: Any) -> bool:
-    """Whether a line makes no array."""
+    """Whether a statement neither makes an array nor stores a reference to one."""
     if isinstance(line, ir.SetItem | ir.StaticSetItem | ir.SetAttr):
         return not _is_held(state, state.typemap[line.value.name])
     if not isinstance(line, ir.Assign) or not isinstance(line.value, ir.Expr):

@@ -38,7 +38,7 @@ PoseRow = Annotated[Array, 7]
 class Fields:
     """Base of the classes that name the fields of a record; see the docstring of this module."""
 
-    if TYPE_CHECKING:  # other attributes of records
+    if TYPE_CHECKING:  # for the type checker: attributes that all records have
         dtype: np.dtype[Any]
 
         def __getitem__(self, name: str) -> Any: ...

@@ -2,7 +2,7 @@
 
 Compiled code does not check indices. In a session, the memory after an array belongs to another part. In a trial,
 there is a fence of NaN after the array: if the kernel reads the fence, NaN appears in the result; if the kernel writes
-to the fence, NaN is missing there.
+to the fence, a NaN of the fence is overwritten.
 """
 
 import numpy as np

@@ -44,7 +44,7 @@ _told: dict[str, str] = {}
 
 @contextmanager
 def told(work: str) -> Iterator[Callable[[str], None]]:
-    """Report work that takes seconds: yields a function that is called with the progress."""
+    """Report work that takes seconds. Yields a function, which the work calls with its progress."""
     _told[work] = ""
     try:
         yield lambda text: _told.update({work: text})

@@ -51,7 +51,7 @@ def user_cache(name: str) -> Path | None:
 
 
 def place(function: FunctionType, stamp: Iterable[str]) -> Path | None:
-    """Path of a function with a given stamp in the store; None without store.
+    """Path in the store of a function with a given stamp; None if there is no store.
 
     Functions with the same name in one file are distinguished by their line.
     """

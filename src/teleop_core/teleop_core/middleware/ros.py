@@ -33,7 +33,7 @@ _CREDENTIALS = struct.Struct("3i")  # process, user, group
 
 
 class RosWorld:
-    """Real time and ROS.
+    """World in real time, with ROS as middleware.
 
     Args:
         context: Context of rclpy; None for the context of the whole process.
@@ -118,7 +118,7 @@ class RosExecutor:
         self._own = SingleThreadedExecutor(context=context)
 
     def add_node(self, node: Any) -> None:
-        """Serve a node of :class:`RosWorld` too."""
+        """Add a node of :class:`RosWorld` to the nodes that this executor serves."""
         self._own.add_node(node.own)
 
     def spin_once(self, timeout_sec: float | None = None) -> None:
@@ -133,12 +133,12 @@ class RosExecutor:
         self._own.create_task(_nothing)
 
     def shutdown(self) -> None:
-        """Stop serving."""
+        """Stop serving the nodes."""
         self._own.shutdown()
 
 
 def _nothing() -> None:
-    """Do nothing: an empty task that makes the executor return."""
+    """Do nothing: this empty task makes the executor return."""
 
 
 class _Listener:

@@ -1,4 +1,4 @@
-"""Lifecycle node on rclpy."""
+"""Lifecycle node, implemented with rclpy."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import partial
@@ -25,7 +25,7 @@ _SIM_TIME = "use_sim_time"
 
 
 def _sim_time(node: str) -> ParameterError:
-    """Error that refuses ``use_sim_time``: a step is a millisecond of real time, also for drives."""
+    """Error that refuses ``use_sim_time``: each step, also of the drives, lasts a millisecond of real time."""
     requirement = (
         "false: nodes step in real time; teleop sim and replay go as fast as the machine can, "
         "teleop play --clock publishes /clock"

@@ -1,4 +1,4 @@
-"""Node on rclpy."""
+"""Node, implemented with rclpy."""
 
 from collections.abc import Callable
 from typing import Any

@@ -95,7 +95,7 @@ class RosTaker:
             event_callbacks=SubscriptionEventCallbacks(use_default_callbacks=False),
         )
         self.handle: Any = self._own.handle
-        # Called with the interpreter's lock held, so that no thread destroys the subscription meanwhile.
+        # The call holds the interpreter's lock, so that no other thread destroys the subscription during the call.
         rcl, rcutils = ctypes.PyDLL("librcl.so"), ctypes.PyDLL("librcutils.so")
         self._bytes, self._info = _Bytes(), _Info()
         rcutils.rcutils_get_default_allocator.restype = _Allocator
@@ -141,7 +141,7 @@ class RosTaker:
 
     @cached_property
     def _loss(self) -> Any:
-        """The middleware's count of lost messages since the beginning."""
+        """Event of the middleware that carries the total number of lost messages."""
         kind = QoSSubscriptionEventType.RCL_SUBSCRIPTION_MESSAGE_LOST
         with self.handle:
             return rclpy_implementation.EventHandle(self.handle, kind)

@@ -126,7 +126,7 @@ class Line(Protocol):
         """
 
     def recv(self, size: int) -> bytes:
-        """Read the received bytes, at most ``size``; empty if the other end is closed.
+        """Read the received bytes, at most ``size``; empty if the other process has closed the connection.
 
         Raises:
             BlockingIOError: No bytes were received.
@@ -210,7 +210,7 @@ class Guard(Protocol):
 
 
 class Client(Protocol):
-    """Client of a service; some thread must spin the node's executor meanwhile."""
+    """Client of a service; to receive answers, some thread must spin the node's executor."""
 
     srv_name: str
 
@@ -240,11 +240,11 @@ class Log(Protocol):
         """Log an error, at most once in some seconds."""
 
     def fatal(self, text: str) -> object:
-        """Log the error that ends the node."""
+        """Log an error after which the node ends."""
 
 
 class Node(Protocol):
-    """A node; names of topics are below its namespace unless they begin with a slash."""
+    """A node. Names of topics without a leading slash are below the namespace of the node."""
 
     def get_name(self) -> str:
         """Name of the node."""
@@ -311,19 +311,19 @@ class Hooks(Protocol):
         """Make everything that the node needs."""
 
     def on_activate(self) -> Outcome:
-        """Begin to work; the node's publishers are already open."""
+        """Begin the node's work; the publishers of the node are already open."""
 
     def on_deactivate(self) -> Outcome:
-        """Stop working; the node's publishers are still open."""
+        """Stop the node's work; the publishers of the node are still open."""
 
     def on_cleanup(self) -> Outcome:
         """Close everything, so that the node can be configured again."""
 
     def on_shutdown(self) -> Outcome:
-        """Stop and close everything for good."""
+        """Stop the node's work and close everything; the node cannot be configured again."""
 
     def on_error(self) -> Outcome:
-        """After a crash, close everything."""
+        """Close everything after a crash."""
 
     def on_no_transition(self, wanted: str) -> None:
         """Called if a requested transition does not exist in the current state."""
@@ -349,7 +349,8 @@ class LifecycleNode(Node, Protocol):
         Args:
             specs: Declarations of the parameters.
             values: Values of the parameters.
-            accept: Called with a whole change before it is made; returns the reason to refuse it, empty to accept it.
+            accept: Called with a whole change before it is made; returns the reason to refuse the change, or an empty
+                text to accept it.
         """
 
     def show(self, values: Mapping[str, Value]) -> None:
@@ -363,7 +364,7 @@ class Executor(Protocol):
     """Serves timers, services and subscriptions of nodes, in the thread that spins it."""
 
     def add_node(self, node: Node) -> None:
-        """Serve a node too."""
+        """Add a node to the nodes that this executor serves."""
 
     def spin_once(self, timeout_sec: float | None = None) -> None:
         """Serve one event, or nothing if no event comes within the time [s].
@@ -376,7 +377,7 @@ class Executor(Protocol):
         """Let :meth:`spin_once` return; may be called from any thread."""
 
     def shutdown(self) -> None:
-        """Stop serving."""
+        """Stop serving the nodes."""
 
 
 class WorldEndedError(Exception):
@@ -412,7 +413,7 @@ class World(Protocol):
         """Apply real-time options to the calling thread; returns one line for each refused option."""
 
     def tidy(self) -> None:
-        """Free the memory of objects that the start has left behind, before the loops run."""
+        """Free the memory of objects that remain from the start, before the loops run."""
 
     def connect(self, place: str) -> Line:
         """Connection to the listener at an address of this machine; raises OSError if there is no listener."""
@@ -437,7 +438,7 @@ class World(Protocol):
         """Executor for the nodes of this process or of this guest."""
 
     def guest(self, domain: int | None = None) -> "World":
-        """This world for a guest that does not belong to the session and has its own context."""
+        """This world for a guest: a program that is not part of the session and has its own context."""
 
     def shutdown(self) -> None:
         """Shut the middleware down."""

@@ -70,7 +70,7 @@ _CLOCK = [("first_ns", "i8"), ("tick_ns", "i8"), ("count", "i8")]
 class Tick:
     """The composed tick of a graph; :meth:`run` executes it for each row.
 
-    Kernels are bound once to the buffers of this object. To check the types of all arguments in each call would take
+    Kernels are bound once to the buffers of this object. A check of the types of all arguments in each call would take
     as long as a hundred ticks.
 
     Args:

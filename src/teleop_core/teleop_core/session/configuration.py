@@ -159,10 +159,10 @@ def _check_robots(graph: Graph, groups: Mapping[str, Any], arm: str) -> None:
 
 
 def _check_sides(graph: Graph, groups: Mapping[str, Any], arm: str) -> None:
-    """Make sure that methods that need a master side and a slave side have both, and that both sides match.
+    """Make sure that each method with a master side and a slave side has both sides, and that the sides match.
 
     Raises:
-        ParameterError: The slave's side is missing or belongs to another method.
+        ParameterError: The slave side is missing, or belongs to another method than the master side.
     """
     names = [stage.name for stage in graph.stages]
     for stage in graph.stages:

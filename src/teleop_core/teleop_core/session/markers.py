@@ -78,7 +78,7 @@ class ArmMarkers:
     def _edges(self, fixture: ReportedFixture, gain: float) -> Array:
         """End points (N, 3) [m] of segments along the fixture's edges, two for each segment.
 
-        They are computed only when the fixture or the gain changes.
+        The points are computed only when the fixture or the gain changes.
         """
         if self._told != (fixture, gain):
             self._segments = segments_of(fixture.outline(gain, self._axes)).reshape(-1, 3)

@@ -96,7 +96,7 @@ class Model:
         namespace: Namespace of the whole session, without leading slash; the arms' namespaces are below it.
 
     Attributes:
-        arms: Arms with a robot, the default one first.
+        arms: Arms with a robot, the default arm first.
         period_ns: Time from one message of ``/tf`` to the next [ns].
 
     Raises:

@@ -26,7 +26,8 @@ from teleop_core.session.master_bag import as_master_bag
 COLUMNS = ("t", "x", "y", "z", "rx", "ry", "rz", "clutch", "fixture", "mode")
 """Columns of a table: time [s], position [m], rotation vector [rad], buttons (1 pressed)."""
 _PERIODS = 5.0
-"""Shortest gap in periods of the recording: a shorter pause is interpolated even if it exceeds ``longest_gap``."""
+"""A pause shorter than this number of sample periods is no gap: it is interpolated even if ``longest_gap`` is shorter.
+"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -214,7 +215,7 @@ def _in_axes_of(rest: Array, turns: Array) -> Array:
 
 
 def _tell_stops(path: Path, samples: Samples, setting: Setting) -> None:
-    """Warn of a motion that leaves the device's workspace, with a hint how to keep it inside."""
+    """Warn of a motion that leaves the device's workspace; the warning explains how to keep the motion inside."""
     device = setting.common.device
     size, start = np.array(device.workspace), np.array(device.start)
     places = samples.moves + np.array(setting.common.center) + start  # positions relative to the middle

@@ -181,7 +181,8 @@ class Recording:
         """Some topics side by side over the time [s], each column as ``topic.column``.
 
         Args:
-            *topics: Names; all streams of numbers if none is given. There is one row for each time at which any of
+            *topics: Names of the topics; all streams of numbers if none is given. There is one row for each time at
+                which any of
                 them has a message; columns of topics without a message at that time are NaN.
 
         Raises:

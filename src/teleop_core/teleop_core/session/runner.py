@@ -38,7 +38,7 @@ def simulate(configuration: Configuration, out: Path, progress: Progress = silen
     Args:
         configuration: Configuration of the session.
         out: Directory of the recording, which is created.
-        progress: Called after every simulated second with the number of finished ticks and the number of all ticks.
+        progress: Called after every simulated second with the number of finished ticks and the total number of ticks.
 
     Returns:
         Number of ticks.
@@ -85,7 +85,7 @@ def replay(bag: Bag, configuration: Configuration, out: Path, progress: Progress
         configuration: Configuration of the session that processes the samples.
         out: Directory of the new recording, which is created.
         progress: As in :func:`simulate`.
-        begin: Stage whose recorded output is played: ``haptic_master``, or ``operator``, the hand.
+        begin: Stage whose recorded output is played: ``haptic_master`` is the device, ``operator`` is the hand.
 
     Returns:
         Number of ticks.
@@ -206,7 +206,7 @@ def record_blocks(
         out: Directory of the recording, which is created.
         blocks: Rows of the session.
         ticks: Total number of ticks, for the progress.
-        progress: Called with the number of finished ticks and the number of all ticks.
+        progress: Called with the number of finished ticks and the total number of ticks.
 
     Returns:
         Number of ticks.
