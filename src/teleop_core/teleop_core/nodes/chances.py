@@ -1,8 +1,7 @@
 """Chances: the time for which a process could have worked, from the kernel's accounting of its threads.
 
 On a busy machine a healthy thread may get no processor for a second. Judged by the clock alone, the thread would seem
-to hang.
-Therefore the time for which a thread waited for a processor does not count here.
+to hang. Therefore the time for which a thread waited for a processor does not count here.
 """
 
 import time

@@ -59,8 +59,8 @@ def _release() -> None:
 def free_domain() -> str:
     """Number of a DDS domain without participants on this machine.
 
-    The first participant of domain d listens on UDP port 7410 + 250 d (DDSI-RTPS 2.5, 9.6.1.1).
-    Until then, a TCP socket with the same port number prevents other sessions from choosing the domain.
+    The first participant of domain d listens on UDP port 7410 + 250 d (DDSI-RTPS 2.5, 9.6.1.1). Until then, a TCP
+    socket with the same port number prevents other sessions from choosing the domain.
     """
     for domain in random.SystemRandom().sample(range(1, 102), 101):
         port = 7410 + 250 * domain

@@ -24,8 +24,7 @@ _GRACE_NS = 500_000_000
 """A button that has sent nothing for this time after its discovery counts as pressed [ns].
 
 A button that repeats its state is received within this time, because reader and sender discover each other within
-about a
-tenth of a second.
+about a tenth of a second.
 """
 _BYTES = 5
 """A Bool as CDR: four bytes of encapsulation, one of data."""

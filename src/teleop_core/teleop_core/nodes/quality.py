@@ -1,9 +1,8 @@
 """Quality: QoS of topics, by default and with ``qos_overrides`` parameters.
 
 The overrides have the form that ROS defines: ``qos_overrides./slave/measured_js.publisher.reliability: best_effort``
-in a parameter file
-or after ``--ros-args -p`` changes one policy of a node's publisher or subscription of a topic. The topic has its full
-name.
+in a parameter file or after ``--ros-args -p`` changes one policy of a node's publisher or subscription of a topic. The
+topic has its full name.
 """
 
 from collections.abc import Mapping

@@ -1,8 +1,7 @@
 """Sessions: the live sessions on this machine, at most one on each ROS domain.
 
 A session locks a file of its domain (``flock``). The lock ends with the session's process, however the process ends: a
-file
-that is not locked belongs to no session.
+file that is not locked belongs to no session.
 """
 
 import fcntl

@@ -71,8 +71,8 @@ class SlaveNode(TickingNode):
         """Update the signals, and answer every sample of the arm.
 
         The next step answers the newest sample. If several samples came meanwhile, this method answers the older
-        samples.
-        After a standstill of the loop, the stop has priority: only the last of the queued samples are answered.
+        samples. After a standstill of the loop, the stop has priority: only the last of the queued samples are
+        answered.
         """
         measured, *others = self.ports.inputs[SLAVE_MEASURED_JS.name]
         if others or not self._is_told:

@@ -266,7 +266,7 @@ def _kept(
 
 
 class _Memory:
-    """A recording in memory. Its methods are those of a writer of bags."""
+    """A recording in memory, which takes blocks of rows and single messages like a writer of bags."""
 
     def __init__(self, session: virtual.VirtualTime, keep: Collection[str] | None) -> None:
         self._session, self._reports = session, runner.StateReports(session)

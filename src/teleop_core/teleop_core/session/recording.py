@@ -182,8 +182,7 @@ class Recording:
 
         Args:
             *topics: Names of the topics; all streams of numbers if none is given. There is one row for each time at
-                which any of
-                them has a message; columns of topics without a message at that time are NaN.
+                which any of them has a message; columns of topics without a message at that time are NaN.
 
         Raises:
             UnknownNameError: There is no such topic.
