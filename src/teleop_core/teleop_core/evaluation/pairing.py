@@ -10,10 +10,10 @@ from teleop_core.evaluation.accumulators import Integers
 
 NONE = -1
 """Index of a sample that has no partner."""
-_ROW = 3
-_SMOOTHED = 21  # samples of the running median; bursts of up to half as many samples do not change it
-_FARTHEST_NS = 50_000_000
-_FAR = 2**62
+_ROW = 3  # samples in a row that must be clear with the same offset
+_SMOOTHED = 21  # samples of the running median: a burst of up to 10 late samples does not change the pairing
+_FARTHEST_NS = 50_000_000  # samples that are farther apart are no pair
+_FAR = 2**62  # later than any time stamp [ns]
 
 
 def same_tick(log_ns: Integers, other_log_ns: Integers) -> Integers:

@@ -146,7 +146,7 @@ class FeedReader:
             self._opened = world.listen(world.feed_place())
 
     def drain(self) -> None:
-        """Pass on all received messages."""
+        """Pass on all messages that have arrived."""
         while self._opened is not None and (line := self._opened.accept()) is not None:
             self._loops.append(_Source(line, self._channels, self._world))
         for one in self._loops:
@@ -173,7 +173,7 @@ class _Source:
         self.is_open, self.has_ended = True, False
 
     def drain(self) -> None:
-        """Pass on all received messages."""
+        """Pass on all messages that have arrived."""
         while self.is_open:
             try:
                 data = self._line.recv(_READ)

@@ -58,7 +58,9 @@ class LiveModel:
 
 
 class ModelTopics:
-    """Publishers of the model's topics whose message types are installed; ``tf2_msgs`` is installed only with ROS.
+    """Publishers of the robot model and its frames; one exists only if the package of its messages is installed.
+
+    ``tf2_msgs`` for example is part of ROS, and not on PyPI.
 
     Args:
         node: Node that owns the publishers.

@@ -71,7 +71,7 @@ class Session:
     >>> session = Session("free_motion")
     >>> begin = session.reset().measured_cp[:3]
     >>> session.command([0.0, 0.01, 0.0])  # the hand goes up by a centimetre
-    >>> end = session.step(50).measured_cp[:3]  # one second; the hand arrives within the first 20 ms
+    >>> end = session.step(50).measured_cp[:3]  # 50 steps of 20 ms; the tip arrives in the first of them
 
     When the session begins, and after :meth:`reset`, the arm already follows the hand. All other stages run as in
     every session. The same commands give bit-identical results.
