@@ -1,12 +1,13 @@
 """Arms: a recording of several arms, seen as one recording per arm.
 
-Topics of the default arm have the plain names; those of an arm called ``left`` are below ``left/``.
-The metadata name the arms under ``arms``, with blanks between them and the default one first; robot
-and seed of a further arm are in ``left/robot`` and ``left/seed``. All arms share ``diagnostics``,
-in which the nodes of an arm are called ``left/slave``.
+Topics of the default arm have the plain names; those of an arm called ``left`` are below ``left/``. The metadata entry
+``arms`` lists the names of the arms, separated by blanks, the default arm first. Robot and seed of a further arm are
+in the entries ``left/robot`` and ``left/seed``. All arms share the topic ``diagnostics``, in which the nodes of an arm
+are called ``left/slave``.
 
 If the recorder ran in a namespace, all topics are below that namespace, which the metadata contain under
-``namespace``. The arms keep their names: topics of the arm ``left`` in ``/lab`` are below ``lab/left/``.
+``namespace``. The names of the arms do not contain the namespace: topics of the arm ``left`` in ``/lab`` are below
+``lab/left/``.
 
 If no metadata name the arms, for example because a recorder ran alone in a namespace, each topic of a slave's measured
 pose is one arm: ``left/slave/measured_cp`` is the arm ``left``. Such a recording may have no default arm with plain
@@ -31,7 +32,7 @@ def arm_names(bag: Bag) -> tuple[str, ...]:
     """Names of a recording's arms, the default arm first; ``("",)`` if the only arm has no name.
 
     Raises:
-        RecordingError: Its metadata name an arm twice.
+        RecordingError: The metadata of the recording name an arm twice.
     """
     names = _named(bag) or _measured_arms(bag)
     if twice := [name for name in dict.fromkeys(names) if names.count(name) > 1]:
@@ -53,7 +54,7 @@ def _measured_arms(bag: Bag) -> tuple[str, ...]:
 
 
 def of_arm(bag: Bag, arm: str = "") -> Bag:
-    """View of a recording that holds one arm only, under the plain names.
+    """View of a recording that contains only one arm, whose topics have plain names.
 
     Args:
         bag: The recording, which stays open as long as the view is used.
@@ -61,7 +62,7 @@ def of_arm(bag: Bag, arm: str = "") -> Bag:
 
     Raises:
         UnknownNameError: The recording has no such arm.
-        RecordingError: Its metadata name an arm twice.
+        RecordingError: The metadata of the recording name an arm twice.
     """
     prefixes = _prefixes(bag)
     prefix = _prefix(bag, arm, prefixes)
@@ -99,7 +100,7 @@ def _base(bag: Bag) -> str:
 
 
 class _ArmBag(Bag):
-    """View of one arm.
+    """Recording of one arm: a view of a recording of several arms.
 
     Args:
         bag: The whole recording.
@@ -140,7 +141,7 @@ class _ArmBag(Bag):
         return name if name == DIAGNOSTICS.name else self._prefix + name
 
     def require(self, topics: Iterable[Topic | str]) -> None:
-        """The same as for the whole recording; the error message names the arm."""
+        """Make sure that each topic has at least one message of this arm; the error message names the arm."""
         try:
             super().require(topics)
         except RecordingError as error:
@@ -148,17 +149,17 @@ class _ArmBag(Bag):
             raise RecordingError(self.path, f"{arm} {error.reason}") from None
 
     def read_many(self, topics: Iterable[Topic | str], joint_names: tuple[str, ...] | None = None) -> dict[str, Series]:
-        """The same as for the whole recording."""
+        """See :meth:`~teleop_core.bags.reader.Bag.read_many`; only topics of this arm."""
         return self._renamed(self._bag.read_many(self._wanted(topics), joint_names))
 
     def blocks(
         self, topics: Iterable[Topic | str], joint_names: tuple[str, ...] | None = None
     ) -> Iterator[dict[str, Series]]:
-        """The same as for the whole recording."""
+        """See :meth:`~teleop_core.bags.reader.Bag.blocks`; only topics of this arm."""
         yield from map(self._renamed, self._bag.blocks(self._wanted(topics), joint_names))
 
     def reports(self, topic: Topic | str) -> list[Report]:
-        """The same as for the whole recording, but ``diagnostics`` gives only reports of the arm's own nodes."""
+        """All reports of a topic; those of ``diagnostics`` are only the reports of the arm's own nodes."""
         self.require([topic])
         found = self._bag.reports(self._recorded(topic))
         if self._recorded(topic) != DIAGNOSTICS.name:
@@ -167,7 +168,7 @@ class _ArmBag(Bag):
         return [report._replace(name=name) for name, report in named if name is not None]
 
     def raw(self, topics: Iterable[Topic | str] | None = None) -> Iterator[tuple[str, str, int, bytes]]:
-        """The same as for the whole recording."""
+        """See :meth:`~teleop_core.bags.reader.Bag.raw`; only topics of this arm."""
         if topics is None:
             topics = [name for name, info in self.topics.items() if info.count]
         for name, ros_type, log_ns, data in self._bag.raw(self._wanted(topics)):

@@ -1,4 +1,4 @@
-"""Background: the thread that writes a recording, its queue, and the disk below it."""
+"""Background: the thread that writes a recording, the queue of this thread, and the disk."""
 
 import os
 import queue
@@ -57,7 +57,7 @@ class Background(Protocol):
         """Wait until all written data are on the disk.
 
         Raises:
-            OSError: The disk refuses it.
+            OSError: The data cannot be written to the disk.
         """
 
 
@@ -87,4 +87,4 @@ class System:
 
 
 SYSTEM = System()
-"""Default background: used if the caller passes none."""
+"""Background that is used if the caller passes none."""

@@ -48,14 +48,14 @@ class Template:
         self._extend(data, b"\xff")
 
     def gap(self, code: str, columns: slice) -> None:
-        """Append a gap for numbers of one struct code that differ in each message: the given columns of the values."""
+        """Append a gap for numbers of one struct code; each message fills the gap with ``columns`` of its values."""
         self._align(struct.calcsize(code))
         count = columns.stop - columns.start
         self.gaps.append((len(self.template), code, count, columns))
         self._extend(bytes(struct.calcsize(code) * count), b"\0")
 
     def constants(self) -> list[tuple[int, int]]:
-        """Begin and end of each run of bytes between gaps."""
+        """Begin and end of each run of constant bytes between gaps."""
         ends = [(at, at + struct.calcsize(code) * count) for at, code, count, _ in self.gaps]
         begins = [0, *(end for _, end in ends)]
         return list(zip(begins, [*(at for at, _ in ends), len(self.template)], strict=True))

@@ -1,4 +1,4 @@
-"""Chunks: messages of one stretch of time as the bytes of MCAP chunks, with their index.
+"""Chunks: converts the messages of a time interval to the bytes of MCAP chunks, and makes the index of the chunks.
 
 Messages of all topics are sorted by log time; messages with equal log times are in the order of the streams. Readers
 that ignore the index therefore also read the messages in the right order.
@@ -20,7 +20,7 @@ from teleop_core.bags.layouts import Bytes, Layout, Stamps, Values
 
 HEADER = struct.Struct("<BQHIQQ")  # opcode, length, channel, sequence, log time, publish time
 _FOREVER = 2**62
-_LENGTH_OF_REST = HEADER.size - 9  # bytes of the header that the record's length includes
+_LENGTH_OF_REST = HEADER.size - 9  # number of header bytes that the record's length includes
 _HEADER = np.dtype(
     {
         "names": ["sequence", "log", "publish"],
@@ -82,7 +82,7 @@ class Stretch(NamedTuple):
 
     @property
     def size(self) -> int:
-        """Bytes of one record."""
+        """Size of one record [bytes]."""
         return HEADER.size + self.layout.size
 
     def fill(self, rows: Bytes) -> None:
@@ -109,7 +109,7 @@ Messages = tuple[list[Stretch], list[Single]]
 
 
 class _Scratch:
-    """Memory that is reused, because to allocate memory takes longer than to fill it."""
+    """Memory that is reused, because allocating memory takes longer than filling it."""
 
     def __init__(self) -> None:
         self._bytes: Bytes = np.empty(0, np.uint8)
@@ -201,11 +201,11 @@ def _chunk(data: Bytes, begin: int, index: Mapping[int, Entries]) -> Chunk:
 
 
 class _Table:
-    """Streams in step as a table of bytes, and the records of the others.
+    """Streams in step as a table of bytes, and the records of all other streams.
 
     Attributes:
         times: Log times of the rows, shape (n,), [ns]; they increase.
-        width: Bytes of a row.
+        width: Size of a row [bytes].
         rows: Records of the streams in step, shape (n, width).
         begins: Maps the channel of each stream in step to the byte of the row at which its record begins.
         loose: Records of the other streams.

@@ -1,4 +1,4 @@
-"""Compression of MCAP chunks: the three kinds of the format, by their names in files."""
+"""Compression of MCAP chunks: the three methods of the format, by their names in files."""
 
 from collections.abc import Callable
 
@@ -29,7 +29,7 @@ def decompress(name: str, data: bytes, size: int) -> bytes:
     A chunk larger than :data:`LARGEST` is not unpacked, whatever size its record states.
 
     Args:
-        name: Name in the chunk's record; empty for none.
+        name: Name of the compression in the chunk's record; empty for none.
         data: Compressed bytes.
         size: Size that the unpacked chunk must have, [bytes].
 
@@ -50,7 +50,7 @@ def decompress(name: str, data: bytes, size: int) -> bytes:
 def _unzstd(data: bytes, size: int) -> bytes:
     """Unpack at most ``size`` bytes. The size that a frame states is checked first, since the library trusts it."""
     told = zstandard.frame_content_size(data)
-    if told not in {-1, size}:  # -1: not told
+    if told not in {-1, size}:  # -1: the frame does not state its size
         raise ValueError(f"a frame states {told} bytes, must state {size}")
     return zstandard.ZstdDecompressor().decompress(data, max_output_size=size)
 

@@ -1,4 +1,4 @@
-"""Ending of a recording: index and metadata. A failure to write them never deletes recorded messages."""
+"""Ending of a recording: writes index and metadata. A failure to write them never deletes recorded messages."""
 
 from pathlib import Path
 
@@ -9,17 +9,17 @@ from teleop_core.base.errors import RecordingError
 
 
 def end(path: Path, file: McapFile, start_ns: int, stopped: OSError | None, given: int = 0) -> Exception | None:
-    """Finish a recording's file and directory, even if they were moved while it was written.
+    """Finish a recording's file and directory, even if they were moved during the recording.
 
     Args:
         path: Path at which the directory was made.
-        file: The file in it, which contains whole chunks only.
+        file: The file in the directory; it contains whole chunks only.
         start_ns: Log time at which the session started, [ns].
         stopped: Error that prevented the writing of a chunk; None if all chunks were written.
-        given: Number of messages that should have been written.
+        given: Number of messages that callers passed to the writer, after decimation.
 
     Returns:
-        Error to raise to the caller that recorded; None if the recording is complete and at ``path``.
+        Error to raise in the caller of the writer; None if the recording is complete and at ``path``.
     """
     found = file.statistics()
     if stopped is None:
@@ -48,7 +48,7 @@ def end(path: Path, file: McapFile, start_ns: int, stopped: OSError | None, give
 
 
 def _finished(path: Path, file: McapFile, start_ns: int) -> Path | None:
-    """Write index and metadata. Return the directory that holds them if the recording was moved or removed, else None.
+    """Write index and metadata. Return their directory if the recording was moved or removed, else None.
 
     Raises:
         OSError: Index or metadata could not be written; all chunks are kept.

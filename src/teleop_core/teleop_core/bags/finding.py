@@ -9,7 +9,7 @@ METADATA = "metadata.yaml"
 
 
 def check_new(path: Path | None) -> None:
-    """Refuse the path of a new recording if something exists there; None is a path that is chosen later.
+    """Refuse the path of a new recording if the path already exists; None stands for a path that is chosen later.
 
     Raises:
         RecordingError: The path exists.

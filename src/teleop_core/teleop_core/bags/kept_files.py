@@ -1,16 +1,16 @@
-"""Kept files: copies of robot and mesh files in a recording, so that it is replayed, scored and drawn with them.
+"""Kept files: copies of robot and mesh files in a recording. Replay, scores and drawings use these copies.
 
-A recording contains the text of a robot's file (a URDF, a table of links) under ``robot_file``, beside ``robot``. Of
-all other files the metadata contain the digest:
+The metadata contain the text of a robot's file (a URDF, a table of links) under ``robot_file``, beside ``robot``. They
+contain the digests of all other files:
 
 - ``mesh_file``, beside ``mesh``: a touched mesh or height field;
 - ``fixture_mesh_file``: the mesh of a fixture;
 - ``drives_file``: the drives of a URDF;
 - ``robot_meshes``: the visual meshes of a robot's links, one line of digest and name for each mesh.
 
-The entry named like a digest contains the packed bytes. It is stored once for all arms, up to a total size of all
-files. If a file is missing or has changed since the recording, its recorded bytes are written to a temporary folder,
-and that copy is used instead.
+The entry that has a digest as its name contains the packed bytes of the file. The entry is stored once for all arms,
+up to a total size of all files. If a file is missing or has changed since the recording, its recorded bytes are
+written to a temporary folder, and that copy is used instead.
 """
 
 import base64
@@ -51,8 +51,9 @@ class KeptFiles:
 
         Args:
             name: Path of the file.
-            prefix: Prefix of the names of its arm.
-            kind: :data:`TOUCHED` or :data:`FIXTURE`; from the second mesh of a kind on with its number appended.
+            prefix: Prefix of the names of the arm.
+            kind: :data:`TOUCHED` or :data:`FIXTURE`; for the second and further meshes of a kind, with the number
+                appended.
         """
         self._name(f"{prefix}{kind}", name)
 
@@ -61,9 +62,9 @@ class KeptFiles:
 
         Args:
             name: The robot's name or path.
-            settings: Its geometry. If the file is a xacro, it is expanded with the arguments in it, and the URDF is
-                stored.
-            prefix: Prefix of the names of its arm.
+            settings: Geometry of the robot. A xacro file is expanded with the arguments in this geometry, and the
+                resulting URDF is stored.
+            prefix: Prefix of the names of the arm.
         """
         found = file_of(name)
         if found is None:
@@ -92,12 +93,12 @@ class KeptFiles:
         return dict(self._texts)
 
     def _name(self, key: str, name: str) -> None:
-        """Keep a file that the metadata name by its path."""
+        """Store a file, and its path in the metadata entry ``key``."""
         if digest := self._add(Path(name).expanduser()):
             self._texts |= {key: name, f"{key}{_FILE}": digest}
 
     def _add(self, path: Path) -> str:
-        """Digest of a file; empty if unreadable. Keeps the file's packed bytes unless they would exceed the limit."""
+        """Digest of a file; empty if unreadable. Stores the file's packed bytes unless they would exceed the limit."""
         data = _bytes(path)
         if data is None:
             return ""
@@ -115,7 +116,7 @@ class KeptFiles:
 def recorded_files(metadata: Mapping[str, str], arm: str = "") -> dict[str, str]:
     """Current path of each recorded file of an arm, by the path in the recording.
 
-    If only the digest of a file was kept, and the file is missing or has changed, this gives a warning.
+    A warning is given if a file is missing or has changed and only its digest was stored.
 
     Args:
         metadata: Names and texts of a recording.
@@ -151,8 +152,8 @@ def recorded_geometry(settings: Iterable[str], files: Mapping[str, str]) -> tupl
     """Geometry of a robot as texts, with the path of the recorded drives in it.
 
     Args:
-        settings: Its geometry.
-        files: Files of its arm, from :func:`recorded_files`.
+        settings: Geometry of the robot.
+        files: Files of the arm, from :func:`recorded_files`.
     """
     found = []
     for text in settings:
@@ -198,7 +199,7 @@ def _text(path: Path) -> str | None:
 
 
 def _bytes(path: Path) -> bytes | None:
-    """Bytes of a file; None if the path cannot be read or is not a regular file, such as a pipe."""
+    """Bytes of a file; None if the path cannot be read or is not a regular file but, for example, a pipe."""
     try:
         return path.read_bytes() if path.is_file() else None
     except OSError:
@@ -216,7 +217,7 @@ def _digest_now(path: Path | None) -> str:
 
 
 def _unpacked(metadata: Mapping[str, str], digest: str, most: int) -> bytes | None:
-    """Bytes that a recording keeps under a digest; None if missing, damaged or larger than ``most``."""
+    """Bytes that a recording stores under a digest; None if missing, damaged or larger than ``most``."""
     try:
         packed = base64.b64decode(metadata.get(digest, "").removeprefix(_PACKED))
         data = zlib.decompressobj().decompress(packed, max(1, most))

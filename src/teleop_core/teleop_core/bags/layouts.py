@@ -26,14 +26,14 @@ SECOND_NS = 1_000_000_000
 
 
 class Layout:
-    """Bytes of every message of one stream.
+    """Template for the bytes of every message of one stream.
 
     Attributes:
         kind: Kind of the values.
         joint_names: Names in the order of the columns; empty without joints.
         frame_id: Frame in the header.
-        size: Bytes of one message.
-        width: Numbers in one message, the columns of its values.
+        size: Size of one message [bytes].
+        width: Number of values in one message, which is the number of columns.
         template: One message whose numbers are zero, shape (size,).
         mask: Bits that are equal in all messages, shape (size,).
     """
@@ -90,7 +90,7 @@ class Layout:
             values: Columns as in :class:`Kind`, shape (N, width).
 
         Returns:
-            Shape (N, size).
+            Bytes of the messages, shape (N, size).
 
         Raises:
             ShapeError: ``values`` does not have the shape (N, width).
@@ -100,7 +100,7 @@ class Layout:
         return rows
 
     def encode_into(self, rows: Bytes, stamps_ns: Stamps, values: Values) -> None:
-        """The same as :meth:`encode`, but written into ``rows``, shape (N, size).
+        """Write the bytes of N messages into ``rows``, shape (N, size); see :meth:`encode`.
 
         The bytes of each row are contiguous.
         """
@@ -115,7 +115,7 @@ class Layout:
             records[f"part{index}"] = values[:, columns]
 
     def decode(self, rows: Bytes) -> tuple[Stamps, Values]:
-        """Stamps, shape (N,), [ns], and values, shape (N, width), of messages that match.
+        """Stamps, shape (N,), [ns], and values, shape (N, width), of messages that match this layout.
 
         Args:
             rows: Whole messages, shape (N, size), or wider if there is padding at the end.
@@ -147,7 +147,7 @@ class Layout:
         return self._pack(self._head, seconds, nanoseconds, self._frame, *numbers)
 
     def decode_one(self, data: bytes) -> tuple[int, Values] | None:
-        """Stamp [ns] and values, shape (width,), of one message; None when it does not match."""
+        """Stamp [ns] and values, shape (width,), of one message; None if it does not match this layout."""
         try:
             head, seconds, nanoseconds, frame, *numbers = self._unpack(data)
         except struct.error:

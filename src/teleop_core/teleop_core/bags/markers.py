@@ -16,7 +16,7 @@ from teleop_core.graph.topics import Kind, Quality, Topic
 from teleop_core.kernels.geometry import Array
 
 MARKERS = Topic("teleop/markers", Kind.REPORT, quality=Quality.REPORT, message="visualization_msgs/msg/MarkerArray")
-"""Fixture, forces and paths of an arm, drawn."""
+"""Topic of the shapes that show fixture, forces and paths of an arm."""
 Color = tuple[float, float, float, float]
 """Red, green, blue, opacity, 0 to 1."""
 _NONE = np.zeros((0, 3))
@@ -34,16 +34,16 @@ class Shape(IntEnum):
 
 @dataclass(frozen=True, eq=False)
 class Marker:
-    """One shape.
+    """One shape that RViz or Foxglove draws.
 
     Attributes:
-        name: Its namespace, which is different for each marker of a topic.
-        frame: Frame that it is in.
+        name: Namespace of the marker, different for each marker of a topic.
+        frame: Frame in which pose and points are given.
         shape: Type of the shape; a cube or sphere fills the box of size ``scale``.
-        pose: Its pose (7,): x, y, z [m], quaternion w, x, y, z.
+        pose: Pose of the shape (7,): x, y, z [m], quaternion w, x, y, z.
         scale: Size along x, y, z [m]. For a line, the first value is its width. For an arrow between two points, the
             values are the shaft diameter, the head diameter and the head length.
-        color: Its colour.
+        color: Colour of the shape.
         points: Points of a line, or start and tip of an arrow (N, 3) [m].
         is_shown: Whether the marker is drawn; False removes it.
     """
@@ -81,8 +81,8 @@ def _append(cdr: Template, stamp_ns: int, marker: Marker) -> None:
     cdr.numbers("i", 0, int(marker.shape), 0 if marker.is_shown else 2)
     cdr.numbers("d", x, y, z, qx, qy, qz, qw, *marker.scale)
     cdr.numbers("f", *marker.color)
-    cdr.numbers("I", 0, 0)  # stays until it is replaced
-    cdr.numbers("B", 1)  # moves with its frame
+    cdr.numbers("I", 0, 0)  # lifetime 0: the marker stays until it is replaced
+    cdr.numbers("B", 1)  # frame_locked: the marker moves with its frame
     cdr.length(len(marker.points))
     if len(marker.points):
         cdr.block("d", np.ascontiguousarray(marker.points, np.float64).tobytes())

@@ -110,7 +110,7 @@ class McapFile:
         self.append_compressed(chunk, data, crc)
 
     def append_compressed(self, chunk: Chunk, data: bytes, crc: int) -> None:
-        """The same as :meth:`append` for a chunk that is already compressed: ``data`` and its checksum ``crc``."""
+        """Write a chunk that is already compressed to ``data``; ``crc`` is the checksum of its uncompressed bytes."""
         begin, name = self._end, self._compression
         tail = struct.pack("<I", len(name)) + name + struct.pack("<Q", len(data))
         length = _CHUNK_HEAD.size - 9 + len(tail) + len(data)
@@ -143,7 +143,7 @@ class McapFile:
         """Wait until all appended chunks are on the disk, where they survive a loss of power.
 
         Raises:
-            OSError: The disk refuses it.
+            OSError: The data cannot be written to the disk.
         """
         self._background.sync(self._file)
 
@@ -189,7 +189,7 @@ class McapFile:
                 return self.path
         if not own.st_nlink:
             return None
-        with suppress(OSError):  # Linux tells
+        with suppress(OSError):  # Linux gives the current path of an open file
             return Path(os.readlink(f"/proc/self/fd/{self._file.fileno()}"))
         return self.path
 

@@ -1,4 +1,4 @@
-"""One MCAP file being read: its topics, and tables of the positions of its messages."""
+"""MCAP source: reads the topics of an MCAP file, and tables of the positions of its messages."""
 
 import struct
 import zlib
@@ -26,7 +26,7 @@ _UNREAD = "{} is damaged ({{}}); `teleop recover` saves the whole parts"
 
 
 class Records(NamedTuple):
-    """Messages of one stretch of a file: message i is ``data[begin[i] : begin[i] + size[i]]``."""
+    """Messages of one part of a file: message i is ``data[begin[i] : begin[i] + size[i]]``."""
 
     data: layouts.Bytes
     channel: layouts.Stamps
@@ -59,7 +59,7 @@ class Contents:
 
 
 class McapSource:
-    """An MCAP file.
+    """Reader of one MCAP file.
 
     Args:
         path: The file.
@@ -144,7 +144,7 @@ class McapSource:
     # -- messages --------------------------------------------------------------------------------
 
     def records(self, places: list[Place], window: int = _WINDOW) -> Iterator[Records]:
-        """Messages of each place in turn; the next places are decompressed in another thread meanwhile.
+        """Messages of each part of the file in turn; another thread decompresses the next parts meanwhile.
 
         Args:
             places: Parts of the file to read.
@@ -246,7 +246,7 @@ def _note_chunk(found: Contents, data: layouts.Bytes, offset: int) -> None:
 
 
 def _loose(found: Contents, rows: walk.Rows) -> list[Place]:
-    """The place of messages outside of chunks, if there are any."""
+    """Part of the file that contains messages outside of chunks; an empty list if there are none."""
     loose = rows[rows[:, walk.OPCODE] == Opcode.MESSAGE]
     if not len(loose):
         return []

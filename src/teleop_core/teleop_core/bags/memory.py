@@ -16,18 +16,18 @@ Message = tuple[int, bytes]
 
 
 class LeftOutError(RecordingError):
-    """The caller asks for a stream that was not kept."""
+    """A caller requests a stream that was not stored in memory."""
 
 
 class MemoryBag(reader.Bag):
-    """Recording held in arrays.
+    """Recording that is stored in arrays.
 
     Args:
         name: Name of the recording in scores.
         series: Streams with their samples, by topic.
         reports: Messages of reports in the order of their log times, by topic.
         metadata: Names and texts, as a writer would store them.
-        left_out: Streams of the session that were not kept.
+        left_out: Streams of the session that were not stored.
 
     Raises:
         RecordingError: The recording has no samples.
@@ -57,7 +57,7 @@ class MemoryBag(reader.Bag):
         self.end_ns = max(int(log[-1]) for log in logs)
 
     def read_many(self, topics: Iterable[Topic | str], joint_names: tuple[str, ...] | None = None) -> dict[str, Series]:
-        """The same as for any recording."""
+        """See :meth:`~teleop_core.bags.reader.Bag.read_many`."""
         wanted = [topic.name if isinstance(topic, Topic) else topic.strip("/") for topic in topics]
         self.require(wanted)
         for name in wanted:
@@ -71,17 +71,17 @@ class MemoryBag(reader.Bag):
     def blocks(
         self, topics: Iterable[Topic | str], joint_names: tuple[str, ...] | None = None
     ) -> Iterator[dict[str, Series]]:
-        """The same as for any recording, but as a single block."""
+        """See :meth:`~teleop_core.bags.reader.Bag.blocks`; all messages are in a single block."""
         yield self.read_many(topics, joint_names)
 
     def reports(self, topic: Topic | str) -> list[Report]:
-        """The same as for any recording."""
+        """See :meth:`~teleop_core.bags.reader.Bag.reports`."""
         self.require([topic])
         name = topic.name if isinstance(topic, Topic) else topic.strip("/")
         return [one for _, data in self._reports.get(name, ()) for one in messages.read_reports(data)]
 
     def raw(self, topics: Iterable[Topic | str] | None = None) -> Iterator[tuple[str, str, int, bytes]]:
-        """The same as for any recording; the bytes are made when they are requested."""
+        """See :meth:`~teleop_core.bags.reader.Bag.raw`; the bytes are made when they are requested."""
         given = self.topics if topics is None else topics
         names = [topic.name if isinstance(topic, Topic) else topic.strip("/") for topic in given]
         self.require(names if topics is not None else ())

@@ -52,7 +52,7 @@ def check(kind: Kind, stamp_ns: int, values: Values, last_stamp_ns: int | None) 
     Args:
         kind: Kind of the values.
         stamp_ns: Stamp of the message, [ns].
-        values: Its numbers, shape (width,).
+        values: Numbers of the message, shape (width,).
         last_stamp_ns: Stamp of the last message used; None before the first.
     """
     numbers = values.tolist()

@@ -22,7 +22,7 @@ from teleop_core.graph.topics import Kind, Topic
 
 class _Message(NamedTuple):
     log_ns: int
-    place: int  # file offset of the chunk or records that contain it
+    place: int  # file offset of the chunk or records that contain the message
     channel: int
     begin: int
     end: int
@@ -66,7 +66,7 @@ def _messages(place: int, records: mcap_source.Records, channels: frozenset[int]
 __all__ = ["Bag", "Series", "TopicInfo", "recover"]
 
 _LATEST_NS = 2**62
-"""Log times from this one on [ns], in the year 2116, are invalid. Differences of valid log times fit into 64 bits."""
+"""First invalid log time [ns], in the year 2116. Differences of earlier log times fit into 64 bits."""
 
 
 @dataclass(frozen=True)
@@ -95,7 +95,7 @@ class Bag:
         path: Directory of a recording, or one ``.mcap`` file.
 
     Attributes:
-        topics: Topics of the recording, with type and count.
+        topics: Type and count of each topic, by its name.
         metadata: Names and texts that this package's writer stored; empty for recordings of other writers.
         is_ros1: Whether the messages are messages of ROS 1, which can only be imported.
         start_ns: First log time, [ns].
@@ -138,7 +138,7 @@ class Bag:
             raise RecordingError(self.path, reason)
 
     def require(self, topics: Iterable[Topic | str]) -> None:
-        """Insist on topics with at least one message.
+        """Make sure that each topic has at least one message.
 
         Raises:
             RecordingError: A topic is missing or empty. The message lists the missing and the existing topics.
@@ -168,7 +168,7 @@ class Bag:
             joint_names: Wanted order of the joints; None for the order in the recording.
 
         Returns:
-            Topic names to series.
+            Series of each topic, by its name.
 
         Raises:
             RecordingError: A topic is missing or cannot be read as numbers, or the file is damaged.
@@ -183,7 +183,7 @@ class Bag:
     def blocks(
         self, topics: Iterable[Topic | str], joint_names: tuple[str, ...] | None = None
     ) -> Iterator[dict[str, Series]]:
-        """The same as :meth:`read_many`, but chunk by chunk, so that memory use does not grow with the recording.
+        """Messages of some topics chunk by chunk, so that memory use does not grow; see :meth:`read_many`.
 
         Chunks are returned in the order of the file. Topics without messages in a chunk are left out of its result.
         """

@@ -25,7 +25,7 @@ def report(stamp_ns: int, name: str, level: int, message: str, values: Mapping[s
         stamp_ns: Time of the report, [ns].
         name: Name of the reporting component.
         level: 0 ok, 1 warning, 2 error, 3 stale.
-        message: One line for people.
+        message: One line of text for users.
         values: Names and texts of the reported values.
         hardware: Identifier of the reported hardware.
     """

@@ -14,7 +14,7 @@ _UNREADABLE = (SerdeError, AssertionError, IndexError, ValueError, OverflowError
 
 @cache
 def typestore() -> Any:
-    """All message types of the distribution; loaded on first use (60 ms)."""
+    """All message types of the distribution; loaded on first use, which takes 60 ms."""
     return get_typestore(Stores.ROS2_JAZZY)
 
 
@@ -40,7 +40,7 @@ def deserialise(data: bytes, ros_type: str) -> Any:
         ValueError: The bytes are not a message of this type.
     """
     said: Exception | None = None
-    for size in (len(data), len(data) - 4, len(data) - 8):  # the type store accepts only up to three bytes
+    for size in (len(data), len(data) - 4, len(data) - 8):  # the type store accepts at most three further bytes
         try:
             return typestore().deserialize_cdr(data[:size], ros_type)
         except _UNREADABLE as error:

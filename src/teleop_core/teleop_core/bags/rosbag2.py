@@ -23,7 +23,7 @@ _QUALITIES = {
 
 
 def offered_qos(quality: Quality) -> list[dict[str, Any]]:
-    """Quality of service of a topic's publisher, as rosbag2 writes it since version 9."""
+    """Quality of service of a topic's publisher, in the form of rosbag2 metadata since version 9."""
     reliability, durability, depth = _QUALITIES[quality]
     profile = {
         "history": "keep_last",
@@ -85,9 +85,9 @@ def metadata_text(
 
     Args:
         file: The MCAP file.
-        schemas: Its message types.
-        channels: Its topics.
-        statistics: Its numbers of messages.
+        schemas: Message types of the file.
+        channels: Topics of the file.
+        statistics: Numbers of messages in the file.
         start_ns: Starting time to write if the file has no messages, [ns].
     """
     types = {schema.id: schema.name for schema in schemas}
@@ -144,7 +144,7 @@ def write_metadata(directory: Path, text: str) -> None:
     """
     draft, final = directory / "metadata.yaml.part", directory / "metadata.yaml"
     try:
-        if final.exists():  # this recording was moved into the directory of another one
+        if final.exists():  # this recording was moved into the directory of another recording
             raise FileExistsError(errno.EEXIST, f"{final.name} is there already", str(final))
         draft.write_text(text, encoding="utf-8")
         draft.replace(final)

@@ -53,7 +53,7 @@ def empty(width: int) -> Series:
 
 
 def kind_of(name: str, ros_type: str) -> Kind | None:
-    """What the values of a topic are; None if messages of its type are not read."""
+    """Kind of a topic's values; None if messages of its type cannot be read."""
     topic = BY_NAME.get(name)
     if topic is not None and topic.kind.ros_type == ros_type:
         return topic.kind
@@ -69,11 +69,12 @@ class Column:
 
     Args:
         name: Topic.
-        kind: Kind of the values. For joints of a topic that this package does not define, the first message decides.
+        kind: Kind of the values. For joints of a topic that this package does not define, the first message determines
+            the kind.
         joint_names: Wanted order of the joints; empty for the order in the first message.
 
     Attributes:
-        total: Number of messages seen.
+        total: Number of all messages.
         left_out: Number of messages that were left out, by reason.
     """
 

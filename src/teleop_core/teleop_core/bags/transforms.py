@@ -12,11 +12,12 @@ from teleop_core.kernels.geometry import Array
 ROBOT_DESCRIPTION = Topic(
     "robot_description", Kind.REPORT, Stamp("none"), quality=Quality.LATCHED, message="std_msgs/msg/String"
 )
-"""URDF of the slave."""
+"""Topic with the URDF of the slave."""
 TF = Topic("tf", Kind.REPORT, quality=Quality.REPORT, message="tf2_msgs/msg/TFMessage")
-"""Poses of the frames of all arms. All arms share this topic, since names of frames contain the arm's name."""
+"""Topic with the poses of the frames of all arms. All arms share this topic, since names of frames contain the arm's
+name."""
 WORLD = "world"
-"""Root frame of the drawing; the bases of all arms are placed in it."""
+"""Root frame of the drawing; the poses of all arms' bases are given in this frame."""
 _MESSAGE_ORDER = [0, 1, 2, 4, 5, 6, 3]  # columns of a pose in a message: x, y, z, qx, qy, qz, qw
 
 

@@ -1,4 +1,7 @@
-"""Walking through MCAP records. These functions are compiled, since they process every message of a recording."""
+"""Walk: finds the records of an MCAP file.
+
+The functions are compiled, since they process every message of a recording.
+"""
 
 import numpy as np
 from mcap.opcode import Opcode
@@ -9,8 +12,8 @@ from teleop_core.kernels import inner, kernel
 
 Rows = NDArray[np.int64]
 _MESSAGE = int(Opcode.MESSAGE)
-_MESSAGE_HEAD = 22
-OPCODE, BEGIN, SIZE, CHANNEL, LOG = range(5)
+_MESSAGE_HEAD = 22  # bytes of a message record before its CDR
+OPCODE, BEGIN, SIZE, CHANNEL, LOG = range(5)  # columns of ``Rows``
 
 
 @inner
@@ -72,7 +75,7 @@ def walk(data: Bytes, begin: int, end: int) -> tuple[Rows, int]:
     Args:
         data: Read-only bytes.
         begin: Position at which the first record begins.
-        end: Position behind which no record is read.
+        end: Position at which reading ends; records beyond this position are not read.
 
     Returns:
         Rows of (opcode, begin of the payload, its size, channel, log time [ns]), shape (n, 5), and the position at

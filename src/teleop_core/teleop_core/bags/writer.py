@@ -21,7 +21,7 @@ from teleop_core.bags.recording import RecordingParameters
 from teleop_core.base.errors import ParameterError, RecordingError, ShapeError, UnknownNameError
 from teleop_core.graph.topics import Kind, Topic
 
-CHUNK_BYTES = 2 << 20
+CHUNK_BYTES = 2 << 20  # approximate size of a chunk [bytes]
 QUEUE_LENGTH = 8
 """Seconds of a session that are queued for a slow disk before callers have to wait."""
 METADATA_NAME = "teleop_core"
@@ -29,7 +29,7 @@ Block = Mapping[Topic, tuple[Stamps, Values, Stamps]]
 
 
 class _Channel:
-    """A topic that may be recorded: ``every`` is 0 if it is not recorded, ``seen`` counts all its messages."""
+    """A topic that may be recorded. ``every`` is 0 if it is not recorded; ``seen`` counts all its messages."""
 
     __slots__ = ("every", "layout", "number", "recorded", "seen")
 
@@ -47,18 +47,18 @@ class BagWriter:
     """Recorder of one session, a context manager for ``with``.
 
     Args:
-        path: Directory to make.
+        path: Directory to create.
         topics: Topics that may be written; topics that the parameters deselect are ignored.
         joint_names: Joints of the robot, in the order of the columns. For several arms: the joints of each arm, by its
             namespace.
         parameters: Recorded topics, their rates and the compression.
         compression: Replaces ``parameters.compression``.
-        metadata: Names and texts stored with the recording: configuration, seed.
+        metadata: Names and texts stored with the recording, such as configuration and seed.
         start_ns: Log time at which the session starts, [ns].
         hold_ns: Longest log time for which single messages are collected before they are written, [ns]. A value below
             one second means a live recording: written data are synced to the disk at once. The end of the process or a
             loss of power then loses only the collected messages.
-        background: Its thread, queue and disk.
+        background: Thread, queue and disk of the writer.
 
     Raises:
         RecordingError: The path exists already or cannot be written.
@@ -121,9 +121,9 @@ class BagWriter:
         """Record one message.
 
         Args:
-            topic: Its topic.
+            topic: Topic of the message.
             log_ns: Time at which the message was received, [ns].
-            data: Its CDR bytes.
+            data: CDR bytes of the message.
             publish_ns: Time at which the message was sent, [ns]; None if unknown.
 
         Raises:
@@ -169,7 +169,7 @@ class BagWriter:
         self._hand_over(stretches)
 
     def flush(self) -> None:
-        """Hand collected single messages to the writing thread.
+        """Pass collected single messages to the writing thread.
 
         Raises:
             RecordingError: Writing has failed, now or earlier.
@@ -177,7 +177,7 @@ class BagWriter:
         self._hand_over([])
 
     def flush_older(self, now_ns: int) -> None:
-        """Hand collected single messages to the writing thread if the first of them is older than ``hold_ns``.
+        """Pass collected single messages to the writing thread if the first of them is older than ``hold_ns``.
 
         Args:
             now_ns: Current log time, [ns]. A clock that was set back does not make messages wait longer.
@@ -210,7 +210,7 @@ class BagWriter:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         if error is not None and error is self._failure:
-            self._failure = None  # the failure is being raised
+            self._failure = None  # the failure is already being raised
         self.close()
 
     # -- between the threads ---------------------------------------------------------------------

@@ -13,7 +13,7 @@ from teleop_core.base.texts import LONGEST_LINE, one_line, printable, shown
 
 _SHOWN = 40
 """Largest number of alternatives that a message lists completely."""
-_NEAR = 8
+_NEAR = 8  # largest number of similar names that a message lists
 
 
 class TeleopError(Exception):
@@ -51,7 +51,7 @@ class ParameterError(TeleopError, ValueError):
 class UnknownNameError(ParameterError):
     """A name is not in its list: carries the ``alternatives``, each once.
 
-    The text lists the nearest alternatives first; if the list is long, it names only these.
+    The text lists the most similar alternatives first; if there are many, it lists only the similar ones.
     """
 
     def __init__(self, kind: str, value: object, alternatives: Iterable[str]) -> None:
@@ -66,7 +66,7 @@ class UnknownNameError(ParameterError):
 
 
 class ClosureError(ParameterError):
-    """Joints with which a robot's loops do not close: carries the ``residual`` that is left [m]."""
+    """The loops of a robot do not close with the given joints: carries the remaining ``residual`` [m]."""
 
     def __init__(self, name: str, value: object, requirement: str, residual: float) -> None:
         self.residual = residual
@@ -98,7 +98,7 @@ class ShapeError(TeleopError, ValueError):
 
 
 class MessageTypeError(TeleopError, ImportError):
-    """A message whose package is not installed: carries ``ros_type`` and ``package``."""
+    """The package of a message is not installed: carries ``ros_type`` and ``package``."""
 
     def __init__(self, ros_type: str, package: str) -> None:
         self.ros_type, self.package = ros_type, package
@@ -117,11 +117,11 @@ class RecordingError(TeleopError):
 
 
 class EvaluationError(TeleopError):
-    """A recording lacks what a score needs; the text says what is missing."""
+    """A recording lacks what a score needs; the text states what is missing."""
 
 
 class SessionError(TeleopError):
-    """A live session failed; the text names the node and the reason, with its last lines below."""
+    """A live session failed; the text names the node and the reason, followed by the node's last lines of output."""
 
     def __init__(self, text: str) -> None:
         Exception.__init__(self, printable(text))

@@ -1,4 +1,4 @@
-"""Own parts: Python files that register parts, for commands and for the processes that these start.
+"""Own parts: Python files that register parts, for commands and for the processes that commands start.
 
 An installed package registers its parts by entry points. A single file is named once, by ``teleop --parts FILE.py`` or
 in the environment variable ``TELEOP_PARTS``, and is loaded in every process of the session.
@@ -17,7 +17,7 @@ from teleop_core.base.registry import ADDED, Registry
 
 VARIABLE = "TELEOP_PARTS"
 _texts: dict[str, tuple[str, bytes]] = {}  # path and content of the file that was run, by module
-_made: dict[str, list[tuple[Registry[Any], str]]] = {}  # parts that its file registered, by module
+_made: dict[str, list[tuple[Registry[Any], str]]] = {}  # parts that the file of a module registered, by module
 
 
 def load_own_parts(files: Iterable[Path] = ()) -> None:

@@ -61,7 +61,7 @@ def parameter(
         length: Number of elements of a tuple; None for any.
         off: Number that is allowed outside of the bounds and switches the feature off; None if there is no such
             number.
-        fixed: Whether it can only be set before the stage is built.
+        fixed: Whether the parameter can only be set before the stage is built.
         source: Origin of the default: a mark of :data:`MARKS`, a colon, and the source, the data or the reason; empty
             if the default is a free choice.
         **former: ``lower``, ``upper`` and ``unit``, as in version 0.6.0, instead of ``within``.
@@ -120,8 +120,8 @@ def choice(
         registry: Registry of the parts.
         default: Name of the default part.
         doc: One line for tables and the ROS descriptor.
-        fixed: Whether it can only be set before the stage is built.
-        usual: Dotted names of parts' parameters that have another default here.
+        fixed: Whether the parameter can only be set before the stage is built.
+        usual: Default values in this group for parameters of the parts, by their dotted names.
     """
     usual = usual or {}
     meta = {"registry": registry, "default": default, "doc": doc, "fixed": fixed, "usual": usual}
@@ -143,7 +143,7 @@ def _below(name: str, values: Mapping[str, object]) -> dict[str, object]:
 class Spec:
     """Declaration of one parameter: ``name`` is dotted for nested groups.
 
-    ``is_part`` says whether it names a part of a registry.
+    ``is_part`` states whether the parameter names a part of a registry.
     """
 
     name: str
@@ -216,7 +216,7 @@ class Spec:
 
 @cache
 def _hints(group: type) -> dict[str, Any]:
-    """Types of a group's fields. They are cached: to resolve them is most of the cost of a group."""
+    """Types of a group's fields. They are cached, because resolving them takes most of the time of a group."""
     return get_type_hints(group)
 
 
@@ -235,7 +235,7 @@ def specs(group: type, prefix: str = "") -> Iterator[Spec]:
 
 @cache
 def _spec(group: type, name: str, prefix: str) -> Spec:
-    """Declaration of one field; cached, because making it is most of the cost of a configuration."""
+    """Declaration of one field; cached, because making it takes most of the time of a configuration."""
     hint, entry = _hints(group)[name], next(one for one in dataclasses.fields(group) if one.name == name)
     kind = get_origin(hint) or hint
     if kind is UnionType or kind not in {bool, int, float, str, tuple}:
@@ -262,12 +262,12 @@ def _choice_specs(entry: Any, prefix: str) -> Iterator[Spec]:
 
 
 def build(group: type[Group], values: Mapping[str, object], prefix: str = "") -> Group:
-    """Checked group with ``values`` instead of its defaults.
+    """Build a group from its defaults and the given values, and check it.
 
     Args:
         group: Dataclass whose fields come from :func:`parameter` or are such groups.
-        values: Dotted names to values; lists count as tuples.
-        prefix: Dotted path of this group, put before names in errors.
+        values: Values by their dotted names; lists are converted to tuples.
+        prefix: Dotted path of this group; errors show it before each name.
 
     Returns:
         The group.

@@ -43,10 +43,10 @@ class _Loader(getattr(yaml, "CSafeLoader", yaml.SafeLoader)):  # type: ignore[mi
 
 
 class _Dumper(getattr(yaml, "CSafeDumper", yaml.SafeDumper)):  # type: ignore[misc]
-    """Writes equal parts in full instead of as references, which rcl cannot read."""
+    """Writer that repeats equal parts in full; it writes no references to earlier parts: rcl cannot read them."""
 
     def ignore_aliases(self, data: Any) -> bool:
-        """Never write a reference to an earlier part."""
+        """Return True: equal parts are never written as references."""
         return True
 
 
@@ -80,7 +80,7 @@ def parse(text: str) -> Any:
         raise UnreadableError(_told(error)) from error
     except UnreadableError:
         raise
-    # What constructors of explicit tags raise, such as of "!!int x", is of many kinds.
+    # Constructors of explicit tags, such as "!!int x", raise exceptions of many kinds.
     except (yaml.YAMLError, ValueError, TypeError, KeyError, AttributeError, IndexError) as error:
         raise UnreadableError(f"is not YAML: {' '.join(str(error).split())}") from error
 

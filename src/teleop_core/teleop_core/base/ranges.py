@@ -1,7 +1,8 @@
-"""Ranges: possible values of a number from outside, by its unit, declared once for all readers.
+"""Ranges: allowed values of numbers from users and files, by their unit, declared once for all readers.
 
-Parameters, arms of files and traces of networks are checked against these ranges. A number beyond ``most`` is
-impossible for any arm and is refused. A number beyond ``usual`` gives a warning, because it probably has another unit.
+Parameters, arms that are read from files, and traces of networks are checked against these ranges. A number beyond
+``most`` is impossible for any arm and is refused. A number beyond ``usual`` gives a warning, because it probably has
+another unit.
 """
 
 import math
@@ -40,13 +41,13 @@ MOST_OF_ARM = 1e3
 """Largest length in an arm [m] or limit of its joints [rad, m]; the longest arms span 500 m. Some files contain limits
 of 999999 that mean no limit, or far origins that mean a position on a map."""
 LONGEST_DELAY = 10.0
-"""Longest delay of a packet [s]: the way to the Moon and back takes 2.6 s, ETS-VII took 7 s."""
+"""Longest delay of a packet [s]: a packet to the Moon and back takes 2.6 s; in the experiment ETS-VII it took 7 s."""
 LATEST_S = 4e9
 """Latest time of a clock [s] since 1970, in the year 2096."""
 
 
 def range_of(unit: str) -> Range:
-    """Range of a unit; for ``rad or m`` the wider range, for an unknown unit any number."""
+    """Range of a unit; for ``rad or m`` the wider of both ranges; for an unknown unit, the range of all numbers."""
     parts = [RANGES.get(part, Range(math.inf)) for part in unit.split(" or ")]
     return max(parts, key=lambda part: part.most)
 

@@ -33,13 +33,13 @@ class Registry(Generic[Part]):
 
     Args:
         kind: Name of the kind in the singular, for messages: "fixture".
-        kinds: The plural; the entry-point group is ``<package>.<kinds>``.
-        builtin: Maps names to places ``module:attribute`` in the package.
+        kinds: Name of the kind in the plural; the entry-point group is ``<package>.<kinds>``.
+        builtin: Maps names to import paths ``module:attribute`` in the package.
         check: Returns a part if it is valid, else raises :class:`~teleop_core.base.errors.PartError`.
-        trial: Tries a part that is not from the package, and raises the same errors as ``check``.
+        trial: Makes a trial run of a part that is not from the package, and raises the same errors as ``check``.
         package: Package that owns the registry.
         others: Alternative to a name, for messages: "FILE.urdf".
-        base: Registry whose parts are also parts of this one.
+        base: Registry whose parts are also parts of this registry.
         elsewhere: Maps names of parts in other distributions of this project to these distributions.
     """
 
@@ -80,7 +80,7 @@ class Registry(Generic[Part]):
         return tuple(dict.fromkeys((*self._builtin, *base, *self._entries(), *self._parts)))
 
     def find(self, name: str) -> Part:
-        """Part of a name.
+        """The part with the given name.
 
         Raises:
             UnknownNameError: There is no such part; the error lists the alternatives.
@@ -97,7 +97,7 @@ class Registry(Generic[Part]):
         return self._parts[name]
 
     def add(self, name: str, part: object, *, replace: bool = False) -> Part:
-        """Add a part for the rest of this program; the same object again changes nothing.
+        """Add a part for the rest of this program; adding the same object again changes nothing.
 
         Args:
             name: Name of the part in configurations.

@@ -109,7 +109,7 @@ def configured(arguments: argparse.Namespace) -> "Configuration":
 
 
 def done(out: Path, what: str) -> str:
-    """Last line of a command that recorded."""
+    """Last line that a command prints after it has recorded."""
     return f"{out}: {what}; next: teleop evaluate {out}"
 
 
@@ -117,7 +117,7 @@ def ros_module(module: str, package: str = "teleop_core.nodes") -> Any:
     """Module of the nodes, which are the only part that needs ROS.
 
     Args:
-        module: Its name in the package.
+        module: Name of the module in the package.
         package: The package of the module.
 
     Raises:

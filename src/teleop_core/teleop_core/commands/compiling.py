@@ -1,4 +1,4 @@
-"""``teleop compile``: kernels of the built-in parts, compiled before a session needs them."""
+"""``teleop compile``: compiles the kernels of the built-in parts before a session needs them."""
 
 import argparse
 from collections.abc import Iterator, Sequence

@@ -1,4 +1,4 @@
-"""``teleop devices``: gamepads and 3-D mice of this machine that can move the stylus."""
+"""``teleop devices``: lists gamepads and 3-D mice of this machine that can move the stylus."""
 
 import argparse
 from collections.abc import Callable, Iterator

@@ -1,4 +1,4 @@
-"""Progress of a long command: a bar on a terminal, a line a minute when piped."""
+"""Progress of a long command: a bar on a terminal, or one line per minute if the output is piped."""
 
 import sys
 import threading
@@ -29,7 +29,7 @@ class Progress:
 
     @property
     def seconds(self) -> float:
-        """Time of the ticks so far."""
+        """Simulated time of all ticks so far [s]."""
         from teleop_core.graph.signals import DT
 
         return round(self.ticks * DT, 9)
@@ -59,7 +59,7 @@ def say_work(say: Callable[[str], None] | None = None) -> bool:
     """Show current one-time work, such as compiling kernels; return whether there was any.
 
     Args:
-        say: Shows a text that replaces the last one; None prints a line.
+        say: Function that shows a text in place of the last text; None prints a line.
     """
     from teleop_core.kernels.progress import in_work
 

@@ -1,6 +1,6 @@
 """Accumulators: statistics of a stream that is passed in parts.
 
-Their memory does not grow with the number of samples, so a recording of any length can be scored.
+The memory of an accumulator does not grow with the number of samples, so a recording of any length can be scored.
 """
 
 import math
@@ -66,7 +66,7 @@ class Moments:
         self.count = total
 
     def spread(self) -> Spread:
-        """Statistics of all samples so far."""
+        """Spread of all samples added so far."""
         if not self.count:
             return Spread(None, None, None)
         sd = math.sqrt(self._deviations / (self.count - 1)) if self.count > 1 else None
@@ -98,27 +98,27 @@ class Distribution:
         return int(self.counts.sum())
 
     def quantile_us(self, share: float) -> int | None:
-        """Quantile: smallest duration [µs] that at least a share (0 to 1) of the durations does not exceed."""
+        """Quantile [µs]: the smallest duration for which at least a share (0 to 1) of all durations is not longer."""
         if not len(self.counts):
             return None
         rank = max(1, math.ceil(share * self.count))
         return int(self.values_us[np.searchsorted(np.cumsum(self.counts), rank)])
 
     def delay(self) -> Delay:
-        """Median, 99th percentile and maximum."""
+        """Median, 99th percentile and maximum of the durations added so far, [ms]."""
         median, p99, largest = (self.quantile_us(share) for share in (0.5, 0.99, 1.0))
         return Delay(_ms(median), _ms(p99), _ms(largest))
 
     def histogram(self, width_us: int) -> tuple[Array, Array]:
         """Share of the durations per bin, for drawing.
 
-        Bins reach to the 99th percentile; longer durations are counted in the last bin.
+        The last bin contains the 99th percentile and all longer durations.
 
         Args:
             width_us: Width of each bin, [µs].
 
         Returns:
-            Middles of the bins, shape (n,), [ms]; shares in per cent, shape (n,).
+            Middle of each bin [ms], shape (n,); share of the durations in each bin [%], shape (n,).
         """
         low, high = int(self.values_us[0]), self.quantile_us(0.99)
         assert high is not None

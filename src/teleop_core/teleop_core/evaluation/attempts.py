@@ -15,7 +15,7 @@ _ATTEMPTS, _SUCCESSES = (TASK_STATE.columns.index(name) for name in ("attempts",
 
 
 class Attempts:
-    """Attempts at the goals of a task: the samples of ``task/state`` at which the number of attempts rises.
+    """Accumulates the attempts at a task's goals; an attempt is a sample of ``task/state`` that counts one more.
 
     Attributes:
         successes: Number of attempts that reached their goal; None without a task.
@@ -24,7 +24,8 @@ class Attempts:
     def __init__(self, _: Context) -> None:
         self.successes: int | None = None
         self._tried: list[Array] = []
-        self._attempts, self._before = np.nan, 0.0  # attempts at the last sample; successes at the first sample
+        self._attempts = np.nan  # number of attempts in the last sample
+        self._before = 0.0  # number of successes in the first sample
 
     def add(self, window: Window) -> None:
         """Process one window."""
@@ -45,7 +46,7 @@ class Attempts:
         return np.array([row[TASK_STATE.columns.index(name)] for row in self._tried])
 
     def settled(self, name: str) -> Array:
-        """The same as :meth:`column`, but if there are four or more attempts, without the first one.
+        """A column of ``task/state`` at the end of each attempt; if there are four or more, the first is left out.
 
         The first attempt begins while the arm is still moved to its start.
         """
@@ -63,13 +64,13 @@ class AttemptsMetric(Metric):
 
     @abstractmethod
     def judge(self, tried: Attempts) -> None:
-        """Compute the figures of this metric; not called without a task."""
+        """Set the values of this metric from the attempts; called only if the recording contains a task."""
 
     def add(self, window: Window) -> None:
         """Do nothing: :class:`Attempts` processes each window once for all metrics."""
 
     def values(self) -> Values:
-        """Figures of all attempts so far; None without a task."""
+        """Values of all attempts so far; None without a task."""
         if self._attempts.successes is not None:
             self.judge(self._attempts)
         return super().values()

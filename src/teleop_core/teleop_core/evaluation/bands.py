@@ -10,16 +10,16 @@ from teleop_core.evaluation.state_history import StateHistory
 from teleop_core.graph import STATE, topics
 from teleop_core.kernels.geometry import Array
 
-_STRETCHES = 20_000  # largest number per cause; more than a screen has pixels
+_STRETCHES = 20_000  # largest number of intervals per cause; a screen has fewer pixels
 _FINEST_S = 1e-3
-# Colours that colour-blind readers (red or green) can distinguish; no curve has any of them.
+# Colours that red-green colour-blind readers can distinguish. No curve has one of these colours.
 LIMIT_COLORS = {
     topics.Limit.JOINT: "#e8590c",
     topics.Limit.WORKSPACE: "#7048e8",
     topics.Limit.SINGULARITY: "#d6336c",
     topics.Limit.SPEED: "#15aabf",
 }
-"""Colour of each cause on every page, as in CSS."""
+"""CSS colour of each cause, the same on every page."""
 _COLORS = {
     topics.Limit.JOINT: ("joint limit", LIMIT_COLORS[topics.Limit.JOINT]),
     topics.Limit.WORKSPACE: ("outside of the workspace", LIMIT_COLORS[topics.Limit.WORKSPACE]),
@@ -46,9 +46,9 @@ class Band:
 
 
 def bands_of(context: Context) -> tuple[Band, ...]:
-    """Bands of a recording: what limited the slave, and the clutch; only causes that occurred.
+    """Bands of a recording: one for each cause that limited the slave, and one for the pressed clutch.
 
-    Recordings of earlier versions do not contain limits.
+    A cause that did not occur has no band. Recordings of earlier versions do not contain limits.
     """
     history, bag = context.history, context.bag
     if not len(history.rows):
@@ -68,9 +68,9 @@ def stretches_of(history: StateHistory, is_so: NDArray[np.bool_], start_ns: int,
     """Time intervals in which a condition on rows of a history is true, shape (M, 2), [s].
 
     Args:
-        history: Each row is valid until the next row, the last row until the end of the recording.
+        history: States. Each row is valid until the next row begins; the last row is valid until the recording ends.
         is_so: Whether the condition is true in each row, shape (N,).
-        start_ns: Start of the recording; the intervals are relative to it, [ns].
+        start_ns: Start of the recording [ns]; the intervals are measured from this time.
         end_ns: End of the recording, [ns].
     """
     is_begin = is_so & ~np.concatenate(([False], is_so[:-1]))

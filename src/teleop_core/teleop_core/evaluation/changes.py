@@ -11,7 +11,7 @@ class Changes:
 
     Args:
         topic: The stream.
-        names: Columns for which the stamps of changes are kept.
+        names: Columns whose stamps of changes are stored.
     """
 
     def __init__(self, topic: Topic, *names: str) -> None:
@@ -21,7 +21,7 @@ class Changes:
         self._rises, self._falls = ({name: list[int]() for name in names} for _ in range(2))
 
     def add(self, window: Window) -> bool:
-        """Process one window. Return whether there has been any sample so far."""
+        """Process one window. Return whether any window so far contained a sample."""
         found = window.samples(self._topic)
         if len(found):
             if not len(self._first):
@@ -40,7 +40,7 @@ class Changes:
         return self._columns.index(name)
 
     def risen(self, *names: str) -> list[int]:
-        """Increase of columns that are counters, since the first sample."""
+        """Increase of each named counter column since the first sample."""
         return [int(self._last[-1, self._at(name)] - self._first[self._at(name)]) for name in names]
 
     def peak(self, name: str) -> float:

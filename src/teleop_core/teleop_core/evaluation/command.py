@@ -73,10 +73,10 @@ def page_maker(name: str) -> Callable[..., str]:
 
 
 def check_places(*files: Path | None) -> None:
-    """Refuse paths at which no file can be written, before the scores are computed.
+    """Check, before the scores are computed, that a file can be written at each path.
 
     Args:
-        files: Paths of the files; None for a file that is not wanted.
+        files: Paths of the files; None for a file that is not requested.
 
     Raises:
         EvaluationError: A directory is missing, a path is a directory, or no file can be created there.

@@ -29,9 +29,9 @@ class Context:
     """One arm of one recording.
 
     Attributes:
-        bag: The recording; it contains this arm only, under the plain names.
+        bag: The recording; it contains only this arm, and its topics have plain names.
         arm: Name of the arm; empty for the default arm of a recording that names no arms.
-        history: Values of teleop/state at all times.
+        history: Values of ``teleop/state`` over time.
         origin: The session that was recorded: graph, streams, chain of stages, map of axes.
         robot: Name of the robot; None if unknown.
         span: Scored part of the recording; None for the whole recording.
@@ -70,7 +70,7 @@ class Context:
         Streams that the recording lacks have no samples.
 
         Args:
-            topics: Streams, under their plain names.
+            topics: Streams, with their plain names.
 
         Raises:
             EvaluationError: The recording is already being read; streams must be requested while a metric is
@@ -84,7 +84,7 @@ class Context:
 
     @property
     def topics(self) -> list[Topic]:
-        """Streams in the windows: all streams that were requested and recorded."""
+        """Streams that the windows contain: all streams that were requested and recorded."""
         return list(self._read.values())
 
     def shared(self, kind: Callable[["Context"], Shared]) -> Shared:

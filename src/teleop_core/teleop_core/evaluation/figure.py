@@ -1,4 +1,4 @@
-"""Figure: one plot of the report page before encoding, and the plot of the time that a long path spent in each area."""
+"""Figure: one plot of the report page before it is encoded. A long path is drawn as the time spent in each area."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -34,7 +34,7 @@ class Figure:
 
 
 def line(x: Numbers, y: Numbers, name: str, color: str, width: float, unit: str = "mm") -> dict[str, Any]:
-    """Trace of a line in a plane; ``unit`` is that of y."""
+    """Trace of a line in a plane; ``unit`` is the unit of y."""
     return {
         "type": "scatter",
         "mode": "lines",
@@ -48,16 +48,19 @@ def line(x: Numbers, y: Numbers, name: str, color: str, width: float, unit: str 
 
 
 def time_axis() -> dict[str, Any]:
-    """Axis of time from the start of the recording.
+    """Time axis that begins at the start of the recording.
 
-    A page links all axes made by this function: they show the same time interval, zoom to single samples, and have
-    bands where the slave was limited. Such axes are marked by ``uirevision`` of plotly.js.
+    A page links all axes made by this function: they show the same time interval, can zoom to single samples, and show
+    bands where the slave was limited. The attribute ``uirevision`` of plotly.js marks such an axis.
     """
     return {"title": {"text": "time [s]"}, "uirevision": _TIME}
 
 
 def force_figure(title: str, sentence: str, times: Numbers, values: Numbers, of: str) -> Figure:
-    """Force against time: x, y, z and magnitude [N], the columns of ``values`` (N, 4), in the axes of ``of``."""
+    """Plot of a force against time.
+
+    The columns of ``values`` (N, 4) are x, y, z and magnitude [N]; ``of`` names the arm whose axes are used.
+    """
     traces = [
         line(times, values[:, i], f"{axis} ({of})", color, 1.2, "N")
         for i, (axis, color) in enumerate(zip("xyz", (FIRST, SECOND, THIRD), strict=True))
@@ -68,7 +71,7 @@ def force_figure(title: str, sentence: str, times: Numbers, values: Numbers, of:
 
 
 def is_against_time(figure: Figure) -> bool:
-    """Whether a plot has an axis of :func:`time_axis`."""
+    """Whether a plot has an axis that was made by :func:`time_axis`."""
     axes = (axis for name, axis in figure.layout.items() if name.startswith("xaxis"))
     return any(isinstance(axis, dict) and axis.get("uirevision") == _TIME for axis in axes)
 
@@ -85,9 +88,9 @@ def along(
 
     Args:
         trace: Line in a plane or in space.
-        times: Time of each of its points, shape (N,), [s].
+        times: Time of each point, shape (N,), [s].
         during: Begin and end of the intervals [s] in which the path is drawn; None for the whole time.
-        colored: Whether its colour shows the time; only for lines in space.
+        colored: Whether the colour of the line shows the time; possible only for lines in space.
         whole: Whether the whole path stays visible, as background of the visible part.
     """
     stretches = None if during is None else [list(stretch) for stretch in during]

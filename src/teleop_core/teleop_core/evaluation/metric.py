@@ -47,7 +47,7 @@ class Key(NamedTuple):
 def figure(unit: str, meaning: str, label: str = "", **default: object) -> Any:
     """Field of a metric's values, with an optional ``default``; :func:`keys_of` makes the field's key.
 
-    A field with a ``label`` has a row in tables, in which shares are in per cent; see :meth:`Metric.rows`.
+    A field with a ``label`` gets a row in tables (see :meth:`Metric.rows`). Tables show shares in per cent.
     """
     return field(metadata={"unit": unit, "meaning": meaning, "label": label}, **default)  # type: ignore[call-overload]
 
@@ -81,8 +81,8 @@ class Metric(ABC):
     :meth:`~teleop_core.evaluation.context.Context.shared` (for the recording) and
     :meth:`~teleop_core.evaluation.windows.Window.once` (for a window).
 
-    The shortest metric declares each value as a :func:`figure`, which is None until it is set. It needs neither
-    ``keys`` nor :meth:`values`::
+    The shortest metric declares each value as a :func:`figure`, which is None until it is set. Such a metric needs
+    neither ``keys`` nor :meth:`values`::
 
         class PeakMetric(tc.Metric):
             name, topics = "peak", (SLAVE_TRUE_CF,)
@@ -94,13 +94,14 @@ class Metric(ABC):
 
     Attributes:
         name: Name of the metric, also in JSON.
-        below: Name of another metric under which its keys appear in JSON; empty for its own name.
-        group: Group of its table rows; empty for the name under which its keys appear.
-        keys: Its keys in JSON; each path begins with the name and a dot. A metric without keys is not in JSON and only
-            draws. Keys of its figures are added automatically.
+        below: Name of another metric, under which the keys of this metric appear in JSON. If empty, the keys appear
+            under the metric's own name.
+        group: Group of the metric's table rows. If empty, the group is the name under which the keys appear.
+        keys: Keys of the metric in JSON; each path begins with the metric's name and a dot. A metric without keys only
+            draws plots and is not in JSON. Keys of fields made by :func:`figure` are added automatically.
         topics: Streams that the metric reads. Streams that a recording lacks have no samples in its windows. For
             streams that depend on the recording see :meth:`~teleop_core.evaluation.context.Context.read`.
-        declared: Its figures; set automatically.
+        declared: Fields of the class that are made by :func:`figure`; set automatically.
     """
 
     name: ClassVar[str]
@@ -111,7 +112,7 @@ class Metric(ABC):
     declared: ClassVar[tuple[Field[Any], ...]] = ()
 
     def __init_subclass__(cls) -> None:
-        """Make the keys for the figures of a subclass, and set each figure to None."""
+        """Make the keys for the fields that a subclass made by :func:`figure`, and set each field to None."""
         super().__init_subclass__()
         found = {name: one for name, one in vars(cls).items() if isinstance(one, Field)}
         for name, one in found.items():
@@ -127,7 +128,7 @@ class Metric(ABC):
 
     @classmethod
     def place(cls) -> str:
-        """Name under which its keys appear in JSON."""
+        """Name under which the metric's keys appear in JSON."""
         return cls.below or cls.name
 
     @abstractmethod
@@ -194,8 +195,8 @@ class SpreadMetric(Metric):
     Attributes:
         label: Name of the error.
         unit: Unit of the error.
-        meaning: Between what the error is measured, for the description of its key; empty for a class with its own
-            keys.
+        meaning: Text that states between which two poses the error is measured; it describes the metric's JSON key.
+            Empty for a class that declares its own keys.
     """
 
     label: ClassVar[str] = "position"
@@ -225,5 +226,5 @@ class SpreadMetric(Metric):
         return self._error.spread()
 
     def rows(self) -> list[TableRow]:
-        """Root mean square and maximum."""
+        """Rows of the root mean square and the maximum."""
         return error_rows(self.group, self.label, self.unit, self.values())

@@ -17,7 +17,7 @@ Mask = NDArray[np.bool_]
 
 @dataclass(frozen=True)
 class MotionFigures:
-    """Figures of a motion; None if there is too little motion for a figure."""
+    """Values that describe a motion; a value is None if there is too little motion for it."""
 
     time_s: float = figure("s", "duration without the approach; in_fixture: duration with a fixture on")
     path_mm: float = figure("mm", "length of the tip's path")
@@ -62,11 +62,11 @@ class MotionFigures:
 
 
 NAMES = tuple(field.name for field in fields(MotionFigures))
-"""Names of all figures, in their order."""
+"""Names of all values, in their order."""
 
 
 class Kinematics:
-    """Velocities of the samples of a motion, from which figures of any part of it are taken.
+    """Velocities of the samples of a motion, from which the values of any part of the motion are computed.
 
     Attributes:
         times: Times of the samples at 30 Hz, shape (N,), [s].
@@ -104,7 +104,7 @@ class Kinematics:
         return motion_measures.velocity_spectrum(self._velocity[part] for part in self._parts(mask))
 
     def figures(self, mask: Mask) -> MotionFigures:
-        """Figures of the samples of a mask (N,)."""
+        """Values of the part of the motion that a mask (N,) selects."""
         parts, speed = self._parts(mask), self.speed[mask]
         time = len(speed) / motion_measures.RATE
         if not len(speed):

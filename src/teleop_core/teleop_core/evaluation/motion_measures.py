@@ -1,9 +1,9 @@
 """Motion: how a hand moves, in numbers: speed, spectrum, smoothness, submovements, tremor.
 
-All figures except the tremor are computed from positions at :data:`RATE`, so that recordings of any rate can be
-compared. Samples are interpolated linearly to 30 Hz; velocities are central differences of these. Smoothness is
-computed for windows of :data:`WINDOW`. Gaps divide the motion into stretches (:func:`stretches`); nothing is computed
-across a gap.
+All values except the tremor are computed from positions at :data:`RATE`, so that recordings of any rate can be
+compared. Positions are interpolated linearly to 30 Hz; velocities are central differences of the interpolated
+positions. Smoothness is computed for windows of :data:`WINDOW`. Gaps divide the motion into stretches
+(:func:`stretches`); nothing is computed across a gap.
 """
 
 import itertools
@@ -15,11 +15,11 @@ import numpy as np
 from teleop_core.kernels.geometry import Array
 
 RATE = 30.0
-"""Rate of the samples from which figures are computed [Hz]."""
+"""Rate of the samples from which values are computed [Hz]."""
 WINDOW = 5.0
 """Length of a window of smoothness and tremor [s]."""
 IDLE_SPEED = 5e-3
-"""Below this speed a hand rests [m/s]."""
+"""A hand that is slower than this rests [m/s]."""
 PROMINENCE = 10e-3
 """Smallest height of a speed peak above the valleys beside it that counts as a submovement [m/s]."""
 SWING = 2e-3
@@ -27,9 +27,9 @@ SWING = 2e-3
 TREMOR_BAND = (8.0, 12.0)
 """Band of physiological tremor [Hz]."""
 SLOWEST_FOR_TREMOR = 60.0
-"""Lowest rate of a recording from which tremor is computed: five samples in a period of 12 Hz [Hz]."""
+"""Lowest sample rate of a recording for which tremor is computed [Hz]: five samples per period of 12 Hz."""
 SPECTRUM_SAMPLES = 256
-"""Samples of a segment of the velocity's spectrum: 8.5 s, so that a bin is 0.117 Hz wide."""
+"""Number of samples in a segment for the velocity's spectrum. A segment lasts 8.5 s; a bin is thus 0.117 Hz wide."""
 SHORTEST = 8
 """Smallest number of samples for a spectrum."""
 GAP = 0.25
@@ -51,10 +51,10 @@ def stretches(times: Array, gap: float = GAP) -> list[slice]:
 
 
 def resampled(times: Array, rows: Array, rate: float = RATE) -> Array:
-    """Rows at equal intervals from the first time on, linearly interpolated, shape (M, columns).
+    """Rows at equal intervals from the first time on, shape (M, columns); they are interpolated linearly.
 
     Args:
-        times: Rising times (N,) [s], at least one.
+        times: Increasing times (N,) [s], at least one.
         rows: Samples (N, columns).
         rate: Samples per second of the result [Hz].
     """
@@ -64,7 +64,7 @@ def resampled(times: Array, rows: Array, rate: float = RATE) -> Array:
 
 
 def velocities(position: Array) -> Array:
-    """Central differences of positions (N, 3), one-sided at both ends; [m/s] for [m]."""
+    """Velocities (N, 3) [m/s] of positions (N, 3) [m]: central differences, one-sided at both ends."""
     if len(position) < 2:
         return np.zeros_like(position)
     found: Array = np.gradient(position, 1.0 / RATE, axis=0)
@@ -91,7 +91,7 @@ def sparc(speed: Array, rate: float, cutoff: float = 10.0, threshold: float = 0.
         rate: Samples per second [Hz].
         cutoff: Highest frequency that counts [Hz].
         threshold: Share of the largest magnitude; the spectrum ends where it falls below this share.
-        padding: Powers of two by which the profile is lengthened with zeros.
+        padding: Zeros lengthen the profile by a factor of ``2**padding`` or more.
 
     Returns:
         The smoothness; None without motion.
@@ -143,7 +143,7 @@ def velocity_spectrum(parts: Iterable[Array]) -> tuple[Array, Array]:
     """Power density of velocity, summed over its axes: Welch's mean of overlapping segments.
 
     Args:
-        parts: Velocities (N, 3) [m/s] of each stretch; short ones are padded with zeros.
+        parts: Velocities (N, 3) [m/s] of each stretch; short stretches are padded with zeros.
 
     Returns:
         Frequencies (129,) [Hz] and densities (129,) [m²/s]; zeros without motion.
@@ -202,7 +202,7 @@ def turning_points(values: Array, swing: float) -> tuple[list[int], list[int]]:
     if len(values) < 3:
         return peaks, valleys
     slope = np.sign(np.diff(values))
-    # Ends and changes of direction; all other samples cannot be extremes.
+    # Only the ends and the changes of direction can be extremes.
     at = np.unique(np.append(np.flatnonzero(np.diff(slope) != 0.0) + 1, (0, len(values) - 1)))
     low = high = int(at[0])
     heading = 0

@@ -11,17 +11,17 @@ from teleop_core.kernels.geometry import Array
 REST = 1e-3
 """Largest extent of the motion within a second that counts as rest [m]."""
 _REGULAR = 0.01  # share by which steps may differ and still count as equal
-_ENOUGH = 150.0  # samples are averaged down to this rate, which reduces a wave of 12 Hz by 1 % [Hz]
+_ENOUGH = 150.0  # samples are averaged down to about this rate [Hz]; this reduces a wave of 12 Hz by 1 %
 
 
 class MotionSamples:
-    """A motion at :data:`RATE`, interpolated on the fly, and the tremor of its full rate.
+    """Interpolates a motion at :data:`RATE` while the motion is read, and computes the tremor at the full rate.
 
     The samples are at whole multiples of 1/30 s after the first sample; an hour has 108 000 samples. The amount of
     stored data at the full rate does not grow.
 
     Attributes:
-        tremor: Tremor of the full rate.
+        tremor: Tremor, computed from the samples at the full rate.
     """
 
     def __init__(self) -> None:
@@ -116,7 +116,7 @@ class TremorWindows:
         self._rests: list[tuple[float, float, float]] = []
 
     def add(self, times: Array, places: Array) -> None:
-        """Add samples: times (N,) [s], later than those before, and positions (N, 3) [m]."""
+        """Add samples: times (N,) [s], all later than the times added before, and positions (N, 3) [m]."""
         times = np.append(self._times, times)
         places = np.vstack((self._places, places))
         first = 0
@@ -152,9 +152,9 @@ class TremorWindows:
                 self._rests.append((moment, moment + 1.0, tremor_power(rest, rate)))
 
     def between(self, spans: Sequence[tuple[float, float]]) -> tuple[float | None, float | None]:
-        """Mean squares [m²] of the windows, and of the seconds of rest, that lie in one of the spans [s].
+        """Mean squares [m²] of the windows in the spans [s], and of the seconds of rest in the spans.
 
-        A value is None if there are none.
+        A value is None if the spans contain no window or no second of rest.
         """
         return _mean(self._windows, spans), _mean(self._rests, spans)
 

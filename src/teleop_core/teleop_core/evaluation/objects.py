@@ -21,7 +21,7 @@ def object_of(context: Context, kind: type) -> tuple[WorldParameters, Array] | N
         kind: Parameter group of the object.
 
     Returns:
-        World and middle; None if the object is of another kind, or if a part of it or its robot is no longer
+        World and middle; None if the object is of another kind, or if the robot or a part of the object is no longer
         available.
     """
     with suppress(TeleopError):
@@ -32,7 +32,7 @@ def object_of(context: Context, kind: type) -> tuple[WorldParameters, Array] | N
 
 
 class ObjectMetric(Metric):
-    """Metric of the true tip at one kind of object; its values are None for other objects.
+    """Metric of the true tip at one kind of object. The values are None if the object is of another kind.
 
     Attributes:
         kind: Parameter group of the object.
@@ -49,7 +49,7 @@ class ObjectMetric(Metric):
 
     @abstractmethod
     def meet(self, shape: Any, ways: Array, wrench: Array) -> None:
-        """Process some samples of the tip.
+        """Process samples of the tip's position and of the wrench on the tip.
 
         Args:
             shape: Parameters of the object, of type ``kind``.

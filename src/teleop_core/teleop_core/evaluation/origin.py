@@ -1,4 +1,4 @@
-"""Origin: the session in which a recording was made, as stored in it: graph, map of axes and parts."""
+"""Origin: the session in which a recording was made, as the recording stores it: graph, map of axes and parts."""
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
@@ -30,21 +30,22 @@ class Origin:
     """Session in which a recording was made, from the view of one arm, whose topics have plain names.
 
     Attributes:
-        graph: Graph of the session; the built-in stages if it is unknown or a stage is not installed.
+        graph: Graph of the session; the graph of the built-in stages if the graph is unknown or a stage is not
+            installed.
         axes: Rotation (3, 3) from the master's base to the slave's axes.
         operator: Stored parameters of the stage ``operator``, by names.
         interpolation: Interpolation of the slave between commands; None if not stored.
         plant: Plant of the simulated slave; "ideal" for versions that had no other plant, None if no simulator is
             stored.
         controller: Control law of the slave; None if not stored.
-        geometry: Settings that its robot was made with.
-        lag: Number of setpoints between a measured pose and the setpoint with which it was sampled: 1 since the arm's
-            server publishes the pose.
+        geometry: Settings with which the robot was made.
+        lag: Number of setpoints between a measured pose and the setpoint with which it was sampled: 1 if an arm's
+            server sent the pose, otherwise 0.
         world: Stored parameters of the object that the slave touches, by names without ``world.``.
         missing: Parts that the recording names but that are unknown here, each as a text.
         begin: Last stage whose topics were taken from a file; empty if there is no such stage.
-        tool: Quaternions (4,) of the maps from the master's base to the slave's axes, and from the
-            stylus to the tool; None if the tool does not rotate as much as the stylus.
+        tool: Two quaternions (4,): the map from the master's base to the slave's axes, and the map from the stylus to
+            the tool. None if the tool does not rotate as much as the stylus.
     """
 
     graph: Graph
@@ -67,7 +68,7 @@ class Origin:
 
     @property
     def streams(self) -> tuple[topics.Topic, ...]:
-        """Topics of an arm with one message per step."""
+        """Topics of this arm that have one message per step."""
         return tuple(topic for topic in self.graph.streams if not topic.arm)
 
     @property
@@ -79,7 +80,7 @@ class Origin:
 
     @property
     def sources(self) -> dict[str, topics.Topic]:
-        """For each topic that passes on stamps, by its name: the topic from which the stamps come."""
+        """For the name of each topic that copies its stamps: the topic from which it copies them."""
         return {
             written.name: link.topic
             for link in self.graph.links
@@ -89,7 +90,7 @@ class Origin:
 
     @property
     def played(self) -> frozenset[str]:
-        """Names of topics that were taken from a file, as a replay does."""
+        """Names of the topics that a replay took from a file."""
         stages = (member.stage for member in self.graph.played(self.begin) if not member.arm)
         return frozenset(topic.name for stage in stages for topic in stage.writes)
 
@@ -143,7 +144,7 @@ def _layer(bag: reader.Bag, content: Mapping[Any, Any]) -> Layer:
 
 
 def _missing(layer: Layer, arm: str) -> Iterator[str]:
-    """Unknown parts: stages of the session, and parts that its stages chose by name, that are not installed."""
+    """Names of parts that are not installed: stages of the session, and parts that these stages chose by name."""
     stages = layer.get(SESSION, {}).get("stages", ())
     for name in stages if isinstance(stages, list | tuple) else ():
         if name not in STAGES.names():
@@ -169,7 +170,7 @@ def _graph(layer: Layer) -> Graph:
 
 
 def _said(layer: Layer, stage: str, arm: str) -> dict[str, object]:
-    """Values stored for a stage: those for all arms, overridden by those of one arm."""
+    """Values stored for a stage; values for one arm override values for all arms."""
     return layer.get(stage, {}) | layer.get(f"{arm}/{stage}", {})
 
 

@@ -15,9 +15,10 @@ from teleop_core.kernels.geometry import Array
 from teleop_core.shapes.box import BOX
 
 _SECOND_NS = 1e9
-# Walls are searched up to this distance at the hand [m], at this number of points, in rounds of finer steps. Depths
-# below a nanometre are rounding errors.
-_FAR, _STEPS, _ROUNDS, _GRAZED = 1.0, 1001, 3, 1e-9
+_FAR = 1.0  # walls are searched up to this distance at the hand [m]
+_STEPS = 1001  # number of points that each round of the search tests
+_ROUNDS = 3  # number of rounds of the search; each round has finer steps
+_GRAZED = 1e-9  # smaller depths are rounding errors [m]
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,10 +26,10 @@ class Outline:
     """A fixture that was on for a while.
 
     Attributes:
-        begin_s: Time at which it was switched on, since the start of the recording, [s].
-        end_s: Time at which it was switched off, [s].
-        kind: Name of its kind.
-        points: One line along its edges in the slave's base, shape (N, 3), [mm]; NaN interrupts the line.
+        begin_s: Time at which the fixture was switched on, since the start of the recording, [s].
+        end_s: Time at which the fixture was switched off, [s].
+        kind: Name of the fixture's kind.
+        points: One line along the fixture's edges in the slave's base, shape (N, 3), [mm]; NaN interrupts the line.
         walls: Positions of the walls on each axis (3, 2) [mm]: the first wall in negative and in positive direction
             from the middle; NaN if there is no wall.
     """
@@ -41,7 +42,7 @@ class Outline:
 
     @property
     def size(self) -> list[float]:
-        """Size along the three axes, [mm]; empty for a shape that is open on a side."""
+        """Size along the three axes, [mm]; empty for a shape that has no wall in some direction."""
         if not np.isfinite(self.walls).all():
             return []
         extent: list[float] = (np.nanmax(self.points, axis=0) - np.nanmin(self.points, axis=0)).tolist()
@@ -53,7 +54,7 @@ class Outline:
         return self.kind, np.round(self.points, 6).tobytes()
 
     def wall_lines(self, axis: int, suffix: str) -> list[dict[str, Any]]:
-        """Lines of its walls on an axis, against time."""
+        """Lines of the fixture's walls on an axis, against time."""
         return [
             {
                 "type": "line",
@@ -97,9 +98,12 @@ def outlines_of(context: Context) -> list[Outline]:
 
 
 def _around(fixture: ReportedFixture, gain: float, axes: Array) -> tuple[Array, Array]:
-    """Points (N, 3) [m] of a fixture's edges and positions (3, 2) [m] of its walls on the axes, from its middle."""
+    """Points (N, 3) [m] of a fixture's edges, and positions (3, 2) [m] of its walls on the axes.
+
+    Both are relative to the fixture's middle.
+    """
     points = fixture.outline(gain, axes)
-    if fixture.size:  # a box, of which only the size is reported
+    if fixture.size:  # a box: only its size is reported
         return points, np.stack((points.min(axis=0), points.max(axis=0)), axis=1)
     walls = np.full((3, 2), np.nan)
     for axis in range(3):

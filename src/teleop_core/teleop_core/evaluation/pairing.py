@@ -20,10 +20,10 @@ def same_tick(log_ns: Integers, other_log_ns: Integers) -> Integers:
     """Partners of samples that one node publishes in pairs, tick by tick, without a common stamp.
 
     Partners are found by counting: the difference of both indices is constant until a message is lost. The difference
-    is certain where, several times in a row, the nearest sample in log time is far nearer than any other. Between such
-    places, a late recorder or network may have mixed the ticks. If the difference is equal on both sides, it is used
-    in between too. If it is not equal, a message was lost in between. Then the running median of the difference to the
-    nearest sample is used (a median ignores bursts and keeps edges).
+    is certain if, for several samples in a row, the nearest sample in log time is far nearer than any other. Between
+    certain samples, a late recorder or network may have mixed the ticks. If the difference is equal before and after,
+    it is used in between too. If not, a message was lost in between. Then the running median of the difference to the
+    nearest sample is used; a median ignores bursts and keeps edges.
 
     Args:
         log_ns: Log times of one topic, shape (N,), in order, [ns].
@@ -75,7 +75,7 @@ def same_stamp(stamp_ns: Integers, other_stamp_ns: Integers) -> Integers:
 
 
 def mean_wait_s(begins_ns: Sequence[int], ends_ns: Sequence[int]) -> float | None:
-    """Mean time [s] from the latest begin at or before each end to that end; None if no end has a begin."""
+    """Mean time [s] from the latest begin at or before an end to that end; None if no end has a begin."""
     before = np.searchsorted(begins_ns, ends_ns, side="right")
     waits = [1e-9 * (end - begins_ns[i - 1]) for end, i in zip(ends_ns, before.tolist(), strict=True) if i]
     return float(np.mean(waits)) if waits else None
@@ -109,7 +109,7 @@ def _offsets(log_ns: Integers, other_log_ns: Integers) -> tuple[Integers, NDArra
 
 
 def _in_a_row(is_clear: NDArray[np.bool_], offset: Integers) -> NDArray[np.bool_]:
-    """Mask of samples that are clear with the same offset at least :data:`_ROW` times in a row."""
+    """Mask of the samples in a run of at least :data:`_ROW` clear samples with the same offset."""
     is_new = np.diff(np.where(is_clear, offset, _FAR), prepend=_FAR - 1) != 0
     run = np.cumsum(is_new) - 1
     in_a_row: NDArray[np.bool_] = is_clear & (np.bincount(run)[run] >= _ROW)

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from _typeshed import DataclassInstance
 
 Values: TypeAlias = "Mapping[str, object] | DataclassInstance"
-"""Results of a metric: a mapping of names to values, which may be such mappings themselves; or a dataclass."""
+"""Results of a metric: a dataclass, or a mapping of names to values. A value may itself be such a mapping."""
 Leaf: TypeAlias = float | int | str | None
 Plain: TypeAlias = "dict[str, Plain] | Leaf"
 
@@ -20,7 +20,7 @@ def plain(values: Values) -> dict[str, Plain]:
     """Values as dictionaries, texts and numbers; numbers that are not finite become None.
 
     Raises:
-        TypeError: A value has another type.
+        TypeError: A value has a type that JSON cannot contain.
     """
     entries: Iterator[tuple[object, object]]
     if isinstance(values, Mapping):

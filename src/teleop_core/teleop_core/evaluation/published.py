@@ -1,4 +1,4 @@
-"""Published figures: results of the RCRT-1 and its operator, and the conditions for comparing with them."""
+"""Published values: results of the RCRT-1 and its operator, and the conditions for comparing scores with them."""
 
 import math
 from collections import Counter
@@ -12,8 +12,10 @@ from teleop_core.graph.topics import SLAVE_MEASURED_CP
 from teleop_core.slave.controllers.source_pid import SOURCE_PID
 
 SOURCE = "Vongbunyong 2008, Table 8.2"
-POSITION_SHARE, ANGLE_FACTOR = 0.15, 1.6
-"""A root mean square agrees with the published value if it is within this share (positions) or this factor (angles)."""
+POSITION_SHARE = 0.15
+"""Largest relative difference at which the root mean square of a position agrees with the published value."""
+ANGLE_FACTOR = 1.6
+"""Largest factor between the root mean square of an angle and the published value at which both agree."""
 
 
 @dataclass(frozen=True)
@@ -41,10 +43,10 @@ BOX_OVERSHOOT_MM = 1.0
 
 
 def published_for(gain: float | None, robot: str | None = "rcrt1", plant: str | None = "hardware") -> Published | None:
-    """Figures of the mode whose gain is nearer, on a logarithmic scale.
+    """Published values of the mode (coarse or fine) whose gain is nearer, on a logarithmic scale.
 
     Returns:
-        The figures; None without a gain, for another robot, and for a plant that does not model the real machine. A
+        The values; None without a gain, for another robot, and for a plant that does not model the real machine. A
         comparison of an ideal arm with a real arm would be meaningless. A recording that does not name its robot or
         its plant (None) may be of the machine itself.
     """
@@ -56,12 +58,12 @@ def published_for(gain: float | None, robot: str | None = "rcrt1", plant: str | 
 
 
 def agrees(value: float | None, published: float, share: float) -> bool | None:
-    """Whether a figure is within a share of the published figure; None without a figure."""
+    """Whether a value differs from the published value by at most a share of it; None without a value."""
     return None if value is None else abs(value - published) <= share * published
 
 
 def agrees_by_factor(value: float | None, published: float, factor: float) -> bool | None:
-    """Whether a figure is within a factor of the published figure; None without a figure."""
+    """Whether a value differs from the published value by at most a factor; None without a value."""
     return None if value is None else published / factor <= value <= published * factor
 
 
@@ -85,10 +87,10 @@ class Gains:
 
     @property
     def published(self) -> Published | None:
-        """Published figures of this gain, robot and plant; None if there are none."""
+        """Published values for this gain, robot and plant; None if there are none."""
         return published_for(self.gain, self._robot, self._origin.plant)
 
     @property
     def is_source(self) -> bool:
-        """Whether this may be the real machine, or this package's simulation of it with the source's control law."""
+        """Whether the slave may be the real machine, or is its simulation here with the source's control law."""
         return self._origin.plant is None or self._origin.controller == SOURCE_PID.name

@@ -1,7 +1,7 @@
-"""Registry of metrics: those of this package, of installed packages and of the running program.
+"""Registry of metrics: metrics of this package, of installed packages and of the running program.
 
-An installed package adds a metric through the entry-point group ``teleop_core.metrics``; a program
-through ``METRICS.add("jerk", JerkMetric)``. Every metric of the registry is in every score.
+An installed package adds a metric through the entry-point group ``teleop_core.metrics``; a program through
+``METRICS.add("jerk", JerkMetric)``. Every score contains every metric of the registry.
 """
 
 import inspect

@@ -1,4 +1,4 @@
-"""Rows: table rows of metrics, for one score or several scores, beside the published figures."""
+"""Rows: table rows of metrics, for one score or several scores, beside the published values."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -59,7 +59,7 @@ def error_rows(group: str, label: str, unit: str, spread: Spread) -> list[TableR
 
 
 def number(value: float | None, missing: str = MISSING) -> str:
-    """Text with four significant digits, at most three of them decimals; ``missing`` for None.
+    """Number as text with four significant digits, at most three of them decimals; ``missing`` for None.
 
     Values below 0.1 have two significant digits; values that are only rounding errors are shown as 0.
     """
@@ -90,9 +90,9 @@ class Line(NamedTuple):
 
 
 def side_by_side(tables: Sequence[Sequence[TableRow]]) -> list[Line]:
-    """Lines of a table of several scores, from the rows of each; a row that a score lacks is a dash.
+    """Lines of a table that shows the rows of several scores side by side; a dash means that a score lacks the row.
 
-    Lines without information for all scores are left out: dashes, and delays of zero, as in virtual time.
+    A line is left out if it shows only dashes, or only delays of zero, as in virtual time.
     """
     found = [{_place(row): row for row in rows} for rows in tables]
     places = dict.fromkeys(place for rows in found for place in rows)
@@ -101,7 +101,7 @@ def side_by_side(tables: Sequence[Sequence[TableRow]]) -> list[Line]:
 
 
 def is_compared(lines: Sequence[Line]) -> bool:
-    """Whether any value has a published figure beside it."""
+    """Whether any line shows a published value."""
     return any(row.published for line in lines for row in line.rows)
 
 

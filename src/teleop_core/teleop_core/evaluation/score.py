@@ -59,7 +59,7 @@ def key_table() -> str:
 
 @dataclass(frozen=True)
 class Session:
-    """The scored recording; texts as in its metadata, None if the metadata lack them.
+    """The scored recording. Its texts come from the metadata of the recording; a text that the metadata lack is None.
 
     ``arm`` is empty for the default arm of a recording that names no arms. ``from_s`` and ``to_s`` are the begin and
     end of the scored part, since the first message; None means the last message. ``missing`` lists the parts that the
@@ -81,7 +81,7 @@ class Session:
 
     @property
     def facts(self) -> tuple[str, ...]:
-        """Scenario, robot, arm, seed, duration and gain, as far as they are known."""
+        """Texts of scenario, robot, arm, seed, duration and gain; unknown facts are left out."""
         found = (
             self.scenario and f"scenario {self.scenario}",
             self.robot and f"robot {self.robot}",
@@ -103,7 +103,7 @@ class Session:
 
     @property
     def title(self) -> str:
-        """Name for people."""
+        """Name that users see: the scenario if it is known, otherwise the name of the recording."""
         return self.scenario or self.name
 
     @property
@@ -118,7 +118,7 @@ class Result:
 
     Attributes:
         name: Name of the metric.
-        place: Name under which its keys appear.
+        place: Name under which the metric's keys appear in JSON.
         values: Return value of its ``values()``.
         json: The values as plain dictionaries; None for a metric without keys.
         rows: Rows of tables.
@@ -248,7 +248,7 @@ class Score:
     samples = _Found(Samples)
     """Number of scored slave poses."""
     reach = _Found(ReachScore)
-    """Share of the time in which the slave followed, and the causes of the rest."""
+    """Share of the time in which the slave followed the hand, and why it could not follow otherwise."""
     asked_error_mm = _Found(Spread)
     """Distance of the slave's tip from the position that the hand asked for, [mm]."""
     asked_error_deg = _Found(Spread)

@@ -1,4 +1,4 @@
-"""Table: scores on the terminal, side by side, with the published figures."""
+"""Table: scores on the terminal, side by side, with the published values."""
 
 from collections.abc import Sequence
 from itertools import groupby
@@ -34,7 +34,7 @@ def score_tables(scores: Sequence[Score], width: int) -> list[Table]:
 
 
 def score_table(scores: Sequence[Score]) -> Table:
-    """Table with one column per score; each figure is beside its published value, with a check mark if both agree."""
+    """Table with one column per score; each value is beside its published value, with a check mark if both agree."""
     lines = side_by_side([score.rows for score in scores])
     caption = CAPTION if is_compared(lines) else None
     table = Table(box=SIMPLE, caption=caption, caption_justify="left", pad_edge=False, padding=(0, 1, 0, 0))

@@ -28,7 +28,7 @@ from teleop_core.evaluation.windows import DisorderError, Seconds, Span, Window,
 from teleop_core.graph.topics import SLAVE_MEASURED_CP, SLAVE_SERVO_CP, SLAVE_SETPOINT_CP, TELEOP_STATE, Topic
 
 REQUIRED = (SLAVE_MEASURED_CP, SLAVE_SETPOINT_CP, SLAVE_SERVO_CP)
-"""Topics that every score requires. Values that need other topics are None if these are missing."""
+"""Topics that every score requires. Values that need other topics are None if those topics are missing."""
 
 
 class Study(NamedTuple):
@@ -61,7 +61,7 @@ def evaluate(bag: Bag, arm: str = "", further: Sequence[type[Metric]] = (), span
         arm: Name of the arm; empty for the default arm.
         further: Metrics in addition to the metrics of the registry.
         span: Begin and end [s] of the scored part, since the first message; None for the whole recording. Counts of
-            messages and reports of nodes are always of the whole recording.
+            messages and reports of nodes always cover the whole recording.
 
     Raises:
         ParameterError: The span is empty or lies beyond the recording.
@@ -152,7 +152,7 @@ Cut = Callable[[Bag, Iterable[Topic], StateHistory, int], Iterable[Window]]
 
 
 def _run(bag: Bag, arm: str, makers: Sequence[type[Metric]], span: Span | None) -> tuple[Context, list[Metric]]:
-    """Metrics after they have processed the whole recording, or its span."""
+    """Metrics after they have processed the whole recording, or the given span of it."""
     history, origin = read_history(bag), read_origin(bag, arm)
     try:
         context = Context(bag, arm, history, origin, span)
@@ -190,7 +190,7 @@ def _named(place: str, part: Accumulator | type[Metric]) -> Iterator[None]:
         yield
     except (RecordingError, PartError):
         raise
-    except Exception as error:  # a metric may be from any user
+    except Exception as error:  # a user's metric can raise any exception
         name = getattr(part, "name", type(part).__name__)
         reason = " ".join(f"{type(error).__name__}: {error}".split())
         raise EvaluationError(f"{place}: the metric {name!r} failed with {reason}") from error
@@ -205,9 +205,10 @@ def _result(context: Context, metric: Metric) -> Result:
 
 
 def _compared(results: tuple[Result, ...]) -> tuple[Result, ...]:
-    """Results that are compared with published figures only if the slave followed nearly all the time.
+    """Results that are compared with published values only if the slave followed nearly all the time.
 
-    If it did not, the rows state this instead: the slave then did not track the motion that the hand asked for.
+    If it followed for less time, a row states this instead: the slave did not track the motion that the hand asked
+    for.
     """
     reach = next((result.values for result in results if isinstance(result.values, ReachScore)), None)
     share = reach.followed_share if reach is not None else None

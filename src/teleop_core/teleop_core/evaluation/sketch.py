@@ -17,7 +17,7 @@ def sketch(title: str, paths: Mapping[str, tuple[Array, Array]]) -> str:
 
     Args:
         title: A line of facts.
-        paths: Positions (N, 3) of each arm's tip [m]: the reference, and measured.
+        paths: For each arm, the reference positions and the measured positions of the tip, both (N, 3) [m].
     """
     parts = [f"<p><b>{escape(title)}</b></p>"]
     for arm, (wanted, reached) in paths.items():

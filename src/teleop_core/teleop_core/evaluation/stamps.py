@@ -14,8 +14,8 @@ class StampTally:
 
     Args:
         topic: The topic.
-        source: Topic whose stamps it passes on; None if it has its own stamps.
-        is_played: Whether its messages come from a replayed file.
+        source: Topic from which the stamps are copied; None if the topic has its own stamps.
+        is_played: Whether the topic's messages come from a replayed file.
     """
 
     def __init__(self, topic: Topic, source: Topic | None = None, *, is_played: bool) -> None:
@@ -28,7 +28,7 @@ class StampTally:
         own = window.own(self.topic)
         if own.stop > own.start:
             stamps = window.series[self.topic.name].stamp_ns[max(0, own.start - 1) : own.stop]
-            # Before the first command, a slave publishes its pose with this stamp; old recordings have 0.
+            # Before the first command, a slave publishes its pose with this stamp; old recordings contain 0 instead.
             is_known = stamps[:-1] > NO_COMMAND_NS
             steps, is_own = np.diff(stamps)[is_known], self._is_own(window, stamps)[is_known]
             if self.topic.stamp.of:
@@ -53,9 +53,10 @@ class StampTally:
     def gaps(self) -> int:
         """Number of samples that are missing at the nominal period.
 
-        Gaps that were passed on from the source topic are counted there, and gaps of a replayed file are not counted.
+        A gap that was copied from the source topic is counted at the source topic only. Gaps of a replayed file are
+        not counted.
 
-        If the stamps are passed on from another topic, each repeated stamp compensates one skipped stamp: the slave
+        If the stamps are copied from another topic, each repeated stamp compensates one skipped stamp: the slave
         repeats a command when no command came, and uses only the newest when several came. If the stamps are times of
         sampling, a repeated stamp is the same sample twice.
         """

@@ -15,7 +15,7 @@ from teleop_core.graph import STATE, STATE_FIELDS, topics
 from teleop_core.kernels.geometry import Array
 
 _CENTER = slice(STATE["fixture_center_x"], STATE["fixture_center_x"] + 3)
-# Fields that recordings of earlier versions lack.
+# Values of the fields that recordings of earlier versions lack.
 _SINCE = {"limit": "nan", "limited_joint": "nan"}
 _SIZE = slice(STATE["fixture_size_x"], STATE["fixture_size_x"] + 3)
 
@@ -28,7 +28,7 @@ class StateHistory:
         stamp_ns: Time from which each row is valid, shape (N,), [ns].
         rows: Columns as in :data:`~teleop_core.graph.signals.STATE_FIELDS`, shape (N, 13).
         fixture: Index in ``fixtures`` of each row's fixture, shape (N,).
-        fixtures: All reported fixtures, each once; on or off.
+        fixtures: All reported fixtures, each once, whether it was on or off.
     """
 
     stamp_ns: Integers

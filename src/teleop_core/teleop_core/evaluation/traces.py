@@ -7,9 +7,9 @@ from teleop_core.evaluation.accumulators import Integers
 from teleop_core.kernels.geometry import Array
 
 SAMPLES = 660_000
-"""Largest number of samples of a stream that are all kept: eleven minutes at 1 kHz."""
+"""Largest number of samples of a stream for which every sample is stored: eleven minutes at 1 kHz."""
 BUCKETS = SAMPLES // 2
-"""Number of intervals of a longer recording; the smallest and largest value of each interval is kept."""
+"""Number of intervals of a longer recording; only the smallest and largest value of each interval are stored."""
 _SECOND_NS = 1e9
 Rows = NDArray[np.float32]
 
@@ -25,7 +25,7 @@ def spacing_s(samples: int, duration_s: float) -> float:
 
 
 class Envelope:
-    """Columns against time: every sample, if there are no more than :data:`SAMPLES`.
+    """Stores columns against time: every sample, if there are no more than :data:`SAMPLES`.
 
     For a longer recording it keeps the smallest and largest value of each column in each of :data:`BUCKETS` time
     intervals. Peaks are thus kept and the memory use does not grow.
@@ -60,7 +60,7 @@ class Envelope:
             self._parts.clear()
 
     def line(self) -> tuple[Array, Rows]:
-        """Times (M,) [s] from the start and values (M, columns), through all samples or extremes.
+        """Curve through all samples or extremes: times since the start (M,) [s] and values (M, columns).
 
         Each interval of a long recording gives two points, ordered so that the line rises or falls as the samples do.
         """

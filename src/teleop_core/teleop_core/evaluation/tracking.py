@@ -1,4 +1,4 @@
-"""Tracking: the slave's poses, the poses it should have had, and the errors between them."""
+"""Tracking: the slave's poses, the poses that it should have had, and the errors between both."""
 
 from dataclasses import dataclass
 
@@ -96,7 +96,7 @@ class Tracked:
         log_ns: Times of recording, shape (N,), [ns].
         stamp_ns: Times of sampling, shape (N,), [ns].
         poses: slave/measured_cp, shape (N, 7).
-        setpoints: slave/setpoint_cp of the tick in which they were sampled, shape (N, 7).
+        setpoints: slave/setpoint_cp of the tick in which each pose was sampled, shape (N, 7).
         commands: Latest slave/servo_cp at the stamp of the pose, shape (N, 7).
         is_paired: Whether the setpoint of the same tick was recorded, shape (N,).
         against: Errors relative to the setpoints.
@@ -122,7 +122,7 @@ def _track(window: Window) -> Tracked:
     measured, setpoint = window.samples(SLAVE_MEASURED_CP), window.around(SLAVE_SETPOINT_CP)
     command, all_measured = window.around(SLAVE_SERVO_CP), window.around(SLAVE_MEASURED_CP)
     partner = same_tick(all_measured.log_ns, setpoint.log_ns)[window.own(SLAVE_MEASURED_CP)]
-    # Until a command is in force, for example on the way to its start, the slave follows no command.
+    # Until the first command is in force, for example while it moves to its start, the slave follows no command.
     is_led = partner == NONE
     partner = np.where(is_led, NONE, np.maximum(partner - window.lag, 0))
     is_led[~is_led] = setpoint.stamp_ns[partner[~is_led]] > NO_COMMAND_NS
@@ -152,7 +152,8 @@ class ErrorTrace:
     """Envelope of all errors, for drawing.
 
     Attributes:
-        envelope: Position error, command error [mm], roll, pitch, yaw, angle [deg]; 6 columns.
+        envelope: 6 columns: position error and command error [mm], then errors of roll, pitch, yaw and total angle
+            [deg].
     """
 
     def __init__(self, context: Context) -> None:

@@ -1,4 +1,4 @@
-"""Verdict: one line about a score that names the worst first."""
+"""Verdict: one line about a score that names the worst problem first."""
 
 import math
 from collections.abc import Callable, Iterator, Mapping
@@ -11,11 +11,15 @@ from teleop_core.evaluation.published import BOX_OVERSHOOT_MM
 SHARE = "reach.followed_share"
 NAMED = 3
 """Largest number of concerns that a verdict names."""
-# Limits from which on a value is a concern. They are assumed, except the overshoot of a fixture and the share of
-# followed time, below which no published figure is compared.
-_FOLLOWED, _DRIFT_MM, _ERROR_MM, _LATENCY_MS, _SHARE = 0.99, 5.0, 1.0, 20.0, 1e-3
+# A value beyond its limit is a concern. The limits are assumed, except the overshoot of a fixture and ``_FOLLOWED``.
+_FOLLOWED = 0.99  # share of followed time; below this limit, no published value is compared
+_DRIFT_MM = 5.0  # lag behind the hand [mm]
+_ERROR_MM = 1.0  # position error [mm]
+_LATENCY_MS = 20.0  # delay from hand to setpoint [ms]
+_SHARE = 1e-3  # share of missing messages or of dropped ticks
 _CREATED_MJ = 1.0
-"""Larger than the energy that passivity lends, and than the energy of a last touch before the recording ends."""
+"""Limit of the created energy [mJ]. It exceeds the energy that passivity lends, and the energy of a last touch before
+the recording ends."""
 _CAUSES = {
     "joint": "at a joint's end",
     "workspace": "beyond the workspace",
@@ -134,7 +138,7 @@ def _following(values: Values) -> Iterator[Concern]:
 
 
 def _beyond(key: str, fine: float, text: str) -> Callable[[Values], Iterator[Concern]]:
-    """Function that gives a concern about one number, which is inserted into the text."""
+    """Return a function that yields a concern about one number, which is inserted into the text."""
 
     def concern(values: Values) -> Iterator[Concern]:
         value = _number(values, key)

@@ -1,4 +1,4 @@
-"""Windows: a recording, divided into windows of some seconds of all topics, each with context on both sides.
+"""Windows: divides a recording into windows of some seconds with all topics; each has context on both sides.
 
 Samples of different topics may belong together although they are in different chunks. A window contains its own
 interval of log time and one second of context on both sides, so that partners are found across its ends. A span is the
@@ -88,7 +88,7 @@ def whole(
 def windows(
     bag: Bag, topics: Iterable[Topic | str], history: StateHistory = NO_HISTORY, lag: int = 0
 ) -> Iterator[Window]:
-    """Windows of a recording in the order of time; memory does not grow with its length.
+    """Windows of a recording in the order of time; the memory use does not grow with the recording's length.
 
     Raises:
         DisorderError: A sample belongs to a window that was already yielded; :func:`whole` can read such a file.
@@ -160,10 +160,11 @@ def span_of(bag: Bag, seconds: Seconds | None) -> Span | None:
 
     Args:
         bag: The recording.
-        seconds: Begin and end [s] since the first message; an end after the last message is reduced to it.
+        seconds: Begin and end [s] since the first message; an end after the last message is reduced to the time of
+            that message.
 
     Raises:
-        ParameterError: The span is empty, not finite, or begins after the end.
+        ParameterError: The span is empty, is not a number, or begins after the recording ends.
     """
     if seconds is None:
         return None

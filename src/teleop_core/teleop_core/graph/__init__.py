@@ -1,4 +1,4 @@
-"""Graph: stages, topics and links: the one description of what runs."""
+"""Graph: stages, topics and links, the single description of what a session runs."""
 
 from typing import TYPE_CHECKING
 

@@ -1,7 +1,7 @@
 """Former shapes: fixtures and objects in recordings of version 0.6 and before.
 
-They had a diameter in place of the present radius, and each shape to stay out of was a separate kind. Only recordings
-are read in this way: for users' files an error lists the known names.
+In these versions shapes had a diameter instead of a radius, and each shape that the tool must stay out of was a
+separate kind. Only recordings are converted in this way; for a user's file an error lists the known names.
 """
 
 import re
@@ -19,11 +19,11 @@ _DIAMETER = re.compile(r"\bdiameter\s*=\s*([^\s,]+)")
 
 
 def present_fixture(kind: str, values: Mapping[str, Any]) -> tuple[str, dict[str, Any]]:
-    """Name of a fixture's shape today, and its values, ``place`` and ``keep_out`` among them.
+    """Present name of a fixture's shape, and its present values, including ``place`` and ``keep_out``.
 
     Args:
-        kind: Such as ``keep_out_sphere``.
-        values: Values of its own parameters, by name.
+        kind: Former kind of the fixture, such as ``keep_out_sphere``.
+        values: Values of the fixture's own parameters, by name.
     """
     shape, found = kind.removeprefix(_KEPT_OUT), dict(values)
     if shape in {"sphere", "cylinder"} and "diameter" in found:
@@ -50,7 +50,7 @@ def present_layer(layer: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[str,
 
 def _present_stage(values: Mapping[str, Any]) -> dict[str, Any]:
     kind, found = str(values.get(_KIND, "")), dict[str, Any]()
-    # Values of the used fixture come last, because keep_out_sphere is a sphere too.
+    # Values of the used fixture come last, because ``sphere`` and ``keep_out_sphere`` get the same present name.
     for name in sorted(values, key=lambda name: name.startswith(f"{_FIXTURE}{kind}.")):
         head, dot, own = name.removeprefix(_FIXTURE).partition(".")
         if not (name.startswith(_FIXTURE) and dot):

@@ -1,4 +1,4 @@
-"""Graph: stages, the links between them and the arms: the one description of what runs.
+"""Graph: stages, links between stages, and arms; the single description of what a session runs.
 
 Virtual time, replay, nodes, recorder, evaluation and diagrams derive everything from the graph: the order of a tick,
 which topic feeds which port, which links are delayed, and which topics are summed.
@@ -17,9 +17,9 @@ __all__ = ["BUILT_IN", "DEVICE", "HAND", "RECORDER_NAME", "Delay", "Graph", "Lin
 BUILT_IN = ("operator", "haptic_master", "motion_scaling", "inverse_kinematics", "slave", "slave_sim")
 """Names of the stages that every arm has."""
 HAND, DEVICE = BUILT_IN[:2]
-"""Stages at whose recorded output a replay can begin."""
+"""Stages from whose recorded output a replay can start."""
 RECORDER_NAME = "recorder"
-_WAYS = {"first": 0, "second": 1}  # maps prefixes of ports between arms to the arm that writes
+_WAYS = {"first": 0, "second": 1}  # maps prefixes of ports between arms to the index of the arm that writes
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ class Member:
 
     @property
     def writes(self) -> tuple[Topic, ...]:
-        """Topics that it writes, in its namespace."""
+        """Topics that the stage writes, in the namespace of its arm."""
         return tuple(topic.of_arm(self.arm) for topic in self.stage.writes)
 
 
@@ -76,7 +76,7 @@ class Delay:
         """Delay from ``topic=seconds`` or ``topic@reader=seconds``.
 
         Raises:
-            ParameterError: The text has another form, or the time is negative or not a number.
+            ParameterError: The text does not have this form, or the time is not between 0 and 60 s.
         """
         link, equals, time = text.partition("=")
         topic, _, reader = link.strip().partition("@")
@@ -191,10 +191,10 @@ class Graph:
 
     @cached_property
     def links(self) -> tuple[Link, ...]:
-        """All links, reader by reader; at each port the link to which others are added comes first.
+        """All links, reader by reader; at each port, the main link comes before links whose values are added to it.
 
-        A port ``first/topic`` of the second arm is fed by the first arm's ``topic``, and a port ``second/topic`` of
-        the first arm by the second arm's. Such ports of other arms are not fed.
+        The second arm's port ``first/topic`` receives the first arm's ``topic``. The first arm's port ``second/topic``
+        receives the second arm's ``topic``. Such ports of further arms receive nothing.
         """
         return tuple(
             link for member in self._all() for port in member.stage.reads for link in self._links_to(member, port)
@@ -217,7 +217,7 @@ class Graph:
             yield Link(own, Member(stage, reader.arm), reader, port, delay, is_late, adds)
 
     def _link_between(self, reader: Member, port: Topic, plain: str, arm: str) -> Iterator[Link]:
-        """Link from a stage of another arm, if one writes the topic of this plain name."""
+        """Link from a stage of another arm, if a stage of that arm writes the topic with this plain name."""
         for stage in self.stages:
             for topic in stage.writes:
                 if topic.name == plain:
@@ -274,7 +274,7 @@ class Graph:
         return tuple(ordered)
 
     def played(self, begin: str) -> tuple[Member, ...]:
-        """Stages whose topics a replay takes from a recording, arm by arm.
+        """Stages whose topics are taken from a recording in a replay, arm by arm.
 
         Args:
             begin: The last of these stages: :data:`HAND`, :data:`DEVICE`, or empty for none.
@@ -284,7 +284,7 @@ class Graph:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Notes on probable mistakes: outputs with names like an input that no stage reads."""
+        """Notes on probable mistakes: a stage reads a topic, but no stage reads its own topic of the same kind."""
         read = {link.topic.name for link in self.links}
         found = []
         for stage in self.stages:
@@ -300,14 +300,14 @@ class Graph:
         return tuple(found)
 
     def links_of(self, member: Member) -> tuple[Link, ...]:
-        """Links that end at a stage."""
+        """Links whose reader is the given stage."""
         return tuple(link for link in self.links if link.reader == member)
 
     def chain(self, arm: str = "") -> tuple[tuple[str, Topic], ...]:
         """Path of a master's sample to the slave: stages, each with its output topic.
 
-        The path begins at the first stage of the order and follows the stamps: each next stage answers the previous
-        topic and keeps its stamp.
+        The path begins at the stage :data:`DEVICE` and follows the stamps: each next stage answers the previous topic
+        and copies its stamp.
         """
         first = Member(next(stage for stage in self.stages if stage.name == DEVICE), arm)
         found = [(first.stage.name, first.writes[0])]
@@ -332,7 +332,7 @@ class Graph:
 
 
 def build_graph(arms: Iterable[str] = (), stages: Iterable[str] = (), delays: Iterable[str] = ()) -> Graph:
-    """Graph of the built-in stages and some more.
+    """Graph of the built-in stages and of further stages.
 
     Args:
         arms: Names of the arms, the default arm first; if empty, there is one arm without a name.

@@ -14,7 +14,7 @@ from teleop_core.graph.stage import STAGES
 
 @dataclass(frozen=True, kw_only=True)
 class RealTimeParameters:
-    """What a live node requests from the operating system; a refusal is reported, and the node works on."""
+    """Real-time privileges that a live node requests; if one is refused, the node reports the refusal and continues."""
 
     priority: int = fixed(
         -1,
@@ -81,7 +81,7 @@ RENAMED = {
         )
     },
 }
-"""Former names, or their prefixes, which recordings and files may still contain, with the present names."""
+"""Maps former names or prefixes, which recordings and files may still contain, to the present names."""
 _READER = ("slave/servo_jp@slave_sim=", "slave/servo_jp@slave=")  # reader of commands: former and present name
 _OF_ROBOT = ("robot", "geometry")
 
@@ -115,7 +115,7 @@ def scenario_file(name: str) -> Path:
     """File of a scenario.
 
     Raises:
-        UnknownNameError: No such scenario; the alternatives are listed.
+        UnknownNameError: There is no such scenario; the error lists the alternatives.
     """
     files = _scenarios()
     if name not in files:
@@ -124,7 +124,7 @@ def scenario_file(name: str) -> Path:
 
 
 def load_file(path: Path) -> Layer:
-    """Values of a ROS 2 parameter file: a mapping from stages to mappings from dotted names to values.
+    """Values of a ROS 2 parameter file, by stage and dotted name.
 
     Raises:
         TeleopError: The file is missing, is not YAML, or has the wrong structure.
@@ -184,7 +184,7 @@ def _owners(name: str, where: str) -> list[str]:
     """Stages that have a parameter of this name.
 
     Raises:
-        UnknownNameError: No stage has it.
+        UnknownNameError: No stage has this parameter.
     """
     names = {stage: {spec.name for spec in specs(group)} for stage, group in declared_groups().items()}
     if not (owners := [stage for stage, own in names.items() if name in own]):
@@ -220,9 +220,9 @@ def _flat(values: Mapping[str, Any], prefix: str = "") -> Iterable[tuple[str, ob
 def parse_setting(text: str) -> Layer:
     """Values of one ``--set key=value``.
 
-    The key is ``stage.name``, or a bare name, which sets every stage that has it; the prefix ``arm/`` restricts it to
-    that arm. The name of a group with a ``kind`` chooses the kind: ``fixture=sphere``. A list is written [1, 2]. Whole
-    numbers are accepted for real numbers.
+    The key is ``stage.name``, or a bare name, which sets the parameter in every stage that has it; the prefix ``arm/``
+    restricts the setting to that arm. The name of a group with a ``kind`` chooses the kind: ``fixture=sphere``. A list
+    is written [1, 2]. Whole numbers are accepted for real numbers.
 
     Raises:
         TeleopError: There is no "=", or the value is not YAML.
@@ -256,7 +256,7 @@ def setting(key: str, value: object) -> Layer:
 
 
 def _hits(key: str) -> list[tuple[str, Spec]]:
-    """Stages and parameters that a key means.
+    """Stages and parameters to which a key refers.
 
     Raises:
         UnknownNameError: There is no such parameter, or there are several with different names.
@@ -284,9 +284,9 @@ def _hits(key: str) -> list[tuple[str, Spec]]:
 
 
 def _as_declared(spec: Spec, value: object) -> object:
-    """Value in the declared type: a whole number becomes a real one; a number read by YAML becomes text.
+    """Value in the declared type; if necessary, a whole number becomes a real number, or a number becomes text.
 
-    A single value stands for a list of one element.
+    For a list, a single value becomes a list of one element.
     """
     if isinstance(value, list | tuple):
         return tuple(_as_element(spec, element) for element in value)

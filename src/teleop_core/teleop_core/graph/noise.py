@@ -9,7 +9,7 @@ BLOCK = 1000
 
 
 class Noise:
-    """Noise of a stage; its kernel counts the used rows in ``next_noise`` of its state.
+    """Noise of a stage; the stage's kernel counts the used rows in ``next_noise`` of the stage's state.
 
     Attributes:
         rows: Standard normal numbers, shape (:data:`BLOCK`, 6), a row for each tick.
@@ -19,7 +19,7 @@ class Noise:
         self.rows = np.zeros((BLOCK, 6))
 
     def begin(self, rng: np.random.Generator) -> None:
-        """Draw from a generator from now on; the state counts from row 0 again."""
+        """Use a generator from now on; the state counts the rows from 0 again."""
         self._rng, self._end = rng, 0
 
     def prepare(self, state: Any, ticks: int) -> None:

@@ -53,7 +53,7 @@ def make_signals(topics: Iterable[Topic], joints: int, notes: Iterable[Field] = 
 
 
 def assign(target: Any, source: Any) -> None:
-    """Write into a record the values of another record of its type, or 0 into all of its fields."""
+    """Set all fields of ``target`` to the values of ``source``, a record of the same type, or to 0."""
     for name in target.dtype.names:
         target[name] = source if isinstance(source, int) else source[name]
 
@@ -67,6 +67,6 @@ def copy(source: Array, target: Array) -> None:
 
 @kernel
 def add(source: Array, target: Array) -> None:
-    """Add a row to another, element by element."""
+    """Add row ``source`` to row ``target``, element by element."""
     for i in range(target.shape[0]):
         target[i] += source[i]

@@ -33,19 +33,19 @@ class Runner(Protocol):
     kernel: Callable[..., None]
     arguments: tuple[Any, ...]
     ahead: int
-    """Largest number of ticks for which it can be prepared at once, 1000 at most."""
+    """Largest number of ticks for which the stage can be prepared at once, 1000 at most."""
     changes_itself: bool
-    """Whether it changes parameters by itself, as a mode button does; see :meth:`present`."""
+    """Whether the stage changes parameters by itself, as with a mode button; see :meth:`present`."""
 
     @property
     def lead(self) -> int:
-        """Ticks before the stage can follow commands, such as those of a move to its start."""
+        """Number of ticks before the stage can follow commands, for example while it moves to its start."""
 
     def prepare(self, ticks: int) -> None:
         """Prepare the next ``ticks`` steps, at most ``ahead``."""
 
     def reset(self) -> None:
-        """Back to the state before the first step."""
+        """Reset the stage to its state before the first step."""
 
     def retune(self, parameters: Any) -> None:
         """Use new parameters from the next step on, without a jump of the outputs."""
@@ -66,7 +66,7 @@ class Runner(Protocol):
         """Make outputs safe when the topic that the stage answers has fallen silent."""
 
     def concerns(self) -> list[str]:
-        """Sentences for people on what is wrong with the stage now; called once a second."""
+        """Sentences for users about current problems of the stage; this method is called once per second."""
 
     def described(self) -> dict[str, str]:
         """Names and texts that the report of the stage contains in addition to its numbers."""
@@ -77,34 +77,34 @@ class Stage:
     """One stage of the graph.
 
     Attributes:
-        name: Name of its node and of its group in parameter files.
+        name: Name of the stage's node, and of the stage's group in parameter files.
         parameters: Parameter group, a dataclass of :func:`~teleop_core.base.parameters.parameter`.
-        reads: Topics it reads; its record has a field for each.
-        writes: Topics it writes, streams and at most one report.
+        reads: Topics that the stage reads; the stage's record has a field for each topic.
+        writes: Topics that the stage writes: streams, and at most one report.
         step: ``step(parameters, state, signals, dt)``, a kernel or a plain function: ``parameters`` and ``state`` are
             records with a field for each parameter and each entry of ``state``.
-        state: Its memory from step to step, zero at the start: a class of :class:`~teleop_core.kernels.fields.Fields`,
-            or fields as :class:`numpy.dtype` takes them.
-        make: In place of ``step`` and ``state``: makes the :class:`Runner` from parameters and the length of a tick
-            [s].
+        state: Memory of the stage from step to step, which is zero at the start: a class of
+            :class:`~teleop_core.kernels.fields.Fields`, or fields as :class:`numpy.dtype` takes them.
+        make: Function that makes the :class:`Runner` from the parameters and the length of a tick [s]; it replaces
+            ``step`` and ``state``.
         late: Topics of ``reads`` whose values from the end of the last tick are read. A cycle of stages needs one.
         optional: Topics of ``reads`` that no stage has to write; their values are zero if no stage writes them.
-        trigger: The topic whose messages it answers, one step each; None for a stage with a clock of its own, which
+        trigger: Topic whose messages the stage answers with one step each; None for a stage with its own clock, which
             makes one step per tick.
-        replaces: Topic whose other readers read ``writes[0]`` in its place, as for a limit or a filter between two
-            stages; or several topics, for ``writes`` in their order.
-        spares: Names of stages that still read the original topic, such as an operator who holds the stylus itself;
-            for one topic alone: ``slave/measured_cf@passivity``.
-        serves: Names of the only stages that read the replacement, even if other stages replace the same topic for
-            them, such as an operator who sees the slave on a display; empty for all.
+        replaces: Topic that ``writes[0]`` replaces for all other readers, as for a limit or a filter between two
+            stages. Several topics are replaced by ``writes`` in their order.
+        spares: Names of stages that still read the original topic, such as an operator who holds the stylus itself. An
+            entry like ``slave/measured_cf@passivity`` applies to one topic only.
+        serves: Names of the only stages that read the replacement, such as an operator who sees the slave on a
+            display. They read it even if other stages replace the same topic. Empty for all stages.
         on_demand: Topics of ``writes`` that exist only if another stage must read them, or if the topic that they
             replace is written.
-        notes: Further fields of its record, which no stage reads.
-        node: ``module:class`` of its node, if a generic node is not enough.
+        notes: Further fields of the stage's record, which no stage reads.
+        node: ``module:class`` of the stage's node, if a generic node is not enough.
         needs: Topics without which the node answers no message.
 
     Raises:
-        PartError: The stage contradicts itself; the message tells how.
+        PartError: The stage contradicts itself; the message states the contradiction.
     """
 
     name: str
@@ -194,21 +194,21 @@ class Stage:
 
     @property
     def replaced(self) -> tuple[Topic, ...]:
-        """Topics whose other readers read ``writes`` in their place, in that order."""
+        """Topics that ``writes`` replaces for all other readers, in the order of ``writes``."""
         if self.replaces is None:
             return ()
         return self.replaces if isinstance(self.replaces, tuple) else (self.replaces,)
 
     @property
     def ports(self) -> tuple[Topic, ...]:
-        """All topics of its record."""
+        """All topics of the stage's record."""
         return tuple(dict.fromkeys((*self.reads, *self.writes)))
 
     def run(self, parameters: Any, dt: float = DT) -> Runner:
-        """Make the running stage.
+        """Make the object that runs this stage in a session.
 
         Args:
-            parameters: An instance of its parameter group.
+            parameters: An instance of the stage's parameter group.
             dt: Length of a tick [s].
         """
         if self.make is not None:
@@ -217,7 +217,7 @@ class Stage:
 
 
 def joints_of(parameters: Any) -> tuple[str, ...]:
-    """Joint names of the robot that a stage's parameters name; empty without one."""
+    """Joint names of the robot that a stage's parameters name; empty without a robot."""
     return tuple(getattr(parameters, "joint_names", ()))
 
 
@@ -226,7 +226,7 @@ class RunningStage:
 
     Args:
         stage: The stage that it runs.
-        joints: Number of joints of its arm; 0 without joints.
+        joints: Number of joints of the arm; 0 without joints.
         dt: Length of a tick [s].
     """
 
@@ -240,14 +240,14 @@ class RunningStage:
 
     @property
     def lead(self) -> int:
-        """Ticks before the stage can follow commands; 0 by default."""
+        """Number of ticks before the stage can follow commands; 0 by default."""
         return 0
 
     def prepare(self, ticks: int) -> None:
         """Prepare the next ``ticks`` steps; does nothing by default."""
 
     def reset(self) -> None:
-        """Back to the state before the first step."""
+        """Reset the stage to its state before the first step."""
 
     def retune(self, parameters: Any) -> None:
         """Use new parameters from the next step on."""
@@ -263,7 +263,7 @@ class RunningStage:
         """Make outputs safe when the topic that the stage answers has fallen silent; does nothing by default."""
 
     def concerns(self) -> list[str]:
-        """Sentences for people on what is wrong with the stage now; none by default."""
+        """Sentences for users about current problems of the stage; none by default."""
         return []
 
     def described(self) -> dict[str, str]:
@@ -288,7 +288,7 @@ def _nothing() -> None:
 
 
 class _Plain(RunningStage):
-    """A stage of records alone: parameters become fields, the state starts at zero."""
+    """Runner of a stage with a ``step``: parameters become fields of a record, and the state starts at zero."""
 
     def __init__(self, stage: Stage, parameters: Any, dt: float) -> None:
         joints = len(joints_of(parameters))
@@ -332,7 +332,7 @@ class _Plain(RunningStage):
         assign(self.signals, self._begin)
 
     def retune(self, parameters: Any) -> None:
-        """Take new parameters; a text parameter becomes its index in the choices."""
+        """Use new parameters; a text parameter becomes its index in the choices."""
         for name, value in _numbers(parameters):
             self._parameters[name] = value
 
@@ -392,7 +392,7 @@ STAGES: Registry[Stage] = Registry(
     },
     _checked,
 )
-"""All stages by name, in the order in which data goes through the built-in ones."""
+"""All stages by name, in the order in which data pass through the built-in stages."""
 
 register_stage = STAGES.register
 """Adds your stage under its own name; see :meth:`Registry.register`."""

@@ -13,10 +13,13 @@ OPERATION = (
     "state", "is_homed", "is_busy", "is_stopped", "fault", "fault_joint", "fault_value",
     "fault_bound", "rest_time", "travel", "is_braked", "is_pressed",
 )  # fmt: skip
-"""Numbers of ``slave/operation``: :class:`~teleop_core.slave.operation.State`, flags,
-:class:`~teleop_core.slave.operation.Fault`, the joint of the fault (-1: none), the value found and its bound. Then,
-for the last stop, the time until the arm was at rest [s] and the distance that the tip moved meanwhile [m], both 0
-before the first stop; whether drives must be off and brakes on; whether a stop button is still pressed, or silent.
+"""Numbers of ``slave/operation``, in this order.
+
+The state (:class:`~teleop_core.slave.operation.State`), and three flags. The fault
+(:class:`~teleop_core.slave.operation.Fault`), the joint of the fault (-1: none), the value that caused the fault, and
+the bound of this value. For the last stop, the time until the arm was at rest [s] and the distance that the tip moved
+meanwhile [m]; both are 0 before the first stop. Whether drives must be off and brakes on. Whether a stop button is
+still pressed or silent.
 """
 
 
@@ -39,11 +42,11 @@ class Limit(IntEnum):
 
 
 def limit_text(limit: int, joint: int, joint_names: tuple[str, ...] = ()) -> str:
-    """What holds the slave back, in words.
+    """Text that names the limit at which the slave is.
 
     Args:
         limit: Value of :class:`Limit`.
-        joint: Index of the joint at its limit; negative if none is.
+        joint: Index of the joint at its limit; negative if no joint is at its limit.
         joint_names: Names of the joints; without them they are counted from 1.
     """
     if limit == Limit.JOINT and joint >= 0:
@@ -83,7 +86,7 @@ class Kind(Enum):
     JAW = "jaw", "sensor_msgs/msg/JointState"
     NUMBERS = "numbers", "sensor_msgs/msg/JointState"
     JOINTS = "joints", "sensor_msgs/msg/JointState"
-    STATE = "state", "sensor_msgs/msg/JointState"  # unknown topics of its type are read with this kind
+    STATE = "state", "sensor_msgs/msg/JointState"  # unknown topics of this message type are read with this kind
     REPORT = "report", "diagnostic_msgs/msg/DiagnosticArray"
 
     def __init__(self, _: str, ros_type: str) -> None:
@@ -92,17 +95,17 @@ class Kind(Enum):
 
     @property
     def has_joints(self) -> bool:
-        """Whether its columns are those of a robot's joints."""
+        """Whether the columns belong to a robot's joints."""
         return self in {Kind.JOINTS, Kind.STATE}
 
     @property
     def has_names(self) -> bool:
-        """Whether its messages contain the names of their numbers."""
+        """Whether the messages contain the names of their numbers."""
         return self.has_joints or self in {Kind.NUMBERS, Kind.JAW}
 
     @property
     def has_motion(self) -> bool:
-        """Whether its messages carry velocity and effort beside position."""
+        """Whether the messages contain velocity and effort in addition to position."""
         return self in {Kind.STATE, Kind.JAW}
 
     def columns(self, joint_names: tuple[str, ...]) -> tuple[str, ...]:
@@ -121,7 +124,7 @@ class Kind(Enum):
 
 
 JAW = ("jaw",)
-"""Name of the one joint of a jaw."""
+"""Name of the only joint of a jaw."""
 _COLUMNS = {
     Kind.POSE: ("x", "y", "z", "qw", "qx", "qy", "qz"),
     Kind.TWIST: ("vx", "vy", "vz", "wx", "wy", "wz"),
@@ -134,13 +137,13 @@ _COLUMNS = {
 
 @dataclass(frozen=True)
 class Stamp:
-    """Rule for the header's stamp of a topic: which time it means.
+    """Rule that states which time the stamp in the header of a topic means.
 
     Attributes:
         text: The rule in words.
         of: Name of the topic whose stamp is passed on; empty if the stamp is the time of sampling.
-        is_in_force: Whether the writer itself chooses the command whose stamp is passed on, because it may hold an
-            older command. Such a stamp may repeat, and is :data:`NO_COMMAND_NS` before the first command.
+        is_in_force: Whether the writer itself chooses the command whose stamp is passed on, because an older command
+            may still be in force. Such a stamp may repeat, and is :data:`NO_COMMAND_NS` before the first command.
     """
 
     text: str
@@ -149,22 +152,22 @@ class Stamp:
 
 
 NO_COMMAND_NS = 1
-"""Stamp of what is in force before the first command [ns]: older than any, but not 0, which CRTK reads as invalid."""
+"""Stamp before the first command [ns]. It is older than any command, but not 0, because CRTK treats 0 as invalid."""
 SAMPLED = Stamp("sampling time")
 
 
 def passed_on(topic: str) -> Stamp:
-    """Stamp of the message of ``topic`` that is answered."""
+    """Rule: the stamp is copied from the message of ``topic`` that this message answers."""
     return Stamp(f"of the {topic} it answers", topic)
 
 
 def in_force(topic: str) -> Stamp:
-    """Stamp of the message of ``topic`` that is in force."""
+    """Rule: the stamp is copied from the message of ``topic`` that is in force."""
     return Stamp(f"of the {topic} in force", topic, is_in_force=True)
 
 
 def arrived(topic: str) -> Stamp:
-    """Stamp of the newest message of ``topic`` that came through the network."""
+    """Rule: the stamp is copied from the newest message of ``topic`` that came through the network."""
     return Stamp(f"of the {topic} that arrived last", topic, is_in_force=True)
 
 
@@ -178,17 +181,17 @@ class Topic:
 
     Attributes:
         name: Name below the arm's namespace, such as ``slave/servo_cp``.
-        kind: Kind of its values.
-        stamp: Meaning of the stamp in its header.
+        kind: Kind of the topic's values.
+        stamp: Meaning of the stamp in the header of a message.
         frame_id: Frame of the header, below the arm's namespace.
         quality: QoS of the topic.
-        columns: Names of the numbers, of reports and of :attr:`Kind.NUMBERS`; else empty.
-        adds_to: Name of a topic whose readers get the sum of both, such as ``master/servo_cf`` for
-            another source of force; empty for a topic of its own.
+        columns: Names of the numbers in reports and in messages of :attr:`Kind.NUMBERS`; empty for other kinds.
+        adds_to: Name of another topic, whose readers get the sum of both topics, such as ``master/servo_cf`` for a
+            further source of force. Empty if the values are not added to another topic.
         arm: Namespace; empty for the default arm.
-        is_seldom: Whether it is sent only at a change and every :data:`SELDOM_NS`.
-        message: Name of the ROS message type of a topic without values, such as a robot's model; empty for that of its
-            kind.
+        is_seldom: Whether messages are sent only when the values change and every :data:`SELDOM_NS`.
+        message: Name of the ROS message type of a topic without values, such as a robot's model; empty for the message
+            type of the kind.
     """
 
     name: str
@@ -204,11 +207,11 @@ class Topic:
 
     @property
     def ros_type(self) -> str:
-        """Name of its ROS message type."""
+        """Name of the topic's ROS message type."""
         return self.message or self.kind.ros_type
 
     def of_arm(self, arm: str) -> "Topic":
-        """The same topic of a named arm: in its namespace, with its frames."""
+        """The same topic of a named arm, in the namespace and with the frames of the arm."""
         if not arm or self.arm == arm:
             return self
         frame = f"{arm}/{self.frame_id}" if self.frame_id else ""
@@ -223,11 +226,11 @@ class Topic:
         return self.name.replace("/", "_")
 
     def width(self, joints: int) -> int:
-        """Number of its numbers for a robot with this many joints."""
+        """Number of values in a message, for a robot with this many joints."""
         return len(self.columns) if self.columns else self.kind.width(joints)
 
     def names(self, joint_names: tuple[str, ...]) -> tuple[str, ...]:
-        """Names in its messages, for a robot with these joints; empty without any."""
+        """Names in the topic's messages, for a robot with these joints; empty if the messages contain no names."""
         if self.kind is Kind.NUMBERS:
             return self.columns
         if self.kind is Kind.JAW:
@@ -241,7 +244,7 @@ MASTER_FILTERED_CP = Topic("master/filtered_cp", Kind.POSE, passed_on("master/me
 MASTER_FILTERED_OUT = Topic(
     "master/filtered_out", Kind.NUMBERS, passed_on("master/measured_cp"), "master_base", columns=("x", "y", "z")
 )
-"""What a tremor filter removed [m]: the position of the stylus minus that of filtered_cp."""
+"""Motion that a tremor filter removed [m]: the position of the stylus minus the position of filtered_cp."""
 MASTER_MEASURED_CV = Topic("master/measured_cv", Kind.TWIST, SAMPLED, "master_base")
 MASTER_MEASURED_CF = Topic("master/measured_cf", Kind.WRENCH, SAMPLED, "master_base")
 MASTER_BUTTONS = Topic("master/buttons", Kind.BUTTONS, SAMPLED, "master_base")
@@ -252,9 +255,9 @@ MASTER_CONTACT = Topic(
     "master_base",
     columns=("number", "taken", "returned", "friction", "largest_force"),
 )
-"""Energy of the present contact, or the last one: number of contacts so far; energy that the motors' force took from
-the hand, returned to it, and that dry friction took meanwhile [J]; and the largest force that the heat of the motors
-allows [N]. Energies use the true motion, which only a simulator knows.
+"""Energy of the present or last contact. In order: number of contacts so far; energy that the motors' force absorbed
+from the hand [J]; energy that it returned to the hand [J]; energy that dry friction absorbed meanwhile [J]; and the
+largest force that the heat of the motors allows [N]. Energies use the true motion, which only a simulator knows.
 """
 MASTER_SERVO_CF = Topic("master/servo_cf", Kind.WRENCH, passed_on("master/measured_cp"), "master_base")
 SLAVE_SERVO_CP = Topic("slave/servo_cp", Kind.POSE, passed_on("master/measured_cp"), "slave_base")
@@ -270,10 +273,9 @@ SLAVE_REACH = Topic(
         "cut_x", "cut_y", "cut_z", "cut_rx", "cut_ry", "cut_rz",
     ),
 )  # fmt: skip
-"""How far inverse kinematics can follow: status as of
-:class:`~teleop_core.kinematics.IkStatus`, :class:`Limit`, the joint at its limit (-1: none), the residual of the
-answer [m, rad], and the correction in slave_base [m, rad] that would bring the command within the arm's reach, without
-a time limit.
+"""How far inverse kinematics can follow a command. In order: the status (:class:`~teleop_core.kinematics.IkStatus`),
+the limit (:class:`Limit`), the joint at its limit (-1: none), the residual of the solution [m, rad], and the
+correction in slave_base [m, rad] that would bring the command within the arm's reach, without a time limit.
 """
 SLAVE_SETPOINT_JS = Topic("slave/setpoint_js", Kind.JOINTS, in_force("slave/servo_jp"), "slave_base")
 SLAVE_SETPOINT_CP = Topic("slave/setpoint_cp", Kind.POSE, in_force("slave/servo_jp"), "slave_base")
@@ -303,7 +305,7 @@ TELEOP_STATE = Topic(
     ),
 )  # fmt: skip
 NETWORK_SERVO_CP = Topic("network/servo_cp", Kind.POSE, arrived("slave/servo_cp"), "slave_base")
-"""slave/servo_cp as it arrived through the network; the next four are the slave's values as they arrived."""
+"""slave/servo_cp as it arrived through the network; the next four topics contain the slave's values as they arrived."""
 NETWORK_SETPOINT_CP = Topic("network/setpoint_cp", Kind.POSE, arrived("slave/setpoint_cp"), "slave_base")
 NETWORK_MEASURED_CP = Topic("network/measured_cp", Kind.POSE, arrived("slave/measured_cp"), "slave_base")
 NETWORK_MEASURED_CF = Topic("network/measured_cf", Kind.WRENCH, arrived("slave/measured_cf"), "slave_base")
@@ -316,8 +318,8 @@ NETWORK_STATE = Topic(
     is_seldom=True,
     columns=("sent_there", "lost_there", "behind_there", "sent_back", "lost_back", "behind_back", "clock_ahead"),
 )
-"""For both directions: packets sent, packets lost, and by how many packets the newest arrived one is behind; then the
-lead of the slave's clock over the master's [s].
+"""For both directions: number of sent packets, number of lost packets, and number of packets by which the newest
+arrived packet is behind. Then, the time by which the slave's clock is ahead of the master's clock [s].
 """
 ENERGY = (
     "law", "round", "energy_in", "energy_out", "told", "heard", "margin", "withheld",
@@ -390,7 +392,7 @@ FIRST_JAW_BOARD = replace(SLAVE_JAW_BOARD, name=f"first/{SLAVE_JAW_BOARD.name}")
 """Port of the second arm at which the first arm's topic arrives; see :meth:`Graph.links`."""
 FIRST_JAW_GRIP = replace(SLAVE_JAW_GRIP, name=f"first/{SLAVE_JAW_GRIP.name}")
 SECOND_TRUE_CP = replace(SLAVE_TRUE_CP, name=f"second/{SLAVE_TRUE_CP.name}")
-"""Port of the first arm at which the second arm's topic arrives; the next one is such a port, too."""
+"""Port of the first arm at which the second arm's topic arrives. The next constant declares another such port."""
 SECOND_JAW_GRIP = replace(SLAVE_JAW_GRIP, name=f"second/{SLAVE_JAW_GRIP.name}")
 NETWORK_JAW_SERVO_JP = Topic(
     "network/jaw_servo_jp", Kind.NUMBERS, arrived("slave/jaw/servo_jp"), "slave_base", columns=JAW
@@ -427,8 +429,9 @@ required attitude of the tool, and its tolerance [rad]; the force to press with 
 [m]. Zero means that the task does not require it. Last, whether no goal is left.
 """
 OPERATOR_SERVO_CP = Topic("operator/servo_cp", Kind.POSE, SAMPLED, "master_base")
-"""Pose of the stylus that a remote person wants, at any rate: ``operator=remote`` moves the hand there. Without
-messages the hand lets go. Like ``operator/buttons`` it comes from outside: no stage writes it, and it is not recorded.
+"""Pose of the stylus that a remote person wants, sent with any frequency; ``operator=remote`` moves the hand there.
+Without messages the hand releases the stylus. Like ``operator/buttons``, this topic comes from outside: no stage
+writes it, and it is not recorded.
 """
 OPERATOR_BUTTONS = Topic("operator/buttons", Kind.BUTTONS, SAMPLED, "master_base", quality=Quality.REPORT)
 """Buttons that the remote person presses and releases: each message counts, so it is sent reliably."""
@@ -456,9 +459,9 @@ NETWORK_TOPICS = (
 )
 """Topics of a session with a network between both sides."""
 PASSIVITY_TOPICS = (MASTER_ENERGY, SLAVE_ENERGY, PASSIVITY_SERVO_CP, NETWORK_MASTER_ENERGY, NETWORK_SLAVE_ENERGY)
-"""Topics of a session with a stage ``passivity``, the last two with a network too."""
+"""Topics of a session with a stage ``passivity``; the last two exist only if there is a network too."""
 IMPEDANCE_TOPICS = (SLAVE_SERVO_CF, NETWORK_SERVO_CF, IMPEDANCE_SERVO_CP)
-"""Topics of a session with a stage ``impedance``, the second with a network too."""
+"""Topics of a session with a stage ``impedance``; the second exists only if there is a network too."""
 JAW_TOPICS = (
     HAND_JAW,
     SLAVE_JAW_SERVO_JP,
@@ -469,11 +472,11 @@ JAW_TOPICS = (
     SLAVE_JAW_OBJECT_CP,
     SLAVE_JAW_BOARD,
 )
-"""Topics of a session with a jaw, the third with a network too."""
+"""Topics of a session with a jaw; the third exists only if there is a network too."""
 PORTS_BETWEEN_ARMS = (FIRST_JAW_BOARD, FIRST_JAW_GRIP, SECOND_TRUE_CP, SECOND_JAW_GRIP)
-"""Ports of one arm for topics of another; no stage writes topics of these names."""
+"""Ports of one arm for topics of another arm; no stage writes topics with these names."""
 TASK_TOPICS = (DISPLAY_MEASURED_CP, TASK_STATE)
-"""Topics of a session with a display, and of one with a task."""
+"""Topic of a session with a display, and topic of a session with a task."""
 ALL = (*STREAMS, HAND_BUTTONS, HAND_TREMOR, SLAVE_MEASURED_CF, SLAVE_ESTIMATED_CF, SLAVE_TRUE_CF, *REPORTS, DIAGNOSTICS)
 BY_NAME = {
     topic.name: topic

@@ -1,4 +1,4 @@
-"""Warming: the first step of a stage, made and undone before its ticks begin."""
+"""Warming: the first step of a stage is made and undone before the ticks of the session begin."""
 
 from teleop_core.graph.signals import assign
 from teleop_core.graph.stage import Runner

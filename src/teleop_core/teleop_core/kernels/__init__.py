@@ -9,9 +9,9 @@ only other kernels call it::
             force[i] = -stiffness * position[i]
 
 A kernel is compiled when it is first called, for the types of that call, and stored on disk. The stored code becomes
-invalid when anything changes that it was made from: its file, a kernel that it calls, the value of a constant that
-either refers to, numba or this package. There is no ``fastmath`` and no reordering: results are the same in all modes,
-and on every x86-64 processor since 2013 with the same C library.
+invalid when one of its sources changes: the kernel's file, a kernel that it calls, the value of a constant in one of
+them, numba or this package. There is no ``fastmath`` and no reordering: results are the same in all modes, and on
+every x86-64 processor since 2013 with the same C library.
 
 With ``NUMBA_DISABLE_JIT=1`` in the environment all kernels stay Python functions: a debugger steps
 through them, coverage counts their lines, and everything is some hundred times slower.
@@ -49,7 +49,7 @@ __all__ = [
 ]
 
 SUPPORTED = ((0, 68), (0, 69))
-"""First supported version, and first later version that is not supported; the same as in setup.py."""
+"""The first supported version of numba and the first later version that is unsupported. Also declared in setup.py."""
 
 
 def check_version(found: str = numba.__version__) -> None:
@@ -87,7 +87,7 @@ class Kernel(Protocol[P, R_co]):
 
     @property
     def py_func(self) -> Callable[P, R_co]:
-        """The Python function, uncompiled."""
+        """The Python function before compilation."""
 
     def __call__(self, *args: P.args, **kwargs: P.kwargs) -> R_co:
         """Call the compiled function."""
@@ -125,8 +125,8 @@ def is_kernel(value: object) -> bool:
 def kernel_from_source(text: str, name: str, names: Mapping[str, object]) -> Any:
     """Kernel from source text that the program generated.
 
-    It is cached on disk like other kernels: the same text that calls the same kernels with the same constants is
-    compiled once. Tracebacks show its lines.
+    The kernel is cached on disk like other kernels: the same text that calls the same kernels with the same constants
+    is compiled once. Tracebacks show the lines of the text.
 
     Args:
         text: Python source that defines a function. The function must not make arrays, but kernels that it calls may.
@@ -166,19 +166,20 @@ def pointer(function: Callable[P, R], signature: Any) -> Callable[P, R]:
     """Function as a value of a fixed signature, which kernels accept as an argument and call.
 
     A plain Python function also works, if the signature has only float64, int64, bool and C-contiguous float64 arrays
-    (n,) or (n, m), and returns void, float64 or int64. It gets views of the kernel's arrays and may write to them. If
-    it raises an exception, the kernel continues with 0, and :func:`raise_pending` raises the first such exception
-    after the block.
+    (n,) or (n, m), and returns void, float64 or int64. A Python function gets views of the kernel's arrays and may
+    write to them. If it raises an exception, the kernel continues with 0, and :func:`raise_pending` raises the first
+    such exception after the block.
 
     With three arrays as arguments, the call of a compiled kernel takes 0.005 µs. The call of a Python function takes
-    0.5 µs plus its own work: with ``out[:] = a * b`` 1.2 µs in all. Making its pointer takes 40 ms.
+    0.5 µs plus its own work: with ``out[:] = a * b`` 1.2 µs in all. Making the pointer of a Python function takes 40
+    ms.
 
     Args:
         function: A kernel, or a plain Python function or other callable.
         signature: numba signature, the same for all functions that may be passed for this argument.
 
     Returns:
-        The callable to pass to a kernel, one for each kernel and signature; called from Python, it runs the Python
+        The callable to pass to a kernel, one for each kernel and signature. If Python calls it, it runs the Python
         function.
 
     Raises:
@@ -201,15 +202,15 @@ def records(fields: Any, count: int = 1) -> Any:
 
 
 def bound(compiled: Callable[P, R], *arguments: P.args, **_: P.kwargs) -> Callable[[], R]:
-    """Kernel with bound arguments that stay the same objects, so that their types are not checked at each call.
+    """Kernel with bound arguments, whose types are therefore not checked at each call.
 
-    Numbers keep the value that they have now; pass changing values in arrays and records. With function pointers among
-    the arguments this saves two thirds of the time of a call. The kernel is compiled here, so that a mistake in it is
-    reported here.
+    The bound arguments stay the same objects. Numbers keep their present value; pass changing values in arrays and
+    records. With function pointers among the arguments this saves two thirds of the time of a call. The kernel is
+    compiled here, so that a mistake in it is reported here.
 
     Args:
         compiled: A kernel; a plain Python function is bound unchanged.
-        arguments: All its arguments, in order.
+        arguments: All arguments of the kernel, in order.
 
     Raises:
         KernelError: The kernel cannot be compiled for these arguments.
@@ -237,7 +238,7 @@ def direct(compiled: Callable[P, R], signature: Any) -> Callable[P, R]:
 
     Args:
         compiled: A kernel.
-        signature: numba signature of its arguments.
+        signature: numba signature of the kernel's arguments.
 
     Raises:
         KernelError: The kernel cannot be compiled for these arguments.
@@ -251,8 +252,9 @@ def direct(compiled: Callable[P, R], signature: Any) -> Callable[P, R]:
 def apart(compiled: Callable[..., R], *arguments: object) -> Callable[..., R]:
     """Kernel that other kernels call by its address, instead of compiling a copy of its code.
 
-    A kernel that calls another kernel by name is compiled with a copy of it, which takes seconds if the other kernel
-    is large. The kernel returned here is compiled once for its arguments, and its callers are compiled without it.
+    A kernel that calls another kernel by name is compiled with a copy of the called kernel, which takes seconds if the
+    called kernel is large. The kernel returned here is compiled once for its arguments; its callers are compiled
+    without a copy.
 
     Args:
         compiled: A kernel.
@@ -287,9 +289,9 @@ def _record_type(dtype: np.dtype[Any]) -> Any:
 
 
 class _Memory:
-    """Array interface of a record with its bytes only, for compiled code.
+    """Array interface of a record, for compiled code; it describes only the bytes of the record.
 
-    NumPy's own interface also describes all fields, in each call: this takes 5 µs for a record of a hundred fields.
+    NumPy's own interface also describes all fields at each call, which takes 5 µs for a record of a hundred fields.
     """
 
     __slots__ = ("data",)
@@ -299,7 +301,7 @@ class _Memory:
 
 
 def bare(value: Any) -> Any:
-    """The same memory as a record without attributes, whose look-up costs 1 µs; other values unchanged."""
+    """View of a record without attributes, because looking up attributes costs 1 µs; other values are unchanged."""
     if isinstance(value, np.record):
         return value.view(np.dtype((np.void, value.dtype)))
     return value
@@ -326,7 +328,7 @@ class Record(_NUMPY_RECORD):
             raise AttributeError(_missing(name, fields)) from None
 
     def __setattr__(self, name: str, value: Any) -> None:
-        """Set a field; there is nothing else to set."""
+        """Set a field; a record has no other attributes that can be set."""
         fields = np.void.__getattribute__(self, "dtype").fields
         if name not in fields:
             raise AttributeError(_missing(name, fields))

@@ -1,4 +1,4 @@
-"""Axes by name, and the rotation that picks three of them."""
+"""Axes by name, and the rotation that is made of three named axes."""
 
 import numpy as np
 
@@ -9,7 +9,7 @@ AXES = ("+x", "-x", "+y", "-y", "+z", "-z")
 
 
 def axis_map(name: str, axes: tuple[str, ...]) -> Array:
-    """Rotation (3, 3) whose rows pick axes by name: ("-z", "-x", "+y") maps z to -x and so on.
+    """Rotation (3, 3) whose rows are the named axes: with ("-z", "-x", "+y"), the new x is the old -z.
 
     Args:
         name: Name of the parameter, for messages.

@@ -1,9 +1,9 @@
 """Borrowing: switches reference counting of array arguments off in kernels that make no arrays.
 
-Compiled code counts the references to each array, so that the last holder frees it. A kernel that gets twenty arrays
-in a tuple increments and decrements all counts in each call. In a tick of a session this happened six hundred times
-and took a quarter of the time. If all arrays of a kernel come from its caller, the caller keeps them until the kernel
-returns, so no counting is needed.
+Compiled code counts the references to each array, so that the array is freed with its last reference. A kernel that
+gets twenty arrays in a tuple increments and decrements all counts in each call. In a tick of a session this happened
+six hundred times and took a quarter of the time. If all arrays of a kernel come from its caller, the caller refers to
+them until the kernel returns, so no counting is needed.
 """
 
 from typing import Any
@@ -42,7 +42,7 @@ class _Borrowing(AnalysisPass):
 
 
 class Pipeline(Compiler):
-    """numba's compiler with this additional step."""
+    """numba's compiler with the additional step :class:`_Borrowing`."""
 
     def define_pipelines(self) -> list[Any]:
         """Steps of the compiler."""
@@ -59,7 +59,7 @@ def _takes_room(state: Any) -> bool:
 
 
 def _borrows(state: Any) -> bool:
-    """Whether a function neither makes nor passes on any array."""
+    """Whether a function neither makes arrays nor stores or returns references to arrays."""
     if _is_held(state, state.return_type):
         return False
     lines = [line for block in state.func_ir.blocks.values() for line in block.body]
@@ -67,7 +67,7 @@ def _borrows(state: Any) -> bool:
 
 
 def _is_plain(state: Any, line: Any) -> bool:
-    """Whether a line makes no array."""
+    """Whether a statement neither makes an array nor stores a reference to one."""
     if isinstance(line, ir.SetItem | ir.StaticSetItem | ir.SetAttr):
         return not _is_held(state, state.typemap[line.value.name])
     if not isinstance(line, ir.Assign) or not isinstance(line.value, ir.Expr):
@@ -82,7 +82,7 @@ def _is_plain(state: Any, line: Any) -> bool:
 
 
 def _called(state: Any, call: Any) -> object:
-    """Python function that is called, if numba supports this function itself."""
+    """Python function that a call names, if numba itself supports this function."""
     return getattr(state.typemap[call.func.name], "typing_key", None)
 
 
@@ -97,7 +97,7 @@ def _is_plain_call(state: Any, call: Any) -> bool:
 
 
 def _is_index(kind: Any) -> bool:
-    """Whether an index gives a view: numbers and slices do, index arrays do not."""
+    """Whether an index gives a view: numbers and slices give views, index arrays give copies."""
     parts: Any = kind if isinstance(kind, types.BaseTuple) else (kind,)
     views = types.Integer | types.SliceType | types.EllipsisType | types.NoneType
     return all(isinstance(part, views) for part in parts)

@@ -1,7 +1,7 @@
 """Plain Python callables instead of kernels: slower, but called in the same way.
 
 Compiled code calls them through ctypes, which holds the interpreter's lock during the call. An exception cannot pass
-through compiled code: it is stored until :func:`raise_pending`.
+through compiled code: it is stored until :func:`raise_pending` raises it.
 """
 
 import ctypes
@@ -31,7 +31,7 @@ _RESULTS: dict[Any, tuple[Any, Callable[[Any], Any]]] = {
     types.int64: (ctypes.c_int64, operator.index),
 }
 
-# C arrays do not contain their lengths: an array is passed as its address and its lengths.
+# C arrays do not contain their lengths. Therefore an array is passed as its address and its lengths.
 _TEXT = """
 def callback({flat}):
     try:
@@ -52,8 +52,8 @@ _pending = threading.local()
 def raise_pending() -> None:
     """Raise the first exception of a plain callable since the last call, if there was one.
 
-    Must be called after each block of ticks, in the thread that ran it, because every thread stores its own
-    exceptions. In pure-Python mode exceptions are raised at once, and this does nothing.
+    Must be called after each block of ticks, in the thread that ran the block, because every thread stores its own
+    exceptions. In pure-Python mode exceptions are raised at once, and this function does nothing.
     """
     error: BaseException | None = getattr(_pending, "error", None)
     if error is not None:
@@ -102,7 +102,7 @@ def _keep(error: BaseException) -> None:
 
 
 def _views() -> Callable[..., Array]:
-    """Function that makes arrays at an address and caches them.
+    """Function that makes arrays at given addresses and caches these arrays.
 
     A kernel passes the same few arrays in every tick; to make an array takes 2 µs.
     """

@@ -1,8 +1,8 @@
 """Dependencies of a kernel: one digest of everything from which its compiled code is made.
 
 A compiled kernel on the disk is valid only for the sources and values from which it was made. Its digest covers the
-text of its file and the values of all global constants that its code refers to, and the same for every kernel that it
-calls directly or indirectly.
+text of its file and the values of all global constants that its code refers to, and the texts and values of every
+kernel that it calls directly or indirectly.
 """
 
 import hashlib
@@ -18,15 +18,15 @@ import numpy as np
 from numba import types
 
 _PLAIN = (type(None), bool, int, float, complex, str, bytes)
-# numba identifies their functions by name; they change only with numba's version.
+# Modules whose functions numba identifies by name; these functions change only with numba's version.
 _FOREIGN = frozenset(["builtins", "math", "cmath", "numpy", "numba", "llvmlite"])
 
 
 def digest(function: FunctionType) -> str:
     """Hexadecimal digest of a function and all its dependencies, through any number of calls.
 
-    Constants count with the value that they have at the first call for this function, which is when numba compiles the
-    function or its first caller.
+    Constants count with their value at the first call for this function. numba makes this call when it compiles the
+    function or the function's first caller.
     """
     reached, waiting = {function: _own(function)}, [function]
     while waiting:
@@ -85,7 +85,7 @@ def _bytes_digest(file: str, _time_ns: int, _size: int) -> str:
 
 
 def _code_digest(code: CodeType) -> str:
-    """Digest of the instructions and literals of a code object and of those nested in it."""
+    """Digest of the instructions and literals of a code object and of the code objects nested in it."""
     parts = [code.co_code.hex(), repr((code.co_names, code.co_varnames, code.co_freevars))]
     for constant in code.co_consts:
         parts.append(_code_digest(constant) if isinstance(constant, CodeType) else repr(constant))
@@ -93,7 +93,7 @@ def _code_digest(code: CodeType) -> str:
 
 
 def _names_in(code: CodeType) -> Iterator[str]:
-    """Names of globals and attributes in a code object and in those nested in it."""
+    """Names of globals and attributes in a code object and in the code objects nested in it."""
     yield from code.co_names
     for constant in code.co_consts:
         if isinstance(constant, CodeType):
@@ -137,7 +137,7 @@ class Tokens:
         return f"{module.__name__}({','.join(found)})"
 
     def _of_callable(self, value: Callable[..., Any]) -> str:
-        """Name of a kernel or Python function, which is collected; for other objects the type's name."""
+        """Type and name of a callable; kernels and Python functions are also added to ``functions``."""
         function = getattr(value, "py_func", getattr(value, "__wrapped__", value))
         place = f"{getattr(value, '__module__', '')}.{getattr(value, '__qualname__', '')}"
         if isinstance(function, FunctionType) and not _is_foreign(function.__module__ or ""):

@@ -1,6 +1,6 @@
 """Fields: declares the fields of a record as a class, so that type checkers and editors know the names.
 
-A class names the fields of a kind of record and gives each a type::
+A class names the fields of a kind of record and gives each field a type::
 
     class Spring(Fields):
         stiffness: float
@@ -26,19 +26,19 @@ Field = tuple[str, str] | tuple[str, str, tuple[int, ...]]
 """Name and type of a field, and its shape if it is an array."""
 Integers = NDArray[np.int64]
 PerJoint = Annotated[Array, "joints"]
-"""One number for each joint."""
+"""Array with one number for each joint."""
 IntegerPerJoint = Annotated[Integers, "joints"]
 Vector3 = Annotated[Array, 3]
 Quaternion = Annotated[Array, 4]
 Wrench = Annotated[Array, 6]
 PoseRow = Annotated[Array, 7]
-"""Position [m], and quaternion w, x, y, z."""
+"""Pose: position [m], then quaternion w, x, y, z."""
 
 
 class Fields:
-    """Base of the classes that name the fields of a record; see the module."""
+    """Base of the classes that name the fields of a record; see the docstring of this module."""
 
-    if TYPE_CHECKING:  # other attributes of records
+    if TYPE_CHECKING:  # for the type checker: attributes that all records have
         dtype: np.dtype[Any]
 
         def __getitem__(self, name: str) -> Any: ...
@@ -78,7 +78,7 @@ def fields_of(kind: type[Fields], joints: int = 0) -> list[Field]:
 
     Args:
         kind: The class.
-        joints: Number of joints, for arrays with one number for each.
+        joints: Number of joints, for arrays with one number for each joint.
     """
     found: dict[str, Field] = {}
     for base in reversed(kind.__mro__):
@@ -96,10 +96,10 @@ def _field(name: str, hint: Any, joints: int) -> Field:
 
 
 def record(kind: type[_R], joints: int = 0) -> _R:
-    """One record of a kind, zero everywhere."""
+    """One record of a kind; all fields are zero."""
     return cast(_R, records(fields_of(kind, joints))[0])
 
 
 def record_array(kind: type[_R], count: int, joints: int = 0) -> Any:
-    """Records (count,) of a kind, zero everywhere; each is one of that kind."""
+    """Records (count,) of a kind; all fields are zero."""
     return records(fields_of(kind, joints), count)

@@ -10,7 +10,7 @@ def lag_step(
     """Next output of the first-order lag ``gain (s + zero) / (s + pole)`` by forward Euler.
 
     ``c(k) = (1 - pole T) c(k-1) + gain (zero T - 1) r(k-1) + gain r(k)``. The defaults of the source, 0.1 (s + 100)/(s
-    + 10), pass slow motion unchanged and fast motion at a tenth, and lag behind a ramp by 90 ms.
+    + 10), pass slow motion unchanged, reduce fast motion to a tenth, and lag behind a ramp by 90 ms.
 
     Args:
         value: Input of this tick.
@@ -18,7 +18,7 @@ def lag_step(
         last_output: Output of the last tick.
         gain: High-frequency gain.
         zero: Zero [rad/s].
-        pole: Pole [rad/s], below 2/dt or the output diverges.
+        pole: Pole [rad/s]; must be below 2/dt, otherwise the output diverges.
         dt: Tick [s].
 
     Source:

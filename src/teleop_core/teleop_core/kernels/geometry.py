@@ -1,7 +1,7 @@
 """Geometry: rotations, poses and transforms as small compiled kernels.
 
-A *pose* is a row of seven numbers, position x, y, z [m] and unit quaternion w, x, y, z. A
-*transform* is a (4, 4) homogeneous matrix; ``T_base_tip`` maps tip coordinates to base ones.
+A *pose* is a row of seven numbers, position x, y, z [m] and unit quaternion w, x, y, z. A *transform* is a (4, 4)
+homogeneous matrix; ``T_base_tip`` maps tip coordinates to base coordinates.
 """
 
 import math
@@ -36,7 +36,7 @@ def rotation_from_quaternion(quaternion: Array, rotation: Array) -> None:
 def quaternion_from_rotation(rotation: Array, quaternion: Array) -> None:
     """Write the unit quaternion w, x, y, z (w >= 0) of a rotation matrix into ``quaternion``.
 
-    The largest of the four components is computed first, which keeps all digits for every rotation (Shepperd 1978).
+    The largest of the four components is computed first, so that no rotation loses digits (Shepperd 1978).
     """
     r00, r11, r22 = rotation[0, 0], rotation[1, 1], rotation[2, 2]
     if r00 + r11 + r22 > 0.0:
@@ -106,7 +106,7 @@ def pose_from_transform(transform: Array, pose: Array) -> None:
 
 @inner
 def compose(a: Array, b: Array, product: Array) -> None:
-    """Write the transform ``a @ b`` (4, 4) into ``product``, which is neither of them."""
+    """Write the transform ``a @ b`` (4, 4) into ``product``, which must be another array than ``a`` and ``b``."""
     for i in range(3):
         for j in range(4):
             product[i, j] = a[i, 0] * b[0, j] + a[i, 1] * b[1, j] + a[i, 2] * b[2, j]
@@ -131,7 +131,7 @@ def rotation_angle_between(a: Array, b: Array) -> float:
 
 @kernel
 def rotation_vector_between(a: Array, b: Array, vector: Array) -> None:
-    """Write the rotation vector (3,) [rad], in the base, that turns the rotation of a to the rotation of b.
+    """Write the rotation vector (3,) [rad] from rotation ``a`` to rotation ``b``, in the base, into ``vector``.
 
     For half a turn, whose axis has two directions, the result may have either direction.
     """
@@ -143,7 +143,7 @@ def rotation_vector_between(a: Array, b: Array, vector: Array) -> None:
 
 @kernel
 def turn_between(a: Array, b: Array, vector: Array) -> None:
-    """Write the rotation vector (3,) [rad], in the base, that turns quaternion a to b."""
+    """Write the rotation vector (3,) [rad] from quaternion ``a`` to ``b``, in the base, into ``vector``."""
     turn = room(4)
     invert_quaternion(a, turn)
     multiply_quaternions(b, turn, turn)
@@ -152,7 +152,7 @@ def turn_between(a: Array, b: Array, vector: Array) -> None:
 
 @kernel
 def turn_within(a: Array, b: Array, vector: Array) -> None:
-    """Write the rotation vector (3,) [rad], in the frame of a, that turns quaternion a to b."""
+    """Write the rotation vector (3,) [rad] from quaternion ``a`` to ``b``, in the frame of ``a``, into ``vector``."""
     turn = room(4)
     invert_quaternion(a, turn)
     multiply_quaternions(turn, b, turn)
@@ -172,7 +172,7 @@ def _vector_of(turn: Array, vector: Array) -> None:
 
 @kernel
 def turn_by(vector: Array, quaternion: Array) -> None:
-    """Turn a quaternion by a rotation vector (3,) [rad] in the base."""
+    """Rotate ``quaternion`` in place by a rotation vector (3,) [rad] in the base."""
     turn, unit = room(4), np.zeros(4)
     unit[0] = 1.0
     rotate_by_vector(unit, vector[0], vector[1], vector[2], turn)
@@ -181,10 +181,10 @@ def turn_by(vector: Array, quaternion: Array) -> None:
 
 @kernel
 def is_rigid(transform: Array) -> bool:
-    """Whether a (4, 4) matrix is finite, with a right-handed rotation within 1e-6.
+    """Whether a (4, 4) matrix is finite and contains a right-handed rotation, within 1e-6.
 
-    It is sufficient that two columns are unit vectors at right angles and the third is their cross product. A NaN or
-    infinity anywhere makes a comparison fail.
+    The rotation is right-handed if two columns are perpendicular unit vectors and the third is their cross product. A
+    NaN or infinity anywhere makes a comparison fail.
     """
     first, second, cosine, third = -1.0, -1.0, 0.0, 0.0
     for i in range(3):
@@ -261,7 +261,7 @@ def quaternion_products(a: Array, b: Array) -> Array:
 
 
 def continuous(quaternions: Array, last: Array | None) -> Array:
-    """The same rotations (N, 4) with signs that never jump, from ``last`` on."""
+    """The same rotations (N, 4) with signs chosen so that no quaternion jumps, beginning after ``last``."""
     if not len(quaternions):
         return quaternions
     first = quaternions[:1] if last is None else last[None]
@@ -272,7 +272,7 @@ def continuous(quaternions: Array, last: Array | None) -> Array:
 
 
 def framed_wrenches(wrench: Array, pose: Array) -> tuple[Array, Array]:
-    """The same force on a tip in the two frames of CRTK's ``body`` and ``spatial``.
+    """Wrench on a tip in the two frames that CRTK calls ``body`` and ``spatial``.
 
     Both wrenches have the same power ``f·v + t·w`` with the twist of their frame. The body twist is the velocity of
     the tip; the spatial twist is the velocity of the point of the tool that is at the base's origin.
@@ -295,7 +295,7 @@ def framed_wrenches(wrench: Array, pose: Array) -> tuple[Array, Array]:
 
 
 def rotation_vectors(quaternions: Array) -> Array:
-    """Turns since the first of a series of unit quaternions (N, 4), w, x, y, z.
+    """Rotations from the first of a series of unit quaternions (N, 4), w, x, y, z, to each of them.
 
     Returns:
         Rotation vectors (N, 3) [rad] in the axes of the first orientation. They continue beyond half a turn, up to a
@@ -314,7 +314,7 @@ def checked_array(name: str, value: object, shape: tuple[int, ...]) -> Array:
     """Writable float array of the wanted trailing shape; a leading batch axis is allowed.
 
     Raises:
-        ShapeError: The array has another shape.
+        ShapeError: The array does not have the wanted shape.
         ParameterError: A value is NaN or infinite.
     """
     array = np.ascontiguousarray(value, dtype=np.float64)

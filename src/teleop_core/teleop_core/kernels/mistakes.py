@@ -15,7 +15,7 @@ from teleop_core.base.errors import KernelError
 _PACKAGE = Path(__file__).parents[1]
 _LONGEST = 300  # largest number of characters of a reason: two or three lines of a terminal
 
-# numba names a record by all its fields with types and offsets, and a literal by its type and value.
+# Names in numba's messages: a record has all its fields in its name, a literal has its type and value.
 _RECORD = re.compile(r"Record\(\[.*?\)\], \d+, (?:True|False)\)")
 _LITERAL = re.compile(r"Literal\[(\w+)\]\(([^()]*)\)")
 _MISSING = re.compile(r"No implementation of function .*?>>> (.*?)\n", re.DOTALL)
@@ -28,8 +28,8 @@ def kernel_error(error: BaseException, function: Callable[..., Any], arguments: 
 
     Args:
         error: Exception of numba.
-        function: The Python function that it compiled.
-        arguments: Types it was compiled for.
+        function: The Python function that numba compiled.
+        arguments: Types for which the function was compiled.
     """
     code = function.__code__
     place = _location(error) or (code.co_filename, code.co_firstlineno)
@@ -40,7 +40,7 @@ def kernel_error(error: BaseException, function: Callable[..., Any], arguments: 
 
 
 def place_of(function: object) -> str:
-    """File and line of a function; for another object its type."""
+    """File and line of a function; for another object, the name of its type."""
     code = getattr(function, "__code__", None)
     if not isinstance(code, CodeType):
         return type(function).__qualname__
@@ -56,7 +56,7 @@ def _shown(file: str) -> str:
 
 
 def _frames(error: BaseException) -> Iterator[dict[str, Any]]:
-    """Local variables of the frames that the error came through, from the innermost out."""
+    """Local variables of the frames through which the error passed, the innermost frame first."""
     frames, trace = [], error.__traceback__
     while trace is not None:
         frames.append(trace.tb_frame.f_locals)

@@ -1,4 +1,4 @@
-"""All uses of numba's internals, which may change in any version, are in this module, ``borrowing`` and ``room``.
+"""All uses of numba's internals are in this module, ``borrowing`` and ``room``; any version may change them.
 
 The public interface of numba cannot stamp a cache, compile without a wrapper for Python, treat literals as plain
 numbers, or report a mistake in one line.
@@ -36,13 +36,13 @@ from teleop_core.kernels.dependencies import digest, source_digest
 from teleop_core.kernels.mistakes import kernel_error
 from teleop_core.kernels.shipped import places
 
-# Function pointers as arguments allow one compiled graph to run any robot.
+# Function pointers as arguments allow one compiled graph to run any robot; numba warns of them.
 warnings.filterwarnings("ignore", "First-class function", NumbaExperimentalFeatureWarning)
 
-# Division by zero gives infinity or NaN as in NumPy, not an exception in the middle of a loop;
-# pointers (below) make their own C wrapper, so kernels compile faster without one.
+# Division by zero gives infinity or NaN as in NumPy, not an exception in the middle of a loop.
 _ERRORS: dict[str, Any] = {"error_model": "numpy"}
-# Set explicitly, although it is numba's default: a kernel without this option inherits its caller's option.
+# ``_nrt`` is set explicitly, although this is numba's default, because a kernel without this option inherits its
+# caller's option. Pointers (below) make their own C wrapper, so kernels compile faster without one.
 _OPTIONS = {"nopython": True, "nogil": True, "no_cfunc_wrapper": True, "_nrt": True, **_ERRORS}
 
 # Exceptions that numba raises for a function that it cannot compile; many are not its own error types.
@@ -65,9 +65,8 @@ def _roomy(function: Callable[..., Any]) -> Callable[..., Any]:
 
     CPython keeps frames in chunks of 16 KiB. A deeply nested compiler crosses the end of a chunk thousands of times,
     each time with a system call. A large frame gets a large chunk, and later frames use the rest of this chunk.
-    Measured on
-    Python 3.11 without a cache, as the mean of three: the kernels of rcrt1 and mma take 3.9 s of processor time with it
-    and 4.4 s without, of which 0.17 s and 0.79 s in the system.
+    Measured on Python 3.11 without a cache, as the mean of three: the kernels of rcrt1 and mma take 3.9 s of processor
+    time with a large frame and 4.4 s without. The system's part is 0.17 s with it and 0.79 s without.
     """
     function.__code__ = function.__code__.replace(co_stacksize=70_000)  # 560 KB of 1 MiB
     return function
@@ -76,9 +75,9 @@ def _roomy(function: Callable[..., Any]) -> Callable[..., Any]:
 class Dispatcher(CPUDispatcher):
     """Compiles a kernel once, as fast as numba allows.
 
-    Literal numbers in a call are treated as any number of their type; numba would compile again for each of their
-    values. The cache is opened when the kernel is first compiled, because all constants of its module have their
-    values by then.
+    Literal numbers in a call are treated as any number of their type; numba itself would compile again for each value.
+    The cache is opened when the kernel is first compiled, because all constants of its module have their values by
+    then.
     """
 
     _has_cache = False
@@ -131,7 +130,7 @@ arrayobj.raise_with_shape_context = _mismatch
 
 
 def _unbox_function(kind: Any, value: Any, c: Any) -> NativeValue:
-    """Addresses of a function of a fixed signature: a :class:`Pointer` or a :class:`Code` here."""
+    """Addresses of a function with a fixed signature; here the function is a :class:`Pointer` or a :class:`Code`."""
     kind = kind.get_precise()
     function = cgutils.create_struct_proxy(kind)(c.context, c.builder)
     for field, name in (("c_addr", "_wrapper_address"), ("jit_addr", "_code_address")):
@@ -148,10 +147,10 @@ _unboxers.functions[types.FunctionType] = _unbox_function
 
 
 class InnerDispatcher(Dispatcher):
-    """Kernel that Python cannot call: a call raises an exception; numba would crash."""
+    """Kernel that Python cannot call: a call raises an exception, where numba itself would crash."""
 
     def __call__(self, *_: Any, **__: Any) -> Any:
-        """Refuse."""
+        """Refuse the call."""
         raise TypeError(f"{self.py_func.__name__} is called by kernels only: decorate it with kernel")
 
 
@@ -166,7 +165,7 @@ def dispatcher(function: Callable[..., Any], *, is_inner: bool = False) -> Any:
 def generated_dispatcher(function: FunctionType) -> Any:
     """Kernel without a source file; its qualified name is the key of the cache.
 
-    It must make no arrays. Without reference counting of its array arguments, a tick is a fifth faster.
+    The function must make no arrays. Without reference counting of its array arguments, a tick is a fifth faster.
     """
     _generated.add(function)
     return Dispatcher(function, targetoptions={**_OPTIONS, "_nrt": False})
@@ -185,12 +184,12 @@ class Pointer(CFunc):
 def c_function(function: Any, signature: Any) -> Any:
     """Function of a fixed signature, kernel or not, as a value that kernels call.
 
-    The same as :func:`numba.cfunc`, but with this package's stamp. It shares a cache file with the kernel of the same
-    function; with different stamps, each would invalidate the other.
+    Like :func:`numba.cfunc`, but with this package's stamp. The value shares a cache file with the kernel of the same
+    function; with different stamps, each would invalidate the cache of the other.
     """
     arguments, result = normalize_signature(signature)
     is_compiled = isinstance(function, CPUDispatcher)
-    # To load a function from disk takes 5 ms, and every robot requests those of its kernels again.
+    # Loading a function from disk takes 5 ms, and every robot requests the functions of its kernels again.
     made = vars(function).setdefault("_pointers", {}) if is_compiled else {}
     if (arguments, result) in made:
         return made[arguments, result]
@@ -203,7 +202,7 @@ def c_function(function: Any, signature: Any) -> Any:
     except _MISTAKES as error:
         raise kernel_error(error, target, arguments) from error
     if not is_compiled:
-        callback._entry, callback._pyfunc = target, function  # keeps the way in alive
+        callback._entry, callback._pyfunc = target, function  # keeps the entry function alive
     made[arguments, result] = callback
     return callback
 
@@ -223,7 +222,7 @@ class Code(types.WrapperAddressProtocol):  # type: ignore[misc]
         return self._wrapper_address
 
     def signature(self) -> Any:
-        """Types of its arguments and of its return value."""
+        """Types of the kernel's arguments and of its return value."""
         return self._made.signature
 
 
@@ -233,7 +232,7 @@ def entry(kernel: Any, arguments: tuple[Any, ...]) -> Callable[..., Any]:
     return found
 
 
-# For example after a loss of power, or from a version whose classes no longer exist.
+# Exceptions for damaged files, for example after a loss of power, and for files of other versions.
 _BROKEN = (OSError, EOFError, UnpicklingError, AttributeError, ImportError)
 
 
@@ -304,6 +303,6 @@ def _cache(function: Any) -> Any:
         return cache.keep(function, name, stamp)
     try:
         cache = _Cache(function)
-    except RuntimeError:  # typed in, or given to python -c
+    except RuntimeError:  # the function was typed in, or given to python -c
         return NullCache()
     return cache.keep(function, cache._cache_file._index_name.removesuffix(".nbi"), stamp)

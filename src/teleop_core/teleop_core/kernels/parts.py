@@ -1,7 +1,8 @@
-"""Parts: the numbers that a part's kernel gets, and arrays for trial calls.
+"""Parts: the numbers that are passed to a part's kernel, and arrays for trial calls.
 
 Compiled code does not check indices. In a session, the memory after an array belongs to another part. In a trial,
-there is a fence of NaN after the array: if it is read, NaN appears in the result; if it is written, NaN is missing.
+there is a fence of NaN after the array: if the kernel reads the fence, NaN appears in the result; if the kernel writes
+to the fence, a NaN of the fence is overwritten.
 """
 
 import numpy as np

@@ -65,7 +65,7 @@ def arctangent(y: ArrayLike, x: ArrayLike) -> Array:
 
 
 def matrix_exponential(matrix: Array) -> Array:
-    """Exponential of a square matrix (n, n), by Taylor's series of its half, quarter, ... squared.
+    """Exponential of a square matrix (n, n): Taylor's series of the matrix after halvings, then squared as often.
 
     Source:
         Moler and Van Loan 2003, method 3, scaling and squaring.

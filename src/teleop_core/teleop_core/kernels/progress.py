@@ -44,7 +44,7 @@ _told: dict[str, str] = {}
 
 @contextmanager
 def told(work: str) -> Iterator[Callable[[str], None]]:
-    """Report work that takes seconds: yields a function that is called with the progress."""
+    """Report work that takes seconds. Yields a function, which the work calls with its progress."""
     _told[work] = ""
     try:
         yield lambda text: _told.update({work: text})
@@ -60,5 +60,5 @@ def in_work() -> str:
 
 
 def compiled_count() -> int:
-    """Number of kernels that this process has compiled, those inside others included."""
+    """Number of kernels that this process has compiled, including kernels that other kernels call."""
     return _progress.done

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 def room(*shape: int) -> NDArray[np.float64]:
     """Uninitialised array of floats, valid until the kernel returns. The kernel must not return this array.
 
-    In a loop, each call gives the same memory.
+    In a loop, each pass uses the same memory.
 
     Args:
         *shape: One or two sizes, written as literal numbers.

@@ -20,7 +20,7 @@ from teleop_core.kernels.dependencies import hexdigest
 
 try:
     import fcntl
-except ImportError:  # elsewhere than on Unix
+except ImportError:  # not on Unix
     fcntl = None  # type: ignore[assignment]
 
 KEPT_DAYS = 30
@@ -31,7 +31,7 @@ _TAG = f"py{sys.version_info[0]}{sys.version_info[1]}"
 def folder() -> Path | None:
     """Folder of the store; None if kernels are stored beside their source, as numba does.
 
-    ``TELEOP_KERNELS`` names another folder; empty, or with ``NUMBA_CACHE_DIR``, there is no store.
+    ``TELEOP_KERNELS`` names another folder. If it is empty, or ``NUMBA_CACHE_DIR`` is set, there is no store.
     """
     config: Any = numba.config
     named = os.environ.get("TELEOP_KERNELS")
@@ -51,9 +51,9 @@ def user_cache(name: str) -> Path | None:
 
 
 def place(function: FunctionType, stamp: Iterable[str]) -> Path | None:
-    """Path of a function with a given stamp in the store; None without store.
+    """Path in the store of a function with a given stamp; None if there is no store.
 
-    Functions of one name in one file differ by their line.
+    Functions with the same name in one file are distinguished by their line.
     """
     kept = folder()
     if kept is None:

@@ -68,7 +68,7 @@ def _priority(priority: int) -> list[str]:
 
 
 def _take(priority: int, thread: int = 0) -> str:
-    """Give a thread a priority that its children do not inherit. Return why the system refuses it, or nothing."""
+    """Give a thread a priority that its children do not inherit. Return the reason if the system refuses, else ""."""
     try:
         policy = os.SCHED_FIFO | os.SCHED_RESET_ON_FORK
         os.sched_setscheduler(thread, policy, os.sched_param(priority))

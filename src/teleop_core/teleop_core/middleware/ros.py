@@ -28,12 +28,12 @@ BAD_ARGUMENTS = (
     rclpy_implementation.RCLInvalidROSArgsError,
 )
 """Exceptions that :meth:`RosWorld.init` and nodes raise if ROS cannot read its arguments."""
-_LOOPS = 64  # largest number of lines that wait to be accepted
+_LOOPS = 64  # largest number of connections that wait to be accepted
 _CREDENTIALS = struct.Struct("3i")  # process, user, group
 
 
 class RosWorld:
-    """Real time and ROS.
+    """World in real time, with ROS as middleware.
 
     Args:
         context: Context of rclpy; None for the context of the whole process.
@@ -118,27 +118,27 @@ class RosExecutor:
         self._own = SingleThreadedExecutor(context=context)
 
     def add_node(self, node: Any) -> None:
-        """Serve a node of :class:`RosWorld` too."""
+        """Add a node of :class:`RosWorld` to the nodes that this executor serves."""
         self._own.add_node(node.own)
 
     def spin_once(self, timeout_sec: float | None = None) -> None:
-        """Serve one event, or none if none comes within the time [s]; raises WorldEndedError."""
+        """Serve one event, or nothing if no event comes within the time [s]; raises WorldEndedError."""
         try:
             self._own.spin_once(timeout_sec)
         except ExternalShutdownException as error:
             raise world.WorldEndedError from error
 
     def wake(self) -> None:
-        """Let :meth:`spin_once` return; from any thread."""
+        """Let :meth:`spin_once` return; may be called from any thread."""
         self._own.create_task(_nothing)
 
     def shutdown(self) -> None:
-        """Stop serving."""
+        """Stop serving the nodes."""
         self._own.shutdown()
 
 
 def _nothing() -> None:
-    """Do nothing: an empty task that makes the executor return."""
+    """Do nothing: this empty task makes the executor return."""
 
 
 class _Listener:
@@ -155,7 +155,7 @@ class _Listener:
             raise
 
     def accept(self) -> world.Line | None:
-        """Next line of a process of this user; None if there is none."""
+        """Next connection from a process of this user; None if there is none."""
         while True:
             try:
                 line, _ = self._own.accept()
@@ -168,7 +168,7 @@ class _Listener:
             line.close()
 
     def close(self) -> None:
-        """Stop accepting lines."""
+        """Stop accepting connections."""
         self._own.close()
 
 

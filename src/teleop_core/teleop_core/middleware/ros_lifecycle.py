@@ -1,4 +1,4 @@
-"""Lifecycle node on rclpy."""
+"""Lifecycle node, implemented with rclpy."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import partial
@@ -25,7 +25,7 @@ _SIM_TIME = "use_sim_time"
 
 
 def _sim_time(node: str) -> ParameterError:
-    """Refuse ``use_sim_time``: a step is a millisecond of real time, for drives too."""
+    """Error that refuses ``use_sim_time``: each step, also of the drives, lasts a millisecond of real time."""
     requirement = (
         "false: nodes step in real time; teleop sim and replay go as fast as the machine can, "
         "teleop play --clock publishes /clock"
@@ -38,7 +38,7 @@ class RosLifecycleNode(RosNode):
 
     Args:
         name: Name of the node.
-        hooks: Functions that it calls in its transitions.
+        hooks: Functions that the node calls in its transitions.
         options: Options of the class in rclpy; ``values`` are parameters that override the command line.
 
     Raises:
@@ -96,7 +96,7 @@ class RosLifecycleNode(RosNode):
 
 
 class _Own(LifecycleNode):  # type: ignore[misc]
-    """Node of rclpy that passes its transitions on."""
+    """Node of rclpy that calls its hooks in its transitions."""
 
     def __init__(self, name: str, hooks: Hooks, **options: Any) -> None:
         self._hooks = hooks

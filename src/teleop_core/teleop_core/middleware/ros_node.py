@@ -1,4 +1,4 @@
-"""Node on rclpy."""
+"""Node, implemented with rclpy."""
 
 from collections.abc import Callable
 from typing import Any
@@ -60,7 +60,7 @@ class RosPublisher:
             self._handle.publish_raw(data)
 
     def wait_for_all_acked(self, seconds: float) -> None:
-        """Wait until all readers have all messages, at most for some time [s]."""
+        """Wait until all readers have received all messages, at most for some time [s]."""
         self.own.wait_for_all_acked(Duration(nanoseconds=round(seconds * 1e9)))
 
 

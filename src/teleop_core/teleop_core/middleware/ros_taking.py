@@ -17,7 +17,8 @@ from rclpy.qos import QoSProfile
 
 from teleop_core.middleware.world import Taken
 
-_OK, _NOTHING = 0, 401  # RCL_RET_OK, RCL_RET_SUBSCRIPTION_TAKE_FAILED
+_OK = 0  # RCL_RET_OK
+_NOTHING = 401  # RCL_RET_SUBSCRIPTION_TAKE_FAILED
 _ROOM = 64  # initial size of the buffer [bytes]; rcl enlarges it
 _GID = 16
 
@@ -57,11 +58,11 @@ class Unattended(CallbackGroup):
     """Group that no executor ever serves: its subscriptions are read directly."""
 
     def can_execute(self, entity: Any) -> bool:
-        """Never."""
+        """Return False: no executor serves this group."""
         return False
 
     def beginning_execution(self, entity: Any) -> bool:
-        """Never."""
+        """Return False: no executor serves this group."""
         return False
 
     def ending_execution(self, entity: Any) -> None:
@@ -72,14 +73,14 @@ class RosTaker:
     """Subscription whose messages are read without an executor; a call without a message takes 1 µs.
 
     Args:
-        node: Node that owns it.
-        kind: Class of its messages.
-        name: Its name for the middleware.
-        profile: Its quality of service.
+        node: Node that owns the subscription.
+        kind: Class of the messages.
+        name: Name of the topic for the middleware.
+        profile: Quality of service of the subscription.
 
     Attributes:
         type: As given.
-        handle: Its handle in rcl.
+        handle: Handle of the subscription in rcl.
     """
 
     def __init__(self, node: Node, kind: Any, name: str, profile: QoSProfile) -> None:
@@ -94,7 +95,7 @@ class RosTaker:
             event_callbacks=SubscriptionEventCallbacks(use_default_callbacks=False),
         )
         self.handle: Any = self._own.handle
-        # Called with the interpreter's lock held, so that no thread destroys the subscription meanwhile.
+        # The call holds the interpreter's lock, so that no other thread destroys the subscription during the call.
         rcl, rcutils = ctypes.PyDLL("librcl.so"), ctypes.PyDLL("librcutils.so")
         self._bytes, self._info = _Bytes(), _Info()
         rcutils.rcutils_get_default_allocator.restype = _Allocator
@@ -108,7 +109,7 @@ class RosTaker:
         self._is_open = True
 
     def take(self) -> Taken | None:
-        """Oldest waiting message; None if there is none.
+        """Oldest queued message; None if the queue is empty.
 
         A message that the middleware cannot deliver is skipped.
         """
@@ -131,7 +132,7 @@ class RosTaker:
 
     @property
     def lost(self) -> int:
-        """Number of messages of all its senders that the middleware should have delivered but did not.
+        """Number of messages of all senders that the middleware should have delivered but did not deliver.
 
         This also counts messages before the first received message of a sender, which message numbers cannot show. A
         call takes 1 µs.
@@ -140,7 +141,7 @@ class RosTaker:
 
     @cached_property
     def _loss(self) -> Any:
-        """The middleware's count of lost messages since the beginning."""
+        """Event of the middleware that carries the total number of lost messages."""
         kind = QoSSubscriptionEventType.RCL_SUBSCRIPTION_MESSAGE_LOST
         with self.handle:
             return rclpy_implementation.EventHandle(self.handle, kind)

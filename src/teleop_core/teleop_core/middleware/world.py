@@ -15,7 +15,7 @@ from teleop_core.graph.layers import RealTimeParameters
 
 @dataclass(frozen=True, kw_only=True)
 class Qos:
-    """Quality of service of one end of a topic.
+    """Quality of service of a publisher or subscription.
 
     Attributes:
         depth: Length of the queue; not used with ``keeps_all``.
@@ -34,11 +34,11 @@ class Taken(NamedTuple):
     """A received message.
 
     Attributes:
-        data: Its bytes.
-        sender: Publisher that sent it.
-        number: Its number in the sequence of that publisher, from 1 on; 0 if it has no number.
+        data: Bytes of the message.
+        sender: Publisher that sent the message.
+        number: Number of the message in the sequence of that publisher, from 1 on; 0 if the message has no number.
         sent_ns: Time of sending, by the clock of the sender [ns].
-        came_ns: Time at which the middleware received it [ns].
+        came_ns: Time at which the middleware received the message [ns].
     """
 
     data: bytes
@@ -52,9 +52,9 @@ class Endpoint(NamedTuple):
     """Publisher or reader of a topic, as known from discovery.
 
     Attributes:
-        node: Name of its node, with the namespace and a leading slash.
-        sender: As in :class:`Taken`; for a reader, its own number.
-        ros_type: Type of its messages, such as ``sensor_msgs/msg/JointState``.
+        node: Name of the node that owns it, with the namespace and a leading slash.
+        sender: As in :class:`Taken`; for a reader, the reader's own identifier.
+        ros_type: Type of the messages, such as ``sensor_msgs/msg/JointState``.
         is_reliable: As in :class:`Qos`.
         is_latched: As in :class:`Qos`.
     """
@@ -81,16 +81,16 @@ class Lock(Protocol):
     """Lock between the threads of a process."""
 
     def acquire(self, blocking: bool = ..., timeout: float = ..., /) -> bool:
-        """Lock it; return whether this was possible within the timeout [s], by default unlimited."""
+        """Lock; return whether this was possible within the timeout [s], which is unlimited by default."""
 
     def release(self) -> None:
-        """Give it back."""
+        """Unlock."""
 
     def __enter__(self) -> object:
-        """Take it."""
+        """Lock."""
 
     def __exit__(self, kind: Any, error: Any, trace: Any, /) -> object:
-        """Give it back."""
+        """Unlock."""
 
 
 class Thread(Protocol):
@@ -108,25 +108,25 @@ class Thread(Protocol):
         """Start the thread."""
 
     def join(self, timeout: float | None = None) -> None:
-        """Wait for its end, at most for ``timeout`` [s]."""
+        """Wait until the thread has ended, at most for ``timeout`` [s]."""
 
     def is_alive(self) -> bool:
         """Whether the thread still runs."""
 
 
 class Line(Protocol):
-    """End of a stream of bytes between two processes of one machine; it never waits."""
+    """Connection for bytes between two processes of one machine; its methods never wait."""
 
     def send(self, data: bytes | bytearray) -> int:
-        """Write as much as the line accepts now; return the number of bytes written.
+        """Write as many bytes as the connection accepts now; return the number of bytes written.
 
         Raises:
-            BlockingIOError: The line accepts nothing now.
+            BlockingIOError: The connection accepts nothing now.
             OSError: The other end is gone.
         """
 
     def recv(self, size: int) -> bytes:
-        """Read the received bytes, at most ``size``; empty if the other end is closed.
+        """Read the received bytes, at most ``size``; empty if the other process has closed the connection.
 
         Raises:
             BlockingIOError: No bytes were received.
@@ -134,40 +134,40 @@ class Line(Protocol):
         """
 
     def close(self) -> None:
-        """Close it."""
+        """Close the connection."""
 
 
 class Listener(Protocol):
-    """Listening end, which accepts lines from processes of the same machine."""
+    """Accepts connections from processes of the same machine."""
 
     def accept(self) -> Line | None:
-        """Next line of a process of this user; None if there is none."""
+        """Next connection from a process of this user; None if there is none."""
 
     def close(self) -> None:
-        """Stop accepting lines."""
+        """Stop accepting connections."""
 
 
 # -- topics, services, parameters ------------------------------------------------------------------
 
 
 class Publisher(Protocol):
-    """Sending end of a topic."""
+    """Publisher of a topic."""
 
     def publish(self, message: Any) -> None:
         """Send a message, or the bytes of one; a node that is not active sends nothing."""
 
     def send(self, data: bytes) -> None:
-        """The same as :meth:`publish`, but only for bytes and faster."""
+        """Send the bytes of a message; faster than :meth:`publish`."""
 
     def get_subscription_count(self) -> int:
         """Number of discovered readers."""
 
     def wait_for_all_acked(self, seconds: float) -> None:
-        """Wait until all readers have all messages, at most for some time [s]."""
+        """Wait until all readers have received all messages, at most for some time [s]."""
 
 
 class Taker(Protocol):
-    """Receiving end of a topic, whose messages are read without an executor.
+    """Subscription to a topic; its messages are read without an executor.
 
     Attributes:
         type: Class of its messages.
@@ -176,11 +176,11 @@ class Taker(Protocol):
     type: Any
 
     def take(self) -> Taken | None:
-        """Oldest waiting message; None if there is none."""
+        """Oldest queued message; None if the queue is empty."""
 
     @property
     def lost(self) -> int:
-        """Number of messages of all its senders that should have been delivered but were not."""
+        """Number of messages of all senders that should have been delivered but were not."""
 
     def wait(self, seconds: float) -> None:
         """Wait for a message, at most for some time [s]; no executor is needed."""
@@ -193,13 +193,13 @@ class Timer(Protocol):
     """Calls a function periodically."""
 
     def cancel(self) -> None:
-        """Pause."""
+        """Pause the timer."""
 
     def reset(self) -> None:
-        """Continue; the next call is one period from now."""
+        """Continue the timer; the next call is one period from now."""
 
     def is_canceled(self) -> bool:
-        """Whether it is paused."""
+        """Whether the timer is paused."""
 
 
 class Guard(Protocol):
@@ -210,7 +210,7 @@ class Guard(Protocol):
 
 
 class Client(Protocol):
-    """Client of a service; some thread must spin the node's executor meanwhile."""
+    """Client of a service; to receive answers, some thread must spin the node's executor."""
 
     srv_name: str
 
@@ -240,11 +240,11 @@ class Log(Protocol):
         """Log an error, at most once in some seconds."""
 
     def fatal(self, text: str) -> object:
-        """Log the error that ends the node."""
+        """Log an error after which the node ends."""
 
 
 class Node(Protocol):
-    """A node; names of topics are below its namespace unless they begin with a slash."""
+    """A node. Names of topics without a leading slash are below the namespace of the node."""
 
     def get_name(self) -> str:
         """Name of the node."""
@@ -308,25 +308,25 @@ class Hooks(Protocol):
     """Functions that a lifecycle node calls in its transitions."""
 
     def on_configure(self) -> Outcome:
-        """Make what it needs."""
+        """Make everything that the node needs."""
 
     def on_activate(self) -> Outcome:
-        """Begin to work; the node's publishers are already open."""
+        """Begin the node's work; the publishers of the node are already open."""
 
     def on_deactivate(self) -> Outcome:
-        """Stop working; the node's publishers are still open."""
+        """Stop the node's work; the publishers of the node are still open."""
 
     def on_cleanup(self) -> Outcome:
         """Close everything, so that the node can be configured again."""
 
     def on_shutdown(self) -> Outcome:
-        """Stop and close everything for good."""
+        """Stop the node's work and close everything; the node cannot be configured again."""
 
     def on_error(self) -> Outcome:
-        """After a crash, close everything."""
+        """Close everything after a crash."""
 
     def on_no_transition(self, wanted: str) -> None:
-        """A transition was requested that does not exist in the current state."""
+        """Called if a requested transition does not exist in the current state."""
 
 
 class LifecycleNode(Node, Protocol):
@@ -339,7 +339,7 @@ class LifecycleNode(Node, Protocol):
     given: Mapping[str, Any]
 
     def create_lifecycle_publisher(self, kind: Any, name: str, qos: Qos) -> Publisher:
-        """Publisher that is silent unless the node is active."""
+        """Publisher that sends only while the node is active."""
 
     def declare(
         self, specs: Iterable[Spec], values: Mapping[str, Value], accept: Callable[[Mapping[str, Value]], str]
@@ -349,7 +349,8 @@ class LifecycleNode(Node, Protocol):
         Args:
             specs: Declarations of the parameters.
             values: Values of the parameters.
-            accept: Called with a whole change before it is made; returns the reason to refuse it, empty to accept it.
+            accept: Called with a whole change before it is made; returns the reason to refuse the change, or an empty
+                text to accept it.
         """
 
     def show(self, values: Mapping[str, Value]) -> None:
@@ -363,20 +364,20 @@ class Executor(Protocol):
     """Serves timers, services and subscriptions of nodes, in the thread that spins it."""
 
     def add_node(self, node: Node) -> None:
-        """Serve a node too."""
+        """Add a node to the nodes that this executor serves."""
 
     def spin_once(self, timeout_sec: float | None = None) -> None:
-        """Serve one event, or none if none comes within the time [s].
+        """Serve one event, or nothing if no event comes within the time [s].
 
         Raises:
             WorldEndedError: The middleware was shut down.
         """
 
     def wake(self) -> None:
-        """Let :meth:`spin_once` return; from any thread."""
+        """Let :meth:`spin_once` return; may be called from any thread."""
 
     def shutdown(self) -> None:
-        """Stop serving."""
+        """Stop serving the nodes."""
 
 
 class WorldEndedError(Exception):
@@ -397,7 +398,7 @@ class World(Protocol):
         """Time of the system's clock [ns]."""
 
     def sleep(self, seconds: float) -> None:
-        """Wait [s]."""
+        """Wait for a time [s]."""
 
     def lock(self) -> Lock:
         """Lock between threads."""
@@ -412,16 +413,16 @@ class World(Protocol):
         """Apply real-time options to the calling thread; returns one line for each refused option."""
 
     def tidy(self) -> None:
-        """Free the memory of objects that the start has left behind, before the loops run."""
+        """Free the memory of objects that remain from the start, before the loops run."""
 
     def connect(self, place: str) -> Line:
-        """Line to the listener at a place of this machine; raises OSError if there is no listener."""
+        """Connection to the listener at an address of this machine; raises OSError if there is no listener."""
 
     def listen(self, place: str) -> Listener:
-        """Listen at a place of this machine; raises OSError if another process already listens there."""
+        """Listen at an address of this machine; raises OSError if another process already listens there."""
 
     def feed_place(self) -> str:
-        """Place at which the recorder of this machine listens, for the domain of this process."""
+        """Address at which the recorder of this machine listens, for the domain of this process."""
 
     def node(self, name: str, **options: Any) -> Node:
         """A node; options are those of the class in rclpy."""
@@ -434,10 +435,10 @@ class World(Protocol):
         """
 
     def executor(self) -> Executor:
-        """Executor of the nodes of this process, or guest."""
+        """Executor for the nodes of this process or of this guest."""
 
     def guest(self, domain: int | None = None) -> "World":
-        """This world for a guest that does not belong to the session and has its own context."""
+        """This world for a guest: a program that is not part of the session and has its own context."""
 
     def shutdown(self) -> None:
         """Shut the middleware down."""
@@ -452,4 +453,4 @@ class Owner(Protocol):
 
     @property
     def ros(self) -> Node:
-        """Node of the guest."""
+        """Node of the owner."""

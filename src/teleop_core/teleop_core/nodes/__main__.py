@@ -1,4 +1,4 @@
-"""``python -m teleop_core.nodes NAME``: the node of a stage, or a whole session."""
+"""``python -m teleop_core.nodes NAME`` runs the node of a stage, or a whole session."""
 
 import sys
 

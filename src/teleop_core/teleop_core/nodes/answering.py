@@ -34,12 +34,12 @@ class AnsweringNode(CoreNode):
     def turn(self) -> None:
         """Answer the next message."""
         assert self._question.subscription is not None
-        # A message that was delayed on a slow link becomes due without a new message to wait for.
+        # A delayed message becomes due even if no new message comes. Therefore the wait is short if there is a delay.
         self._question.subscription.wait(DT if self._question.delay else 0.1)
         self.work(self.send_report)
 
     def tick(self, tick_ns: int) -> None:
-        """Answer the received messages. Used within a session, which calls :meth:`tell` later."""
+        """Answer the received messages. A session calls this method, and :meth:`tell` later."""
         self.work()
 
     def tell(self) -> None:
@@ -48,7 +48,7 @@ class AnsweringNode(CoreNode):
             self.send_report(self._told_ns)
 
     def work(self, report: Callable[[int], None] | None = None) -> None:
-        """Answer the messages that have come, one by one.
+        """Answer the received messages one by one.
 
         Args:
             report: Called with the stamp of each answer [ns] when it is sent.
@@ -68,7 +68,7 @@ class AnsweringNode(CoreNode):
             self._find_silence(report)
 
     def _find_silence(self, report: Callable[[int], None] | None) -> None:
-        """When the trigger falls silent, let the stage make its outputs safe, and report this once."""
+        """When the trigger stops sending, let the stage make its outputs safe, and report this once."""
         is_silent = self._question.age() > self._timeout
         if is_silent and not self._was_silent:
             with self.lock:

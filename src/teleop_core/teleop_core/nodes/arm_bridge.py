@@ -18,8 +18,9 @@ _WAITING = 20  # number of the arm's messages that are queued while the loop is 
 class ArmBridgeNode(TickingNode):
     """Sends the newest setpoint in the form that the controller accepts, and passes on the arm's measurements.
 
-    The node publishes one measurement for each valid sample of the arm, with the time of that sample as stamp, and
-    none otherwise: its silence makes the server hold the arm. It publishes nothing before the server is discovered.
+    For each valid sample of the arm, the node publishes one measurement, stamped with the time of the sample. Without
+    valid samples it publishes nothing; the server then keeps the arm still. It also publishes nothing before the
+    server is discovered.
     """
 
     def setup(self, parameters: BridgeParameters) -> None:
@@ -57,7 +58,7 @@ class ArmBridgeNode(TickingNode):
         self._trouble.tell(self.stage.concerns())
 
     def _listen(self) -> None:
-        if not self._has_server:  # a server that is discovered late would continue without the arm
+        if not self._has_server:  # a server that is discovered after the first message would miss the arm
             self._has_server = self._setpoint.publishers() > 0
         while (taken := self._arm.take()) is not None:
             message = read_message(taken.data, self._arm.type)

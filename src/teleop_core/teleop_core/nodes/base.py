@@ -23,13 +23,13 @@ from teleop_core.nodes.streams import Input, message_type
 from teleop_core.nodes.tuned import TunedNode
 from teleop_core.session.reports import report_of
 
-# longest wait for the gate; even on a busy machine, a session's tick takes a hundredth of this time
+# longest wait for the gate [s]; even on a busy machine, a session's tick takes a hundredth of this time
 _GATE_PATIENCE = 1.0
-_NEWS = {"active": "at work", "finalized": "ended"}  # others: the state itself
+_NEWS = {"active": "at work", "finalized": "ended"}  # other states are logged by their own names
 
 
 class CoreNode(TunedNode):
-    """Lifecycle node around one stage: fills its signals, steps it, publishes its signals.
+    """Lifecycle node around one stage: writes received values to its signals, makes steps, publishes outputs.
 
     A subclass makes the stage in :meth:`setup` and does one round of work in :meth:`turn`, which
     runs in a thread of its own while the node is active. Arguments and errors are those of
@@ -88,11 +88,11 @@ class CoreNode(TunedNode):
         self._open_report()
 
     def turn(self) -> None:
-        """One round of work; blocks for a tenth of a second at most."""
+        """Do one round of work; blocks for a tenth of a second at most."""
         raise NotImplementedError
 
     def tick(self, tick_ns: int) -> None:
-        """Work for one tick [ns, monotonic] of a session, which calls all its nodes in turn."""
+        """Work for one tick [ns, monotonic]; a session calls this method of all its nodes in turn."""
         raise NotImplementedError
 
     def tell(self) -> None:
@@ -105,14 +105,14 @@ class CoreNode(TunedNode):
         """Make the outputs safe after the last turn."""
 
     def teardown(self) -> None:
-        """Close everything except topics that :meth:`setup` made."""
+        """Close everything that :meth:`setup` opened, except topics."""
 
     def concerns(self) -> list[str]:
-        """Texts about everything that is wrong now."""
+        """Texts about all current problems of the node."""
         return []
 
     def values(self) -> dict[str, str]:
-        """Names and texts of the node's own values in its report, in addition to those of all nodes."""
+        """Names and texts of the node's own values in its report, in addition to the values that every node reports."""
         return {}
 
     def news(self, word: str) -> str:
@@ -147,7 +147,7 @@ class CoreNode(TunedNode):
     # -- topics ----------------------------------------------------------------------------------
 
     def open_publisher(self, topic: Topic) -> Publisher:
-        """Publisher that is silent unless the node is active, and closed at cleanup."""
+        """Open a publisher that sends only while the node is active, and that is closed at cleanup."""
         kind = message_type(topic.ros_type)
         name = self.ros.resolve_topic_name(topic.name)
         offered = self.overrides.apply(name, "publisher", profile(topic))
@@ -169,10 +169,10 @@ class CoreNode(TunedNode):
         if self._report is not None:
             self._report_publisher = self.open_publisher(self._report)
             self._state = self.row[self._report.field]
-            read_reports(report_of(self._report, 0, self._state))  # loads the message types, 60 ms
+            read_reports(report_of(self._report, 0, self._state))  # loads the message types, which takes 60 ms
 
     def send_report(self, stamp_ns: int) -> None:
-        """Send the state report if the state, or a parameter that goes with it, has changed."""
+        """Send the report of the state if the state or a reported parameter has changed."""
         if self._report is None or self.runner is None:
             return
         bits, parameters = self._state.tobytes(), self.parameters
@@ -209,11 +209,11 @@ class CoreNode(TunedNode):
         return result
 
     def on_activate(self) -> Outcome:
-        """Start to work."""
+        """Start working."""
         return self._guard("activate", self._begin, "active")
 
     def on_deactivate(self) -> Outcome:
-        """Stop to work."""
+        """Stop working."""
         return self._guard("deactivate", self._halt, "inactive")
 
     def on_cleanup(self) -> Outcome:
@@ -325,7 +325,7 @@ class CoreNode(TunedNode):
                 self.ended.set_result(None)
 
     def _deactivate(self) -> None:
-        if self.is_at_work:  # a supervisor may have shut it down already
+        if self.is_at_work:  # a supervisor may have shut the node down already
             self.ros.trigger("deactivate")
 
     def finish(self) -> None:

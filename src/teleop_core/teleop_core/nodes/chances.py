@@ -1,7 +1,7 @@
 """Chances: the time for which a process could have worked, from the kernel's accounting of its threads.
 
-On a busy machine a healthy thread may get no processor for a second. Judged by the clock alone, it would seem to hang.
-Therefore the time for which a thread waited for a processor does not count here.
+On a busy machine a healthy thread may get no processor for a second. Judged by the clock alone, the thread would seem
+to hang. Therefore the time for which a thread waited for a processor does not count here.
 """
 
 import time
@@ -11,13 +11,12 @@ from pathlib import Path
 
 _LONGEST = 0.2
 """Largest time between two calls of :meth:`Chances.look` that counts [s]. If more time has passed, the caller itself
-had no processor, or was
-stopped together with the process."""
+had no processor, or was stopped together with the process."""
 
 
 @dataclass(frozen=True)
 class _Account:
-    """Time that a thread ran, and waited for a processor [s]; whether it is ready to run."""
+    """Time for which a thread ran, time for which it waited for a processor [s], and whether it is ready to run."""
 
     ran: float
     waited: float
@@ -52,7 +51,7 @@ class Chances:
             if thread not in before:
                 continue
             got = account.ran - before[thread].ran
-            waits = account.is_ready and got <= 0.0  # the kernel updates its account when it runs again
+            waits = account.is_ready and got <= 0.0  # the kernel updates an account when its thread runs again
             waited = max(waited, elapsed if waits else account.waited - before[thread].waited)
             ran = got if thread == self._worker else ran
         return max(elapsed - waited, ran, 0.0)
@@ -62,14 +61,14 @@ class Chances:
         return {thread: one for thread in names if (one := self._account(thread)) is not None}
 
     def _threads(self) -> list[int]:
-        """All threads of the process; empty after its end."""
+        """Numbers of all threads of the process; empty after the process has ended."""
         try:
             return [int(path.name) for path in self._folder.iterdir()]
         except OSError:
             return []
 
     def _account(self, thread: int) -> _Account | None:
-        """Account of one thread; None if it has ended, or the system keeps none."""
+        """Account of one thread; None if the thread has ended, or the system has no account."""
         folder = self._folder / str(thread)
         try:
             ran, waited, _ = map(int, (folder / "schedstat").read_text().split())

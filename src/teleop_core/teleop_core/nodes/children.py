@@ -20,19 +20,21 @@ from teleop_core.nodes.parent import VARIABLE
 from teleop_core.nodes.start import SESSION
 from teleop_core.nodes.starter import NODE, Starter
 
-# Not SIGINT: a process that a shell started in the background ignores it, and so do its children.
+# Signals that end a process, with the wait after each [s]. SIGINT is not used: a process that a shell started in the
+# background ignores SIGINT, and so do its children.
 _PATIENCE = ((signal.SIGTERM, 30.0), (signal.SIGKILL, 5.0))
-# signals to a process that does not run, with the wait after each [s]
+# signals that end a process that is suspended, with the wait after each [s]
 _STILL_PATIENCE = ((signal.SIGTERM, 2.0), (signal.SIGKILL, 5.0))
 _TROUBLE = ("[ERROR]", "[FATAL]", "Traceback")
-_STILL = 3.0  # a separate thread reports ten times a second, whatever the process is doing
-_STILL_STARTING = 60.0  # the interpreter loads, perhaps from a cold disk
+_STILL = 3.0  # longest silence of a process at work [s]; a separate thread reports ten times a second
+_STILL_STARTING = 60.0  # longest silence of a starting process [s]; the interpreter may load from a cold disk
 
 
 def environment(domain: int | None = None) -> dict[str, str]:
-    """Environment of the nodes; by default communication within this machine only, and a free domain.
+    """Environment variables of the nodes. By default, nodes communicate within this machine only, in a free domain.
 
-    Variables that this process also needs are set in it too, except the domain: one process may run several sessions.
+    Variables that this process needs too are also set in its own environment. The domain is not set there, because one
+    process may run several sessions.
 
     Args:
         domain: ROS domain; None for the domain in ``ROS_DOMAIN_ID``, or for a free domain if this is not set.
@@ -57,8 +59,8 @@ def _release() -> None:
 def free_domain() -> str:
     """Number of a DDS domain without participants on this machine.
 
-    The first participant of domain d listens on UDP port 7410 + 250 d (DDSI-RTPS 2.5, 9.6.1.1).
-    Until then, a TCP socket with the same port number keeps other sessions away.
+    The first participant of domain d listens on UDP port 7410 + 250 d (DDSI-RTPS 2.5, 9.6.1.1). Until then, a TCP
+    socket with the same port number prevents other sessions from choosing the domain.
     """
     for domain in random.SystemRandom().sample(range(1, 102), 101):
         port = 7410 + 250 * domain
@@ -84,11 +86,11 @@ class Child:
     file without a name.
 
     Args:
-        name: Stage with its namespace, or a whole session.
+        name: Name of a stage with its namespace, or of a whole session.
         parameters: Open parameter file.
         env: Environment variables of the process.
-        starter: Starter that starts it.
-        command: Command that it runs instead of the node with that name.
+        starter: Starter that starts the process.
+        command: Command of the process; by default, the process runs the node ``name``.
         nodes: Nodes in the process. If there are several, or one with another name, the process is one side of a
             session.
 
@@ -113,7 +115,7 @@ class Child:
         self._line, theirs = socket.socketpair()
         self._line.setblocking(False)
         self._text = b""
-        # Closed together with this process: no other process has this file.
+        # The system closes this file when this process ends, because no other process opens it by name.
         self._log = cast("IO[bytes]", tempfile.TemporaryFile())  # noqa: SIM115
         is_side = bool(nodes) and tuple(nodes) != (name,)
         ours = [SESSION, *nodes] if is_side else [stage]
@@ -134,7 +136,7 @@ class Child:
 
     @property
     def is_running(self) -> bool:
-        """Whether it has not ended."""
+        """Whether the process is still running."""
         return self._process.poll() is None
 
     def check(self) -> None:
@@ -177,7 +179,7 @@ class Child:
         return ":" + "".join(f"\n  {line}" for line in lines) if lines else "; it wrote nothing"
 
     def ask(self) -> None:
-        """Ask it to end, without waiting."""
+        """Ask the process to end, without waiting."""
         if self._process.poll() is None and not self._is_asked:
             self._is_asked = True  # a second signal would only disturb its end
             self._process.send_signal(signal.SIGTERM)
@@ -196,7 +198,7 @@ class Child:
         return self._process.wait()
 
     def close(self) -> None:
-        """Close the child's output and its line, after its end."""
+        """Close the child's output and its socket, after the child has ended."""
         self._line.close()
         self._log.close()
 

@@ -24,7 +24,7 @@ class Processes(StrEnum):
 
 
 def crews(graph: Graph, processes: Processes = Processes.SIDES, without: Collection[str] = ()) -> tuple[Crew, ...]:
-    """Processes of a graph: the recorder before the others.
+    """Processes of a graph, in groups that are started one after the other. The first group is the recorder.
 
     Args:
         graph: Graph of the session.
@@ -44,7 +44,7 @@ def crews(graph: Graph, processes: Processes = Processes.SIDES, without: Collect
 
 
 def _process_of(graph: Graph, name: str, processes: Processes) -> str:
-    """Name of the process in which a node is."""
+    """Name of the process that runs a node."""
     if processes is Processes.NODES:
         return name
     if processes is Processes.ONE:

@@ -1,9 +1,8 @@
 """CRTK: operating state and state commands of an arm, as the Collaborative Robotics Toolkit defines them.
 
-``operating_state`` (crtk_msgs/OperatingState) is sent when it changes and five times a second;
-``state_command`` (crtk_msgs/StringStamped) takes the commands of
-:mod:`teleop_core.slave.operation.states`. Both need the package crtk_msgs; without it, an arm has only its services
-and reports.
+``operating_state`` (crtk_msgs/OperatingState) is sent when it changes and once a second; ``state_command``
+(crtk_msgs/StringStamped) takes the commands of :mod:`teleop_core.slave.operation.states`. Both need the package
+crtk_msgs; without it, an arm has only its services and reports.
 """
 
 from collections import deque
@@ -25,7 +24,7 @@ Condition = tuple[str, bool, bool]
 
 
 def is_installed() -> bool:
-    """Whether messages of CRTK can be sent here."""
+    """Whether the messages of CRTK are installed."""
     try:
         message_type(OPERATING_STATE)
     except ImportError:
@@ -36,15 +35,16 @@ def is_installed() -> bool:
 SINGLE = Qos(depth=10)
 """QoS of one-shot commands: reliable, so that none is lost if the sender is reliable too."""
 STREAMED = Qos(depth=1, is_reliable=False)
-"""QoS of streamed commands: best effort, so that any sender is heard; the newest counts."""
+"""QoS of streamed commands: best effort, so that messages of any sender are received; only the newest command counts.
+"""
 _LATCHED = Qos(depth=10, is_latched=True)
-"""QoS of states: who subscribes late, with transient-local durability, gets the last value."""
+"""QoS of states: a late subscriber with transient-local durability receives the last value."""
 
 
 class OperatingState:
     """Topics of the operating state of one arm, served by the executor.
 
-    The node's loop calls :meth:`note` and never publishes here itself, so that no slow reader blocks it.
+    The node's loop calls :meth:`note` and never publishes these topics itself, so that no slow reader blocks the loop.
 
     Args:
         node: Node that owns the topics; its ``lock`` is held while a command is processed.
@@ -67,7 +67,7 @@ class OperatingState:
         self._timer = node.ros.create_timer(_PERIOD, self._send)
 
     def note(self, stamp_ns: int) -> None:
-        """Let the current condition be sent soon, with its stamp [ns]; may be called from any thread."""
+        """Let the executor send the current condition soon, with a stamp [ns]; may be called from any thread."""
         self._changes.append((stamp_ns, self._condition()))
         self._guard.trigger()
 

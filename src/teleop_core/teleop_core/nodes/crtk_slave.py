@@ -1,8 +1,9 @@
 """CRTK slave: motion commands and further measurements of a slave, in addition to its streams.
 
 :class:`~teleop_core.slave.motion_commands.MotionCommands` decides which command moves the arm, and which motions are
-allowed. This module converts messages to its calls, in the executor: for commands that come once, or some hundred
-times a second. Commands that come a thousand times a second go to ``slave/servo_jp`` and ``slave/servo_cp``.
+allowed. This module converts messages to calls of that class. It works in the executor, which is fast enough for
+commands that come once or some hundred times a second. Commands that come a thousand times a second go to
+``slave/servo_jp`` and ``slave/servo_cp``.
 """
 
 from collections.abc import Callable
@@ -34,7 +35,7 @@ _LOOK = 1.0  # time between two checks for readers [s]
 
 
 class CrtkSlave:
-    """Topics of CRTK that a slave has in addition to its streams.
+    """Topics of CRTK that a slave offers in addition to its streams.
 
     Args:
         node: Node that owns the topics; its ``lock`` is held while the stage is read or commanded.
@@ -57,7 +58,7 @@ class CrtkSlave:
         self._measured = Measured(node, stage)
 
     def note(self, stamp_ns: int) -> None:
-        """Let a changed operating state be sent, with its stamp [ns]; called from the node's loop."""
+        """Let the executor send a changed operating state with a stamp [ns]; called from the node's loop."""
         if self._state is not None:
             self._state.note(stamp_ns)
 
@@ -66,7 +67,7 @@ class CrtkSlave:
         return {"motion": self._motion.source, **self._refusals.values()}
 
     def close(self) -> None:
-        """Withdraw them."""
+        """Close the topics."""
         if self._state is not None:
             self._state.close()
         for subscription in self._subscriptions:
@@ -92,7 +93,7 @@ class CrtkSlave:
             (
                 "servo_jr",
                 _JOINTS,
-                False,  # not streamed: each command counts
+                False,  # not streamed, because each command counts
                 lambda m: self._locked(motion.servo_by, self._of(m), now()),
             ),
             ("servo_jv", _JOINTS, True, lambda m: self._locked(motion.drive_joints, self._of(m, "velocity"), now())),
@@ -188,14 +189,14 @@ class Measured:
         }
         self._layouts = {t: layout(t.of_arm(node.arm), names) for t in self._publishers}
         self._jacobian = node.ros.create_lifecycle_publisher(message_type(_MATRIX), JACOBIAN, profile(MEASURED_CV))
-        self._force: Any = None  # newest message of it
+        self._force: Any = None  # newest message of the force sensor
         self._forces: Any = None  # subscription, while there is a reader of forces in other frames
         self._timer = node.ros.create_timer(_PERIOD, self._send)
         self._timer.cancel()
         self._look = node.ros.create_timer(_LOOK, self._look_for_readers)
 
     def close(self) -> None:
-        """Withdraw them."""
+        """Close the topics."""
         for timer in (self._timer, self._look):
             self._node.ros.destroy(timer)
         for publisher in (*self._publishers.values(), self._jacobian):
@@ -248,7 +249,7 @@ class Measured:
             self._send_force(tip)
 
     def _send_force(self, pose: Array) -> None:
-        """Publish the newest force once, with its stamp, in the frames of a tip at a pose (7,)."""
+        """Publish the newest force once, with its stamp, in body and spatial frame of a tip at ``pose`` (7,)."""
         message, self._force = self._force, None
         found = read_values(SLAVE_MEASURED_CF.kind, message)
         if isinstance(found, Refusal):
@@ -263,7 +264,7 @@ class Measured:
 
 
 def _matrix(rows: Array) -> Any:
-    """Matrix as a message: rows, then columns."""
+    """Message that contains a matrix, row by row."""
     dimension = message_type("std_msgs/msg/MultiArrayDimension")
     message = message_type(_MATRIX)(data=rows.ravel().tolist())
     height, width = rows.shape

@@ -12,19 +12,19 @@ from teleop_core.nodes.loop import Loop
 
 PERIOD = 0.01
 """Time between two readings of the device [s]."""
-_RUMBLES = 5  # readings from one rumble to the next
+_RUMBLES = 5  # number of readings from one rumble to the next
 _AGAIN = 1.0  # time between two attempts to find a lost device [s]
-_OPENING = 20.0  # a device that takes longer to open hangs [s]
+_OPENING = 20.0  # a device that takes longer to open counts as hung [s]
 
 
 class DeviceHand:
     """Reader of a device in a separate thread; only this thread uses the device.
 
-    A device that is unplugged is closed, and opened again when it comes back.
+    A device that is unplugged is closed, and opened again when it is plugged in again.
 
     Args:
-        node: Node in whose log it reports.
-    hand: Hand that it moves.
+        node: Node whose log is used.
+        hand: Hand that the device moves.
         opens: Opens the device.
         parameters: Parameters of the operator.
         force: Returns the force that the person should feel, as a share of the largest force.
@@ -63,7 +63,7 @@ class DeviceHand:
         return [] if self._hand.is_held else [f"waits for a hand: {UNHELD}"]
 
     def values(self) -> dict[str, str]:
-        """The device, and whether the stylus is held."""
+        """Name of the device, and whether a person holds the stylus."""
         name = self._device.name if self._device is not None else ""
         return {"hand": name, "hand.is_held": str(int(self._hand.is_held))}
 

@@ -16,7 +16,7 @@ from teleop_core.nodes.streams import Input
 OK, WARNING = 0, 1
 """Levels of a report."""
 _STEP_NS = 50_000_000
-"""The system clock was stepped if it moves by more than this relative to the monotonic clock within a second [ns]."""
+"""Largest change of the system clock relative to the monotonic clock in a second that does not count as a step [ns]."""
 
 
 class Reporter:
@@ -73,7 +73,7 @@ class Reporter:
         return concerns
 
     def rates(self, inputs: list[Input]) -> dict[str, str]:
-        """Messages per second at each input, over the same time as the last call of :meth:`rate`."""
+        """Messages per second at each input, over the time between the last two calls of :meth:`rate`."""
         values = {}
         for entry in inputs:
             new = entry.received - self._last_received.get(entry, 0)

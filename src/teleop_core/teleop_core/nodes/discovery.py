@@ -1,4 +1,4 @@
-"""Discovery and transport: by default only this machine, and no reader can block a writer.
+"""Discovery and transport: by default, nodes communicate only within this machine, and no reader blocks a writer.
 
 Fast DDS is configured by a profile, an XML file of this package:
 
@@ -21,8 +21,10 @@ RANGE = "ROS_AUTOMATIC_DISCOVERY_RANGE"
 _PEERS, _LOCAL_ONLY = "ROS_STATIC_PEERS", "ROS_LOCALHOST_ONLY"
 _PROFILES = ("FASTRTPS_DEFAULT_PROFILES_FILE", "FASTDDS_DEFAULT_PROFILES_FILE")
 _FOLDER = Path(__file__).with_name("profiles")
-LOOPBACK, NETWORK = str(_FOLDER / "loopback.xml"), str(_FOLDER / "network.xml")
-"""Profiles for this machine alone and for several machines."""
+LOOPBACK = str(_FOLDER / "loopback.xml")
+"""Profile for communication within this machine."""
+NETWORK = str(_FOLDER / "network.xml")
+"""Profile for communication between several machines."""
 
 
 def choose_transport(environment: MutableMapping[str, str] = os.environ) -> None:
@@ -32,7 +34,7 @@ def choose_transport(environment: MutableMapping[str, str] = os.environ) -> None
     from other machines. For middlewares other than Fast DDS only the range is set.
 
     Args:
-        environment: Variables; changed in place.
+        environment: Environment variables; changed in place.
     """
     if _profile(environment):
         return
@@ -65,7 +67,7 @@ def beyond_this_machine(environment: Mapping[str, str] = os.environ) -> str:
     """One line about other machines that may take part; empty if only this machine can.
 
     Args:
-        environment: Variables, after :func:`choose_transport`.
+        environment: Environment variables, after :func:`choose_transport`.
     """
     profile = _profile(environment)
     said = environment.get(RANGE, "").upper() or "SUBNET"

@@ -42,10 +42,10 @@ def displayed(topic: Topic) -> Topic:
 
 
 class LiveDisplay:
-    """Slow copies of the streams of one arm, published while there are subscribers.
+    """Publishes the streams of one arm at a low rate while there are subscribers.
 
     Args:
-        node: Node that publishes them.
+        node: Node that publishes the streams.
         arm: Namespace of the arm.
     """
 

@@ -1,7 +1,7 @@
 """Feed: sends messages from a loop to the recorder of the same machine, without the middleware.
 
 A loop writes all messages of a tick to a socket at once, and never waits. Messages that the socket does not accept are
-queued, up to :data:`MOST` bytes. Further messages are lost; the recorder detects this by the numbers of later
+queued, at most :data:`MOST` bytes. Further messages are lost; the recorder detects this by the numbers of later
 messages. A loop looks for a recorder once a second. Without a feed, and from other machines, the recorder gets
 messages by the middleware.
 """
@@ -16,10 +16,10 @@ from teleop_core.middleware.world import Line, Listener, World
 
 MOST = 16 << 20
 """Largest queue for a recorder that reads nothing [bytes]; about 7 s of a session of one arm."""
-_HEAD = struct.Struct("<IHHIq")  # size, topic, word, number, time [ns]
+_HEAD = struct.Struct("<IHHIq")  # head of a frame: size, topic, word, number, time [ns]
 _NAMES, _MESSAGE, _JOINED, _LEFT, _END = 0, 1, 2, 3, 4
 _AGAIN_NS = 1_000_000_000  # time between two searches for a recorder
-_READ = 1 << 20  # bytes at once
+_READ = 1 << 20  # largest number of bytes per read
 
 
 class Channel:
@@ -47,7 +47,7 @@ class Channel:
             self.tell()
 
     def tell(self) -> None:
-        """Tell it again to a new recorder."""
+        """Tell a new recorder whether this process sends the topic."""
         if self._feed.is_open:
             word = _JOINED if self._is_inside else _LEFT
             self._feed.put(self._index, word, time_ns=self._feed.world.time_ns())
@@ -63,7 +63,7 @@ class Feed:
     Attributes:
         world: As given.
         channels: Channel of each topic, by its name.
-        waiting: Bytes that are still to be written.
+        waiting: Queued bytes that are not written yet.
         is_open: Whether a recorder listens.
     """
 
@@ -97,7 +97,7 @@ class Feed:
             del self.waiting[:written]
 
     def close(self) -> None:
-        """Write as much of the rest as the socket accepts, and disconnect from the recorder."""
+        """Write as much of the queue as the socket accepts, and disconnect from the recorder."""
         if self._line is not None:
             self.put(0, _END)
             with suppress(OSError):
@@ -124,11 +124,11 @@ class Fed(Protocol):
         """Receive a message; ``lost`` messages before it were lost."""
 
     def join(self, is_inside: bool, since_ns: int) -> None:
-        """Receive messages sent from ``since_ns`` on [ns] from the feed, or from the middleware again."""
+        """Receive messages sent since ``since_ns`` [ns] from the feed if ``is_inside``, else from the middleware."""
 
 
 class FeedReader:
-    """The recorder's ends of all feeds of its machine. It accepts only loops of the same user.
+    """The recorder's side of all feeds of its machine. It accepts only loops of the same user.
 
     Args:
         channels: Receiver of the messages of each topic, by its name.
@@ -189,7 +189,7 @@ class _Source:
         self._hand_on()
 
     def close(self) -> None:
-        """Give its topics back to the middleware."""
+        """Close the feed; the recorder receives its topics by the middleware again."""
         self._line.close()
         self.is_open = False
         for channel in self._channels:

@@ -39,12 +39,12 @@ def checked_arguments(arguments: list[str]) -> list[str]:
 
 
 def _anywhere(key: str) -> str:
-    """Key that a node matches in any namespace: name as /lab/name, left/name as /lab/left/name."""
+    """Key that matches a node in any namespace: ``left/name`` becomes a key that matches /lab/left/name."""
     return key if key.startswith("/") else f"/**/{key}"
 
 
 def _copy(content: dict[str, Any]) -> str:
-    """Path of a copy for this process, in a file without a name, so that nothing of it can remain."""
+    """Write a copy for this process into a file without a name, so that no file remains; return its path."""
     file = tempfile.TemporaryFile("w+", encoding="utf-8")  # noqa: SIM115
     file.write(written(content))
     file.flush()

@@ -12,7 +12,7 @@ from teleop_core.slave.operation.states import TABLE, Answer, Event, State, answ
 
 
 class CrtkMaster:
-    """Operating state of the device in the hand.
+    """Operating state of the haptic device.
 
     The device is enabled from the start and needs no homing, because its encoders are absolute. In all states except
     ENABLED its motors give no force, and the hand moves it freely. An emergency stop of the session sets the state
@@ -30,7 +30,7 @@ class CrtkMaster:
 
     @property
     def is_enabled(self) -> bool:
-        """Whether its motors may push."""
+        """Whether the device's motors may push."""
         return self._state is State.ENABLED and not self._is_stopped
 
     def request(self, name: str) -> tuple[Answer, str]:
@@ -73,7 +73,7 @@ _PRESSED = OPERATION.index("is_pressed")
 
 
 class HapticMasterNode(TickingNode):
-    """One sample of the device per millisecond, stamped with its nominal time."""
+    """Publishes one sample of the device per millisecond, stamped with the nominal time of the tick."""
 
     def setup(self, parameters: HapticMasterParameters) -> None:
         """Make the device and open its topics."""
@@ -101,7 +101,7 @@ class HapticMasterNode(TickingNode):
             self._press(is_pressed=pressed)
         was_pressed = self._operation[_PRESSED]
         super().read_ports(trigger)
-        if was_pressed and not self._operation[_PRESSED]:  # released, or overridden at the slave
+        if was_pressed and not self._operation[_PRESSED]:  # the stop was released, or overridden at the slave
             self._stop.release()
             self._press(is_pressed=False)
         if not self._crtk.is_enabled:

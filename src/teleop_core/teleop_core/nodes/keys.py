@@ -22,7 +22,7 @@ class Keys:
         stop: Called at once, in that thread, when :data:`STOP` is pressed.
 
     Attributes:
-        is_there: Whether there is a terminal to read keys from.
+        is_there: Whether there is a terminal from which keys can be read.
         waiting: Other keys that were pressed, oldest first.
     """
 

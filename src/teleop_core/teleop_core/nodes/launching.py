@@ -31,7 +31,7 @@ COMMON = {
     "respawn": ("true", "whether a process that ends is started again; never that of the slave or the recorder"),
     "log_level": ("info", "one of " + ", ".join(LOG_LEVELS)),
 }
-"""Arguments of all launch files: name to default and meaning."""
+"""Arguments of all launch files: default and meaning of each name."""
 ONE_ARM = {"robot": ("", "robot of the arm, one of `teleop parts`; empty: the scenario's")}
 TWO_ARMS = {
     "left_robot": ("", "robot of the default arm, whose topics have no arm's name"),
@@ -52,11 +52,11 @@ class Process:
     Attributes:
         executable: Executable of this package.
         arguments: Arguments before the ROS arguments.
-        name: Name of its node; empty if it contains several nodes.
-        namespace: Its namespace, with leading slash.
+        name: Name of the node; empty if the process contains several nodes.
+        namespace: Namespace of the process, with leading slash.
         parameters: Parameter file, kept until the launching process ends.
-        log_level: Lowest level of its log.
-        respawns: Whether it is restarted when it ends.
+        log_level: Lowest level of the log.
+        respawns: Whether the process is restarted when it ends.
     """
 
     executable: str
@@ -69,7 +69,7 @@ class Process:
 
 
 def processes(given: Mapping[str, str], namespace: str = "") -> list[Process]:
-    """Processes of a session, the recorder first and masters last, so that no message is missed.
+    """Processes of a session. The recorder is the first and masters are the last, so that no message is missed.
 
     Args:
         given: Arguments by name, as in :data:`COMMON` and in the arguments of one launch file.
@@ -119,7 +119,7 @@ def describe(own: Mapping[str, tuple[str, str]]) -> "LaunchDescription":
     """Description of a launch file.
 
     Args:
-        own: Its arguments in addition to :data:`COMMON`: name to default and meaning.
+        own: Arguments of this launch file in addition to :data:`COMMON`: default and meaning of each name.
     """
     from launch.actions import DeclareLaunchArgument, OpaqueFunction
     from launch_ros.actions import Node

@@ -34,7 +34,7 @@ from teleop_core.slave.slave import SlaveParameters
 SILENCE = 30.0
 """A working node that has not reported for this time counts as failed [s].
 
-Whether its process or its loop hangs is detected within seconds by :mod:`teleop_core.nodes.children` and
+A process or a loop that hangs is detected within seconds by :mod:`teleop_core.nodes.children` and
 :mod:`teleop_core.nodes.watch`.
 """
 _LOOK = 0.5
@@ -45,8 +45,8 @@ _ALONE = 1.0
 end [s]."""
 
 _TRANSPORT = dict.fromkeys(Processes, 0.3e-3) | {Processes.NODES: 1.4e-3}
-"""Time from a sample of the device to the force on it [s], as measured by `make bench`: within a process on the hand's
-side, or over two of the three hops from master to slave."""
+"""Time from a sample of the device to the force on the device [s], as measured by `make bench`. With one process per
+node, it is the time of two of the three hops from master to slave; otherwise, the time within a process."""
 _PRIORITY = 20
 """SCHED_FIFO priority of loops if a session does not set one and the system allows it."""
 _NEWS_PERIOD = 5.0  # time between two lines about a node that starts slowly [s]
@@ -68,7 +68,7 @@ def live(
 
     Args:
         configuration: Configuration of the session, with its duration.
-        out: Directory of the recording, made here.
+        out: Directory of the recording, which is created.
         console: Console that shows the progress.
         processes: Distribution of the nodes over processes.
         without: Nodes that are not started because other nodes replace them, for example an arm bridge instead of
@@ -122,7 +122,7 @@ _UNGRANTED = (
 def _priority(configuration: Configuration, processes: Processes) -> int | None:
     """Priority of the loops; None: as configured.
 
-    With one process per node it stays 0, because these processes together need more than two processors.
+    With one process per node the priority stays 0, because these processes together need more than two processors.
     """
     if configuration.groups[SESSION].real_time.priority >= 0 or processes is Processes.NODES:
         return None
@@ -341,7 +341,7 @@ class _Progress:
         self._begin = self._last = self._told = time.monotonic()
 
     def since_begin(self) -> float:
-        """Time since they were started [s]."""
+        """Time since the processes were started [s]."""
         return time.monotonic() - self._begin
 
     def news(self) -> list[str]:
@@ -356,7 +356,7 @@ class _Progress:
         return [f"{name}: {doing}" for name, doing in seen.items() if "compiling" in doing]
 
     def age(self) -> float:
-        """Time since the last progress of any of them [s]."""
+        """Time since the last progress of any process [s]."""
         return time.monotonic() - self._last
 
 
@@ -368,7 +368,7 @@ def session_parameters(
     starts_recorder: bool = True,
     priority: int | None = None,
 ) -> dict[str, Any]:
-    """Parameters of all nodes, as the text of a ROS 2 parameter file; ``out`` is the recorder's parameter.
+    """Parameters of all nodes, as the content of a ROS 2 parameter file.
 
     Every node is named with its namespace. A port that is not fed by the topic of its own name has an entry in the
     node's ``links``.

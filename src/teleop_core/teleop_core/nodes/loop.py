@@ -7,7 +7,7 @@ from collections.abc import Callable
 from teleop_core.base.errors import TeleopError
 from teleop_core.middleware.world import World
 
-_END_PATIENCE = 8.0  # the last turn may compile a kernel, or wait for a slow disk
+_END_PATIENCE = 8.0  # longest wait for the last turn [s], which may compile a kernel or wait for a slow disk
 
 
 class Loop:
@@ -24,10 +24,10 @@ class Loop:
 
     Attributes:
         name: Name of the thread.
-        turns: Number of turns taken.
+        turns: Number of finished turns.
         patience: As given.
-        is_running: Whether the loop continues; False after it was told to stop.
-        is_ready: Whether it is prepared.
+        is_running: Whether the loop continues; False after it was asked to stop.
+        is_ready: Whether the loop is prepared for its turns.
         is_hung: Whether a watchdog found that it hangs.
     """
 
@@ -47,7 +47,7 @@ class Loop:
         self._thread = world.thread(name, self._run)
 
     def start(self) -> None:
-        """Begin with the turns."""
+        """Start the thread."""
         self._thread.start()
 
     def stop(self) -> bool:
@@ -60,16 +60,16 @@ class Loop:
 
     @property
     def is_alive(self) -> bool:
-        """Whether the loop still makes turns."""
+        """Whether the thread is still running."""
         return self._thread.is_alive()
 
     @property
     def thread(self) -> int:
-        """Number of its thread in the operating system; 0 before the thread has begun."""
+        """Number of the loop's thread in the operating system; 0 before the thread has begun."""
         return self._thread.native_id or 0
 
     def place(self) -> str:
-        """Current position of its thread in the code: the innermost calls, the most recent call last."""
+        """Current position of the loop's thread in the code: the innermost calls, the most recent call last."""
         frame = sys._current_frames().get(self._thread.ident or 0)
         if frame is None:
             return "  it has ended"

@@ -1,4 +1,4 @@
-"""Making: makes the node of a stage, of its own class or of a generic class."""
+"""Making: makes the node of a stage, from the stage's own node class or from a generic class."""
 
 from importlib import import_module
 from typing import Any

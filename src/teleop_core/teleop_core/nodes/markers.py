@@ -28,9 +28,10 @@ class LiveMarkers:
     """Markers of one arm of a running session.
 
     Args:
-        node: Node that publishes them.
+        node: Node that publishes the markers.
         arm: Namespace of the arm.
-        axes: Rotation (3, 3) from its master's base to its slave's axes; None for the published rotation.
+        axes: Rotation (3, 3) from the master's base to the slave's axes; None for the rotation of the default
+            parameters.
     """
 
     def __init__(self, node: CoreNode, arm: str, axes: Array | None = None) -> None:

@@ -19,8 +19,9 @@ _BUTTONS_AGAIN_NS = 20_000_000  # button states are sent again after this time, 
 class MasterBridgeNode(TickingNode):
     """Passes on the device's poses and buttons, and sends it the newest force.
 
-    The node publishes ``master/measured_cp`` for each valid pose, with the time of that pose as stamp, and never
-    otherwise: its silence makes the slave hold. The buttons are repeated as long as messages of the device come.
+    For each valid pose, the node publishes ``master/measured_cp`` with the time of the pose as stamp. Without valid
+    poses it publishes nothing; the slave then holds its position. The buttons are repeated as long as messages of the
+    device come.
     """
 
     def setup(self, parameters: MasterBridgeParameters) -> None:

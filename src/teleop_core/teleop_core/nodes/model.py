@@ -17,8 +17,8 @@ _NOWHERE = np.zeros(7)
 class LiveModel:
     """Frames of the robots of a running session.
 
-    The robot's description is sent with the first joints that match the robot. If the recorder records the session of
-    another robot, that robot is thus not drawn as this one.
+    The robot's description is sent with the first joint positions that match the robot. If the recorder records the
+    session of another robot, that robot is thus not drawn as this one.
 
     Args:
         model: Model that is drawn.
@@ -35,7 +35,7 @@ class LiveModel:
         self._described.clear()
 
     def messages(self, newest: Newest) -> list[tuple[Topic, bytes, int]]:
-        """Messages that are due: topic, bytes, and the time of arrival [ns] of the newest drawn sample."""
+        """Messages that are due, each as topic, bytes, and time of arrival [ns] of the newest drawn sample."""
         latest_ns = max(map(newest.received_ns, self._read), default=0)
         if not latest_ns or latest_ns // self._period_ns == self._slot:
             return []

@@ -14,7 +14,8 @@ _THERE = (topics.NETWORK_SERVO_CP, topics.NETWORK_MASTER_ENERGY, topics.NETWORK_
 class NetworkNode(TickingNode):
     """Passes on the messages that arrive in a tick; if none arrives, nothing is sent.
 
-    Each stamp is passed on once, except stamps of the slave's setpoint, which may move while its stamp stays the same.
+    Each stamp is passed on once, except stamps of the slave's setpoint, which may change while its stamp stays the
+    same.
     """
 
     def setup(self, parameters: NetworkParameters) -> None:
@@ -23,7 +24,7 @@ class NetworkNode(TickingNode):
         self._passed = {topic: 0 for topic in self.description.writes if topic is not topics.NETWORK_STATE}
 
     def turn(self) -> None:
-        """Make all steps that are due; a packet counts as sent when this node reads it, however late that is."""
+        """Make all steps that are due; a packet counts as sent when this node reads it, even if this node is late."""
         due, state = list(self.schedule.due()), self.stage.state
         for tick_ns in due[:-1]:
             self.make_tick(tick_ns, self.send_report)

@@ -7,7 +7,7 @@ from teleop_core.graph.stage import Stage
 from teleop_core.middleware.world import Owner
 from teleop_core.nodes.streams import Input
 
-_CALM_NS = 1_000_000_000  # time after which the same trouble is logged again [ns]
+_CALM_NS = 1_000_000_000  # shortest time between two log lines about trouble [ns]
 _COMMANDS = ("servo_", "move_", "interpolate_")
 
 
@@ -17,8 +17,8 @@ def introduction(stage: Stage, inputs: Iterable[Input], outputs: Iterable[str], 
     Args:
         stage: Stage of the node in the graph.
         inputs: Inputs that the node reads.
-        outputs: Names of the topics that it writes.
-        robot: Name of its robot; empty without a robot.
+        outputs: Names of the topics that the node writes.
+        robot: Name of the node's robot; empty without a robot.
     """
     read = ", ".join(f"/{entry.topic.name}" for entry in inputs) or "nothing"
     written = ", ".join(f"/{name}" for name in outputs) or "nothing"
@@ -58,7 +58,7 @@ class Commanders:
 
 
 class Trouble:
-    """Log of the reasons why a bridge holds.
+    """Log of the reasons why a bridge passes on no motion.
 
     Each reason is logged once, even if numbers in it change. When all reasons are gone, this is logged too.
 

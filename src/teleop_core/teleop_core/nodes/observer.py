@@ -34,7 +34,7 @@ class Status:
 
 
 class Observer(Guest):
-    """Listener to a session.
+    """Node that reads the reports of a session.
 
     Args:
         domain: ROS domain.
@@ -69,7 +69,7 @@ class Observer(Guest):
         super().close()
 
     def listen(self, timeout: float) -> None:
-        """Read all reports until ``timeout`` [s] after the call or after the first report."""
+        """Wait for a report, at most ``timeout`` [s], then read all received reports."""
         self._reports.wait(timeout)
         self.take()
 

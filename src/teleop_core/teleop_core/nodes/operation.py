@@ -1,4 +1,4 @@
-"""Operation on topics and services: the emergency stop of all arms, and the commands of each."""
+"""Operation on topics and services: the emergency stop of all arms, and the commands of each arm."""
 
 from collections.abc import Callable, Iterable
 from functools import partial
@@ -23,8 +23,8 @@ _LOOK = 0.1
 _GRACE_NS = 500_000_000
 """A button that has sent nothing for this time after its discovery counts as pressed [ns].
 
-A button that repeats its state is heard within this time, because reader and sender discover each other within about a
-tenth of a second.
+A button that repeats its state is received within this time, because reader and sender discover each other within
+about a tenth of a second.
 """
 _BYTES = 5
 """A Bool as CDR: four bytes of encapsulation, one of data."""
@@ -38,7 +38,7 @@ class StopButton:
     """Emergency stop button: publishes its state, also to readers that are discovered later.
 
     Args:
-        owner: Node that owns it.
+        owner: Node that owns the button.
     """
 
     def __init__(self, owner: Owner) -> None:
@@ -77,7 +77,7 @@ class StopButton:
 
 
 class StopInput:
-    """The emergency stop, read in every tick, which takes 1 µs and needs no executor.
+    """Reader of the emergency stop in every tick; reading takes 1 µs and needs no executor.
 
     The first reader is read in every tick, the other two in every fourth tick. No press is lost: readers keep all
     messages, and missing messages count as a press (:class:`~teleop_core.slave.operation.presses.Presses`). Missing
@@ -89,7 +89,7 @@ class StopInput:
         owner: Node that owns it; its executor looks for buttons that send nothing.
 
     Attributes:
-        has_new: Whether a new button was heard; reset it before calling :meth:`learn`.
+        has_new: Whether a message of a new button was received; reset it before calling :meth:`learn`.
     """
 
     def __init__(self, owner: Owner) -> None:
@@ -107,7 +107,7 @@ class StopInput:
 
         Args:
             now_ns: Time of any monotonic clock [ns].
-            is_idle: Whether a possible press before a new button's first message would stop nothing.
+            is_idle: Whether the arm is idle, so that a press before a new button's first message had nothing to stop.
         """
         found: list[bool] = []
         self._ticks += 1
@@ -143,7 +143,7 @@ class StopInput:
         return self._presses.lost
 
     def holders(self, silent_since_ns: int = 0) -> tuple[bytes, ...]:
-        """Buttons that hold the stop pressed, or have been silent since ``silent_since_ns``."""
+        """Buttons that are pressed, or have been silent since ``silent_since_ns``."""
         presses = self._presses
         return tuple(dict.fromkeys((*presses.holders, *presses.silent(silent_since_ns))))
 
@@ -152,7 +152,7 @@ class StopInput:
         self._look_up()
 
     def names(self, buttons: Iterable[bytes]) -> str:
-        """Names of buttons, for people; takes longer than a tick."""
+        """Names of buttons, as text for users; takes longer than a tick."""
         there = self._look_up()
         return " and ".join(self._names.get(one, "a button") + ("" if one in there else " (gone)") for one in buttons)
 
@@ -206,7 +206,7 @@ class CommandServices:
     Args:
         node: Node that owns the services; its ``lock`` is held while a command is processed.
         arm: Receiver of the commands.
-        stop: Its emergency stop.
+        stop: Emergency stop of the arm.
         holders: Returns the buttons that are pressed or missing now.
     """
 

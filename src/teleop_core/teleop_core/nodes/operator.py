@@ -27,7 +27,7 @@ class HandInput:
 
     Args:
         node: Configured node that owns the inputs.
-        hand: Hand that gets their values.
+        hand: Hand that receives the values.
         has_poses: Whether poses are read; if False, only the buttons.
     """
 
@@ -74,7 +74,7 @@ class HandInput:
 
 
 _FULL = 3.3
-"""Force that is shown to a person at full strength [N]; a rumble cannot be stronger."""
+"""Force at which a device rumbles at full strength [N]; a larger force feels the same."""
 _LOOK = 10
 """Ticks between two readings of the state, for operators that do not react to measurements."""
 
@@ -140,7 +140,7 @@ class OperatorNode(TickingNode):
         return found + [text for one in people if one is not None for text in one.concerns()]
 
     def values(self) -> dict[str, str]:
-        """Whether the operator already moves, and whose hand it is."""
+        """Whether the operator already moves, and the device or sender that moves the hand."""
         begun = {"has_begun": str(int(self.stage.has_begun))}
         people = (self._hand, self._device)
         return begun | {k: v for one in people if one is not None for k, v in one.values().items()}

@@ -1,9 +1,9 @@
-"""Parent: the line between a node's process and the live session that started it.
+"""Parent: the connection between a node's process and the live session that started it.
 
 Both ends are sockets of one pair. The system closes an end when its process has ended for any reason, so a node
 detects the end of its parent at once. In the other direction, a separate thread of the node reports ten times a second
 what the process is doing. A process that is starting or compiling thus still reports; a stopped process does not. A
-process that was started by hand has no such line.
+process that was started by hand has no such connection.
 """
 
 import os
@@ -14,7 +14,7 @@ VARIABLE = "TELEOP_PARENT"
 
 
 class Parent:
-    """A process's own end of the line.
+    """A process's own end of the connection.
 
     Args:
         line: Socket to the parent.
@@ -26,9 +26,9 @@ class Parent:
 
     @classmethod
     def of_environment(cls) -> "Parent | None":
-        """Line that the parent opened for this process; None if it was started by hand.
+        """Connection that the parent opened for this process; None if the process was started by hand.
 
-        Only this process has the line; its own children do not inherit it.
+        Only this process uses the connection; its own children do not inherit it.
         """
         number = os.environ.pop(VARIABLE, "")
         if not number.isdecimal():
@@ -37,7 +37,7 @@ class Parent:
         return cls(socket.socket(fileno=int(number)))
 
     def fileno(self) -> int:
-        """File descriptor of the line, to wait on."""
+        """File descriptor of the connection, for ``select``."""
         return self._line.fileno()
 
     def has_gone(self) -> bool:
@@ -50,7 +50,7 @@ class Parent:
             return True
 
     def close(self) -> None:
-        """Close the line."""
+        """Close the connection."""
         self._line.close()
 
     def tell(self, word: str) -> None:

@@ -24,9 +24,9 @@ from teleop_core.nodes.streams import message_type
 
 _KNOWN = BY_NAME | {topic.name: topic for topic in (TF, ROBOT_DESCRIPTION)}
 _DISCOVERY_NS = 1_000_000_000
-"""Waiting time for the discovery of subscribers before the first message."""
+"""Waiting time for the discovery of subscribers before the first message [ns]."""
 _EARLY_NS = 100_000
-"""Largest time by which a message may be published too early."""
+"""Largest time by which a message may be published too early [ns]."""
 
 
 def play(
@@ -44,8 +44,8 @@ def play(
         topics: Topics to publish; None for all, except ``/tf`` if its type is not installed.
         rate: Speed relative to real time, > 0.
         console: Console that shows the progress, if it is a terminal.
-        world: World in which it is published.
-        interrupt: Object that ends it, in addition to signals of this process.
+        world: World in which the recording is published.
+        interrupt: Object that ends the playback, in addition to signals of this process.
 
     Returns:
         Number of messages published.

@@ -27,7 +27,7 @@ class Ports:
 
     Args:
         owner: Node that owns the ports.
-        arm: Its namespace, without leading slash.
+        arm: Namespace of the node, without leading slash.
         stage: Stage to which the ports belong.
         signals: Record of the stage.
         joint_names: Order of the joints.
@@ -72,8 +72,8 @@ class Ports:
         # Built once, because every tick uses them, a thousand times a second.
         self._ports = [(p.name, f"{p.field}_ns", self.inputs[p.name]) for p in stage.reads]
         self._stamped: list[tuple[Output, str]] = []
-        self._passed_on: dict[Output, int] = {}  # stamps that were sent last
-        self._seldom: dict[Output, tuple[bytes, int]] = {}  # values that were sent last, and their stamp
+        self._passed_on: dict[Output, int] = {}  # last sent stamp of each output
+        self._seldom: dict[Output, tuple[bytes, int]] = {}  # last sent values of each output, and their stamp
         for topic in stage.writes:
             if topic.kind is not Kind.REPORT:
                 form = layout(topic.of_arm(arm), joint_names)
@@ -118,7 +118,9 @@ class Ports:
             self.row[name] = np.sum(parts, axis=0)
 
     def send(self, now_ns: int, silent: Collection[str] = ()) -> None:
-        """Send the stage's outputs, except the topics in ``silent``. Each gets the stamp that its topic declares.
+        """Send the stage's outputs, except the topics in ``silent``.
+
+        Each output gets the stamp that its topic declares.
 
         An output whose stamp was already sent is not a new answer and is not sent. Values of a user's stage that are
         not finite are not sent either.
@@ -155,7 +157,7 @@ class Ports:
         return [lost] if self.refused else []
 
     def close(self) -> None:
-        """Stop listening."""
+        """Close all inputs."""
         for entry in self.all_inputs():
             entry.close()
 

@@ -21,13 +21,13 @@ from teleop_core.nodes.watch import Crew, Watch, signal_pipe
 def run(make_crew: Callable[[], Crew]) -> int:
     """Run one node, or several together, until a signal or the parent's end.
 
-    SIGINT, SIGTERM, SIGHUP and SIGQUIT end it in order.
+    SIGINT, SIGTERM, SIGHUP and SIGQUIT end the nodes in order.
 
     Args:
         make_crew: Class of the node, or of a crew of several nodes.
 
     Returns:
-        Exit code: 0; 1 after a failure at work; 2 if a parameter or file is wrong.
+        Exit code: 0 without a failure; 1 after a failure at work; 2 if a parameter or file is wrong.
     """
     signals, parent = signal_pipe(), Parent.of_environment()
     try:

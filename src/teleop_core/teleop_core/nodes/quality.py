@@ -1,8 +1,8 @@
 """Quality: QoS of topics, by default and with ``qos_overrides`` parameters.
 
-Overrides are those of ROS: ``qos_overrides./slave/measured_js.publisher.reliability: best_effort`` in a parameter file
-or after ``--ros-args -p`` changes one policy of a node's publisher or subscription of a topic. The topic has its full
-name.
+The overrides have the form that ROS defines: ``qos_overrides./slave/measured_js.publisher.reliability: best_effort``
+in a parameter file or after ``--ros-args -p`` changes one policy of a node's publisher or subscription of a topic. The
+topic has its full name.
 """
 
 from collections.abc import Mapping
@@ -59,7 +59,7 @@ class QualityOverrides:
         self._used: set[str] = set()
 
     def apply(self, name: str, side: Side, base: Qos) -> Qos:
-        """QoS of one end of a topic with its full name, after overrides."""
+        """QoS of a publisher or subscription after overrides; ``name`` is the full name of its topic."""
         for key, (policy, value) in self._values.items():
             if key.startswith(f"{PREFIX}{name}.{side}."):
                 base = replace(base, **{policy: value})
@@ -77,7 +77,7 @@ class QualityOverrides:
 
 
 NO_OVERRIDES = QualityOverrides({})
-"""Overrides of a node that was given none."""
+"""Overrides of a node without given overrides."""
 
 
 def _checked(name: str, value: object) -> tuple[str, Any]:

@@ -21,7 +21,7 @@ def report_phase(stage: str, stages: Sequence[str], arm: str = "") -> float:
     Args:
         stage: Name of the node's stage.
         stages: Names of all stages.
-        arm: Name of the node's arm, which shifts the phase to between two stages.
+        arm: Name of the node's arm; the phase of a named arm lies between the phases of two stages.
     """
     place = stages.index(stage) if stage in stages else len(stages)
     between = zlib.crc32(arm.encode()) / 2**32 if arm else 0.0
@@ -51,7 +51,7 @@ class Recent:
     """The last numbers of a stream, for their median and extremes.
 
     Args:
-        size: Number of values that are kept.
+        size: Number of values that are stored.
     """
 
     def __init__(self, size: int = 1000) -> None:
@@ -59,12 +59,12 @@ class Recent:
         self._count = 0
 
     def put(self, number: float) -> None:
-        """Add a number in place of the oldest one."""
+        """Add a number, which replaces the oldest number."""
         self._numbers[self._count % len(self._numbers)] = number
         self._count += 1
 
     def clear(self) -> None:
-        """Forget all."""
+        """Delete all numbers."""
         self._count = 0
 
     def summary(self) -> tuple[float, float, float]:
@@ -85,8 +85,8 @@ class Schedule:
         max_catch_up: Largest number of missed ticks that are executed in one wake-up; further missed ticks are dropped
             and counted.
         period_ns: Time between two ticks [ns].
-        phase_ns: Times of all ticks modulo the period, which keeps loops of one machine in order [ns]; None: the phase
-            of the start.
+        phase_ns: Times of all ticks modulo the period [ns]. Different phases keep the loops of one machine in order.
+            None: the phase of the start.
     """
 
     def __init__(

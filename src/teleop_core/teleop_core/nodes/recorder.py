@@ -39,10 +39,10 @@ HOLD_NS = 100_000_000
 """Longest time for which messages are collected before they are written [ns]. A loss of power or the end of the
 process loses the messages of this time plus the time of writing one chunk, together below 0.2 s."""
 DISCOVERY_NS = 3_000_000_000
-"""Time within which two existing nodes discover each other [ns]; most need a tenth of it."""
+"""Time within which two existing nodes discover each other [ns]; most nodes need a tenth of this time."""
 _PAUSE = 5e-3
 _RECENT = 1000
-"""Number of messages of a topic that may come by the middleware before its feed announces itself."""
+"""Number of messages of a topic that may come by the middleware before the topic's feed announces itself."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -67,11 +67,11 @@ class _Channel:
         self._subscription: Subscription | None = None
         self._inside_ns: int | None = None
         self._recent: deque[int] = deque(maxlen=_RECENT)  # times of sending of messages that came by the topic
-        self._twice = 0  # messages of a feed that already came by the topic
+        self._twice = 0  # number of messages of a feed that already came by the topic
         self._follow()
 
     def join(self, is_inside: bool, since_ns: int | None = None) -> None:
-        """Receive messages from :meth:`give`, or from the topic again, beginning with those sent at ``since_ns`` [ns].
+        """Receive messages sent since ``since_ns`` [ns] from :meth:`give` if ``is_inside``, else from the topic.
 
         Messages that already came by the topic are not recorded twice.
         """
@@ -84,7 +84,7 @@ class _Channel:
     def give(self, data: bytes, sent_ns: int) -> None:
         """Receive a message from a sender in this process, which may be in another thread.
 
-        Its time of arrival is the time at which it was given to the next stage, before it was published.
+        The time of arrival is the time at which the message was given to the next stage, before it was published.
         """
         self._given.append((sent_ns, self.topic, data, sent_ns))
 
@@ -132,7 +132,7 @@ class _Channel:
         """Count a message, by its publisher and its number in the publisher's sequence.
 
         A restarted node sends for 0.1 s, rarely 1 s, before the recorder discovers it. Messages that a late publisher
-        sent before its first recorded one therefore count as lost.
+        sent before its first recorded message therefore count as lost.
         """
         self.received += 1
         if (last := self._numbers.get(sender)) is None:
@@ -203,7 +203,7 @@ class RecorderNode(CoreNode):
             self._writer.write(topic, now_ns, data, now_ns)
 
     def _configuration(self, parameters: RecorderParameters) -> Configuration:
-        """Configuration of the session: the given one, the one of its stages, or the defaults."""
+        """Configuration of the session: the one in ``parameters``, the one of its stages, or the defaults."""
         if self._graph is not None and not parameters.configuration:
             own = {spec.name for spec in specs(RecordingParameters)}
             values = {k: v for k, v in values_of(parameters).items() if k in own}
@@ -214,7 +214,7 @@ class RecorderNode(CoreNode):
         return Configuration.from_layers([layer], parameters.scenario)
 
     def _model_of(self, configuration: Configuration, parameters: RecorderParameters) -> LiveModel:
-        """Model whose frames are recorded in addition to the topics; without frames if the robot is not installed."""
+        """Model whose frames are recorded in addition to the topics; it has no frames if the robot is not installed."""
         try:
             return LiveModel(Model(configuration, parameters.tf_rate, self.arm))
         except TeleopError as error:
@@ -256,7 +256,7 @@ class RecorderNode(CoreNode):
             try:
                 self._writer.close()
             except RecordingError:
-                self.exit_code = self.exit_code or 1  # the log says why
+                self.exit_code = self.exit_code or 1  # the log contains the reason
                 raise
 
     def abandon(self) -> None:

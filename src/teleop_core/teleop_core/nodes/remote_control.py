@@ -28,7 +28,8 @@ class ArmState:
     Attributes:
         values: Numbers of ``slave/operation`` by name; empty before the first report.
         text: The state as text.
-        stopped_after: Time from the first stop message to the report that the stop is in force [s]; negative before.
+        stopped_after: Time from the first stop message to the report that the stop is in force [s]; negative before
+            that report.
     """
 
     values: dict[str, float] = field(default_factory=dict)
@@ -106,8 +107,8 @@ class RemoteControl(Guest):
     def go_on(self) -> list[str]:
         """Reset and enable, or resume, every arm; returns the arms' answers.
 
-        An arm that was stopped before it was homed is then homed. This waits for an arm whose stop is being released.
-        An arm whose stop stays pressed answers with the pressed buttons.
+        An arm that was stopped before it was homed is then homed. The method waits for an arm whose stop is being
+        released. An arm whose stop stays pressed answers with the pressed buttons.
         """
         self.look()
         self._until(lambda: not any(arm.values["is_pressed"] for arm in self.arms.values()), must=False)
@@ -132,9 +133,9 @@ class RemoteControl(Guest):
         """Send a state command to an arm; returns whether it was accepted, and the arm's answer.
 
         Args:
-            name: One of :data:`~teleop_core.slave.operation.states.COMMANDS`, or ``release``, which
-                overrides the stop buttons that are pressed.
-            arm: Its namespace.
+            name: One of :data:`~teleop_core.slave.operation.states.COMMANDS`, or ``release``, which overrides the stop
+                buttons that are pressed.
+            arm: Namespace of the arm.
 
         Raises:
             SessionError: The arm does not answer.

@@ -12,7 +12,7 @@ from teleop_core.nodes.rate import Recent
 
 SECOND_NS = 1_000_000_000
 AHEAD_NS = SECOND_NS
-"""A stamp that is farther in the future than this is from another clock [ns]."""
+"""A stamp that is farther in the future than this comes from another clock [ns]."""
 
 
 class StampFault(Enum):
@@ -28,15 +28,15 @@ class Sender:
 
     Args:
         limit: Largest number of messages per second; further messages are refused as a flood.
-        silence: Time without a message after which another sender may take the topic [s].
+        silence: Time without a message after which another sender may become the owner of the topic [s].
 
     Attributes:
         gaps: Messages of the owner that did not arrive.
         repeats: Messages with the same stamp as the previous message.
         reordered: Messages with an older stamp than the previous message.
         owners: Number of senders that have owned the topic.
-        conflict: Whether two senders were heard at once, until :meth:`forget`.
-        ages: Time from the stamp of a message to its arrival [ns], of the last thousand.
+        conflict: Whether two senders sent at the same time; reset by :meth:`forget`.
+        ages: Times from the stamp of a message to its arrival [ns], for the last thousand messages.
     """
 
     def __init__(self, limit: int = 5000, silence: float = 0.5) -> None:
@@ -62,8 +62,8 @@ class Sender:
         """Reason to refuse a message before it is read; None for a message of the owner.
 
         Args:
-            sender: Publisher that sent it.
-            number: Its number in the publisher's sequence; 0 if the middleware has no numbers.
+            sender: Publisher that sent the message.
+            number: Number of the message in the publisher's sequence; 0 if the middleware has no numbers.
             now_ns: Monotonic time [ns].
         """
         if now_ns - self._window_ns >= SECOND_NS:
@@ -81,7 +81,7 @@ class Sender:
         if number > self._number:  # a message that was only overtaken is not lost
             self.gaps += number - self._number - 1 if self._number else 0
             self._number = number
-        self.conflict = self.conflict or self.has_other  # the owner is still there
+        self.conflict = self.conflict or self.has_other  # the owner still sends
         return None
 
     def release(self) -> None:
@@ -89,13 +89,13 @@ class Sender:
         self._owner = b""
 
     def note_stamp(self, stamp_ns: int, now_ns: int) -> None:
-        """Note the age of a valid message; ``now_ns`` is the time of the system's clock [ns]."""
+        """Store the age of a valid message; ``now_ns`` is the time of the system's clock [ns]."""
         self.newest_age_ns = now_ns - stamp_ns
         self.ages.put(self.newest_age_ns)
         self.fault = None
 
     def note_old(self, stamp_ns: int, last_ns: int) -> None:
-        """Note a message whose stamp is not newer than the last one."""
+        """Count a message whose stamp is not newer than the last stamp."""
         if stamp_ns < last_ns:
             self.reordered += 1
             self.fault = StampFault.BACKWARDS

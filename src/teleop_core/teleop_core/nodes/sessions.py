@@ -1,7 +1,7 @@
 """Sessions: the live sessions on this machine, at most one on each ROS domain.
 
-A session locks a file of its domain (``flock``). The lock ends with the session's process, however that ends: a file
-that is not locked belongs to no session.
+A session locks a file of its domain (``flock``). The lock ends with the session's process, however the process ends: a
+file that is not locked belongs to no session.
 """
 
 import fcntl
@@ -21,7 +21,7 @@ def _folder() -> Path:
 
 
 def _holds(file: IO[str]) -> bool:
-    """Lock a file without waiting; return whether this succeeded."""
+    """Lock a file without waiting; return whether the file is now locked by this process."""
     try:
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
@@ -60,7 +60,7 @@ def announced(domain: int) -> Iterator[None]:
 
 
 def _held(mark: Path) -> IO[str]:
-    """Open lock file, locked if no other session has locked it; never a file that was removed meanwhile."""
+    """Open the lock file, and lock it unless another session has locked it; never a file that was removed meanwhile."""
     mark.parent.mkdir(mode=0o700, exist_ok=True)
     while True:
         file = mark.open("a+")

@@ -17,13 +17,13 @@ _SERVO = SLAVE_SERVO_JP.name
 _SELDOM = 10
 """Number of turns between two checks of clocks and publishers."""
 _ANSWERS = 50
-"""Largest number of the arm's samples that are answered in one turn, so that it takes less than a tick."""
+"""Largest number of the arm's samples that are answered in one turn, so that a turn takes less than a tick."""
 _CLOCK_STEP_NS = 100_000_000
-"""The system clock was stepped if it moves by more than this relative to the monotonic clock between two turns [ns]."""
+"""Largest change of the system clock relative to the monotonic clock that does not count as a step [ns]."""
 
 
 class SlaveNode(TickingNode):
-    """Follows the newest ``slave/servo_jp`` while it is enabled and homed; stops on command.
+    """Follows the newest ``slave/servo_jp`` while the arm is enabled and homed; stops on command.
 
     Nothing is sent before the arm has reported its position, because any setpoint could move it. The emergency stop is
     read before every tick. Faults that only a node can detect, such as a stepped clock, are passed to the stage, which
@@ -47,7 +47,7 @@ class SlaveNode(TickingNode):
         super().teardown()
 
     def start(self) -> None:
-        """Note the offset of the clocks, against which later steps are detected."""
+        """Store the offset between the clocks, so that later steps of the system clock are detected."""
         super().start()
         self._is_told = False
         self._offset_ns, self._turns, self._floods = self.epoch_ns, 0, 0
@@ -70,8 +70,9 @@ class SlaveNode(TickingNode):
     def read_ports(self, trigger: Topic | None = None) -> None:
         """Update the signals, and answer every sample of the arm.
 
-        The next step answers the newest sample. If several samples came meanwhile, the older ones are answered here.
-        After a standstill of the loop, the stop has priority: only the last of the queued samples are answered.
+        The next step answers the newest sample. If several samples came meanwhile, this method answers the older
+        samples. After a standstill of the loop, the stop has priority: only the last of the queued samples are
+        answered.
         """
         measured, *others = self.ports.inputs[SLAVE_MEASURED_JS.name]
         if others or not self._is_told:
@@ -90,8 +91,8 @@ class SlaveNode(TickingNode):
             row[name] = waiting[-1][0]
 
     def advance(self, now_ns: int) -> None:
-        """Read the emergency stop, then make one step; also before each of several late steps."""
-        with self.lock:  # held for both: a reset in between would treat a silent button as released
+        """Read the emergency stop, then make one step. Several late steps also read the stop before each step."""
+        with self.lock:  # locked for both: a reset in between would treat a silent button as released
             is_idle = self._state[0] == State.DISABLED
             for is_pressed in self._stop.take(now_ns, is_idle=is_idle):
                 heard_ns = self._stop.heard_ns
@@ -169,7 +170,7 @@ class SlaveNode(TickingNode):
         log.error(text) if is_bad else log.info(text)
 
     def concerns(self) -> list[str]:
-        """Texts with the reasons why the arm holds still, and about stop buttons that send nothing."""
+        """Texts with the reasons why the arm does not move, and about stop buttons that send nothing."""
         return [*self._standstills(), *self._unknown_buttons()]
 
     def _unknown_buttons(self) -> list[str]:

@@ -5,7 +5,7 @@ from teleop_core.nodes.ticking import TickingNode
 
 
 class SlaveSimNode(TickingNode):
-    """Moves to and holds the newest ``slave/setpoint_js``; before the first setpoint the arm is at home."""
+    """Moves the arm to the newest ``slave/setpoint_js``; before the first setpoint the arm is at home."""
 
     def concerns(self) -> list[str]:
         """Text about an arm that gets no setpoints."""
@@ -16,7 +16,7 @@ class SlaveSimNode(TickingNode):
         return [f"no slave/setpoint_js for {setpoint.age():.1f} s: the arm stands still"] if is_silent else []
 
     def values(self) -> dict[str, str]:
-        """Presses of a button; punctures and depth of the needle, if the world can be punctured."""
+        """Presses of a button; number of punctures and depth of the needle if the world can be punctured."""
         stage = self.stage
         if stage.parameters["click_force"] > 0.0:
             return {"presses": str(stage.presses)}
@@ -25,4 +25,4 @@ class SlaveSimNode(TickingNode):
         return {"punctures": str(stage.punctures), "depth_mm": f"{1e3 * stage.depth:.2f}"}
 
 
-_SILENCE = 0.5  # s
+_SILENCE = 0.5  # a longer time without a setpoint is a concern [s]

@@ -1,7 +1,7 @@
 """Start: starts the node of any stage, of this package or of a user, from the command line.
 
 ``ros2 run teleop_core slave_sim`` starts a built-in stage by the name of its executable;
-``ros2 run teleop_core stage NAME`` starts any registered one, such as that of another package.
+``ros2 run teleop_core stage NAME`` starts any registered stage, such as a stage of another package.
 """
 
 import sys
@@ -20,14 +20,14 @@ ANY = "stage"
 """Executable of any stage."""
 _FLAGS = ("-r", "--remap")
 _RULES = {"__ns": "__ns", "__node": "__node", "__name": "__node"}
-"""Rules for all nodes of a process; a rule for one node has its name and a colon before it."""
+"""Remapping rules for all nodes of a process; a rule for one node begins with the name of the node and a colon."""
 
 
 def main() -> int:
     """Entry point of every executable: its name, or its first argument, names the stage.
 
     Returns:
-        Exit code: 0; 1 after a failure at work; 2 if a name, parameter or file is wrong.
+        Exit code: 0 without a failure; 1 after a failure at work; 2 if a name, parameter or file is wrong.
     """
     try:
         load_own_parts()

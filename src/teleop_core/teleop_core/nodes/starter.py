@@ -1,4 +1,4 @@
-"""Starter: a process that has loaded all modules that nodes need, and starts each node as a copy of itself.
+"""Starter: a process that has loaded all modules that nodes need, and starts each node as a copy of the starter.
 
 Python, numba, the middleware and a node's kernels take two seconds of processor time and 200 MB to load. A copy of a
 process that has loaded them begins at once, and shares that memory as long as it does not write to it. The starter
@@ -39,7 +39,7 @@ START_TIMEOUT = 180.0
 LOST = 255
 """Exit code of a process whose starter ended earlier, so that the true exit code is unknown."""
 _KIND = socket.SOCK_SEQPACKET  # messages stay whole, and the end is detected
-_LARGEST = 1 << 20  # bytes of a message
+_LARGEST = 1 << 20  # largest size of a message [bytes]
 _TELLS = 0.1  # time between two reports while loading [s]
 
 
@@ -50,8 +50,8 @@ class Starter:
 
     Args:
         configuration: Text of the configuration whose stages and kernels are loaded; empty: none.
-        env: Environment in which it loads.
-        patience: Longest time without progress before it is given up [s].
+        env: Environment variables of the starter.
+        patience: Longest time without progress before the starter is given up [s].
     """
 
     def __init__(self, configuration: str, env: Mapping[str, str], patience: float = START_TIMEOUT) -> None:
@@ -106,8 +106,8 @@ class Starter:
 
         Args:
             command: Command of the process, as in ``sys.argv``.
-            env: Its environment.
-            files: Files that it gets: ``out`` and ``err`` for its output, and others. Names in angle brackets
+            env: Environment variables of the process.
+            files: Files of the process: ``out`` and ``err`` for its output, and others. Names in angle brackets
                 (``<parameters>``) in ``command`` and ``env`` are replaced by the file descriptors.
             main: ``module:function`` that runs in the copy; empty: the program in ``command`` replaces the copy.
 
@@ -167,7 +167,7 @@ class Started:
         self.pid = int(text)
 
     def poll(self) -> int | None:
-        """Exit code; None while it runs."""
+        """Exit code; None while the process runs."""
         return self._look(0.0)
 
     def wait(self, timeout: float | None = None) -> int:
@@ -188,7 +188,7 @@ class Started:
         return self.returncode
 
     def send_signal(self, number: int) -> None:
-        """Send a signal, unless it has ended."""
+        """Send a signal to the process, unless the process has ended."""
         if self.poll() is None:
             with suppress(ProcessLookupError):  # the process has ended, and the starter will report this soon
                 os.kill(self.pid, number)
@@ -198,7 +198,7 @@ class Started:
         self.send_signal(signal.SIGTERM)
 
     def kill(self) -> None:
-        """End it at once."""
+        """End the process at once."""
         self.send_signal(signal.SIGKILL)
 
 
@@ -263,7 +263,7 @@ class _Copies:
 def _tell(line: socket.socket, text: str) -> None:
     try:
         line.send(text.encode())
-    except OSError:  # who asked is gone
+    except OSError:  # the receiver has ended
         return
 
 
@@ -324,7 +324,7 @@ def _load(configuration: str) -> None:
         return
     load_own_parts()
     typestore()
-    inspect.getmodule(inspect.currentframe())  # rclpy needs it for a node's first log line
+    inspect.getmodule(inspect.currentframe())  # rclpy needs this for a node's first log line
     loaded = Configuration.from_layers([parse_text(configuration, "the configuration")])
     for member in loaded.graph.members:
         node_class(member.stage)
@@ -356,7 +356,7 @@ def _loaded(configuration: str, line: socket.socket) -> None:
 
 
 def main() -> None:
-    """Load, then start the requested processes: ``starter LINE CONFIGURATION``, both file descriptors."""
+    """Load, then start the requested processes: ``starter LINE CONFIGURATION``; both are file descriptors."""
     line = socket.socket(fileno=int(sys.argv[1]))
     line.set_inheritable(False)
     with open(int(sys.argv[2]), encoding="utf-8") as file:

@@ -23,17 +23,17 @@ from teleop_core.nodes.sender import Sender
 SILENCE_NS = 2_000_000_000
 """After this time without a valid message, a sender may restart with any stamp [ns]."""
 _WAITING = 20
-"""Smallest queue length for a late reader [messages]. A longer queue is used if a late sender of its kind may catch up
-more ticks in one wake-up."""
+"""Smallest queue length for a late reader [messages]. A longer queue is used if a late sender may catch up more ticks
+than this in one wake-up."""
 _PRESSES = 500
-"""Queue length for buttons [messages]: a press is not lost even if the reader stands still for half a second."""
+"""Queue length for buttons [messages]: a press is not lost even if the reader reads nothing for half a second."""
 
 
 def message_type(ros_type: str) -> Any:
     """Class of a message, from a name like ``sensor_msgs/msg/JointState``.
 
     Raises:
-        MessageTypeError: Its package is not installed.
+        MessageTypeError: The package of the message is not installed.
         AttributeError: The package has no such message.
     """
     package, _, name = ros_type.split("/")
@@ -50,7 +50,7 @@ class Subscription:
     Args:
         owner: Node that owns it.
         topic: Topic of the subscription.
-        name: Its name for the middleware.
+        name: Name of the topic for the middleware.
         depth: Length of the queue; None for the topic's own.
 
     Attributes:
@@ -66,7 +66,7 @@ class Subscription:
         self.type = message_type(topic.ros_type)
         own = owner.ros.create_taker(self.type, name, wanted)
         self.take: Callable[[], Taken | None] = own.take
-        """Oldest waiting message; None if there is none."""
+        """Return the oldest queued message; None if the queue is empty."""
         self.wait: Callable[[float], None] = own.wait
         """Wait for a message, at most for some time [s]."""
         self.close: Callable[[], None] = own.close
@@ -79,7 +79,7 @@ class Input:
     Args:
         owner: Node that owns it.
         topic: Topic of the input, in its namespace.
-        name: Its name for the middleware, below the node's namespace.
+        name: Name of the topic for the middleware, below the node's namespace.
         joint_names: Order of the joints in the signals.
         target: Array into which the values are written, shape (width,).
         delay: Time for which each message is delayed, as on a slow link [s].
@@ -87,7 +87,7 @@ class Input:
 
     Attributes:
         stamp_ns: Stamp of the newest valid message; None before the first.
-        arrival_ns: Monotonic time at which it was read [ns].
+        arrival_ns: Monotonic time at which that message was read [ns].
         received: Number of messages read, valid or not.
         refused: Number of invalid messages, by reason.
         sender: Data about the sender of the messages.
@@ -114,7 +114,7 @@ class Input:
         self._layout = None if is_report else messages.layout(topic, joint_names)
         self._buttons = buttons
         self._has_own_order = topic.kind is not Kind.BUTTONS or buttons == messages.BUTTONS
-        messages.read_reports(messages.report(0, "", 0, "", {}))  # loads the message types, 60 ms
+        messages.read_reports(messages.report(0, "", 0, "", {}))  # loads the message types, which takes 60 ms
         self._delay_ns = round(delay * 1e9)
         self._held: deque[tuple[int, int, messages.Values]] = deque()
         self.received, self.refused = 0, Counter[messages.Refusal]()
@@ -125,7 +125,7 @@ class Input:
 
     @property
     def conflict(self) -> bool:
-        """Whether a second publisher was heard although that is a fault; reset by :meth:`forget`."""
+        """Whether a second publisher sent a message although this is a fault; reset by :meth:`forget`."""
         return self._is_fault and self.sender.conflict
 
     @property
@@ -175,7 +175,7 @@ class Input:
         return None
 
     def _take_held(self) -> bool:
-        """The same as :meth:`take`, for delayed messages that are due."""
+        """Write the next valid delayed message that is due into the signals; return whether there was one."""
         while (found := self._next()) is not None:
             self._held.append((self._world.monotonic_ns() + self._delay_ns, *found))
         now_ns = self._world.monotonic_ns()
@@ -239,7 +239,7 @@ class Input:
     # -- within a process that holds the sender too ----------------------------------------------
 
     def join(self, is_inside: bool) -> None:
-        """Receive values only from :meth:`give`, or from the topic again."""
+        """Receive values only from :meth:`give` if ``is_inside``, otherwise only from the topic."""
         if is_inside and self.subscription is not None:
             self.close()
         elif not is_inside and self.subscription is None:
@@ -273,10 +273,10 @@ class Output:
         name: Name of the topic, below the node's namespace.
 
     Attributes:
-        sent: Number of messages.
+        sent: Number of sent messages.
         inputs: Readers of the topic in this process, which get the values directly.
-        tap: Called with the bytes of every message and the time at which it was sent [ns], instead of a subscription
-            in this process.
+        tap: Function that is called with the bytes of every message and the time of sending [ns]; it replaces a
+            subscription in this process.
         pending: Queue of messages that the session will :meth:`publish`; None to publish at once.
     """
 

@@ -27,14 +27,14 @@ from teleop_core.nodes.streams import Output
 from teleop_core.session.links import link_texts
 
 _AFTER_NS = 700_000
-"""Phase of the slave's side within the millisecond. The hand's side has phase 0; its commands have arrived by then,
-even at the p99 of its lateness."""
+"""Phase of the slave's side within the millisecond [ns]. The hand's side has phase 0. Even at the p99 of the lateness
+of the hand's side, its commands arrive before this phase."""
 
 
 class TeleopSession:
     """The nodes of a graph and the loop that runs all nodes except the recorder.
 
-    The loop has the real-time options and the catch-up limit of the last stage, the slave. The group ``teleop`` of the
+    The loop uses the real-time options and the catch-up limit of the last stage, the slave. The group ``teleop`` of the
     parameter files defines the graph.
 
     Args:
@@ -83,7 +83,7 @@ class TeleopSession:
 
     @property
     def nodes(self) -> tuple[CoreNode, ...]:
-        """The nodes, recorder first and masters last, so that no message is missed."""
+        """The nodes. The recorder is the first and masters are the last, so that no message is missed."""
         return (*self._recorder, *reversed(self._stages))
 
     def watched(self) -> list[tuple[Loop, int]]:
@@ -131,9 +131,8 @@ class TeleopSession:
             for node in self._stages:
                 if node.is_at_work:
                     node.tick(tick_ns)
-                    # Messages with the longest path to their reader are sent first: the slave's setpoint, the master's
-                    # sample
-                    # last.
+                    # Messages with the longest path to their reader are sent first: the slave's setpoint first, the
+                    # master's sample last.
                     waiting[:0] = self._pending
                     self._pending.clear()
             for output, data, sent_ns in waiting:
@@ -146,7 +145,7 @@ class TeleopSession:
     def _link(self) -> None:
         """Connect every stage's output to its readers in this process, if both are at work."""
         active = [node for node in self._stages if node.is_at_work]
-        for node in self._stages:  # if one ticking node is late in a tick, all ticking nodes are late in it
+        for node in self._stages:  # if one ticking node is late in a tick, all ticking nodes are late in this tick
             if node.description.trigger is None:
                 node.schedule = self._schedule
         outputs = {topic.name: out for node in active for topic, out in node.ports.outputs.items()}

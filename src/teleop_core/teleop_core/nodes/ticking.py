@@ -9,7 +9,7 @@ class TickingNode(CoreNode):
     """Node that makes exactly one step for every tick, however late its wake-ups are."""
 
     def start(self) -> None:
-        """Relate the monotonic time of the loop to the stamps."""
+        """Store the offset between the monotonic time of the loop and the time of stamps."""
         self.epoch_ns = self.world.time_ns() - self.world.monotonic_ns()
 
     def turn(self) -> None:

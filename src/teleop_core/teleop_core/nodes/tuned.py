@@ -61,7 +61,7 @@ class NodeParameters:
     real_time: RealTimeParameters = field(default_factory=RealTimeParameters)
 
     def sender(self) -> Sender:
-        """New check of the sender of an input topic."""
+        """New object that checks the sender of an input topic."""
         return Sender(self.flood_rate, self.owner_silence)
 
     def feeds(self, port: str) -> list[tuple[str, float]]:
@@ -90,7 +90,7 @@ class TunedNode(Hooks):
 
     Args:
         stage: Stage of the node in the graph.
-        group: Parameters instead of the stage's own.
+        group: Parameter group that replaces the group of the stage; None for the group of the stage.
         world: World of the node.
         options: Options of :meth:`~teleop_core.middleware.world.World.lifecycle_node`.
 
@@ -131,7 +131,7 @@ class TunedNode(Hooks):
             self._present.trigger()
 
     def _overrides(self) -> dict[str, Any]:
-        """Values of these parameters on the command line and in parameter files."""
+        """Values of the node's parameters from the command line and from parameter files."""
         return {
             name: () if value is None and name in self._specs else value
             for name, value in self.ros.given.items()

@@ -21,7 +21,7 @@ from teleop_core.nodes.parent import Parent
 
 ENDS = tuple(number for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT))
 """Signals that ask for an orderly end: Ctrl-C, a supervisor, a closed terminal, Ctrl-\\."""
-_PERIOD = 0.1
+_PERIOD = 0.1  # time between two checks [s]
 _END_PATIENCE = 4.0  # longest time until the main thread begins the end [s]
 _LEAVE_PATIENCE = 5.0  # longest time until the middleware is closed [s]
 _FLUSH_PATIENCE = 20.0  # longest time until the recording is closed; a slow disk needs time [s]
@@ -32,7 +32,7 @@ class Crew(Protocol):
 
     @property
     def nodes(self) -> tuple[CoreNode, ...]:
-        """The nodes."""
+        """Nodes of the process, in the order in which they are started."""
         ...
 
     def watched(self) -> list[tuple[Loop, int]]:
@@ -47,7 +47,7 @@ class Crew(Protocol):
 def signal_pipe() -> int:
     """Pipe to which the signals of :data:`ENDS` are written.
 
-    Thus no work is interrupted halfway, and the middleware still exists for an orderly end. A handler in Python would
+    A pipe interrupts no work halfway, and the middleware still exists for an orderly end. A handler in Python would
     not run while the main thread waits in C code. Signals that are ignored from the start stay ignored, such as SIGHUP
     under ``nohup``.
     """
@@ -62,7 +62,11 @@ def signal_pipe() -> int:
 
 @dataclass
 class _Stillness:
-    """Time without progress of a loop: its last count, and the processor time it could have used since then [s]."""
+    """Time without progress of a loop.
+
+    ``number`` is the last count of its progress; ``time`` is the processor time that it could have used since then
+    [s].
+    """
 
     chances: Chances
     number: int
@@ -74,8 +78,8 @@ class Watch:
 
     Args:
         crew: Nodes to watch.
-        signals: File of :func:`signal_pipe`.
-        parent: Line to the parent, if there is one.
+        signals: Pipe of :func:`signal_pipe`.
+        parent: Connection to the parent, if there is one.
 
     Attributes:
         word: Activity of the process: starting, at work, ending, leaving.
@@ -113,7 +117,7 @@ class Watch:
         """Do the periodic checks, ten times a second."""
         if self._parent is not None:
             self._parent.tell(self._doing())
-        if self._asked is None and self._first.ended.done():  # a loop of its own failed
+        if self._asked is None and self._first.ended.done():  # the loop of a node failed
             self._asked = time.monotonic()
         if in_work():
             self._still.clear()

@@ -1,4 +1,4 @@
-"""Python API: run a session, replay one, open what was recorded, register parts.
+"""Python API: run a session, replay a recorded session, open a recording, register parts.
 
 >>> import teleop_core as tc
 >>> recording = tc.run("coarse_box", duration=10.0, fixture="sphere", fine_gain=0.2)
@@ -39,7 +39,8 @@ if TYPE_CHECKING:
 __all__ = ["OperatorLike", "Progress", "configuration", "replay", "run"]
 
 Progress = Callable[[int, int], None]
-"""Called with ticks done and ticks in all, after every simulated second."""
+"""Function that is called after every simulated second with the number of finished ticks and the number of all ticks.
+"""
 OperatorLike: TypeAlias = Union[
     str, Path, Operator, Motion, NDArray[np.float64], tuple[Array, Array], "pandas.DataFrame"
 ]
@@ -69,7 +70,7 @@ def configuration(
     """Configuration of a session, from a scenario, files, parameters and parts of your own.
 
     Args:
-        scenario: One of ``teleop scenarios``; the defaults alone if None.
+        scenario: Name of a scenario, as in ``teleop scenarios``; None for the defaults alone.
         files: ROS 2 parameter files. They override the scenario.
         settings: Parameters by name, which override all files: ``{"motion_scaling.fine_gain": 0.2}``. A name without a
             stage sets every stage that has this parameter; ``left/...`` sets the arm ``left`` only.
@@ -78,7 +79,7 @@ def configuration(
         fixture: Shape around the hand: a name, or a part of your own.
         controller: Control law of the slave's joints: a name, or a part of your own.
         plant: Plant that the slave simulator moves: a name, or a part of your own.
-        robot: The slave: a name, a table's file, or a robot of your own.
+        robot: Robot of the slave: a name, the file of a table, or a robot of your own.
         stages: Further stages of every arm, one or several: names, or stages of your own.
         arms: Names of the arms; the first is the default arm.
         delays: Delays on links [s]: ``{"slave/servo_jp": 0.02}``.
@@ -88,7 +89,7 @@ def configuration(
         The checked configuration.
 
     Raises:
-        TeleopError: Something is wrong; the text names it.
+        TeleopError: An argument is wrong; the error text names it.
     """
     named: dict[str, object] = {}
     for name, registry, part in (
@@ -144,30 +145,32 @@ def run(
     """Run a session in virtual time.
 
     Args:
-        scenario: One of ``teleop scenarios``, or a complete configuration, to which no further settings may be given.
+        scenario: Name of a scenario, as in ``teleop scenarios``, or a complete configuration. No further settings may
+            be given with a configuration.
         duration: Simulated time [s]; replaces the scenario's duration.
-        seed: Seed of everything random.
-        out: Directory of the recording, made here; None keeps it in memory (2 MB a second).
+        seed: Seed of all random numbers.
+        out: Directory of the recording, which is created; None keeps the recording in memory, 2 MB per second.
         progress: Called with the progress of the run.
         files: As in :func:`configuration`, like all arguments from here to ``delays``.
-        settings: As there.
-        operator: As there.
-        fixture: As there.
-        controller: As there.
-        plant: As there.
-        robot: As there.
-        stages: As there.
-        arms: As there.
-        delays: As there.
+        settings: As in :func:`configuration`.
+        operator: As in :func:`configuration`.
+        fixture: As in :func:`configuration`.
+        controller: As in :func:`configuration`.
+        plant: As in :func:`configuration`.
+        robot: As in :func:`configuration`.
+        stages: As in :func:`configuration`.
+        arms: As in :func:`configuration`.
+        delays: As in :func:`configuration`.
         keep: Streams of all arms that are kept in memory, such as ``task/state``; None keeps all streams. A run that
             keeps few streams is faster. Reading a stream that was not kept raises an error.
-        **parameters: As there.
+        **parameters: As in :func:`configuration`.
 
     Returns:
         The recorded session.
 
     Raises:
-        TeleopError: Something is wrong; the text names it, before anything runs if possible.
+        TeleopError: An argument or a part is wrong; the error text names it. If possible, the error is raised before
+            the session runs.
     """
     given = dict(settings or {})
     if duration is not None:
@@ -208,7 +211,7 @@ def replay(
     begin: Literal["device", "hand"] = "device",
     **parameters: Setting,
 ) -> Recording:
-    """Run the recorded masters of a session through the graph again, in virtual time.
+    """Run the recorded motion of a session's masters through the graph again, in virtual time.
 
     If nothing is changed, the replay of a recording in virtual time gives exactly the same slave motion, bit for bit,
     for each ``begin``.
@@ -219,7 +222,7 @@ def replay(
         progress: As in :func:`run`.
         files: Parameter files. They override the recorded configuration.
         settings: Parameters, which override the files, as in :func:`configuration`.
-        texts: As there.
+        texts: As in :func:`configuration`.
         begin: ``device`` takes the measured motion of the device from the recording. ``hand`` takes the motion that
             the hand wanted; forces of the new session then act on the hand.
         **parameters: As in :func:`configuration`.
@@ -263,7 +266,7 @@ def _kept(
 
 
 class _Memory:
-    """A recording in memory. It accepts blocks like a writer of bags."""
+    """A recording in memory, which takes blocks of rows and single messages like a writer of bags."""
 
     def __init__(self, session: virtual.VirtualTime, keep: Collection[str] | None) -> None:
         self._session, self._reports = session, runner.StateReports(session)
@@ -286,7 +289,7 @@ class _Memory:
         self._reports.write(self, block)
 
     def write(self, topic: topics.Topic, log_ns: int, data: bytes) -> None:
-        """Take one message of a report."""
+        """Store one message of a report."""
         self._messages[topic].append((log_ns, data))
 
     def bag(self, made: Configuration) -> MemoryBag:

@@ -28,7 +28,7 @@ def block_dtype(graph: Graph, joints: Mapping[str, int]) -> Any:
 
     Args:
         graph: The graph.
-        joints: Number of joints of each namespace's arm.
+        joints: Number of joints of each arm, by its namespace.
     """
     fields: list[Any] = [("now_ns", "i8")]
     for member in graph.members:
@@ -70,12 +70,12 @@ _CLOCK = [("first_ns", "i8"), ("tick_ns", "i8"), ("count", "i8")]
 class Tick:
     """The composed tick of a graph; :meth:`run` executes it for each row.
 
-    Kernels are bound once to the buffers of this object. To check the types of all arguments in each call would take
+    Kernels are bound once to the buffers of this object. A check of the types of all arguments in each call would take
     as long as a hundred ticks.
 
     Args:
         text: Generated source of the graph, with its objects.
-        dtype: Record of :func:`block_dtype`.
+        dtype: Record type from :func:`block_dtype`.
         dt: Length of a tick [s].
         size: Largest number of ticks per call of the kernel.
 
@@ -175,11 +175,12 @@ def compose(
     Args:
         graph: The graph.
         runners: Running stages, by the names of their members.
-        dtype: Record of :func:`block_dtype`.
+        dtype: Record type from :func:`block_dtype`.
         dt: Length of a tick [s].
         size: Largest number of ticks per call of the kernel.
         played: Members whose topics come from recorded samples; they need no runner.
-        rings: Values in transit on delayed links. Pass those of an earlier tick to keep them; missing rings are added.
+        rings: Values in transit on delayed links. Pass the rings of an earlier tick to keep these values; missing
+            rings are added.
     """
     text = _Text()
     places = {member.name: i for i, member in enumerate(graph.members)}

@@ -1,4 +1,4 @@
-"""Configuration: layers of files and settings become one checked group per stage of the graph."""
+"""Configuration: layers of files and settings become one checked parameter group per stage of the graph."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -159,10 +159,10 @@ def _check_robots(graph: Graph, groups: Mapping[str, Any], arm: str) -> None:
 
 
 def _check_sides(graph: Graph, groups: Mapping[str, Any], arm: str) -> None:
-    """Make sure that methods that need a master side and a slave side have both, and that both sides match.
+    """Make sure that each method with a master side and a slave side has both sides, and that the sides match.
 
     Raises:
-        ParameterError: The slave's side is missing or belongs to another method.
+        ParameterError: The slave side is missing, or belongs to another method than the master side.
     """
     names = [stage.name for stage in graph.stages]
     for stage in graph.stages:

@@ -17,11 +17,11 @@ def as_long_as_followed(made: Configuration, given: Iterable[Layer]) -> Configur
     """Session with the duration of the recordings that its operators follow.
 
     If the scenario itself chooses such an operator, the session lasts at least the scenario's duration. The slave then
-    has time to arrive where the hand ends.
+    has time to arrive at the end of the hand's motion.
 
     Args:
         made: The session.
-        given: Layers of the session without defaults and scenario; a duration in them is kept.
+        given: Layers of the session without defaults and scenario; a duration in these layers is kept.
 
     Raises:
         TeleopError: A recording cannot be read.

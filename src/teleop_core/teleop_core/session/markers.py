@@ -15,10 +15,10 @@ from teleop_core.shapes import box, sphere
 from teleop_core.shapes.basis.drawing import segments_of
 
 TAIL = 200
-"""Points of a path."""
+"""Largest number of points of a drawn path."""
 FORCE_SCALE = 0.02
 """Length of the arrow of a force [m/N]."""
-_TOUCH = 0.05  # force from which on a wall counts as touched [N]
+_TOUCH = 0.05  # smallest force at which a wall counts as touched [N]
 _FREE: Color = (0.26, 0.52, 0.96, 0.25)
 _TOUCHED: Color = (0.90, 0.20, 0.15, 0.40)
 _WIDTH = 0.001  # width of a fixture's lines [m]
@@ -32,8 +32,9 @@ class ArmMarkers:
     """Markers of one arm. This class stores the latest points of the arm's paths.
 
     Args:
-        arm: Its namespace; empty for the arm of plain topics.
-        axes: Rotation (3, 3) from the master's base to the slave's axes; None for the published rotation.
+        arm: Namespace of the arm; empty for the arm whose topics have no prefix.
+        axes: Rotation (3, 3) from the master's base to the slave's axes; None for the rotation of the default
+            parameters.
     """
 
     def __init__(self, arm: str = "", axes: Array | None = None) -> None:
@@ -77,7 +78,7 @@ class ArmMarkers:
     def _edges(self, fixture: ReportedFixture, gain: float) -> Array:
         """End points (N, 3) [m] of segments along the fixture's edges, two for each segment.
 
-        They are computed only when the fixture or the gain changes.
+        The points are computed only when the fixture or the gain changes.
         """
         if self._told != (fixture, gain):
             self._segments = segments_of(fixture.outline(gain, self._axes)).reshape(-1, 3)

@@ -1,6 +1,6 @@
-"""Master bag: converts any recording into one whose masters can be replayed and followed.
+"""Master bag: converts any recording into a recording whose master motion can be replayed or followed by an operator.
 
-Valid recordings are used unchanged. For other recordings and for tables an installed reader is used.
+Valid recordings are used unchanged. Other recordings, and tables, are converted by an installed reader.
 """
 
 from importlib.metadata import entry_points
@@ -23,8 +23,8 @@ def as_master_bag(recording: Path | str | reader.Bag) -> reader.Bag:
     A warning names everything that had to be guessed, changed or left out.
 
     Args:
-        recording: An open recording, or its path. With ``teleop_exchange`` installed also ROS 1, CSV or Parquet, other
-            topics, and recordings with damaged rows.
+        recording: An open recording, or its path. If ``teleop_exchange`` is installed, the recording may also be a ROS
+            1, CSV or Parquet file, use other topics, or contain damaged rows.
 
     Returns:
         The recording itself if it is valid, else a copy of these topics in memory, with the same stamps and metadata.
@@ -78,7 +78,7 @@ def is_sound(bag: reader.Bag, prefix: str) -> bool:
         lengths = length(series.values[:, 3:])
         first = int(series.stamp_ns[0]) if first < 0 else first
         is_rising = series.stamp_ns[0] >= last and (np.diff(series.stamp_ns) >= 0).all()
-        is_unit = (np.abs(lengths - 1.0) <= messages.QUATERNION_TOLERANCE).all()  # NaN is not
+        is_unit = (np.abs(lengths - 1.0) <= messages.QUATERNION_TOLERANCE).all()  # False for NaN
         if not (is_rising and is_unit and np.isfinite(series.values[:, :3]).all()):
             return False
         last = int(series.stamp_ns[-1])
@@ -95,6 +95,6 @@ def _are_sound(bag: reader.Bag, name: str) -> bool:
         return False
     try:
         stamps = bag.read(name).stamp_ns
-    except RecordingError:  # messages have another number of buttons
+    except RecordingError:  # the messages do not have three buttons
         return False
     return not (len(stamps) > 1 and (stamps == stamps[0]).all()) and bool((np.diff(stamps) >= 0).all())

@@ -23,11 +23,13 @@ from teleop_core.robots.bodies import bodies_of, urdf_of
 from teleop_core.robots.robot import Robot
 from teleop_core.session.configuration import Configuration
 
-SLAVE, MASTER = "slave_", "master_"
-"""Prefixes of the names of frames."""
+SLAVE = "slave_"
+"""Prefix of the names of a slave's frames."""
+MASTER = "master_"
+"""Prefix of the names of a master's frames."""
 _HERE = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
-_ASIDE = 0.3  # m, from the end of a robot's reach to the middle of its master
-_APART = 2.0  # distance between two slaves, in reaches
+_ASIDE = 0.3  # distance from the end of a robot's reach to the middle of its master [m]
+_APART = 2.0  # distance between two slaves, as a multiple of the robot's reach
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,8 +37,8 @@ class ArmModel:
     """Robot, master and frames of one arm.
 
     Args:
-        arm: Its namespace, empty for the arm of plain topics.
-        robot: Its robot.
+        arm: Namespace of the arm; empty for the arm whose topics have no prefix.
+        robot: Robot of the arm.
         base: Pose (7,) of slave_base in the world.
         master: Pose (7,) of master_base in the world.
     """
@@ -60,21 +62,21 @@ class ArmModel:
 
     @property
     def description(self) -> Topic:
-        """Topic of its URDF."""
+        """Topic of the robot's URDF."""
         return ROBOT_DESCRIPTION.of_arm(self.arm)
 
     def urdf(self) -> bytes:
-        """Message of its URDF."""
+        """Message with the robot's URDF."""
         prefix = f"{self.arm}/" if self.arm else ""
         return text_message(urdf_of(self.robot, self.robot.name, prefix + SLAVE))
 
     def transforms(self, stamp_ns: NDArray[np.int64], joints: Array, stylus: Array) -> list[bytes]:
-        """Messages with the poses of all its frames.
+        """Messages with the poses of all frames of the arm.
 
         Args:
             stamp_ns: Stamps (N,) [ns].
             joints: Joint vectors (N, n) [rad, m].
-            stylus: Poses (N, 7) in master_base; invalid poses are replaced by its origin.
+            stylus: Poses (N, 7) in master_base; invalid poses are replaced by the origin of master_base.
         """
         count = len(stamp_ns)
         poses = np.empty((count, len(self._messages.frames), 7))  # type: ignore[attr-defined]
@@ -94,7 +96,7 @@ class Model:
         namespace: Namespace of the whole session, without leading slash; the arms' namespaces are below it.
 
     Attributes:
-        arms: Arms with a robot, the default one first.
+        arms: Arms with a robot, the default arm first.
         period_ns: Time from one message of ``/tf`` to the next [ns].
 
     Raises:

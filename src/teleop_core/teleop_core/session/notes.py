@@ -53,8 +53,8 @@ def passive_note(device: DeviceParameters, fixture: gains.FixtureParameters, del
 
     Args:
         device: The device.
-        fixture: The wall.
-        delay: Delay of its force in addition to the tick [s].
+        fixture: Virtual fixture, whose wall is examined.
+        delay: Delay of the wall's force in addition to the tick [s].
     """
     wall = walls.WALLS[fixture.wall]
     stiffness = wall.spring(fixture.stiffness, fixture.max_force)
@@ -69,7 +69,7 @@ def passive_note(device: DeviceParameters, fixture: gains.FixtureParameters, del
 
 
 def rendered_note(device: DeviceParameters, fixture: gains.FixtureParameters) -> str:
-    """Note on a wall that is stiffer than the device, with the stiffness that the hand feels.
+    """Note on a wall that is stiffer than the device; the note states the stiffness that the hand feels.
 
     The text is empty if the wall is not stiffer.
 

@@ -26,7 +26,8 @@ from teleop_core.session.master_bag import as_master_bag
 COLUMNS = ("t", "x", "y", "z", "rx", "ry", "rz", "clutch", "fixture", "mode")
 """Columns of a table: time [s], position [m], rotation vector [rad], buttons (1 pressed)."""
 _PERIODS = 5.0
-"""Shortest gap in periods of the recording: a shorter pause is interpolated even if it exceeds ``longest_gap``."""
+"""A pause shorter than this number of sample periods is no gap: it is interpolated even if ``longest_gap`` is shorter.
+"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,9 +49,9 @@ class Samples(NamedTuple):
         moves: Positions (N, 3) [m], in the master's axes.
         turns: Rotations since the first sample, quaternions (N, 4) in the master's axes, without jumps of sign.
         pressed_at: Times (K,) [s] at which buttons change.
-        pressed: Values of clutch, fixture and mode from these times on (K, 3).
+        pressed: Values of clutch, fixture and mode (K, 3), each valid from its time in ``pressed_at``.
         closed_at: Times (M,) [s] at which the closing of the jaw changes.
-        closed: Closing of the jaw from these times on (M, 1), 0 open to 1 closed.
+        closed: Closing of the jaw (M, 1), 0 open to 1 closed, each valid from its time in ``closed_at``.
     """
 
     at: Array
@@ -214,7 +215,7 @@ def _in_axes_of(rest: Array, turns: Array) -> Array:
 
 
 def _tell_stops(path: Path, samples: Samples, setting: Setting) -> None:
-    """Warn of a motion that leaves the device's workspace, with a hint how to keep it inside."""
+    """Warn of a motion that leaves the device's workspace; the warning explains how to keep the motion inside."""
     device = setting.common.device
     size, start = np.array(device.workspace), np.array(device.start)
     places = samples.moves + np.array(setting.common.center) + start  # positions relative to the middle

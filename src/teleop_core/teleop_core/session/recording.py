@@ -32,9 +32,9 @@ class Stream:
     """All messages of one topic.
 
     Attributes:
-        topic: Its name.
-        columns: Names of the columns: ``x y z qw qx qy qz`` of a pose, ``fx`` of a force, the
-            joints' names, ``<joint>.velocity`` of a joint state, the fields of ``teleop/state``.
+        topic: Name of the topic.
+        columns: Names of the columns: ``x y z qw qx qy qz`` of a pose, ``fx`` of a force, the joints' names,
+            ``<joint>.velocity`` of a joint state, the fields of ``teleop/state``.
         stamp_ns: Stamps of the headers (N,) [ns].
         log_ns: Times of recording (N,) [ns].
         values: Rows (N, columns) in SI units.
@@ -135,7 +135,7 @@ class Recording:
         """Time from the first to the last message [s].
 
         This is longer than the ``duration`` of :func:`teleop_core.run`: the slave first moves to its start, and
-        ``duration`` is counted from the time at which the hand may begin.
+        ``duration`` is counted from the time at which the hand may begin to move.
         """
         return (self._bag.end_ns - self._bag.start_ns) * 1e-9
 
@@ -181,8 +181,8 @@ class Recording:
         """Some topics side by side over the time [s], each column as ``topic.column``.
 
         Args:
-            *topics: Names; all streams of numbers if none is given. There is one row for each time at which any of
-                them has a message; columns of topics without a message at that time are NaN.
+            *topics: Names of the topics; all streams of numbers if none is given. There is one row for each time at
+                which any of them has a message; columns of topics without a message at that time are NaN.
 
         Raises:
             UnknownNameError: There is no such topic.
@@ -204,7 +204,7 @@ class Recording:
         """Score of one arm.
 
         Args:
-            arm: Its name; empty for the default arm.
+            arm: Name of the arm; empty for the default arm.
             further: Metrics in addition to the registered metrics.
             span: Begin and end [s] of the scored part, since the first message; None for the whole recording.
 
@@ -322,7 +322,7 @@ def open_recording(path: Path | str) -> Recording:
     """Open a recording made by this package or by others.
 
     Args:
-        path: Its directory, or one ``.mcap`` file.
+        path: Directory of the recording, or one ``.mcap`` file.
 
     Raises:
         RecordingError: The path does not exist or is no recording, or the recording was cut off or is empty.

@@ -11,8 +11,8 @@ from teleop_core.base.errors import RecordingError, TeleopWarning
 from teleop_core.graph.signals import TICK_NS
 
 LONGEST_GAP_NS = 60_000_000_000
-"""Longest pause of a hand within one session [ns]. A longer pause means that a clock was wrong. To replay such a pause
-would take as long as the wrong stamps state."""
+"""Longest pause of a hand within one session [ns]. A longer pause means that a clock was wrong. The replay would last
+as long as this wrong pause."""
 
 
 def in_order(series: Series) -> Series:

@@ -12,9 +12,9 @@ def report_of(topic: topics.Topic, stamp_ns: int, row: Array, described: Mapping
     """Message of a report's topic, as CDR bytes.
 
     Args:
-        topic: Such as :data:`~teleop_core.graph.topics.TELEOP_STATE`.
+        topic: Topic of the report, such as :data:`~teleop_core.graph.topics.TELEOP_STATE`.
         stamp_ns: Stamp [ns].
-        row: Its numbers (columns,).
+        row: Numbers of the report (columns,).
         described: Further names and texts, such as a description of the fixture.
     """
     values = {name: repr(float(value)) for name, value in zip(topic.columns, row, strict=True)}

@@ -37,8 +37,8 @@ def simulate(configuration: Configuration, out: Path, progress: Progress = silen
 
     Args:
         configuration: Configuration of the session.
-        out: Directory of the recording, made here.
-        progress: Called with ticks done and ticks in all, after every simulated second.
+        out: Directory of the recording, which is created.
+        progress: Called after every simulated second with the number of finished ticks and the total number of ticks.
 
     Returns:
         Number of ticks.
@@ -83,15 +83,15 @@ def replay(bag: Bag, configuration: Configuration, out: Path, progress: Progress
     Args:
         bag: Recording with master/measured_cp of every arm, or hand/servo_cp.
         configuration: Configuration of the session that processes the samples.
-        out: Directory of the new recording, made here.
+        out: Directory of the new recording, which is created.
         progress: As in :func:`simulate`.
-        begin: Stage whose recorded output is played: ``haptic_master``, or ``operator``, the hand.
+        begin: Stage whose recorded output is played: ``haptic_master`` is the device, ``operator`` is the hand.
 
     Returns:
         Number of ticks.
 
     Raises:
-        RecordingError: The bag lacks a topic, or the directory is as in :func:`simulate`.
+        RecordingError: The bag lacks a topic, or the directory exists or cannot be written.
     """
     session = virtual.VirtualTime(configuration, played=begin)
     samples, ticks = replayed_blocks(session, bag)
@@ -109,7 +109,7 @@ def replayed_blocks(session: virtual.VirtualTime, bag: Bag) -> tuple[Iterator[An
     name = needed[0].name
     first_ns, last_ns = replayed_span.replayed_span(bag.path, name, series[name].stamp_ns)
     lead_ns = _lead_ns(session, bag, first_ns)
-    later_ns = max(0, TICK_NS + lead_ns - first_ns)  # stamps are positive
+    later_ns = max(0, TICK_NS + lead_ns - first_ns)  # this shift keeps all stamps positive
     # The last tick is the first one that is not before the last sample.
     begin_ns = first_ns + later_ns - lead_ns
     ticks = -(-(last_ns + later_ns + TICK_NS - begin_ns) // TICK_NS)
@@ -132,7 +132,7 @@ def _lead_ns(session: virtual.VirtualTime, bag: Bag, first_ns: int) -> int:
     is_known = all(state.name in bag.topics for state in states)
     if not lead_ns or "configuration" not in bag.metadata or not is_known:
         return lead_ns
-    begins = [_follows_ns(bag, state) for state in states]  # early if an arm is near its start
+    begins = [_follows_ns(bag, state) for state in states]  # an arm near its start begins to follow early
     return lead_ns if None in begins else max(0, lead_ns - (max(filter(None, begins)) - first_ns))
 
 
@@ -157,7 +157,7 @@ def _hold(series: Series, later_ns: int, samples: Any, field: str) -> None:
 def recorded_configuration(bag: Bag) -> tuple[Layer, str]:
     """Configuration and scenario that a recording was made with; both empty for bags of other writers.
 
-    Files of a robot, its drives, a mesh and a height field have the content that was recorded, see
+    Files of a robot, its drives, a mesh and a height field are read as they were recorded, see
     :mod:`teleop_core.bags.kept_files`.
 
     Raises:
@@ -165,7 +165,7 @@ def recorded_configuration(bag: Bag) -> tuple[Layer, str]:
     """
     text, arms = bag.metadata.get("configuration"), bag.metadata.get(ARMS_KEY, "").split()
     layer = present_layer(parse_text(text, f"{bag.path}: configuration")) if text else {}
-    if arms and not text:  # an import of several hands
+    if arms and not text:  # the bag is an import of several hands
         layer = {SESSION: {"arms": tuple(arms)}}
     owners = {name: name.rpartition("/")[0] for name in layer}
     found = {arm: kept_files.recorded_files(bag.metadata, arm) for arm in set(owners.values())}
@@ -203,10 +203,10 @@ def record_blocks(
     Args:
         session: Session that makes the blocks.
         configuration: Configuration that is stored in the recording.
-        out: Directory of the recording, made here.
+        out: Directory of the recording, which is created.
         blocks: Rows of the session.
         ticks: Total number of ticks, for the progress.
-        progress: Called with ticks done and ticks in all.
+        progress: Called with the number of finished ticks and the total number of ticks.
 
     Returns:
         Number of ticks.

@@ -40,10 +40,10 @@ class Observation:
 
     Attributes:
         time: Time since the session began [s].
-        measured_jp: Joints of the slave (n,) [rad or m].
-        measured_jv: Their speeds (n,) [rad/s or m/s].
-        measured_cp: Pose (7,) of its tip in its base: x, y, z [m], quaternion w, x, y, z.
-        measured_cf: Force and moment (6,) on its tip, in its base [N, N·m].
+        measured_jp: Joint positions of the slave (n,) [rad or m].
+        measured_jv: Joint speeds of the slave (n,) [rad/s or m/s].
+        measured_cp: Pose (7,) of the slave's tip in the slave's base: x, y, z [m], quaternion w, x, y, z.
+        measured_cf: Force and moment (6,) on the slave's tip, in the slave's base [N, N·m].
         servo_cp: Pose (7,) that the hand commands, in the slave's base.
         master_cp: Pose (7,) of the stylus in the master's base.
         master_cf: Force and moment (6,) on the hand, in the master's base [N, N·m].
@@ -77,8 +77,8 @@ class Session:
     every session. The same commands give bit-identical results.
 
     Args:
-        scenario: One of ``teleop scenarios``; the defaults alone if None.
-        files: ROS 2 parameter files over the scenario.
+        scenario: Name of a scenario, as in ``teleop scenarios``; None for the defaults alone.
+        files: ROS 2 parameter files that override the scenario.
         settings: Parameters by name, which override all files: ``{"robot": "puma560"}``. The program moves the hand,
             so the hand has tremor only if ``tremor_amplitude`` is set.
         period: Time of a step [s], in whole milliseconds.
@@ -89,7 +89,7 @@ class Session:
         runner: The underlying session, with the rows of all its topics.
 
     Raises:
-        TeleopError: Something is wrong; the text names it.
+        TeleopError: An argument is wrong; the error text names it.
     """
 
     def __init__(
@@ -132,7 +132,7 @@ class Session:
             turn: Rotation vector (3,) of the stylus [rad].
             clutch: Whether the clutch is pressed, so that the slave stays where it is.
             fixture: Whether the button of the fixture is pressed.
-            mode: Whether the button of coarse and fine is pressed.
+            mode: Whether the button that switches between coarse and fine mode is pressed.
             jaw: Closing of the jaw, 0 open to 1 closed.
 
         Raises:
@@ -198,7 +198,7 @@ class Session:
         """Newest values of a topic, shape (width,), in the order of its columns.
 
         Args:
-            topic: Such as ``task/state``, or ``left/slave/measured_cp`` of another arm.
+            topic: Name of the topic, such as ``task/state``, or ``left/slave/measured_cp`` of another arm.
 
         Raises:
             UnknownNameError: The session has no such topic.

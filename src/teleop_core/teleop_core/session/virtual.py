@@ -15,7 +15,7 @@ from teleop_core.session.compose import Rings, Tick, block_dtype, compose
 from teleop_core.session.configuration import Configuration
 
 BLOCK = 1000
-"""Largest number of ticks per call."""
+"""Largest number of ticks in one call of the composed tick."""
 
 
 class VirtualTime:
@@ -134,7 +134,7 @@ class VirtualTime:
         return self._run(out, None)
 
     def reset(self) -> None:
-        """Go back to before the first tick, so that the session repeats itself exactly, bit for bit.
+        """Reset the session to its state before the first tick, so that the session repeats itself bit for bit.
 
         Changed parameters stay changed. A stage of your own is reset only by its own ``reset``.
         """
@@ -149,8 +149,8 @@ class VirtualTime:
         """Run ticks with recorded samples instead of simulated hands or masters.
 
         Args:
-            samples: Rows (N,) of which ``now_ns``, steps of one tick, and the fields and stamps of
-                :attr:`played_topics` are used.
+            samples: Rows (N,), one tick apart. Only ``now_ns`` and the fields and stamps of :attr:`played_topics` are
+                used.
 
         Returns:
             Rows (N,), as :meth:`run` returns them.
@@ -178,7 +178,7 @@ class VirtualTime:
     def _check(self, part: Any) -> None:
         """Make sure that a user's stages wrote finite numbers.
 
-        This is called once per block; the time hardly depends on its length.
+        This check is done once per block; its time hardly depends on the length of the block.
 
         Raises:
             PartError: A stage wrote NaN or infinity; the error text names topic and time.

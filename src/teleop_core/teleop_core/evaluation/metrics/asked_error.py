@@ -19,18 +19,20 @@ _FIRST_NS = -(2**62)
 class Asked:
     """Accumulator of the poses that the hand asks for, window by window.
 
-    The asked pose is the slave's pose when it was last engaged or the clutch was released, plus the hand's motion
-    since then, scaled by the gain, and the hand's rotation since then.
+    The asked pose begins as the slave's pose at the moment when the slave was last engaged or the clutch was last
+    released. The hand's motion since that moment, scaled by the gain, and the hand's rotation are added.
     """
 
     def __init__(self, context: Context) -> None:
         context.read(ASKED_TOPICS)
         self._history, self._origin = context.history, context.origin
         self._until_ns = _FIRST_NS
-        # State at the last command: the hand [m] in the slave's axes, the command [m], the part that limits cut off,
-        # and the latched alignment.
-        self._hand, self._command, self._cut = np.zeros(3), np.zeros(3), np.full(3, np.nan)
-        self._alignment, self._pose = np.full(4, np.nan), np.full(7, np.nan)
+        # State at the last command.
+        self._hand = np.zeros(3)  # position of the hand in the slave's axes [m]
+        self._command = np.zeros(3)  # commanded position [m]
+        self._cut = np.full(3, np.nan)  # motion that limits cut off [m]
+        self._alignment = np.full(4, np.nan)  # latched alignment of the tool
+        self._pose = np.full(7, np.nan)  # asked pose
         self._stamps, self._asked = np.empty(0, np.int64), np.empty((0, 7))
 
     def add(self, window: Window) -> None:
@@ -59,7 +61,8 @@ class Asked:
         hands = hand.values[partner[partner != NONE]]
         rows = self._history.at(stamps).rows
         is_held = (rows[:, STATE["is_following"]] == 0.0) | (rows[:, STATE["is_clutched"]] > 0.0)
-        # A sequence begins with the sample after a held sample: this first sample only latches the alignment.
+        # A sequence begins with the sample after a sample at which the slave is held. This first sample only latches
+        # the alignment.
         was_held = np.concatenate(([np.isnan(self._cut).any()], is_held[:-1]))
         asked = np.empty((len(stamps), 7))
         places = hands[:, :3] @ self._origin.axes.T
@@ -73,7 +76,7 @@ class Asked:
         return stamps, asked
 
     def _cuts(self, gain: Array, hands: Array, commands: Array, begins: NDArray[np.bool_]) -> Array:
-        """Sum of what limits cut off the commands since the slave was last engaged, at each command (N, 3) [m]."""
+        """For each command, the total motion that limits cut off since the slave was last engaged, (N, 3) [m]."""
         moved = np.diff(hands, axis=0, prepend=self._hand[None])
         cut = np.diff(commands, axis=0, prepend=self._command[None]) - gain * moved
         cut[begins] = 0.0
@@ -84,7 +87,7 @@ class Asked:
         return found
 
     def _turned(self, stylus: Array, commands: Array, begins: NDArray[np.bool_]) -> Array:
-        """Asked orientations (N, 4): since it was engaged, the tool rotates like the stylus."""
+        """Asked orientations (N, 4): from the moment at which it was engaged, the tool rotates like the stylus."""
         if self._origin.tool is None:
             return np.full((len(stylus), 4), np.nan)
         slave_master, stylus_tool = self._origin.tool

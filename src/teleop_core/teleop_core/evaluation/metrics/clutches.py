@@ -8,7 +8,7 @@ from teleop_core.graph.topics import MASTER_BUTTONS
 
 
 class ClutchesMetric(Metric):
-    """Presses of the clutch, and the share of the samples in which it is down."""
+    """Number of presses of the clutch, and share of the samples in which the clutch is pressed."""
 
     name, topics = "clutches", (MASTER_BUTTONS,)
     count = figure("1", "number of presses of the clutch")

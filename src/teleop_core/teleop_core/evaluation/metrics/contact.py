@@ -11,15 +11,15 @@ from teleop_core.graph.topics import MASTER_CONTACT
 from teleop_core.kernels.geometry import Array
 
 TOUCH_J = 14e-6
-"""A contact that takes less energy than this is a touch [J]. The limit is the energy that the device's dry friction,
-0.26 N, takes over one encoder step, 0.055 mm. In a touch, a force that begins and ends one period late may give back
-tenths of a microjoule more than it took, for any law of the wall."""
+"""A contact that absorbs less energy than this counts as a touch [J]. The limit is the energy that the device's dry
+friction, 0.26 N, dissipates over one encoder step, 0.055 mm. In a touch, a force that begins and ends one period late
+may return tenths of a microjoule more than it absorbed, whatever the law of the wall."""
 _NUMBER, _TAKEN, _RETURNED, _FRICTION, _MOST = range(len(MASTER_CONTACT.columns))
 
 
 @dataclass(frozen=True)
 class ContactScore:
-    """Energy of the contacts of the hand with walls; None if there was no contact, or contacts were not recorded."""
+    """Energies of the hand's contacts with walls; values are None without contacts or if none were recorded."""
 
     count: int | None = figure(
         "1",
@@ -34,7 +34,7 @@ class ContactScore:
     )
     feeding: int | None = figure("1", "number of contacts in which the wall returned more energy than it absorbed")
     feeding_device: int | None = figure(
-        # Only in this case the hand gets more energy than it spent.
+        # Only in such a contact the hand receives more energy than it spent.
         "1",
         "number of contacts that returned more energy than the wall and the device's dry friction absorbed",
     )
@@ -50,7 +50,7 @@ class ContactScore:
 
 
 class ContactMetric(Metric):
-    """Returned and taken energy of each contact, as the simulated device reports them."""
+    """Energy that each contact absorbed and returned, as the simulated device reports it."""
 
     name = "contact"
     keys = keys_of("contact", ContactScore)
@@ -58,8 +58,9 @@ class ContactMetric(Metric):
 
     def __init__(self, context: Context) -> None:
         self._start_ns = context.bag.start_ns
-        # Finished contacts (N, 6): the topic's columns and the begin of the contact [s]. Then the current contact.
+        # Finished contacts (N, 6): the columns of the topic, then the time at which the contact began [s].
         self._over: list[Array] = []
+        # The current contact, with the same columns.
         self._present = np.empty((0, len(MASTER_CONTACT.columns) + 1))
         self._most = np.inf
 
@@ -103,7 +104,7 @@ class ContactMetric(Metric):
         )
 
     def rows(self) -> list[TableRow]:
-        """Contacts and the worst contact; "none" if the recording does not contain contacts."""
+        """Rows about the number of contacts and the worst contact; "none recorded" without contacts."""
         score = self.values()
         if score.count is None:
             return [TableRow(GROUP, "energy of contacts", "", "none recorded")]

@@ -67,7 +67,7 @@ class Ticks:
 
 
 class TicksMetric(Metric):
-    """Ticks from the slave's own report if it exists, else from the samples that the slave published."""
+    """Counts of ticks, taken from the slave's own report if there is one, otherwise from the slave's samples."""
 
     name = "ticks"
     keys = (

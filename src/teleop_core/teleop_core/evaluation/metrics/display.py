@@ -8,7 +8,10 @@ from teleop_core.graph.topics import DISPLAY_MEASURED_CP, NO_COMMAND_NS
 
 
 class DisplayMetric(Metric):
-    """Age of the displayed slave pose, from its measurement to the end of each frame; None without a display."""
+    """Mean age of the slave pose on the display, and rate of the frames; None without a display.
+
+    The age counts from the measurement of the pose until the next frame replaces the pose.
+    """
 
     name, topics = "display", (DISPLAY_MEASURED_CP,)
     age_mean_ms = figure("ms", "mean age of the frame on the screen", "age of what is seen, mean")
@@ -27,7 +30,7 @@ class DisplayMetric(Metric):
             return
         logs = np.append(self._log_ns, shown.log_ns[is_new])
         stamps = np.append(self._stamp_ns, shown.stamp_ns[is_new])
-        first = int(self._frames == 0)  # no frame was shown before the first one
+        first = int(self._frames == 0)  # no frame was shown before the first frame
         until = 1e-9 * np.diff(logs)[first:]
         # The age grows from the arrival of a frame to the arrival of the next frame.
         ages = 1e-9 * (logs[:-1] - stamps[:-1])[first:] + 0.5 * until

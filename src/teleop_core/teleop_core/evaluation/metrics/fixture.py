@@ -19,7 +19,7 @@ from teleop_core.shapes.box import BOX
 def fixture_depth(positions: Array, states: States, axes: Array) -> Array:
     """Distance (N,) [m] of points outside of the fixture to the fixture's nearest point; zero inside.
 
-    It is NaN for points that are not finite, and for fixtures of unknown shape.
+    The distance is NaN for points that are not finite, and for fixtures of unknown shape.
 
     Args:
         positions: Points in the slave's base, shape (N, 3), [m].
@@ -40,7 +40,7 @@ GROUP = "virtual fixture"
 
 @dataclass(frozen=True)
 class FixtureScore:
-    """Score of the time in which a fixture was on; None if no fixture was ever on."""
+    """Score of the time in which a fixture was on; values are None if no fixture was ever on."""
 
     on_s: float = figure("s", "time with the fixture on")
     outside_share: float | None = figure(
@@ -116,7 +116,7 @@ class FixtureMetric(Metric):
     def rows(self) -> list[TableRow]:
         """Rows of all values; the slave's penetration is shown beside the published overshoot of a box.
 
-        Empty if no fixture was ever on.
+        The list is empty if no fixture was ever on.
         """
         score = self.values()
         if not score.on_s:

@@ -19,7 +19,7 @@ class ForceMetric(Metric):
 
     def __init__(self, context: Context) -> None:
         self._context, self._magnitude = context, Moments()
-        # x, y, z and magnitude, [N].
+        # Columns: x, y, z and magnitude of the force, [N].
         self._trace = Envelope(context.bag.start_ns, context.bag.end_ns, columns=4)
 
     def add(self, window: Window) -> None:
@@ -35,11 +35,11 @@ class ForceMetric(Metric):
         return self._magnitude.spread()
 
     def rows(self) -> list[TableRow]:
-        """Row of the maximum, in the group of the penetration that caused the force."""
+        """Row of the largest force, in the group of the virtual fixture."""
         return [row(GROUP, "force on hand, max", "N", self.values().max)]
 
     def figures(self) -> list[Figure]:
-        """Force against time; none if it was not recorded."""
+        """Plot of the force against time; no plot if the force was not recorded."""
         times, values = self._trace.line()
         if not len(times):
             return []

@@ -6,7 +6,7 @@ from teleop_core.evaluation import Metric, Window
 from teleop_core.evaluation.metric import figure
 from teleop_core.graph.topics import SLAVE_TRUE_CF
 
-_STEP = 0.1  # smallest rise of the force before a peak, and fall after it [N]
+_STEP = 0.1  # smallest rise of the force before a peak, and smallest fall after the peak [N]
 
 
 class ForcePeaksMetric(Metric):
@@ -17,7 +17,7 @@ class ForcePeaksMetric(Metric):
     _turn, _rises = 0.0, True
 
     def add(self, window: Window) -> None:
-        """Process one window; ``turn`` is the extreme force since the last counted turning point."""
+        """Process one window; ``_turn`` is the extreme force since the last counted turning point."""
         force = np.linalg.norm(window.samples(SLAVE_TRUE_CF).values[:, :3], axis=1)
         for one in force[np.diff(force, prepend=np.nan) != 0.0].tolist():
             is_turned = abs(one - self._turn) >= _STEP and (one < self._turn) == self._rises

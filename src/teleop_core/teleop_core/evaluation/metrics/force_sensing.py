@@ -13,7 +13,7 @@ class ForceSensingMetric(Metric):
 
     Values are None if there was no contact, or the true force is unknown.
 
-    All three topics are sent only when they change, so each value is valid until its next sample.
+    Messages of all three topics are sent only when a force changes, so each value is valid until the next sample.
     """
 
     name, group = "force_sensing", "force on the tip as it was told"

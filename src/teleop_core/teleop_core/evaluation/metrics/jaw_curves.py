@@ -30,7 +30,7 @@ class JawCurvesMetric(Metric):
             envelope.add(found.log_ns, found.values[:, :1])
 
     def figures(self) -> list[Figure]:
-        """Angle and force against time; none without a jaw."""
+        """Plot of angle and force against time; no plot without a jaw."""
         score = self._score
         if score.grips is None:
             return []

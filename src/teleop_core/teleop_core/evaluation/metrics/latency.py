@@ -13,16 +13,18 @@ from teleop_core.graph.topics import NETWORK_SERVO_CP, Topic
 _NEVER = 2**62
 _BINS = 150
 _COLORS = (FIRST, "#e69f00", SECOND, THIRD, DARK)
-TOTAL, ASKED = "total", "asked"
-"""Names of the delay of the whole chain, and of its configured part."""
+TOTAL = "total"
+"""Name of the delay of the whole chain."""
+ASKED = "asked"
+"""Name of the configured part of the whole chain's delay."""
 
 
 class LatencyMetric(Metric):
-    """Delays of every stage.
+    """Delay of each stage of the chain.
 
-    The delay of a stage is the time between two first arrivals at the recorder: of the stage's input and of its output
-    with the same stamp. The first stage is measured against the stamp itself, so its delay includes the transport to
-    the recorder.
+    The delay of a stage is the time from the first arrival of its input at the recorder to the first arrival of its
+    output with the same stamp. The delay of the first stage is measured from the stamp itself, so it includes the
+    transport to the recorder.
     """
 
     name = "latency_ms"
@@ -54,7 +56,7 @@ class LatencyMetric(Metric):
             arrivals = logs - (stamps if before is None else _arrivals(window, before, stamps))
             self._delays[stage].add(arrivals[arrivals > -_NEVER // 2])
             before = topic
-        # At its start, the last stage holds a pose that was not commanded; only commands count.
+        # At the start, the last stage sends a pose that no command asked for. Only commands are counted.
         is_command = same_stamp(stamps, window.around(self._command).stamp_ns) != NONE
         self._delays[TOTAL].add((logs - stamps)[is_command])
 
@@ -68,7 +70,7 @@ class LatencyMetric(Metric):
         return found
 
     def rows(self) -> list[TableRow]:
-        """One row per stage."""
+        """One row per stage: median, 99th percentile and maximum of the stage's delay."""
         rows = []
         for stage, delay in self.values().items():
             known = (delay.median, delay.p99, delay.max)
@@ -77,7 +79,7 @@ class LatencyMetric(Metric):
         return rows
 
     def figures(self) -> list[Figure]:
-        """Distribution of each stage's delay; a line of text where all are zero."""
+        """Plot of the distribution of each stage's delay; a line of text if all delays are zero."""
         known = {stage: delay for stage, delay in self._delays.items() if delay.count}
         if len(known) == len(self._delays) and not any(d.values_us.any() for d in known.values()):
             return [Figure("Latency", "none, as in virtual time.", [])]
@@ -107,7 +109,7 @@ def _first_arrivals(window: Window, topic: Topic) -> tuple[Integers, Integers]:
 
 
 def _arrivals(window: Window, topic: Topic, stamps: Integers) -> Integers:
-    """Log times [ns] of another topic's samples with the given stamps; far in the future if missing."""
+    """Log times [ns] of a topic's samples with the given stamps; far in the future for a missing sample."""
     series = window.around(topic)
     if not len(series):
         return np.full(len(stamps), _NEVER)

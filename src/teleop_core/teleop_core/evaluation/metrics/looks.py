@@ -9,10 +9,11 @@ from teleop_core.graph.topics import MASTER_MEASURED_CP
 
 
 class LooksMetric(Metric):
-    """Number of times the hand begins to move after a rest of at least 0.1 s, the shortest time to use what was seen.
+    """Number of times the hand begins to move after a rest of at least 0.1 s.
 
-    A look itself is not recorded. It is inferred from the hand's motion, for persons and for simulated operators.
-    Submovements without such a rest between them count as one look.
+    0.1 s is the shortest time in which a person can use what was seen. A look itself is not recorded. It is inferred
+    from the hand's motion, for persons and for simulated operators. Submovements without such a rest between them
+    count as one look.
     """
 
     name, topics = "looks", (MASTER_MEASURED_CP,)

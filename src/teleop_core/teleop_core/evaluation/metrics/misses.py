@@ -17,6 +17,6 @@ class MissesMetric(AttemptsMetric):
     )
 
     def judge(self, tried: Attempts) -> None:
-        """Count each kind."""
+        """Count the errors of each kind."""
         for kind, one in enumerate(self.declared, start=1):
             setattr(self, one.name, int((tried.column("miss") == kind).sum()))

@@ -22,7 +22,7 @@ def approach_end_ns(context: Context) -> int:
     """Time at which the approach ends [ns].
 
     The approach begins when teleop/state first reports that the slave follows; its duration is in the stored
-    configuration. Recordings of other writers have no approach: this returns their start.
+    configuration. Recordings of other writers have no approach; the function then returns the start of the recording.
     """
     history, start_ns = context.history, context.bag.start_ns
     begin_ns = start_ns
@@ -40,7 +40,7 @@ def approach_time(context: Context) -> float:
         operator = OPERATORS.find(common.kind.kind)
     except TeleopError:
         return 0.0
-    # A recorded motion has an approach only if it was moved to a centre.
+    # An operator that replays a recorded motion approaches only if the motion was moved to a centre.
     is_moved = operator.length is not None and any(common.center)
     return common.approach_time if values and (operator.approaches or is_moved) else 0.0
 
@@ -70,9 +70,9 @@ class MotionScore:
         slave: Motion of the slave's tip.
         in_fixture: Motion of the master's tip while a fixture was on.
         clutch: Strokes of the clutch.
-        segments: Motion of the hand between clutch strokes, by number from 1: ``begin_s`` and ``end_s`` since the
-            start of the recording, and figures.
-        segment_median: ``count``, and the median of each figure over the segments.
+        segments: Motion of the hand between clutch strokes, by number from 1. Each segment contains ``begin_s`` and
+            ``end_s`` since the start of the recording, and the values of the motion.
+        segment_median: ``count``, and the median of each value over the segments.
     """
 
     hand: MotionFigures
@@ -84,7 +84,7 @@ class MotionScore:
 
 
 class MotionMetric(Metric):
-    """Figures of the motion of hand and slave, after the approach.
+    """Values that describe the motion of hand and slave after the approach.
 
     If a span is scored, the whole span counts, including the approach.
     """
@@ -133,7 +133,7 @@ class MotionMetric(Metric):
         return self._context.history.at(stamps)
 
     def values(self) -> MotionScore:
-        """Figures of the whole motion, of the time with the fixture on, and between clutch strokes."""
+        """Values of the whole motion, of the time with the fixture on, and between clutch strokes."""
         self._score = self._score or self._scored()
         return self._score
 
@@ -176,7 +176,7 @@ class MotionMetric(Metric):
         ]
 
     def figures(self) -> list[Figure]:
-        """Speed against time, and the spectrum of velocity."""
+        """Plots of speed against time, and of the spectrum of velocity."""
         score = self.values()
         return [self._speed_figure(score.hand), self._spectrum_figure(score.hand)]
 
@@ -217,7 +217,7 @@ _DRAWN = ((MASTER_MEASURED_CP, "hand", DARK), (SLAVE_MEASURED_CP, "slave", MEASU
 
 
 class _Stream:
-    """One tip of a recording at 30 Hz."""
+    """Motion of one tip of a recording, resampled to 30 Hz."""
 
     def __init__(self, topic: Topic, start_ns: int) -> None:
         self._topic, self._start_ns = topic, start_ns

@@ -18,12 +18,12 @@ from teleop_core.graph.topics import NETWORK_MEASURED_CP, NETWORK_SERVO_CP, NETW
 GROUP = "network"
 _WAYS = (("to the slave", NETWORK_SERVO_CP), ("from the slave", NETWORK_MEASURED_CP))
 _ROUND_NS = 100_000
-"""Ages are rounded down to multiples of this time [ns], because live ages can have any value."""
+"""Ages are rounded down to multiples of this time [ns], because in a live session an age can have any value."""
 
 
 @dataclass(frozen=True)
 class WayScore:
-    """Ages at the reader in one direction, and losses; None if nothing was recorded."""
+    """Ages of packets at their reader, and losses, in one direction; values are None if nothing was recorded."""
 
     age_mean_ms: float | None = figure("ms", "mean age of the newest packet that has arrived")
     age_p99_ms: float | None = figure("ms", "age of the newest arrived packet that is exceeded for 1 % of the time")
@@ -33,7 +33,7 @@ class WayScore:
 
 @dataclass(frozen=True)
 class NetworkScore:
-    """Both directions of the network."""
+    """Scores of both directions of the network."""
 
     there: WayScore
     back: WayScore
@@ -49,7 +49,7 @@ class _Ages:
         """Process arrivals, and return the age (N,) [ns] right after each arrival.
 
         Args:
-            logs: Times of arrival [ns]; the first may be the last arrival before ``after_ns``.
+            logs: Times of arrival [ns]. Only the first of these times may be before ``after_ns``.
             stamps: Times of sending [ns].
             after_ns: Begin of the counted time [ns].
             until_ns: End of the counted time [ns].
@@ -73,7 +73,7 @@ class _Ages:
 
 
 def _clock_ahead_ns(window: Window, logs: Integers) -> Integers:
-    """Offset of the slave's clock at the given times (N,) [ns], positive if it was ahead; 0 if unknown."""
+    """Offset of the slave's clock at the given times (N,) [ns]; positive if the clock was ahead, 0 if unknown."""
     told, column = window.around(NETWORK_STATE), NETWORK_STATE.columns.index("clock_ahead")
     if not len(told) or told.values.shape[1] <= column:
         return np.zeros_like(logs)
@@ -147,7 +147,7 @@ class NetworkMetric(Metric):
         return found
 
     def figures(self) -> list[Figure]:
-        """Ages against time; none without a network."""
+        """Plot of the ages against time; no plot without a network."""
         score, traces = self.values(), []
         for (name, _), trace, color in zip(_WAYS, self._traces, (FIRST, SECOND), strict=True):
             times, values = trace.line()

@@ -83,7 +83,7 @@ class OrientationErrorMetric(Metric):
         return self._error.error()
 
     def rows(self) -> list[TableRow]:
-        """The spreads beside the published figures of the mode."""
+        """Rows of the spreads, beside the published values of the mode."""
         error, mode, group = self.values(), self._gains.published, GROUP
         published = (mode.roll_deg, mode.pitch_deg, mode.yaw_deg) if mode else (None, None, None)
         is_judged = mode is not None and self._gains.is_source
@@ -97,7 +97,7 @@ class OrientationErrorMetric(Metric):
         return rows + spread_rows(group, "rotation", "deg", error.angle)
 
     def figures(self) -> list[figure.Figure]:
-        """Roll, pitch and yaw of the tip against the reference, against time."""
+        """Plots of the errors of roll, pitch and yaw relative to the reference, against time."""
         times, values = self._trace.envelope.line()
         traces = [
             {

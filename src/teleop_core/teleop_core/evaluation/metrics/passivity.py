@@ -41,7 +41,7 @@ class PassivityScore:
 
 
 class _Port:
-    """Sums over rounds of one port, and its curve."""
+    """Energies of one port, summed over rounds, and their curve against time."""
 
     def __init__(self, context: Context) -> None:
         self._trace = Envelope(context.bag.start_ns, context.bag.end_ns, columns=len(_COLUMNS))
@@ -73,7 +73,7 @@ class _Port:
 
     @property
     def law(self) -> int:
-        """Kind of passivity at the end, as its index among all kinds."""
+        """Kind of passivity in the last sample, as its index among all kinds."""
         return int(self._last[LAW]) if self._last is not None else 0
 
     def score(self) -> PortScore:
@@ -84,7 +84,7 @@ class _Port:
         return PortScore(into, out, withheld, _MJ * self._least)
 
     def line(self) -> tuple[Array, Rows]:
-        """Times [s], and energies in, out, received from the other side and withheld [mJ]."""
+        """Times [s]; and energies [mJ]: in, out, received from the other side, and withheld."""
         return self._trace.line()
 
 
@@ -143,7 +143,7 @@ class PassivityMetric(Metric):
         ]
 
     def figures(self) -> list[Figure]:
-        """Energies of both ports against time; none without a stage ``passivity``."""
+        """Plot of the energies of both ports against time; no plot without a stage ``passivity``."""
         score, traces = self.values(), []
         if score.chatter_ns is None:
             return []

@@ -32,7 +32,7 @@ class _Path(NamedTuple):
 
     @property
     def shown(self) -> figure.Numbers:
-        """Measured points of the time that is drawn, NaN elsewhere, shape (N, 3)."""
+        """Measured points, shape (N, 3); NaN at times that are not drawn."""
         if self.during is None:
             return self.measured
         ends = np.array(self.during).ravel()
@@ -50,7 +50,7 @@ class PathMetric(Metric):
         self._context = context
         self._error = context.shared(position_error.PositionErrorMetric)
         self._fixture = context.shared(fixture.FixtureMetric)
-        # x, y, z of command, setpoint and measured, [mm].
+        # Columns: x, y, z of the command, of the setpoint and of the measured pose, [mm].
         self._position = Envelope(context.bag.start_ns, context.bag.end_ns, columns=9)
 
     def add(self, window: Window) -> None:
@@ -65,7 +65,7 @@ class PathMetric(Metric):
         return {}
 
     def figures(self) -> list[figure.Figure]:
-        """Paths in space and per plane, and positions against time."""
+        """Plots of the paths in space and per plane, and of the positions against time."""
         outlines = outlines_of(self._context)
         path = self._path(outlines)
         return [
@@ -122,7 +122,7 @@ class PathMetric(Metric):
         return figure.Figure("Position against time", sentence, traces, layout, 640)
 
     def _interesting(self, outlines: list[Outline]) -> list[float]:
-        """Time [s] that is shown first: the time with a fixture on, else the time since the slave began to follow."""
+        """Interval [s] shown first: the time with a fixture on, else the time since the slave began to follow."""
         bag, history = self._context.bag, self._context.history
         if outlines:
             return [outlines[0].begin_s, outlines[-1].end_s]
@@ -156,7 +156,7 @@ def _in_space(path: _Path, outlines: list[Outline], sentence: str) -> figure.Fig
             (path.measured, "measured", figure.MEASURED),
         )
     )
-    measured |= {"showlegend": False}  # the colour bar explains its colours
+    measured |= {"showlegend": False}  # the colour bar explains the colours of this line
     measured["line"] |= {"colorscale": "Viridis", "showscale": True, "colorbar": _TIME_BAR}
     traces = [
         {**figure.along(whole, path.times, path.during, whole=True), "opacity": 0.5, "hoverinfo": "skip"},
@@ -191,7 +191,7 @@ def _line3(points: figure.Numbers, name: str, color: str, width: int, *, hidden:
 
 
 def _in_planes(path: _Path, outlines: list[Outline]) -> figure.Figure:
-    """The same paths seen along each axis; behind them the whole path, or the time spent in each area."""
+    """Plots of the paths seen along each axis; the background is the whole path, or the time spent in each area."""
     shown = path.shown
     fixtures = largest(outlines)
     every = np.concatenate([shown, path.reference[np.isfinite(shown[:, 0])], *(outline.points for outline in fixtures)])
@@ -244,7 +244,7 @@ def _surroundings(
 def _plane_axes(
     plot: int, across: str, up: str, width: list[float] | None, height: list[float] | None
 ) -> dict[str, Any]:
-    """Two axes of the same scale."""
+    """Layout of a plot whose two axes have the same scale."""
     suffix = figure.axis_suffix(plot)
     return {
         f"xaxis{suffix}": {"title": {"text": f"{across} [mm]"}, "constrain": "domain", "range": width},

@@ -67,7 +67,7 @@ class PositionErrorMetric(SpreadMetric):
         return tracked(window).against.position_mm
 
     def rows(self) -> list[TableRow]:
-        """The spread beside the published figures of the mode."""
+        """Rows of the spread, beside the published values of the mode."""
         mode = self._gains.published
         if mode is None:
             return spread_rows(GROUP, "position", "mm", self.values())
@@ -76,7 +76,7 @@ class PositionErrorMetric(SpreadMetric):
         return spread_rows(GROUP, "position", "mm", spread, published, met)
 
     def figures(self) -> list[Figure]:
-        """Distance of the tip from reference and command against time."""
+        """Plot of the tip's distances from reference and command against time."""
         times, values = self._trace.envelope.line()
         spread, behind = self.values(), self._command.values()
         traces = [

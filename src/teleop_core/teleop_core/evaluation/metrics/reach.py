@@ -1,4 +1,4 @@
-"""Reach: share of the time in which the slave could follow the hand, and the causes of the rest."""
+"""Reach: share of the time in which the slave could follow the hand, and why it could not follow otherwise."""
 
 import math
 from dataclasses import dataclass
@@ -15,16 +15,16 @@ from teleop_core.kernels.geometry import Array
 
 GROUP = "slave follows the hand"
 COMPARABLE = 0.99
-"""Smallest share of followed time for a comparison with published figures."""
+"""Smallest share of followed time at which values are compared with published values."""
 _RESIDUAL = SLAVE_REACH.columns.index("position_residual")
 _LIMIT = SLAVE_REACH.columns.index("limit")
-# One more cause besides the limits: the slave is being aligned, or no command came for longer than this time [s].
-_ALIGNING, _SILENT_S = len(Limit), 0.5
+_ALIGNING = len(Limit)  # one more cause besides the limits: the slave is being aligned
+_SILENT_S = 0.5  # a longer time without a command counts as alignment [s]
 
 
 @dataclass(frozen=True)
 class ReachScore:
-    """How well the slave followed, since it first followed; None if slave/reach was not recorded."""
+    """How well the slave followed after it began to follow; values are None if slave/reach was not recorded."""
 
     followed_share: float | None = figure(
         "1",
@@ -66,7 +66,7 @@ class ReachMetric(Metric):
         self._distance, self._angle = Moments(), Moments()
         self._stamps = context.shared(StampTallies)
         self._interpolation = context.origin.interpolation
-        self._time = np.zeros(len(Limit) + 1)  # time in each limit, and while aligning [s]
+        self._time = np.zeros(len(Limit) + 1)  # time at each limit, then time of alignment [s]
         self._longest_s = self._open_s = 0.0
         self._last: tuple[int, int] | None = None  # stamp [ns] of the last command, and its limit
 
@@ -83,7 +83,7 @@ class ReachMetric(Metric):
         self._add_times(found.stamp_ns, np.where(follows, found.values[:, _LIMIT], _ALIGNING))
 
     def _add_times(self, stamp_ns: Integers, limits: Array) -> None:
-        """Add commands. Each counts until the next command; a long time without a command counts as alignment."""
+        """Add commands. Each command counts until the next one; a long time without a command counts as alignment."""
         kinds = limits.astype(np.int64)
         if self._last is not None:
             stamp_ns = np.concatenate(([self._last[0]], stamp_ns))
@@ -137,7 +137,7 @@ class ReachMetric(Metric):
         return period_us * 1e-3 if is_slow else 0.0
 
     def rows(self) -> list[TableRow]:
-        """Shares in percent, the longest stretch, residuals, and whether figures are comparable."""
+        """Rows of tables; shares are in percent."""
         score = self.values()
         return [
             TableRow(GROUP, "followed, time", "%", _percent(score.followed_share)),

@@ -10,7 +10,7 @@ from teleop_core.kernels.geometry import Array, rotations_from_quaternions
 
 
 def distances(poses: Array, centre: Array, shaft: Array) -> tuple[Array, Array]:
-    """Distances (N,) [m] from a point to the shafts of tools, and to their tips.
+    """Distances from a point to the shafts of tools (N,) [m], and from the point to the tips (N,) [m].
 
     Args:
         poses: Poses of the tips, (N, 7).
@@ -24,7 +24,7 @@ def distances(poses: Array, centre: Array, shaft: Array) -> tuple[Array, Array]:
 
 
 class RemoteCentreMetric(Metric):
-    """How well a tool keeps its remote centre after the approach; None without a remote centre."""
+    """Distance between a tool's shaft and its remote centre after the approach; None without a remote centre."""
 
     name, group = "remote_centre", "remote centre"
     topics = (REMOTE_CENTRE, SLAVE_MEASURED_CP)

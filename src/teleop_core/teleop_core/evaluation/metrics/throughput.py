@@ -6,7 +6,7 @@ from teleop_core.evaluation.attempts import Attempts, AttemptsMetric
 from teleop_core.evaluation.metric import figure
 
 EFFECTIVE = 4.133
-"""Effective width in standard deviations of the end points: 96 % of a normal distribution."""
+"""Effective width of a target, in standard deviations of the end points; 96 % of a normal distribution lie in it."""
 
 
 class ThroughputMetric(AttemptsMetric):

@@ -39,7 +39,7 @@ class _Presses:
 
 
 class TouchMetric(Metric):
-    """Touches of the tip with the world, and their forces; None if no forces were recorded.
+    """Touches of the tip with the world, and forces of these touches; None if no forces were recorded.
 
     The true force is used if it was recorded, so that noise and bias of a sensor do not count as touches.
     """
@@ -65,13 +65,13 @@ class TouchMetric(Metric):
         self._presses = _Presses(context)
         self._force = Moments()
         self._touches, self._time_ns, self._seen = 0, 0, 0
-        self._last = (0, 0.0)  # stamp, and force
+        self._last = (0, 0.0)  # log time [ns] and force [N] of the last sample
         self._drop = 0.0
         self._begin_ns = 0
         self._trace = Envelope(context.bag.start_ns, context.bag.end_ns, columns=4)
 
     def add(self, window: Window) -> None:
-        """Process one window. The topic is sent when it changes, and at long intervals."""
+        """Process one window. A force is sent when it changes, and otherwise at long intervals."""
         if self._presses.count is not None:
             self._presses.add(window.samples(SLAVE_TRUE_CP).values[:, :3])
             self.presses = self._presses.count if self._seen else None
@@ -101,7 +101,7 @@ class TouchMetric(Metric):
         self.drop_n = self._drop if self._touches else None
 
     def figures(self) -> list[Figure]:
-        """Force on the tip against time; no plot if nothing was touched."""
+        """Plot of the force on the tip against time; no plot if the tip touched nothing."""
         times, values = self._trace.line()
         if not self.count:
             return []

@@ -49,7 +49,7 @@ class TremorFilterScore:
 
 
 def passage(before: Array, after: Array) -> tuple[float, float] | None:
-    """Delay [s] and gain of motion below :data:`MEANT` from one motion to another.
+    """Delay [s] and gain from a first motion to a second motion, for frequencies below :data:`MEANT`.
 
     Segments of :data:`SPECTRUM_SAMPLES`, half overlapping and Hann-windowed, give the cross-spectrum S of both
     velocities, summed over the axes. The delay is the one whose phase ``-2πf delay`` fits best: ``-Σ|S| 2πf arg S /
@@ -100,8 +100,9 @@ class TremorFilterMetric(Metric):
         self._start_ns = context.bag.start_ns
         self._begin_s = (begin_ns - self._start_ns) * 1e-9
         self._before, self._after = MotionSamples(), MotionSamples()
-        self._off, self._count = np.zeros(2), 0  # squared distances from the intended motion, before and after the
-        # filter
+        # Sums of the squared distances from the intended motion, before and after the filter [m²].
+        self._off = np.zeros(2)
+        self._count = 0  # number of samples in these sums
 
     def add(self, window: Window) -> None:
         """Process one window: device samples that have a filtered sample with the same stamp."""

@@ -8,7 +8,7 @@ from teleop_core.graph.topics import MASTER_MEASURED_CP
 
 
 class WaitsMetric(Metric):
-    """Rests of the hand: at least 0.3 s with less than 0.5 mm of motion in each tenth of a second."""
+    """Number and share of rests of the hand: 0.3 s or more with less than 0.5 mm of motion in each 0.1 s."""
 
     name, topics = "waits", (MASTER_MEASURED_CP,)
     count = figure(
