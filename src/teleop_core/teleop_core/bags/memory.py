@@ -62,7 +62,7 @@ class MemoryBag(reader.Bag):
         self.require(wanted)
         for name in wanted:
             if name in self._left_out:
-                raise LeftOutError(self.path, f"{name} was not kept in memory in memory")
+                raise LeftOutError(self.path, f"{name} was not kept in memory")
             if name not in self._series:
                 raise RecordingError(self.path, f"{name} contains reports, which cannot be read as numbers")
         kinds = {topic.name: topic.kind for topic in self.streams}

@@ -140,13 +140,13 @@ class Stage:
         known = {topic.name for topic in self.reads}
         for word in ("late", "optional", "needs"):
             for topic in getattr(self, word):
-                self._insist(topic.name in known, f"one one with {topic.name} ({word}) among its reads")
+                self._insist(topic.name in known, f"one with {topic.name} ({word}) among its reads")
         if self.trigger is not None:
-            text = f"one one with its trigger {self.trigger.name} among its reads"
+            text = f"one with its trigger {self.trigger.name} among its reads"
             self._insist(self.trigger.name in known, text)
         for topic in self.writes:
             is_known = topic.stamp.is_in_force or topic.stamp.of in {"", *known}
-            text = f"one one with {topic.stamp.of}, whose stamp {topic.name} passes on, among its reads"
+            text = f"one with {topic.stamp.of}, whose stamp {topic.name} passes on, among its reads"
             self._insist(is_known, text)
         for i, topic in enumerate(self.replaced):
             is_like = i < len(self.writes) and self.writes[i].kind is topic.kind
