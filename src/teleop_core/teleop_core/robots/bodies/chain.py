@@ -94,7 +94,7 @@ def places(axes: list[Axis], out: Array, tip: Array) -> list[Place]:
 
 
 def _laid(axes: list[Axis], tip: Array) -> list[Axis]:
-    """The axes; the axis of each sliding joint is moved to a later parallel rotation axis, or else to the tip."""
+    """The axes; a sliding axis passes through the tip if it is last, through the next if parallel, else nowhere."""
     laid: list[Axis] = []
     beyond: Array | None = tip
     for axis, after in zip(reversed(axes), [None, *reversed(axes[1:])], strict=True):
