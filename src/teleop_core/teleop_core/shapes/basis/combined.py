@@ -124,7 +124,7 @@ _distance_of = kernel_from_source(
 
 @inner
 def next_part(numbers: Array, first: int) -> int:
-    """Index at which the numbers of the part after the one at ``first`` begin; the first part begins at 1."""
+    """Index of the first number of the part after the part that begins at ``first``; the first part begins at 1."""
     return first + _HEAD + int(numbers[first + 1])
 
 
