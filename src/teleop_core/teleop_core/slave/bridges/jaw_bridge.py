@@ -61,7 +61,7 @@ class JawBridge(arm_bridge.ControllerBridge):
         super().__init__(JAW_BRIDGE, p, joints, lead, speed, dt)
 
     def command(self, now_ns: int, setpoint_age: float, is_led: bool) -> Command | None:
-        """Return the command as every bridge does; None also before the first command of the hand is followed."""
+        """Return the command, as all bridges do; also None until the server follows the first command of the hand."""
         if self.signals["slave_jaw_setpoint_js_ns"] <= NO_COMMAND_NS:
             self.lead_arm.let_go("waits for the hand: no command is in force")
             return None
