@@ -55,8 +55,8 @@ class Directions(NamedTuple):
 def _links(theta1: float, g: Array) -> Directions:
     """Directions of crank, rocker and coupler in the robot's mode; with the smallest gap if the loop is open.
 
-    Relative to the end of the crank, the right pivot is at (x, y), and the end of the rocker is at (x, y) + l3 (cos
-    phi1, sin phi1), where the other end of the coupler must be.
+    Points are relative to the end of the crank. The right pivot is at (x, y). The end of the rocker, where the coupler
+    must end, is at (x, y) + l3 (cos phi1, sin phi1).
     """
     l0, l1, l2, l3 = g[0], g[1], g[2], g[3]
     c1, s1 = math.cos(theta1), math.sin(theta1)

@@ -194,9 +194,9 @@ def _at_home(geometry: Array, T: Array) -> None:
 def fk(q: Array, geometry: Array, T: Array) -> None:
     """Write ``T_base_tip`` (4, 4) of leg lengths (6,) [m], found from the home pose.
 
-    If no pose closes near home, the pose of least error is written; :func:`assemble` reports this. For legal legs with
-    joints in pairs, this was measured for no pose that is rotated by up to 1 rad, for 0.2 % of the poses rotated by up
-    to 1.3 rad, and for 8 % of those rotated by up to half a turn.
+    If no pose closes near home, the pose of least error is written; :func:`assemble` reports this. Measured for legal
+    legs with joints in pairs, this happens for no pose rotated by up to 1 rad. It happens for 0.2 % of the poses
+    rotated by up to 1.3 rad, and for 8 % of those rotated by up to half a turn.
     """
     _at_home(geometry, T)
     base, platform = geometry[:18].reshape((6, 3)), geometry[18:36].reshape((6, 3))

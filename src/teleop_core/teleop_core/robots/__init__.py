@@ -142,8 +142,7 @@ def load_robot_set(name: str, settings: Iterable[str]) -> Robot:
         The robot.
 
     Raises:
-        ParameterError: A text contains no "=".
-        TeleopError: As in :func:`load_robot`.
+        ParameterError: A text contains no "="; and all errors of :func:`load_robot`.
     """
     return _loaded(name, geometry_of(settings))
 
