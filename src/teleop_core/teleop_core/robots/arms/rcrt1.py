@@ -34,8 +34,8 @@ START = np.array([-0.7622, 1.7058, 0.3445, 1.1233, 0.7795, -1.3396])
 # Below this sine the wrist axes 4 and 6 count as one line, and joint 4 keeps its value. Rounding in T (1e-16), divided
 # by this sine, then changes joint 4 by less than 1e-6 rad.
 _COLLINEAR = 1e-10
-# Below this sine of joint 5, or below this wrist distance divided by the full reach, small moves of the tool need large
-# moves of the joints (more than 50 rad of joint per rad of tool).
+# Below this sine of joint 5, or this wrist distance divided by the full reach, small moves of the tool need large moves
+# of the joints: more than 50 rad of joint per rad of tool.
 _NEAR = 0.02
 _REACH = 0.421  # full reach of the wrist [m]
 _FOLLOWED, _LIMITED = int(IkStatus.FOLLOWED), int(IkStatus.LIMITED)
