@@ -109,7 +109,7 @@ def load_robot(name: str, **geometry: float | str) -> Robot:
         The robot.
 
     Raises:
-        UnknownNameError: No such robot or no such symbol; the alternatives are listed.
+        UnknownNameError: There is no such robot or symbol; the message lists the alternatives.
         ParameterError: A length is impossible, or a table contains an impossible entry.
         PartError: A robot of another package cannot be loaded.
         OSError: A table cannot be read.

@@ -47,7 +47,7 @@ class _Start:
     def __get__(self, robot: "Robot", owner: type) -> Array: ...
     def __get__(self, robot: "Robot | None", owner: type) -> Array | None:
         if robot is None:
-            return None  # the field's default
+            return None  # default of the field ``start``
         if robot.__dict__["start"] is None:
             posture = read_only("start", freedom.start_of(robot), (robot.n,))
             robot.__dict__["start"] = posture

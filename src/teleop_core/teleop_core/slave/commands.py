@@ -16,7 +16,7 @@ from teleop_core.slave.operation.watch import ServerParameters, ServerState, fai
 class CommandStatus(IntEnum):
     """How the slave took the command of this tick."""
 
-    FRESH = 0  # followed
+    FRESH = 0  # the command is new and followed
     STALE = 1  # no command came for longer than the command timeout: the last command is held
     REFUSED = 2  # too far from the present command to belong to one motion: the last command is held
     MOVING = 3  # the arm moves to a goal, such as the start position, or at a wanted speed; servo_jp is ignored

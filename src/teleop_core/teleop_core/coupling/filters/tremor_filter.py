@@ -37,7 +37,7 @@ class FilterState(plausibility.PlausibilityState):
 
     origin: Vector3  # reading at which the filter began [m]
     value: Vector3  # last reading, relative to ``origin`` [m]
-    told: Vector3  # last answer
+    told: Vector3  # last filtered position [m]
     shift: Vector3  # remaining step of the output at a change of parameters
     begun: int
     is_retuned: int

@@ -74,7 +74,7 @@ class Solver(NamedTuple):
     geometry: Array
     T: Array
     reached: Array
-    seed: Array  # the last answer (n,)
+    seed: Array  # joints of the last solution (n,)
     q: Array
     free: Array  # the answer without a time limit
     before: Array  # the slave's setpoint at the last command, while the slave follows no command

@@ -78,7 +78,7 @@ class Law(NamedTuple):
     heard: Array  # energies of the slave, its wave along the master's base
     port: Array
     wall: Array  # force of fixture and limits since the last sample [N]
-    walls: Array  # energies of this force
+    walls: Array  # energies of the force ``wall``
 
     def clear(self) -> None:
         """Set memory, forces and energies to zero."""

@@ -28,7 +28,7 @@ class WallNumbers(Fields):
 class WallState(Fields):
     """Fields of a state record with the last sample."""
 
-    felt: Vector3  # place [m]
+    felt: Vector3  # last measured position of the hand [m]
     rate: Vector3  # smoothed rate of the hand [m/s]
 
 

@@ -43,7 +43,7 @@ class LinkState(Fields):
     sent: _BothWays
     lost: _BothWays
     newest: _BothWays  # numbers of the newest packets that arrived
-    last_due: _BothWays  # tick
+    last_due: _BothWays  # latest arrival tick of a packet so far
     sent_tick: _BothWays
     arrived: _BothWays  # whether a packet arrived in this tick
     free: Annotated[Array, 2]  # tick, with fractions, at which the line is free
@@ -57,7 +57,7 @@ class Way(NamedTuple):
     draw: Any
     numbers: Array
     memory: Array
-    chances: Array  # (BLOCK, CHANCES + 1)
+    chances: Array  # random numbers of a block of ticks (BLOCK, CHANCES + 1)
     packet: Array  # values (W,) of the packet that is made; the next array contains the stamps of its topics (K,)
     packet_ns: Any
     came: Array  # values and stamps of the newest packet that arrived

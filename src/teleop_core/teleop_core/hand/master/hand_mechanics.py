@@ -87,7 +87,7 @@ def move_hand(p: HandNumbers, s: HandState, wanted: Array, force: Array, dt: flo
     for i in range(3):
         s.wanted[i] = wanted[i]
         low, high = p.center[i] - p.half[i], p.center[i] + p.half[i]
-        if s.position[i] < low or s.position[i] > high:  # the device's stops
+        if s.position[i] < low or s.position[i] > high:  # the device is at a stop
             s.position[i] = min(max(s.position[i], low), high)
             s.speed[i] = 0.0
             # The stops are in the device's joints, so a hand that pushes against a stop must not bend the structure.

@@ -89,7 +89,7 @@ _MOST = topics.MASTER_CONTACT.columns.index("largest_force")
 def _is_sound(p: MasterNumbers, s: MasterState, force: Array, now_ns: int) -> bool:
     """Whether the force (6,) may be applied: the command was within its range for the last second, and is so now."""
     square = force[0] * force[0] + force[1] * force[1] + force[2] * force[2]
-    if not square <= p.force_range * p.force_range:  # NaN is not
+    if not square <= p.force_range * p.force_range:  # also for NaN
         s.doubted_ns, s.doubted = now_ns, square**0.5
     elif s.doubted_ns != 0 and now_ns - s.doubted_ns > _DOUBT_NS:
         s.doubted_ns = 0

@@ -22,7 +22,7 @@ from teleop_core.kernels.room import room
 class OperatorNumbers(Fields):
     """Parameter record of the operator."""
 
-    tremor: float  # amplitude [m]
+    tremor: float  # amplitude of the tremor [m]
     frequency: float  # frequency of the tremor [Hz]
     patience_ns: int
 

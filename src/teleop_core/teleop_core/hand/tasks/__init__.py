@@ -42,7 +42,7 @@ class Act(IntEnum):
     """Action of the operator at the goal."""
 
     PRESS = 0  # close the hand at the goal for a moment, like a mouse click
-    PASS = 1  # be there
+    PASS = 1  # be at the goal, without an action of the hand
     GRIP = 2  # be at the goal, and keep the hand closed from then on
     LET_GO = 3  # be at the goal, and keep the hand open from then on
 
@@ -50,7 +50,7 @@ class Act(IntEnum):
 class Miss(IntEnum):
     """Error in an attempt at a task."""
 
-    NONE = 0  # nothing
+    NONE = 0  # no error
     BESIDE = 1  # the attempt ended beside the goal
     LATE = 2  # the attempt took too long
     FORCE = 3  # the tip pressed too hard

@@ -24,7 +24,7 @@ _SECOND, _X0 = SCENE.index("is_second"), SCENE.index("x0")
 _STARTS = 4
 _TRIES = _STARTS + 3 * topics.JAW_OBJECTS
 _MEETS = 0.01  # a block within this distance of the meeting point has reached it [m]
-_RESTS = 5e-4  # a block no higher than this above its start stands on the table or a peg [m]
+_RESTS = 5e-4  # a block that is no higher above its start rests on the table or on a peg [m]
 
 
 @inner

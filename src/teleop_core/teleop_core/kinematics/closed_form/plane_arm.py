@@ -134,7 +134,7 @@ def _attitude(H: Array, K: Array, turned: float, roll: float) -> tuple[float, fl
     difference is defined. Then both angles change by equal amounts from the given angles.
     """
     sign = -1.0 if K[ROLL] >= 0.0 and H[2, 2] < 0.0 else 1.0
-    both = math.atan2(H[1, 0] - sign * H[0, 1], H[0, 0] + sign * H[1, 1])  # turn + sign roll
+    both = math.atan2(H[1, 0] - sign * H[0, 1], H[0, 0] + sign * H[1, 1])  # angle in the plane plus ``sign`` times roll
     if K[ROLL] < 0.0:
         return both, 0.0
     if math.hypot(H[0, 2], H[1, 2]) > _ALIGNED:

@@ -34,7 +34,7 @@ LINKS = {
     # Reflected motor inertias: 81.6 taken as 1e-3 kg·m² at the output, as the catalogue does.
     "J1": 0.0816, "J2": 0.0816,
     "J3": 6.627e-7 * (2.0 * math.pi / 1e-3) ** 2,  # motor and screw through a 1 mm lead [kg]
-    "J4": 6.5e-8 * 141.0**2, "J5": 6.5e-8 * 76.0**2, "J6": 6.5e-8 * 76.0**2,  # assumed rotor
+    "J4": 6.5e-8 * 141.0**2, "J5": 6.5e-8 * 76.0**2, "J6": 6.5e-8 * 76.0**2,  # the rotor's inertia is assumed
     "g": 9.81,
 }  # fmt: skip
 # The other inertias of link 1 have no effect, because it turns about its y axis alone; Iyz is -∫yz dm.
@@ -207,5 +207,5 @@ DRIVES = drives.Drives(
         ]
     ),
     bandwidth=np.array([60.0, 60.0, 60.0, 80.0, 80.0, 80.0]),  # assumed: the source prints no gains
-    assumed=("inertia", "viscous", "coulomb", "friction_speed"),  # inertia: of the wrist
+    assumed=("inertia", "viscous", "coulomb", "friction_speed"),  # the inertia is assumed only for the wrist
 )

@@ -29,7 +29,7 @@ _LENGTH = np.array([20e-6, 20e-6, 20e-6, 100e-6, 100e-6, 100e-6])
 _DRAWN = np.random.default_rng(2008).uniform(-1.0, 1.0, (4, 6)) * np.stack(
     [_LENGTH, _LENGTH / 0.05, _LENGTH, np.zeros(6)]
 )
-_DRAWN[2, 2] = 5.5e-3  # d3
+_DRAWN[2, 2] = 5.5e-3  # error of d3 [m]; it replaces the random value
 
 HARDWARE = hardware.Hardware(
     coulomb=np.array([0.0880, 0.251, 1.0, 6.08e-3, 5.62e-4, 5.10e-4]),

@@ -27,7 +27,7 @@ _SHAPES: dict[VisualKind, tuple[tuple[str, tuple[float, ...]], ...]] = {
 
 
 def mesh_file(name: str, urdf: Path) -> Path:
-    """File of a mesh that a URDF names; callers try :func:`kept_mesh` first.
+    """File of a mesh that a URDF names; a copy at the path of :func:`kept_mesh` is preferred.
 
     ``package://NAME/REST`` is searched in folders called NAME next to and above the URDF's folder, in the packages of
     ``AMENT_PREFIX_PATH`` and ``ROS_PACKAGE_PATH``, and without NAME in the folders above. Any other name is relative

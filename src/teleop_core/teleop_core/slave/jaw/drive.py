@@ -17,7 +17,7 @@ class DriveNumbers(Fields):
     stiffness: float  # stiffness of the control law [N·m/rad]
     damping: float  # damping of the control law [N·m·s/rad]
     inertia: float  # [kg·m²]
-    friction: float  # viscous [N·m·s/rad]
+    friction: float  # viscous friction [N·m·s/rad]
     length: float  # length of a finger [m]
     size: float  # size of the object [m]
     pad_stiffness: float  # stiffness of both pads and the object [N/m]

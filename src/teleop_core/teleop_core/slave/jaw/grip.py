@@ -52,7 +52,7 @@ class GripState(drive.DriveState):
     held: Vector3  # middle of the second arm's object in the tip's frame when the grip began [m]
     forces: Annotated[geometry.Array, 2]  # force of each hand's fingers on its object [N]
     numbers: Annotated[Integers, 2]  # number of the object that each hand moves, or moved last
-    objects: Annotated[geometry.Array, 7 * topics.JAW_OBJECTS]  # poses
+    objects: Annotated[geometry.Array, 7 * topics.JAW_OBJECTS]  # poses (7,) of all objects
     motions: Annotated[geometry.Array, 3 * topics.JAW_OBJECTS]  # [m/s]
     pegs: Annotated[Integers, topics.JAW_OBJECTS]  # peg that each object is on; _NONE without a peg
     homes: Annotated[Integers, topics.JAW_OBJECTS]  # peg where each object rested last; _NONE: it dropped

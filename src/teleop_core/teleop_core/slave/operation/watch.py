@@ -141,7 +141,7 @@ def watch_joints(p: ServerParameters, s: ServerState, effort: Array, passed_ns: 
     """
     for i in range(effort.shape[0]):
         off = abs(s.setpoint[i] - s.measured[i])
-        if not off <= p.lag[i]:  # NaN is too far as well
+        if not off <= p.lag[i]:  # also for NaN
             fail(p, s, _TRACKING, i, off, p.lag[i])
         fast = p.overspeed * p.speed_limit[i]
         if not abs(s.speed[i]) <= fast:
