@@ -16,7 +16,7 @@ def solved_one(robot: arm.Arm, q: Array, seed: object, *, search: bool = True) -
     """Pose of a joint vector (n,), by the rules of :meth:`Robot.solve_fk`.
 
     Raises:
-        ShapeError: The seed has another shape.
+        ShapeError: The seed has a wrong shape.
         ParameterError: The seed is not a rigid transform.
     """
     T, numbers = np.empty((4, 4)), np.zeros(2)
@@ -34,7 +34,7 @@ def solved(robot: arm.Arm, joints: Array, seed: object, *, search: bool = True, 
     """Poses of joint vectors (N, n), by the rules of :meth:`Robot.solve_fk`.
 
     Raises:
-        ShapeError: The seed has another shape.
+        ShapeError: The seed has a wrong shape.
         ParameterError: The seed is not a rigid transform.
     """
     count = len(joints)

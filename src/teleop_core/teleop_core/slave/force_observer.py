@@ -107,7 +107,7 @@ def force_of_efforts(J: Array, efforts: Array, scale: Array, force: Array) -> No
         J: Jacobian (6, n) of the tip; only its linear rows are used, because the force acts at the tip without torque.
         efforts: Joint efforts caused by the force [N·m or N].
         scale: Scale of each joint's effort, > 0: its largest effort.
-        force: Written.
+        force: Resulting force; written.
     """
     A, b = np.zeros((3, 3)), np.zeros(3)
     for k in range(3):

@@ -130,7 +130,7 @@ def damped_wall(
         depth: Vector (3,) [m] from the nearest point of the fixture to the hand.
         length: Length of ``depth`` [m]; 0 inside.
         period: Time since the last sample [s]; the push is assumed to act for the same time.
-        force: Written.
+        force: Resulting force; written.
 
     Source:
         Colgate and Schenkel 1997, b > K T / 2 + |B|: the damping b that a wall of stiffness K with the sample period T

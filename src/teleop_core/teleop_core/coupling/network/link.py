@@ -136,7 +136,7 @@ def send_packet(p: LinkNumbers, s: LinkState, way: Way, k: int, dt: float) -> No
     Args:
         p: Parameters.
         s: State; written.
-        way: Written.
+        way: The direction; written.
         k: Index of the direction.
         dt: Tick [s].
     """
@@ -177,7 +177,7 @@ def serve_line(p: LinkNumbers, s: LinkState, way: Way, k: int, dt: float) -> Non
     Args:
         p: Parameters.
         s: State; written.
-        way: Written.
+        way: The direction; written.
         k: Index of the direction.
         dt: Tick [s].
     """

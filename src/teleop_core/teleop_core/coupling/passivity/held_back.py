@@ -23,7 +23,7 @@ def hold_back(force: Array, size: float, last: Array, left: float, least: float,
         left: Work that the command may do against the force [J]; if negative, the command must go back.
         least: A force of at most this size counts as no contact [N].
         port: Drift and the work that was withheld; written.
-        command: Written.
+        command: Pose (7,) of the original command; overwritten with the command to give.
 
     Returns:
         Work that the command does [J].
@@ -94,7 +94,7 @@ def hold_lead(
         force: Wrench on the tip (6,).
         tip: Pose of the tip (7,).
         port: Drift and the work that was withheld; written.
-        command: Written.
+        command: Pose (7,) of the original command; overwritten with the command to give.
     """
     size, away, spring = norm(force), memory[1:4], numbers[6]
     left, lead, inwards = max(left, 0.0), room(3), 0.0

@@ -179,7 +179,7 @@ def open_pairs(A: Array, B: Array, h: Array, rule: Array, seeds: Array, pairs: A
         rule: Method (4,): 0 if B has a null vector, 1 if A has one, 2 if neither; the null vector, two numbers;
             and the row that remains for the second angle.
         seeds: Values of x and y to use if the equations leave them free (2,).
-        pairs: Written.
+        pairs: Resulting pairs; written.
 
     Returns:
         Number of pairs; if no pair solves the equations, the pairs are those with the smallest error.

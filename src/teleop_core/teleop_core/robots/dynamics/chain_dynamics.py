@@ -178,7 +178,7 @@ def inverse_dynamics(q: Array, dq: Array, ddq: Array, row: Array, effort: Array)
         dq: Joint speeds (n,) [rad/s or m/s].
         ddq: Joint accelerations (n,) [rad/s² or m/s²].
         row: See :func:`chain_row`.
-        effort: Written.
+        effort: Resulting efforts; written.
     """
     n = q.shape[0]
     axes, bodies = np.empty((n, 6)), np.empty((n, _BODY))
@@ -198,7 +198,7 @@ def tip_efforts(q: Array, wrench: Array, row: Array, effort: Array) -> None:
         q: Joint positions (n,) [rad or m].
         wrench: Force [N], then torque [N·m], at the origin of the tip in the axes of the base (6,).
         row: See :func:`chain_row`.
-        effort: Written.
+        effort: Resulting efforts; written.
 
     Source:
         Craig 2005, section 5.10 (the transposed Jacobian maps forces to efforts).
@@ -262,7 +262,7 @@ def chain_acceleration(q: Array, dq: Array, effort: Array, row: Array, ddq: Arra
         dq: Joint speeds (n,) [rad/s or m/s].
         effort: Efforts of the drives, minus friction.
         row: See :func:`chain_row`.
-        ddq: Written.
+        ddq: Resulting accelerations; written.
     """
     n = q.shape[0]
     axes, bodies, M = np.empty((n, 6)), np.empty((n, _BODY)), np.empty((n, n))

@@ -271,7 +271,7 @@ def write_distances(tree: Tree, first: Array, step: float, distances: Array) -> 
         tree: Tree of the mesh.
         first: Point of ``distances[0, 0]`` (3,) [m].
         step: Distance between points [m].
-        distances: Written.
+        distances: Signed distances (N, M) [m]; written.
     """
     for j in range(distances.shape[0]):
         most = 1e9

@@ -16,8 +16,9 @@ class PdParameters:
     bandwidth: tuple[float, ...] = fields.bandwidth("double")
 
 
-# Columns of the table of gains, and of the memory.
+# Columns of the table of gains.
 _KP, _KD = range(2)
+# Columns of the memory.
 _LAST, _SPEED = range(2)
 
 

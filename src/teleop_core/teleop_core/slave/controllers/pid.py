@@ -56,8 +56,9 @@ def critically_damped_gains(inertia: Array, viscous: Array, bandwidth: Array) ->
     return kp, ki, kd
 
 
-# Columns of the table of gains, and of the memory.
+# Columns of the table of gains.
 _KP, _KI, _KD, _WEIGHT = range(4)
+# Columns of the memory.
 _INTEGRAL, _LAST, _SPEED, _LAGGED = range(4)
 
 

@@ -37,8 +37,9 @@ class SourcePidParameters:
     kd: tuple[float, ...] = parameter((), Within(0.0), "derivative gain of each joint [N·m·s/rad or N·s/m]")
 
 
-# Columns of the table of gains, and of the memory.
+# Columns of the table of gains.
 _KP, _KI, _KD = range(3)
+# Columns of the memory.
 _INTEGRAL, _LAST = range(2)
 
 

@@ -185,7 +185,7 @@ def _touch_at(
         lever: Point relative to the tip (3,) [m]; overwritten with the point of contact.
         q: Joints of the links (n,).
         dq: Their speeds (n,).
-        force: Written.
+        force: Resulting force; written.
 
     Returns:
         Whether ``arm.J`` now belongs to this tick.
