@@ -30,15 +30,15 @@ def _alike(
 
 
 def electric_cylinders(count: int, speed_limit: float = 0.3) -> Drives:
-    """Legs of a parallel robot, each with 2 kg of motor and load to move [N, m, s]."""
+    """Drives of the legs of a parallel robot; each moves 2 kg of motor and load [N, m, s]."""
     return _alike(count, 2.0, 20.0, 0.8, 5e-4, 80.0, speed_limit, 1e-6, 80.0)
 
 
 def geared_motors(count: int) -> Drives:
-    """Cranks of a bench mechanism of a few hundred millimetres [N·m, rad, s]."""
+    """Drives of the cranks of a bench mechanism of a few hundred millimetres [N·m, rad, s]."""
     return _alike(count, 0.02, 0.05, 0.01, 2e-3, 2.0, 3.0, 1e-5, 60.0)
 
 
 def finger_motors(count: int) -> Drives:
-    """Joints of a small hand, all nine driven [N·m, rad, s]."""
+    """Drives of the nine joints of a small hand [N·m, rad, s]."""
     return _alike(count, 2e-4, 1e-3, 5e-4, 1e-2, 0.05, 6.0, 1e-4, 80.0)

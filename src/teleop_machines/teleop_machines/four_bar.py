@@ -1,10 +1,10 @@
 """Four-bar: a crank that moves a point of the coupler along a plane curve.
 
-q is the crank angle theta1 only; the tip is the point of the coupler at distance ``a`` from the crank, with x along
-the coupler. ``ik`` finds the point of the coupler curve nearest to the wanted x and y; the rest of the pose error is
-the residual. ``mode``, 1 or -1, is the sign of the arc cosine in the closure. For a crank angle outside of its range,
-:meth:`Robot.fk` raises an error. :meth:`Robot.solve_fk` then returns NOT_CLOSED and the loop with the smallest gap.
-:class:`FourBar` computes both modes and all forms of the closure.
+q is the crank angle theta1 only; the tip is the point of the coupler at distance ``a`` from the crank, with x along the
+coupler. ``ik`` finds the point of the coupler curve nearest to the wanted x and y; the rest of the pose error is the
+residual. ``mode``, 1 or -1, is the sign of the arc cosine in the closure. For a crank angle at which the loop does not
+close, :meth:`Robot.fk` raises an error, and :meth:`Robot.solve_fk` returns NOT_CLOSED and the loop with the smallest
+gap. :class:`FourBar` computes both modes and all forms of the closure.
 
 Source:
     Ghosal 2020, lecture 11, section on the planar 4-bar; Freudenstein 1954.
@@ -26,14 +26,14 @@ from teleop_machines.four_bar_loop import Assembly, Closure, FourBar
 
 __all__ = ["GEOMETRY", "Assembly", "Closure", "FourBar", "make"]
 
-# No lengths are published; these are a crank-rocker.
+# No lengths are published; these lengths make a crank-rocker.
 GEOMETRY = {"l0": 0.4, "l1": 0.1, "l2": 0.35, "l3": 0.25, "a": 0.175, "mode": 1.0}
 _TURNS = 4.0 * math.pi  # assumed cable limit of a crank that can rotate fully
-_SAMPLES = 90  # samples of the coupler curve in the search for its nearest point
-# Sine between coupler and rocker under which the crank hardly determines the coupler.
+_SAMPLES = 90  # number of samples of the coupler curve in the search for its nearest point
+# With a smaller sine of the angle between coupler and rocker, the crank hardly determines the coupler.
 _NEAR = 0.02
 _ROUNDING = 1e-12
-_CLOSE = 1e-15  # m; smaller improvements of the distance do not matter
+_CLOSE = 1e-15  # smaller improvements of the distance are ignored [m]
 _FOLLOWED, _LIMITED = int(kinematics.IkStatus.FOLLOWED), int(kinematics.IkStatus.LIMITED)
 _CLOSED, _NOT_CLOSED = int(kinematics.FkStatus.CLOSED), int(kinematics.FkStatus.NOT_CLOSED)
 _NEAR_SINGULAR_FK = int(kinematics.FkStatus.NEAR_SINGULAR)
@@ -55,8 +55,8 @@ class Directions(NamedTuple):
 def _links(theta1: float, g: Array) -> Directions:
     """Directions of crank, rocker and coupler in the robot's mode; with the smallest gap if the loop is open.
 
-    Seen from the end of the crank, the right pivot is at (x, y) and the coupler's other end at
-    (x, y) + l3 (cos phi1, sin phi1): never nearer than l2.
+    Points are relative to the end of the crank. The right pivot is at (x, y). The end of the rocker, where the coupler
+    must end, is at (x, y) + l3 (cos phi1, sin phi1).
     """
     l0, l1, l2, l3 = g[0], g[1], g[2], g[3]
     c1, s1 = math.cos(theta1), math.sin(theta1)
@@ -87,8 +87,8 @@ def fk(q: Array, geometry: Array, T: Array) -> None:
 def assemble(q: Array, geometry: Array, ask: Array, T: Array, out: Array) -> int:
     """Write ``T_base_tip`` of theta1 (1,); see :class:`kinematics.Kernels`.
 
-    With a seed, it is the mode whose point is nearer to the seed's point. At the end of the range both modes have the
-    same angle. Two modes need no search.
+    With a seed, the result is the mode whose point is nearer to the seed's point. At the end of the range the angles of
+    the two modes are equal. Two modes need no search.
     """
     g = geometry.copy()
     if ask[1] > 0.0:
@@ -112,7 +112,7 @@ def assemble(q: Array, geometry: Array, ask: Array, T: Array, out: Array) -> int
 
 @kernel
 def assemblies(q: Array, geometry: Array, found: Array) -> int:
-    """Write both ``T_base_tip`` of theta1 (1,); see :class:`kinematics.Kernels`."""
+    """Write ``T_base_tip`` of theta1 (1,) in both modes; see :class:`kinematics.Kernels`."""
     g, out = geometry.copy(), np.empty(2)
     if assemble(q, g, np.zeros(2), found[0], out) >= _NOT_CLOSED:
         return 0
@@ -125,8 +125,8 @@ def assemblies(q: Array, geometry: Array, found: Array) -> int:
 def _slopes(theta1: float, g: Array) -> tuple[float, float, float]:
     """Slopes of the coupler point [m/rad] and of the coupler's angle along theta1.
 
-    Bounded where coupler and rocker are in line. The ends of the coupler have the same speed along
-    the rocker: l1 sin(phi1 - theta1) + l2 sin(phi1 - coupler) d coupler/d theta1 = 0.
+    The slopes are bounded where coupler and rocker are in line. The ends of the coupler have the same speed along the
+    rocker: l1 sin(phi1 - theta1) + l2 sin(phi1 - coupler) d coupler/d theta1 = 0.
     """
     c1, s1, c3, s3, c, s = _links(theta1, g)
     sine = s3 * c - c3 * s
@@ -159,7 +159,7 @@ def _distance(theta1: float, T: Array, g: Array) -> float:
 
 @inner
 def _refined(theta1: float, lower: float, upper: float, T: Array, g: Array) -> float:
-    """Crank angle in [lower, upper] with the locally smallest distance of the coupler point from T."""
+    """Crank angle in [lower, upper] at a local minimum of the coupler point's distance from T."""
     best = _distance(theta1, T, g)
     for _ in range(60):
         if best <= _CLOSE:

@@ -1,9 +1,8 @@
 """Planar four-bar loop: all four forms of its closure and its two assembly modes.
 
 Ground ``l0`` is along x from the left to the right pivot. Crank ``l1`` rotates by theta1 about the left pivot, rocker
-``l3`` by phi1 about the right pivot. Coupler ``l2`` connects their ends. phi2 is the angle from crank to coupler, phi3
-from coupler to
-rocker, taken from the coupler's end downward to the right pivot.
+``l3`` by phi1 about the right pivot. Coupler ``l2`` connects their ends. phi2 is the angle from crank to coupler. phi3
+is the angle from coupler to rocker, where the rocker points from the coupler's end to the right pivot.
 
 Source:
     Ghosal 2020, lecture 11, eqs. 2-5, corrected (coupler form: pi; last form: l0 restored).
@@ -25,7 +24,7 @@ _ROUNDING = 1e-12
 class Assembly(IntEnum):
     """Whether a loop can be put together."""
 
-    CLOSED = 0  # both assembly modes exist (they coincide at the end of the range)
+    CLOSED = 0  # both assembly modes exist (they are equal at the end of the range)
     CANNOT_ASSEMBLE = 1  # the loop does not close; angles are those of the smallest gap
 
 
@@ -73,7 +72,7 @@ class FourBar:
         return Closure(np.where(is_open, 1, 0)[..., 0], *(_principal(angle) for angle in angles))
 
     def crank_ranges(self) -> tuple[tuple[float, float], ...]:
-        """Intervals of theta1 [rad] in which the loop closes; none, one or two (mirror images).
+        """Intervals of theta1 [rad] in which the loop closes: no interval, one, or two that are mirror images.
 
         The distance between the crank's end and the right pivot must be between |l2 - l3| and l2 + l3.
         """
@@ -91,5 +90,5 @@ class FourBar:
 
 
 def _principal(angle: Array) -> Array:
-    """Same angle in (-pi, pi]."""
+    """The angle plus whole turns, in (-pi, pi]."""
     return np.asarray(-np.remainder(math.pi - angle, 2.0 * math.pi) + math.pi)

@@ -1,11 +1,11 @@
 """Fingers of the three-fingered hand: contact point and joints of one R-R-R finger, as kernels.
 
 A finger's base is at the origin of its frame F: theta rotates the finger about z, psi lifts the second link, phi bends
-the third link. ``links`` are l1, l2, l3 [m]. Points are passed as three numbers, which need no memory.
+the third link. ``links`` are l1, l2, l3 [m]. Points are passed as three numbers, so that no array must be allocated.
 
 Source:
-    Ghosal 2020, lecture 6, table and F_p of the hand (after Salisbury 1982); the inverse and its
-    four branches are derived from them.
+    Ghosal 2020, lecture 6, table and F_p of the hand (after Salisbury 1982). The inverse kinematics and their four
+    branches are derived from the table and F_p.
 """
 
 import math
@@ -14,8 +14,8 @@ from typing import NamedTuple
 from teleop_core.kernels import Array, inner, kernel
 from teleop_core.kinematics.branches import bounded, turned, wrapped
 
-# Sine of phi of a straight finger. It shortens the finger by less than rounding, and has a sign, so that a path
-# through the straight position keeps its branch.
+# Sine of phi that replaces 0 for a straight finger. It shortens the finger by less than rounding, and has a sign, so
+# that a path through the straight position keeps its branch.
 _STRAIGHT = 1e-8
 _HELD = 1e-12
 Triple = tuple[float, float, float]
@@ -55,9 +55,9 @@ def finger_jacobian(q: Array, links: Array, J: Array) -> None:
 
 @inner
 def _bent(r: float, z: float, links: Triple, is_positive: bool) -> tuple[float, float, bool]:
-    """Angles psi and phi for a point at distance r in front of joint 2 and z above it.
+    """Angles psi and phi for a point at distance r in front of joint 2 and z above joint 2.
 
-    The third value is whether the finger reaches it.
+    The third value is whether the finger reaches the point.
     """
     _, l2, l3 = links
     k = (r * r + z * z - l2 * l2 - l3 * l3) / (2.0 * l2 * l3)
@@ -72,8 +72,8 @@ def _bent(r: float, z: float, links: Triple, is_positive: bool) -> tuple[float, 
 def finger_branch(p: Triple, links: Triple, branch: int, seed: float) -> tuple[float, float, float, bool]:
     """Angles theta, psi, phi of one of four branches; and whether the finger reaches p.
 
-    In branches 0 and 1 the finger is turned towards p, in 2 and 3 away from it; even branches have phi > 0. On the
-    axis of joint 1, where every theta is possible, the seed's theta is kept.
+    In branches 0 and 1 the finger is turned towards p, in branches 2 and 3 away from p. Even branches have phi > 0. If
+    p is on the axis of joint 1, every theta is possible, and the seed's theta is kept.
     """
     x, y, z = p
     theta, reach, turn = seed, math.sqrt(x * x + y * y), 0.0
@@ -87,7 +87,7 @@ def finger_branch(p: Triple, links: Triple, branch: int, seed: float) -> tuple[f
 
 @inner
 def _side(psi: float, phi: float, links: Triple) -> int:
-    """Current branch of a finger."""
+    """Number of the branch that a finger is on."""
     reach = links[0] + links[1] * math.cos(psi) + links[2] * math.cos(psi + phi)
     return (2 if reach < 0.0 else 0) + (0 if math.sin(phi) >= 0.0 else 1)
 
@@ -109,8 +109,8 @@ def _cost(angles: Triple, seed: Array, limits: Array, first: int) -> float:
 def _nearest_branch(p: Triple, links: Triple, seed: Array, limits: Array, first: int) -> Branch:
     """Branch nearest to the seed by the largest joint move; a branch inside the limits is preferred.
 
-    The search begins with the seed's sign of phi and the theta that is less than a quarter turn away. The other sign
-    and the other theta are examined only if the move of phi or theta alone is not too large.
+    The search begins with the seed's sign of phi and with the theta that is less than a quarter turn away. The branches
+    with the other sign or the other theta are examined only if the move of phi or theta alone is not already larger.
     """
     theta, phi = seed[first], seed[first + 2]
     is_away = p[0] * math.cos(theta) + p[1] * math.sin(theta) < 0.0
@@ -130,9 +130,9 @@ def _nearest_branch(p: Triple, links: Triple, seed: Array, limits: Array, first:
 
 @inner
 def _is_held(angle: float, i: int, seed: Array, limits: Array, q: Array) -> bool:
-    """Write joint i, as near as possible to an angle modulo full turns.
+    """Write joint i, as near as possible to an angle plus full turns.
 
-    Return whether limits or the step hold it back.
+    Return whether limits or the step prevent this angle.
     """
     is_path = math.isfinite(limits[2, i])
     wanted = turned(angle, seed[i], limits[0, i], limits[1, i], is_path)
@@ -144,8 +144,8 @@ def _is_held(angle: float, i: int, seed: Array, limits: Array, q: Array) -> bool
 def finger_joints(p: Triple, links: Triple, seed: Array, limits: Array, first: int, q: Array) -> bool:
     """Write theta, psi, phi for a contact point; return whether the finger reaches it.
 
-    In a path (finite steps) the finger stays on its branch. If a joint is held back, the joints after it are computed
-    for its real angle: psi and phi for the real theta, phi for the real psi.
+    In a path (finite steps) the finger stays on its branch. If limits or the step change the angle of a joint, the
+    later joints are computed for the changed angle: psi and phi for the changed theta, phi for the changed psi.
 
     Args:
         p: Wanted contact point [m] in F.

@@ -24,7 +24,7 @@ from teleop_machines.hand_fingers import Triple, finger_branch, finger_jacobian,
 from teleop_machines.rps3_loop import COSINES, SINES, frame
 
 FINGERS = 3
-# No lengths are published; these are lengths of a hand that holds an object of 5 cm.
+# No lengths are published; with these lengths the hand holds an object of 5 cm.
 GEOMETRY = {
     "l11": 0.03, "l12": 0.05, "l13": 0.04,
     "l21": 0.03, "l22": 0.05, "l23": 0.04,
@@ -36,7 +36,7 @@ _D, _H, _GAMMA, SIDE = 9, 10, 11, 12
 
 @inner
 def _turned(i: int, g: Array, sign: float, x: float, y: float, z: float) -> Triple:
-    """Vector of finger frame F_i in base axes (sign 1), or back (-1)."""
+    """Rotate a vector from finger frame F_i to base axes (sign 1), or from base axes to F_i (sign -1)."""
     if i < FINGERS - 1:
         return x, y, z
     c, s = math.cos(g[_GAMMA]), sign * math.sin(g[_GAMMA])
@@ -45,7 +45,7 @@ def _turned(i: int, g: Array, sign: float, x: float, y: float, z: float) -> Trip
 
 @inner
 def _base(i: int, g: Array) -> tuple[float, float]:
-    """Base position of finger i: y, z [m]."""
+    """Position y, z of the base of finger i [m]."""
     if i == FINGERS - 1:
         return 0.0, 0.0
     return (g[_D] if i == 1 else -g[_D]), g[_H]
@@ -99,7 +99,7 @@ def contact_jacobian(q: Array, g: Array, J: Array) -> None:
 
 
 class Grasp(IntEnum):
-    """Whether six actuated joints hold the object."""
+    """Whether six actuated joints can hold the object."""
 
     HELD = 0  # the contacts keep their distances
     CANNOT_HOLD = 1  # no solution was found from the seed; the joints of least error are returned
@@ -161,7 +161,7 @@ class Hand:
         return found[found[:, 3] > 0.0, :3]
 
     def slip(self, q: object) -> Array:
-        """Distances between the contacts minus the object's side: pairs 12, 23, 31, (3,) [m]."""
+        """Distances between the contacts minus the object's side, (3,) [m], for the pairs 12, 23 and 31."""
         points = self.contact_points(q)
         ends = np.roll(points, -1, axis=0)
         return np.linalg.norm(ends - points, axis=1) - self._row[SIDE]
@@ -210,7 +210,7 @@ def _shaped(name: str, value: object, shape: tuple[int, ...]) -> Array:
 
 
 def checked_geometry(given: Mapping[str, float | str]) -> dict[str, float]:
-    """Default geometry with the given symbols replaced; refuses lengths that are not > 0."""
+    """Default geometry, with the values of the given symbols replaced; lengths that are not > 0 are refused."""
     row = geometry_of(GEOMETRY, given)
     for symbol, value in row.items():
         is_link = symbol[0] == "l" and symbol[2] != "1"

@@ -3,13 +3,13 @@
 Joint readings q = (θ1, θ2, θ3, θ3', θ6, θ8, θ10). Links 3, 3a, 3b and 4 form the parallelogram: θ3 and θ3' are both
 measured from link 2, and link 4 stays parallel to link 3a. There are three models:
 
-- ``model="C"``: with the loop; ``model="B"``: as a serial arm with dummy frames. Both give the same results for joint
-  readings, and are the default.
+- ``model="C"``, the default, has the loop; ``model="B"`` is a serial arm with dummy frames. The two models give the
+  same results for joint readings.
 - ``model="A"``: the conventional table, kept for comparison. It loses four offsets (the error of the tool at home is
   127 mm) and rotates the tool frame by 90°.
 
-The source gives no joint limits, sensors, drives or rates: one turn about home and the drive table are *assumed*. As a
-master it needs only :meth:`Robot.fk`; :func:`holding_torques` is for force feedback.
+The source states no joint limits, sensors, drives or rates: limits of one turn about home and the drive table are
+*assumed*. An MMA as a master needs only :meth:`Robot.fk`; :func:`holding_torques` is for force feedback.
 
 Source:
     Singh 2014, Kinematic study of a spatial hybrid manipulator for robot-assisted surgery.
@@ -32,7 +32,7 @@ HOME = np.radians([0.0, -90.0, 0.0, 90.0, 90.0, 0.0, 0.0])
 # Result of :func:`teleop_core.robots.freedom.start_posture` for the published lengths, rounded.
 START = np.array([1.2611, -0.5588, -1.012, 1.6884, 0.3097, 0.0, 0.0])
 
-# All assumed. Inertia: 0.3 kg spread over the arm's 0.2 m, and small motors at the wrist.
+# All numbers are assumed. The inertia is that of 0.3 kg spread over the arm's 0.2 m, and of small motors at the wrist.
 DRIVES = Drives(
     inertia=np.array([0.02, 0.02, 0.01, 0.01, 2e-3, 2e-3, 1e-3]),
     viscous=np.array([0.1, 0.1, 0.05, 0.05, 0.004, 0.004, 0.002]),
@@ -57,7 +57,7 @@ def make(model: str = "C", **geometry: float) -> Robot:
         The robot; its tip is the end of link 7.
 
     Raises:
-        UnknownNameError: No such model or symbol.
+        UnknownNameError: There is no such model or symbol.
         ParameterError: A length is impossible.
     """
     if model not in mma_models.MODELS:
@@ -84,8 +84,8 @@ def make(model: str = "C", **geometry: float) -> Robot:
 def holding_torques(robot: Robot, q: object, wrench: object, spring: mma_balance.ShoulderSpring | None = None) -> Array:
     """Joint torques with which the handle is at rest and applies a wrench to the hand.
 
-    The source gives masses of the links but no mass centres. So the gravity torque is known only for joint 2, in poses
-    in which the links after the shoulder have the same orientation as at home. All other joints count as balanced.
+    The source gives masses of the links but no mass centres. So the gravity torque is known only for joint 2, and only
+    in poses in which the links after the shoulder have their orientation of home. All other joints count as balanced.
 
     Args:
         robot: The MMA.
@@ -97,8 +97,8 @@ def holding_torques(robot: Robot, q: object, wrench: object, spring: mma_balance
         Torques (7,) [N·m].
 
     Raises:
-        ShapeError: Another shape.
-        ParameterError: NaN or infinity.
+        ShapeError: ``q`` is not (7,), or ``wrench`` is not (6,).
+        ParameterError: ``q`` or ``wrench`` contains NaN or infinity.
     """
     push, joints = mma_models.vector("wrench", wrench, 6), mma_models.vector("q", q, 7)
     torques = product(robot.jacobian(joints).T, push)

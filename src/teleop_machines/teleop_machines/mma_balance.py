@@ -1,8 +1,8 @@
 """Balance of the MMA's shoulder: the published spring at joint 2, and the load that it does not balance.
 
 The design balances only the *difference* of the gravity torque between two poses, 0.16 N·m. The spring is slack in the
-first pose, where the gravity torque is 1.03 N·m. In the worst pose it gives 0.18 of 1.19 N·m, so the operator has to
-hold 1.01 N·m. :func:`shoulder_load` returns this residual.
+first pose, where the gravity torque is 1.03 N·m. In the worst pose the spring gives 0.18 of 1.19 N·m, so the operator
+has to apply 1.01 N·m. :func:`shoulder_load` returns this residual.
 
 Source:
     Singh 2014, chapter 5, misprints corrected; torques about joint 2, positive downwards.
@@ -23,27 +23,28 @@ MASSES = {
     "L2": 0.03773, "L3": 0.02587, "L3a": 0.00746, "L3b": 0.02587, "L4": 0.02557, "L5": 0.01693,
     "L6": 0.01209, "L7": 0.15259, "packing": 0.00325,
 }  # fmt: skip
-# Horizontal distance of the common mass centre from joint 2 [m]: link 2 at 45° and level.
-ARM_AT_45_DEGREES, ARM_LEVEL = 0.34360, 0.39594
+# Horizontal distance of the common mass centre from joint 2 [m].
+ARM_AT_45_DEGREES = 0.34360  # with link 2 at 45°
+ARM_LEVEL = 0.39594  # with link 2 level
 
 
 @dataclass(frozen=True, kw_only=True)
 class ShoulderSpring:
-    """Compression spring between points at distance ``anchor`` from joint 2 on links 1 and 2."""
+    """Compression spring between points on links 1 and 2, both at the distance ``anchor`` from joint 2."""
 
     anchor: float = 0.028
     """[m]"""
     free_length: float = 0.05173
     """[m]"""
     rate: float = 754.57
-    """[N/m], safety factor 1.15 included."""
+    """Spring rate [N/m], with the safety factor 1.15."""
 
     def __post_init__(self) -> None:
         for name in ("anchor", "free_length", "rate"):
             _positive(name, getattr(self, name))
 
     def length(self, opening: float | Array) -> Array:
-        """Distance of the anchors [m] when links 1 and 2 enclose ``opening`` [rad]."""
+        """Distance between the anchors [m] if the angle between links 1 and 2 is ``opening`` [rad]."""
         return 2.0 * self.anchor * np.sin(0.5 * np.asarray(opening))
 
     def lever(self, opening: float | Array) -> Array:
@@ -61,11 +62,11 @@ class Coil(NamedTuple):
 
     turns: int
     slenderness: float
-    """Free length over mean diameter."""
+    """Free length, divided by mean diameter."""
     solid_length: float
     """[m]"""
     spring_index: float
-    """Mean diameter over wire diameter."""
+    """Mean diameter, divided by wire diameter."""
     pitch: float
     """[m]"""
 
@@ -114,8 +115,8 @@ def coil(
 ) -> Coil:
     """Helical spring of a given rate.
 
-    The source prints 13 turns and no material; 13 turns need 40.9 to 44.2 GPa (as phosphor bronze
-    has), steel would need 24.
+    The source prints 13 turns and no material. 13 turns need a shear modulus of 40.9 to 44.2 GPa, as phosphor bronze
+    has; steel would need 24 turns.
 
     Args:
         free_length: [m], > 0.
@@ -148,9 +149,9 @@ def coil(
 def shoulder_load(theta2: float | Array, spring: ShoulderSpring | None = None) -> ShoulderLoad:
     """Torques of gravity and spring at joint 2, and their difference, for θ2 [rad] (-90° upright, 0 level).
 
-    The source gives the lever arm of the mass centre in two poses. Between them the links after the shoulder keep
-    their orientation, as at home, so the lever arm is a constant plus a cosine, fitted to both values. The enclosed
-    angle of links 1 and 2 is 90° - θ2.
+    The source gives the lever arm of the mass centre in two poses. Between these poses the links after the shoulder
+    keep their orientation of home. So the lever arm is a constant plus a cosine, fitted to the two values. The angle
+    between links 1 and 2 is 90° - θ2.
 
     Args:
         theta2: θ2 [rad], any shape.

@@ -1,7 +1,7 @@
 """Closed-form family of the MMA: all joint vectors that reach a pose, by θ10 and branch.
 
-A given θ10 determines the other six joints, in eight branches: shoulder in front or behind, wrist flipped or not, and
-two elbows.
+A given θ10 determines the other six joints, in eight branches: shoulder in front or behind, wrist flipped or not, elbow
+on one side or the other.
 
 Source:
     The thesis has no inverse kinematics; derived here from Singh 2014, eq. 4.81 corrected.
@@ -15,12 +15,12 @@ from teleop_core.kernels import Array, inner, kernel
 from teleop_machines.mma_forward import groups
 
 BRANCHES = 8
-_ROUNDING = 1e-12  # a point out of reach by less than this [m] counts as reached
+_ROUNDING = 1e-12  # a point that is out of reach by less counts as reached [m]
 
 
 @inner
 def _wrist_centre(T: Array, turn: float, geometry: Array, out: Array) -> None:
-    """Write rows (4, 3): where axes 6 and 8 meet [m], K, column 1 and X, for θ10 = ``turn``."""
+    """Write rows (4, 3) for θ10 = ``turn``: the point where axes 6 and 8 meet [m], K, column 1, X."""
     _, S, F, G = groups(geometry)
     c10, s10 = math.cos(turn), math.sin(turn)
     c12, s12 = math.cos(geometry[12]), math.sin(geometry[12])
@@ -37,7 +37,8 @@ def _wrist_centre(T: Array, turn: float, geometry: Array, out: Array) -> None:
 def _shoulder(wrist: Array, is_back: bool, geometry: Array, seed: Array, q: Array) -> float:
     """Write θ1. Return the radius of the arm in its plane [m]; NaN if axis 6 cannot pass through the wrist centre.
 
-    The distance of the arm's plane from the base axis is a5; on that axis θ1 keeps the value of the seed.
+    The distance of the arm's plane from the base axis is a5. If the wrist centre is on the base axis, θ1 keeps the
+    value of the seed.
     """
     x, y, a5 = wrist[0, 0], wrist[0, 1], geometry[4]
     square = x * x + y * y - a5 * a5
@@ -83,7 +84,7 @@ def _miss(radius: float, height: float, geometry: Array) -> float:
 
 @inner
 def _elbow(radius: float, height: float, is_other: bool, geometry: Array, seed: Array, q: Array) -> None:
-    """Write θ2 and θ3' of the two long links, stretched or folded if the point is out of reach."""
+    """Write θ2 and θ3' of the two long links; the links are stretched or folded if the point is out of reach."""
     a2, a3 = geometry[1], geometry[2]
     square = radius * radius + height * height
     cosine = min(max((square - a2 * a2 - a3 * a3) / (2.0 * a2 * a3), -1.0), 1.0)
@@ -160,7 +161,7 @@ def nearest_branch(
     """Search the branches with θ10 = ``turn`` for a branch nearer to the seed than ``best``.
 
     Returns:
-        Largest joint move of the branch written as (θ10, choice) to ``found``; else ``best``.
+        Largest joint move of the branch that is written as (θ10, choice) to ``found``; ``best`` if there is none.
     """
     q, wrist, H = np.empty(7), np.empty((4, 3)), geometry[3] + geometry[6]
     _wrist_centre(T, turn, geometry, wrist)
@@ -189,11 +190,11 @@ def least_miss(T: Array, turn: float, seed: Array, geometry: Array, least: float
     """Search the branches with θ10 = ``turn`` for a branch whose remaining distance is less than ``least`` [m].
 
     Returns:
-        Distance of the branch written as (θ10, choice) to ``found``; else ``least``.
+        Remaining distance of the branch that is written as (θ10, choice) to ``found``; ``least`` if there is none.
     """
     q, wrist, H = np.empty(7), np.empty((4, 3)), geometry[3] + geometry[6]
     _wrist_centre(T, turn, geometry, wrist)
-    for choice in range(4):  # both elbows reach equally far
+    for choice in range(4):  # the two elbows reach equally far
         radius = _shoulder(wrist, choice & 1 != 0, geometry, seed, q)
         if math.isnan(radius):
             break

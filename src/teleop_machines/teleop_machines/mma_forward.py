@@ -13,21 +13,21 @@ import numpy as np
 
 from teleop_core.kernels import Array, inner, kernel
 
-# Lengths [m] in the symbols of table 4.4; magnitudes, so d7 and d9 enter tables with a minus.
-# a3 is the long side of the parallelogram (a3' = a3'' in table 4.10) and d5 the sum of what
-# table 4.10 calls a3 + a4'. theta12 is the fixed turn of the tool about its z axis [rad].
+# Lengths [m] in the symbols of table 4.4. They are magnitudes, so d7 and d9 enter tables with a minus. a3 is the long
+# side of the parallelogram (a3' = a3'' in table 4.10) and d5 the sum of what table 4.10 calls a3 + a4'. theta12 is the
+# fixed turn of the tool about its z axis [rad].
 GEOMETRY = {
     "d1": 0.13777, "a2": 0.18746, "a3": 0.16076, "d5": 0.06782, "a5": 0.02011, "d7": 0.03507,
     "a7": 0.02524, "d9": 0.03840, "a9": 0.01609, "a11": 0.11873, "d11": 0.02729, "d12": 0.03650,
     "theta12": 0.0,
 }  # fmt: skip
-# Model A, the conventional table 4.1, loses these four offsets and turns the tool frame by 90°.
+# Model A, the conventional table 4.1, lacks these four offsets, and its tool frame is rotated by 90°.
 MODEL_A = {"a5": 0.0, "a7": 0.0, "a9": 0.0, "a11": 0.0, "theta12": 0.5 * math.pi}
 
 
 @kernel
 def groups(geometry: Array) -> tuple[float, float, float, float]:
-    """Lengths H = d5 + a7, S = d7 + a9, F = d9 + a11, G = d11 + d12 that add up on one axis [m]."""
+    """Lengths H = d5 + a7, S = d7 + a9, F = d9 + a11, G = d11 + d12 [m]; the terms of a sum lie along one axis."""
     g = geometry
     return g[3] + g[6], g[5] + g[8], g[7] + g[9], g[10] + g[11]
 
@@ -36,8 +36,8 @@ def groups(geometry: Array) -> tuple[float, float, float, float]:
 def wrist_axes(q: Array, axes: Array) -> None:
     """Write columns of ``axes`` (3 or more rows and columns): col1, K, X in base axes.
 
-    col1 points against axis 10, K against axis 8; K and X are columns 2 and 3 of the tool
-    rotation before θ10 turns them.
+    col1 has the opposite direction of axis 10, and K that of axis 8. K and X are columns 2 and 3 of the tool's rotation
+    before the rotation by θ10.
     """
     c1, s1 = math.cos(q[0]), math.sin(q[0])
     c23, s23 = math.cos(q[1] + q[2]), math.sin(q[1] + q[2])
@@ -111,7 +111,7 @@ def jacobian_at(q: Array, geometry: Array, T: Array, J: Array) -> None:
     _turn(J, 2, (-s1, c1, 0.0), x - c1 * c, y - s1 * c, z + s)
     for i in range(3):
         col1, column2 = c12 * T[i, 0] - s12 * T[i, 1], s12 * T[i, 0] + c12 * T[i, 1]
-        # Axes of joints 10 and 8, and in place of joint 6 for a moment the lever of joint 10.
+        # Axes of joints 10 and 8. The column of joint 6 temporarily contains the lever arm of joint 10.
         J[3 + i, 6], J[3 + i, 5] = -col1, -(c10 * column2 + s10 * T[i, 2])
         J[3 + i, 4] = F * col1 + G * T[i, 2]
     x, y, z = J[3, 4], J[4, 4], J[5, 4]

@@ -1,12 +1,12 @@
 """Inverse kinematics of the MMA: seven joints for six degrees of freedom, on the branch nearest to the seed.
 
 The local search resolves the redundancy by damped least squares inside the joint limits: it finds the smallest joint
-move that brings the tool to the pose. The closed-form family then finds branches that are nearer, and solutions that a
-local search misses.
+move that brings the tool to the pose. The search in the closed-form family then finds nearer branches, and solutions
+that a local search misses.
 
 Source:
-    The thesis gives none; least squares on (position / 100 mm, rotation vector) as in the notes
-    that check Singh 2014. The search over branches is not from a source.
+    The thesis contains no inverse kinematics. Least squares on (position / 100 mm, rotation vector) are those of the
+    notes that check Singh 2014. The search over branches is ours.
 """
 
 import math
@@ -19,24 +19,26 @@ from teleop_core.kinematics.branches import bounded
 from teleop_machines import mma_branches, mma_forward
 
 LENGTH = 0.1  # distance [m] that weighs as much as one radian
-_ROUNDS, _PATH_ROUNDS = 60, 12  # largest numbers of rounds of the local search
-_STALLED = 1e-5  # share of the squared error by which a round must reduce it
-# Damping per squared error: at the start, at least, and where no step helps any more.
-_DAMPING, _LEAST_DAMPING, _HOPELESS = 1e-2, 1e-6, 1e10
-_KICK = 0.02  # joint move that leaves a singular pose in which the search stops [rad]
+_ROUNDS = 60  # largest number of rounds of the local search
+_PATH_ROUNDS = 12  # largest number of rounds of the local search in a path
+_STALLED = 1e-5  # the local search stops if a round reduces the squared error by a smaller share
+_DAMPING = 1e-2  # initial damping, divided by the squared error
+_LEAST_DAMPING = 1e-6  # least damping, divided by the squared error
+_HOPELESS = 1e10  # the local search stops when the damping, divided by the squared error, exceeds this value
+_KICK = 0.02  # joint move by which the search leaves a singular pose [rad]
 _STEP = math.radians(5.0)  # step of θ10 in the search of the branches
-_NEAR = 0.02  # singular value under which one radian of tool takes more than 50 of joints
+_NEAR = 0.02  # with a smaller singular value, one radian of the tool needs more than 50 rad of the joints
 _FOLLOWED, _LIMITED = int(IkStatus.FOLLOWED), int(IkStatus.LIMITED)
 _NEAR_SINGULAR, _UNREACHABLE = int(IkStatus.NEAR_SINGULAR), int(IkStatus.UNREACHABLE)
 
 
 @inner
 def _descend(T: Array, box: Array, geometry: Array, rounds: int, q: Array) -> float:
-    """Lower the pose error from ``q`` (7,), inside a box, until it is zero or least.
+    """Reduce the pose error from ``q`` (7,), inside a box, until it is zero or minimal.
 
     Args:
         T: Wanted ``T_base_tip`` (4, 4).
-        box: Lower and upper joint positions, then rows that do not matter (2 or more, 7).
+        box: Lower and upper joint positions; later rows are ignored (2 or more, 7).
         geometry: Row of the robot.
         rounds: Largest number of evaluations.
         q: Start inside the box (7,), then the result.
@@ -74,8 +76,8 @@ def _descend(T: Array, box: Array, geometry: Array, rounds: int, q: Array) -> fl
 def _approach(T: Array, box: Array, geometry: Array, rounds: int, q: Array) -> float:
     """Move ``q`` (7,) inside a box to the pose T, or to the local minimum of the error.
 
-    At a singular pose the error may be in the direction that the arm has lost, so that no step lowers it at first
-    order. Then all joints are moved a little; this move is kept only if the error decreases.
+    At a singular pose the error may be in the direction in which the arm cannot move, so that no small step reduces it.
+    Then all joints are moved a little; this move is kept only if the error decreases.
 
     Returns:
         Squared weighted error that is left.
@@ -106,11 +108,11 @@ def _cost(T: Array, turn: float, choice: int, seed: Array, limits: Array, geomet
 def _scan(T: Array, seed: Array, limits: Array, geometry: Array, bound: float, found: Array) -> float:
     """Search for branches nearer to the seed than ``bound``, in steps of θ10 away from the seed.
 
-    The largest joint move is at least the move of θ10. The search therefore ends when θ10 alone has moved by the best
-    result so far.
+    The largest joint move is at least the move of θ10. The search therefore ends when the move of θ10 alone is as large
+    as the best result so far.
 
     Returns:
-        Largest joint move of the branch written as (θ10, choice) to ``found``; else ``bound``.
+        Largest joint move of the branch that is written as (θ10, choice) to ``found``; ``bound`` if there is none.
     """
     best = bound
     for k in range(73):
@@ -123,7 +125,7 @@ def _scan(T: Array, seed: Array, limits: Array, geometry: Array, bound: float, f
 
 @inner
 def _refine(T: Array, seed: Array, limits: Array, geometry: Array, found: Array, q: Array) -> float:
-    """Within one step of θ10, find the value with the smallest largest joint move, and write its joints."""
+    """Find the θ10 within one step whose largest joint move is smallest, and write the joints for it."""
     choice, turn, width = int(found[1]), found[0], 0.5 * _STEP
     trial = np.empty(7)
     best = _cost(T, turn, choice, seed, limits, geometry, q)
@@ -177,8 +179,8 @@ def _search_branches(T: Array, seed: Array, limits: Array, geometry: Array, left
         seed: Joints (7,) to stay next to.
         limits: Rows lower, upper and more (3, 7).
         geometry: Row of the robot.
-        left: Squared weighted error of ``q``; while it is not zero, any solution is nearer.
-        q: Result (7,) of the local search, then of this one.
+        left: Squared weighted error of ``q``; if it is not zero, any solution is better.
+        q: Result (7,) of the local search; overwritten with the result of this search.
     """
     found, trial, bound = np.empty(2), np.empty(7), math.inf
     if left <= damped.ZERO:
@@ -219,7 +221,7 @@ def ik(T: Array, seed: Array, limits: Array, geometry: Array, q: Array, residual
 
 @kernel
 def ik_all(T: Array, geometry: Array, solutions: Array) -> int:
-    """Write one joint vector per branch (up to 8, 7), with θ10 as near to zero as it can be.
+    """Write one joint vector per branch (up to 8, 7), with θ10 as near to zero as possible.
 
     The arm has one joint more than a pose needs, so each branch is a curve of joint vectors; :func:`branch` gives the
     other vectors. Angles are within half a turn of home.

@@ -3,10 +3,10 @@
 They show the derivation of the closed form and check it; the kernels never need them. Modified
 Denavit-Hartenberg throughout, with signed d; joint vectors, in the order of their tables:
 
-- A: θ1, θ2, θ3, θ4, θ5, θ6, θ7. Loses the offsets a5, a7, a9, a11; same attitude up to a turn.
+- A: θ1, θ2, θ3, θ4, θ5, θ6, θ7. It lacks the offsets a5, a7, a9, a11; its attitude is that of C up to a fixed rotation.
 - B: θ1, θ2, θ3, θ4, θ6, θ8, θ10. A serial arm that reaches the same poses as C.
-- C: θ1, θ2, θ3, θ3'', θ4', θ6, θ8, θ10. θ3'' and θ4' are passive, given by the loop. The joint
-  readings are θ1, θ2, θ3, θ3', θ6, θ8, θ10, the joint vector of the robot.
+- C: θ1, θ2, θ3, θ3'', θ4', θ6, θ8, θ10. θ3'' and θ4' are passive; the loop determines them. The joint readings are θ1,
+  θ2, θ3, θ3', θ6, θ8, θ10, the joint vector of the robot.
 
 Source:
     Singh 2014, tables 4.1, 4.4, 4.8-4.10, eqs. 4.1, 4.45-4.62, misprints corrected.
@@ -23,9 +23,10 @@ from teleop_core.base import ShapeError, UnknownNameError
 from teleop_core.kernels import Array, checked_array, product
 from teleop_core.robots.arms.dh import DhJoint, DhRow, DhTable
 
-# Half of d5: the thesis only gives the sum of the two equal symbols a3 + a4'.
+# Half of d5, because the thesis states only the sum of the two equal lengths a3 + a4'.
 SHORT_SIDE = 0.03391
-LINKS, JOINTS = 10, 10  # base included; the joint of three links counts twice
+LINKS = 10  # number of links, base included
+JOINTS = 10  # number of joints; the joint of three links counts twice
 _QUARTER = 0.5 * math.pi
 # Frames of the tables from the base to the tool.
 FRAMES = {
@@ -40,9 +41,9 @@ class LoopEnds(NamedTuple):
     """End points of the two branches of the parallelogram; the loop is closed if points and angles are equal."""
 
     along_link_3a: Array
-    """Point reached over links 3a and 3b (3,) [m]."""
+    """End point (3,) [m] of the branch over links 3a and 3b."""
     along_link_3: Array
-    """Point reached over link 3 (3,) [m]."""
+    """End point (3,) [m] of the branch over link 3."""
     frame_4: Array
     """Origin of frame 4', where link 4 leaves the parallelogram (3,) [m]."""
 
@@ -56,8 +57,8 @@ def vector(name: str, value: object, size: int) -> Array:
     """One finite vector of length ``size``.
 
     Raises:
-        ShapeError: Another shape.
-        ParameterError: NaN or infinity.
+        ShapeError: The shape of ``value`` is not (``size``,).
+        ParameterError: ``value`` contains NaN or infinity.
     """
     array = checked_array(name, value, (size,))
     if array.ndim != 1:
@@ -111,7 +112,7 @@ def _wrist_b(g: Mapping[str, float], _short_side: float) -> tuple[DhRow, ...]:
 
 
 def _wrist_c(g: Mapping[str, float], short_side: float) -> tuple[DhRow, ...]:
-    """Over links 3a and 3b of the parallelogram."""
+    """Rows of model C over links 3a and 3b of the parallelogram."""
     return (
         _row("theta3''", a=short_side),
         _row("theta4'", a=g["a3"]),
@@ -141,8 +142,8 @@ def frames(table: DhTable, joints: object) -> dict[str, Array]:
         joints: Joint vector in the order of the model [rad].
 
     Raises:
-        ShapeError: Another shape.
-        ParameterError: NaN or infinity.
+        ShapeError: The length of ``joints`` does not fit the model.
+        ParameterError: ``joints`` contains NaN or infinity.
     """
     steps = accumulate(table.link_transforms(joints), product)
     return dict(zip(FRAMES[table.name], steps, strict=True))
@@ -151,8 +152,8 @@ def frames(table: DhTable, joints: object) -> dict[str, Array]:
 def passive_angles(q: object) -> Array:
     """θ3'' = θ3' - θ3 and θ4' = pi - θ3'' [rad] that close the loop, (2,) or (N, 2), of readings.
 
-    If θ3'' is 0 or pi, the four links are on one line, and a real parallelogram could fold over. The formula stays in
-    the mode in which opposite links are parallel.
+    If θ3'' is 0 or pi, the four links are on one line, and a real parallelogram could change to its crossed mode. The
+    formula stays in the mode in which opposite links are parallel.
     """
     joints = checked_array("q", q, (7,))
     knee = joints[..., 3] - joints[..., 2]
@@ -163,9 +164,9 @@ def joints_of_model(q: object, model: str) -> Array:
     """Joint vector of model "A", "B" or "C" from joint readings q (7,) [rad]; see the module.
 
     Raises:
-        UnknownNameError: No such model.
-        ShapeError: Another shape.
-        ParameterError: NaN or infinity.
+        UnknownNameError: There is no such model.
+        ShapeError: ``q`` is not (7,).
+        ParameterError: ``q`` contains NaN or infinity.
     """
     _check_model(model)
     joints = vector("q", q, 7)
@@ -177,7 +178,7 @@ def joints_of_model(q: object, model: str) -> Array:
 
 
 def loop_closure(q: object, g: Mapping[str, float], short_side: float = SHORT_SIDE) -> LoopEnds:
-    """End points of both branches of the parallelogram for joint readings q (7,) [rad].
+    """End points of the two branches of the parallelogram for joint readings q (7,) [rad].
 
     Source:
         Singh 2014, eqs. 4.45-a, 4.53-a (sign corrected) and 4.66.

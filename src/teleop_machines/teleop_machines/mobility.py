@@ -8,20 +8,20 @@ SPATIAL, PLANAR = 6, 3
 def degrees_of_freedom(links: int, joints: int, joint_freedoms: int, *, space: int = SPATIAL) -> int:
     """Mobility by counting: ``space (links - joints - 1) + joint_freedoms``.
 
-    The formula assumes constraints in general position. Mechanisms with special geometry, such as parallel axes
-    counted in space, can move although the count is zero or negative. A negative count means overconstrained.
+    The formula assumes constraints in general position. Mechanisms with special geometry, such as parallel axes counted
+    in space, can move although the count is zero or negative. A mechanism with a negative count is overconstrained.
 
     Args:
-        links: Number of links, the fixed one included.
-        joints: Number of joints that connect two links each; one that joins three counts twice.
+        links: Number of links, the fixed link included.
+        joints: Number of joints between two links; a joint of three links counts twice.
         joint_freedoms: Sum of the freedoms of all joints.
-        space: 6 in space, 3 in a plane (:data:`SPATIAL`, :data:`PLANAR`).
+        space: Degrees of freedom of a free body: 6 in space, 3 in a plane (:data:`SPATIAL`, :data:`PLANAR`).
 
     Returns:
         The degrees of freedom.
 
     Raises:
-        ParameterError: A count that no mechanism has.
+        ParameterError: No mechanism can have such a count.
 
     Source:
         Grübler 1883, Kutzbach 1929, as Ghosal 2020, lecture 11, eq. 1.
@@ -38,7 +38,7 @@ def independent_loops(links: int, joints: int) -> int:
     """Number of loops that are independent of each other: ``joints - links + 1``.
 
     Raises:
-        ParameterError: A count that no connected mechanism has.
+        ParameterError: No connected mechanism can have such a count.
 
     Source:
         Singh 2014, eq. 3.16.
@@ -51,7 +51,7 @@ def passive_joints(joints: int, freedoms: int) -> int:
     """Number of joints without a motor, of a mechanism with as many motors as freedoms.
 
     Raises:
-        ParameterError: More freedoms than joints, or negative counts.
+        ParameterError: There are more freedoms than joints, or a count is negative.
     """
     if not 0 <= freedoms <= joints:
         raise ParameterError("freedoms", freedoms, f"0 to {joints}, the number of joints")

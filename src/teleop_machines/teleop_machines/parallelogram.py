@@ -1,8 +1,8 @@
-"""Parallelogram: the four-bar with equal opposite sides, whose coupler never turns.
+"""Parallelogram: the four-bar with equal opposite sides; its coupler never rotates.
 
-q is the crank angle theta1; the tip is the coupler point at distance ``a`` from the crank. Instead of choosing a sign
-of the general closure, the rocker is always parallel to the crank. This keeps the loop in one mode at theta1 = 0 and
-180°, where all links are on one line and the general modes cross.
+q is the crank angle theta1; the tip is the coupler point at distance ``a`` from the crank. The closure has no sign to
+choose, because the rocker is always parallel to the crank. This keeps the loop in one mode at theta1 = 0 and 180°,
+where all links are on one line and the two modes of a general four-bar meet.
 
 Source:
     Ghosal 2020, lecture 11, eq. 3 with l0 = l2, l1 = l3 and phi1 = theta1.
@@ -48,7 +48,7 @@ def jacobian(q: Array, geometry: Array, J: Array) -> None:
 def ik(T: Array, seed: Array, limits: Array, geometry: Array, q: Array, residual: Array) -> int:
     """Write theta1 (1,) of the nearest point; see :class:`teleop_core.robots.robot.Kernels`.
 
-    At the centre of the circle, where all points are equally near, the crank angle is kept.
+    If T is at the centre of the circle, all points are equally near, and the seed's crank angle is kept.
     """
     if not is_askable(T, seed):
         return -1
@@ -68,7 +68,7 @@ def ik(T: Array, seed: Array, limits: Array, geometry: Array, q: Array, residual
 
 @kernel
 def ik_all(T: Array, geometry: Array, solutions: Array) -> int:
-    """Write the one crank angle (1, 1) that reaches T's x and y; their number, 0 or 1."""
+    """Write the crank angle (1, 1) that reaches T's x and y; return the number of solutions, 0 or 1."""
     x, y = T[0, 3] - geometry[2], T[1, 3]
     solutions[0, 0] = math.atan2(y, x)
     return 1 if abs(math.hypot(x, y) - geometry[1]) <= REACHED else 0

@@ -8,14 +8,14 @@ The three slides set the height and the direction of the platform's normal. Each
 rotation about the normal (zero torsion), and the centre moves sideways: with R12 = R21, x = a/2 (R11 - R22) and y = -a
 R21. Therefore ``task_mask`` is z and two tilts, and ``ik`` leaves the rest as residual.
 
-Direct kinematics has up to 16 assembly modes, in pairs above and below the base:
-:func:`assembly_modes` and :meth:`Robot.fk_all` find all modes. ``fk`` uses the mode nearest to legs that lean in
-towards the platform. Half of the legal leg triples have this mode, with tilts up to 70 degrees. All other tested
-triples (20 000) have modes on the other side of the singular poses, with tilts of 64 degrees and more. For these,
+Direct kinematics has up to 16 assembly modes, in pairs above and below the base. :func:`assembly_modes` and
+:meth:`Robot.fk_all` find all modes. ``fk`` uses the mode that is found from legs that lean in towards the platform.
+Half of the legal leg triples have this mode, with tilts up to 70 degrees. Of 20 000 tested triples, all others have
+modes only on the other side of the singular poses, with tilts of 64 degrees and more. For these triples,
 :meth:`Robot.fk` searches the mode nearest to home.
 
 Source:
-    Lee and Shah 1988; Ghosal 2020, lectures 6 and 11; inverse and modes derived from them.
+    Lee and Shah 1988; Ghosal 2020, lectures 6 and 11. Inverse kinematics and modes are derived from these sources.
 """
 
 import math
@@ -44,7 +44,7 @@ _NEAR_SINGULAR, _UNREACHABLE = (int(kinematics.IkStatus.NEAR_SINGULAR), int(kine
 
 @inner
 def _close(q: Array, geometry: Array, theta: Array) -> None:
-    """Write leg angles (3,) of the assembly nearest to legs that lean in by b - a."""
+    """Write leg angles (3,) of the assembly that is found from legs that lean in by b - a."""
     lean(q, geometry, theta)
     settle(q, geometry[0], geometry[1], theta)
 
@@ -53,9 +53,9 @@ def _close(q: Array, geometry: Array, theta: Array) -> None:
 def fk(q: Array, geometry: Array, T: Array) -> None:
     """Write ``T_base_tip`` (4, 4) of leg lengths (3,) [m], found from equally leaning legs.
 
-    The loop closes for half of the legal leg triples, and for all triples within 30 % of the strokes around home. For
-    the other triples, whose modes are all far away, the result is the frame on the ball joints with the smallest
-    error; :func:`assemble` reports this.
+    The loop closes for half of the legal leg triples, and for all triples within 30 % of the strokes around home. The
+    other triples have only distant modes. For these, the result is the frame of the ball joints at the smallest error;
+    :func:`assemble` reports this.
     """
     theta, S = np.empty(3), np.empty((3, 3))
     _close(q, geometry, theta)
@@ -65,7 +65,7 @@ def fk(q: Array, geometry: Array, T: Array) -> None:
 
 @kernel
 def jacobian(q: Array, geometry: Array, J: Array) -> None:
-    """Write the Jacobian (6, 3) at the pose of :func:`assemble`, search included.
+    """Write the Jacobian (6, 3) at the pose of :func:`assemble` with a search.
 
     Leg angles follow from the loop equations G dθ + H dl = 0.
     """
@@ -91,7 +91,7 @@ def jacobian(q: Array, geometry: Array, J: Array) -> None:
             J[0, k] += x / 3.0
             J[1, k] += y / 3.0
             J[2, k] += z / 3.0
-            # Three unit masses: sum of p × v = I ω, with I = 3/2 a² (1 + n nᵀ).
+            # For unit masses at the three ball joints, the sum of p × v is I ω, with I = 3/2 a² (1 + n nᵀ).
             J[3, k] += (py * z - pz * y) * 2.0 / (3.0 * a * a)
             J[4, k] += (pz * x - px * z) * 2.0 / (3.0 * a * a)
             J[5, k] += (px * y - py * x) * 2.0 / (3.0 * a * a)
@@ -138,7 +138,7 @@ def ik(T: Array, seed: Array, limits: Array, geometry: Array, q: Array, residual
 
 @kernel
 def ik_all(T: Array, geometry: Array, solutions: Array) -> int:
-    """Write the leg lengths (1, 3) for T's height and normal; their number, 1."""
+    """Write the leg lengths (1, 3) for T's height and normal; return the number of solutions, 1."""
     _legs(T, geometry, solutions[0])
     return 1
 
@@ -152,7 +152,7 @@ def make(**geometry: float | str) -> Robot:
     if row["l_home"] <= abs(row["b"] - row["a"]):
         raise ParameterError("l_home", row["l_home"], "more than |b - a|, so that legs meet")
     home = np.full(3, row["l_home"])
-    drives = electric_cylinders(3, speed_limit=2.0)  # a platform of a metre
+    drives = electric_cylinders(3, speed_limit=2.0)  # assumed for a platform of a metre
     return Robot(
         name="rps3",
         joint_names=("l1", "l2", "l3"),

@@ -11,9 +11,9 @@ import numpy as np
 from teleop_core.kernels import Array, inner, kernel
 
 _ITERATIONS = 100
-_ROUNDING = 1e-28  # squared relative error that more iterations cannot improve
-_LARGEST_TURN = 0.5  # largest turn in one iteration [rad]
-# Of 0, 120 and 240 degrees, where the legs stand.
+_ROUNDING = 1e-28  # more iterations cannot reduce a squared relative error below this value
+_LARGEST_TURN = 0.5  # largest change of a leg angle in one iteration [rad]
+# Cosines and sines of the directions of the legs: 0, 120 and 240 degrees.
 COSINES = (1.0, -0.5, -0.5)
 SINES = (0.0, math.sqrt(0.75), -math.sqrt(0.75))
 
@@ -126,7 +126,7 @@ def _damped_turn(G: Array, gap: Array, damping: float, turn: Array) -> None:
 def settle(lengths: Array, b: float, a: float, theta: Array) -> float:
     """Move leg angles (3,) from their current values to values at which the loop closes.
 
-    The damping decreases after each successful step, so that the final convergence is quadratic. If the lengths do not
+    The damping decreases after each successful step, so that the final convergence is quadratic. If the loop does not
     close near the start, the result has the smallest sum of squared errors.
 
     Returns:

@@ -57,9 +57,9 @@ def leg_coordinates(ball_joints: object, *, b: float) -> tuple[Array, Array]:
 def assembly_modes(lengths: object, *, b: float, a: float) -> AssemblyModes:
     """All poses of the platform for three leg lengths.
 
-    Given theta1, two loop equations give theta2 and theta3 with two signs each. The third, times
-    its four sign variants and the squared denominators, is a polynomial of degree 8 in
-    cos(theta1); its real roots are polished on the loop equations.
+    For a given theta1, two loop equations give theta2 and theta3 with two signs each. The product of the third
+    equation's four sign variants and of the squared denominators is a polynomial of degree 8 in cos(theta1). Its real
+    roots are refined by the loop equations.
 
     Args:
         lengths: Legs (3,) [m], > 0.
@@ -67,7 +67,7 @@ def assembly_modes(lengths: object, *, b: float, a: float) -> AssemblyModes:
         a: Distance of the ball joints from the platform centre [m].
 
     Raises:
-        ShapeError: Another shape.
+        ShapeError: ``lengths`` is not (3,).
         ParameterError: A length is not positive and finite.
     """
     legs = _three("lengths", lengths)
@@ -116,7 +116,7 @@ def _variants(x: Array, legs: Array, b: float, a: float) -> tuple[Array, Array, 
 
 
 def _eliminant(x: Array, legs: Array, b: float, a: float) -> Array:
-    """Third loop equation at cos(theta1) = x, all four variants multiplied, denominators out."""
+    """Product of the four variants of the third loop equation at cos(theta1) = x, times the denominators."""
     cosine2, sine2, cosine3, sine3 = _variants(x, legs, b, a)
     _, l2, l3 = legs
     product = np.ones_like(x, dtype=complex)
@@ -143,7 +143,7 @@ def _starts(x: float, legs: Array, b: float, a: float) -> list[Array]:
 
 
 def _collect(found: list[Array], start: Array, legs: Array, b: float, a: float) -> None:
-    """Refine leg angles and add them with theta1 >= 0, unless they are already known or not a solution."""
+    """Refine leg angles and add them with theta1 >= 0, unless they are already known or are no solution."""
     theta = start.copy()
     if settle(legs, b, a, theta) > _CLOSED * a * a:
         return

@@ -1,11 +1,11 @@
-"""Assemblies of the 3-RPS: the assembly nearest to a seed, and the search for others, as kernels.
+"""Assemblies of the 3-RPS: the assembly nearest to a seed, and the search for other assemblies, as kernels.
 
-Given theta1, two loop equations give theta2 and theta3 with two signs each, which makes four starts. For values of
-theta1 spread over half a turn, leg angles are moved from these starts to values at which the loop closes. The other
-half turn is the mirror image below the base.
+For a given theta1, two loop equations give theta2 and theta3 with two signs each, which makes four starts. For values
+of theta1 spread over half a turn, leg angles are moved from these starts to values at which the loop closes. The other
+half turn gives the mirror images below the base.
 
 Source:
-    Lee and Shah 1988; Ghosal 2020, lectures 6 and 11; search derived from them.
+    Lee and Shah 1988; Ghosal 2020, lectures 6 and 11. The search is derived from these sources.
 """
 
 import math
@@ -17,12 +17,13 @@ from teleop_core.kernels.geometry import Array, rotation_angle_between
 from teleop_core.kinematics import MAX_ASSEMBLIES, REACHED, SEARCH_ALL, FkStatus
 from teleop_machines.rps3_loop import COSINES, SINES, frame, loop, points, settle
 
-# Volume of the three unit rows of the loop equations below which the legs hardly fix the platform.
+# With a smaller volume of the three unit rows of the loop equations, the legs hardly determine the platform's pose.
 _NEAR = 1e-3
-# Steps of the path from a seed, and the rotation [rad] above which the path is followed. Of 7300 random triples with a
-# least-squares pose nearer than 0.6 rad, all had this pose at the path's end.
-WAY, FAR = 48, 0.5
-_SAME = 1e-6  # rad, smallest difference of two assemblies
+WAY = 48  # number of steps of the path from a seed
+# Rotation [rad] above which the path is followed. Of 7300 random triples with a least-squares pose nearer than 0.6 rad,
+# all had this pose at the path's end.
+FAR = 0.5
+_SAME = 1e-6  # assemblies with a smaller difference are equal [rad]
 _CLOSED, _NEAR_SINGULAR = int(FkStatus.CLOSED), int(FkStatus.NEAR_SINGULAR)
 _OTHER_MODE, _NOT_CLOSED = int(FkStatus.OTHER_MODE), int(FkStatus.NOT_CLOSED)
 
@@ -37,7 +38,7 @@ def lean(q: Array, geometry: Array, theta: Array) -> None:
 
 @inner
 def volume(q: Array, theta: Array, b: float, a: float) -> float:
-    """Determinant of the unit rows of the loop equations' slopes, -1 to 1; 0 where singular.
+    """Determinant of the unit rows of the loop equations' slopes, -1 to 1; 0 at a singular pose.
 
     The platform is on the same side of the singular poses as home if the value is above 0.
     """
@@ -53,7 +54,7 @@ def volume(q: Array, theta: Array, b: float, a: float) -> float:
 
 @inner
 def is_near_singular(q: Array, theta: Array, b: float, a: float) -> bool:
-    """Whether the legs hardly fix the platform: the unit rows of the loop equations span a small volume."""
+    """Whether the legs hardly determine the pose: the unit rows of the loop equations span a small volume."""
     return bool(abs(volume(q, theta, b, a)) < _NEAR)
 
 
@@ -91,7 +92,7 @@ def angles_of(T: Array, b: float, a: float, q: Array, theta: Array) -> None:
 
 @inner
 def _others(q: Array, b: float, a: float, theta1: float, pairs: Array) -> None:
-    """Write both possible angles of legs 2 and 3 (2, 2) [rad] for the first leg's angle.
+    """Write the two possible angles of leg 2, and of leg 3, (2, 2) [rad] for an angle of the first leg.
 
     They are the roots of P cos + Q sin + R = 0; if there is no root, the angle of least error is written twice.
     """

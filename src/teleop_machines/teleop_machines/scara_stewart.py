@@ -1,18 +1,19 @@
 """SCARA + Stewart hybrid: three axes that position the tip, six legs that orient it.
 
-q is theta1, theta2, d3 (up), then six leg lengths. The legs hold the platform's centre ``w_z``
-above the Stewart base, so position and orientation decouple: R = Rx(alpha) Ry(beta) Rz(gamma), tip
-= s + (0, 0, w_z) + e_eff R z with s the SCARA tip. ``heading="fixed"`` is the published model, in
-which the Stewart base does not rotate. With ``"carried"`` it is fixed to link 2, so the SCARA is solved first, and the
-legs compensate its rotation theta1 + theta2.
+q is theta1, theta2, d3 (up), then six leg lengths. The platform's centre stays ``w_z`` above the Stewart base, so
+position and orientation decouple: R = Rx(alpha) Ry(beta) Rz(gamma), tip = s + (0, 0, w_z) + e_eff R z, where s is the
+tip of the SCARA. ``heading="fixed"`` is the published model, in which the Stewart base does not rotate. With
+``"carried"`` the Stewart base is fixed to link 2. Then the SCARA is solved first, and the legs compensate the rotation
+theta1 + theta2.
 
-The published leg layout is architecturally singular: the legs alone do not hold the platform. For a level platform,
-the leg lengths do not show whether it is rotated left or right about the vertical (``ik`` then returns NEAR_SINGULAR).
-``fk`` uses the published assumption that the centre is held. With ``sigma_b`` and ``sigma_m``, such as 15° each, the
-joints are arranged in pairs, and ``fk`` uses the full information of the legs.
+The published leg layout is architecturally singular: the legs alone do not hold the platform. For a level platform, the
+leg lengths do not show whether it is rotated left or right about the vertical (``ik`` then returns NEAR_SINGULAR).
+``fk`` uses the published assumption that the centre is fixed. With ``sigma_b`` and ``sigma_m``, such as 15° each, the
+joints are arranged in pairs, and the legs alone determine the pose that ``fk`` returns.
 
 Source:
-    Kucuk and Gungor 2016, eqs. 1-25, corrected; carried mode and way back derived from them.
+    Kucuk and Gungor 2016, eqs. 1-25, corrected. The heading "carried" and direct kinematics are derived from these
+    equations.
 """
 
 import math
@@ -35,7 +36,7 @@ GEOMETRY = {
 }  # fmt: skip
 HEADINGS = ("fixed", "carried")
 _L1, _L2, _H1, _E, _LEGS, _W, _CARRIED = 0, 1, 2, 3, 4, 6, 9
-# Limits, strokes and home are not published: assumed.
+# Limits, strokes and home are assumed, because they are not published.
 _TURN = math.radians(175.0)
 _STROKES = 0.45, 1.6  # smallest and largest leg length, divided by that of a level platform
 HOME_JOINTS = -math.pi / 4.0, math.pi / 2.0, 0.25
@@ -43,8 +44,8 @@ HOME_JOINTS = -math.pi / 4.0, math.pi / 2.0, 0.25
 START = np.array([-0.0032, 2.145, 0.2651, 0.2327, 0.3012, 0.1801, 0.1219, 0.1221, 0.1767])
 HOME_TILT = math.radians(30.0)  # alpha of the published example; a level platform would hide the rotation
 _NEAR = 0.02  # sine of the elbow below which small moves need large joint moves
-_SWING = 1.25 * math.pi  # rad, of a joint that a path sends round the other way
-# Sine of the elbow of a straight arm: shortens it by less than rounding, and has a sign.
+_SWING = 1.25 * math.pi  # largest rotation of a joint that moves in the other direction in a path [rad]
+# Sine of the elbow that replaces 0 for a straight arm. It shortens the arm by less than rounding, and has a sign.
 _STRAIGHT = 1e-8
 _NOT_CLOSED = int(kinematics.FkStatus.NOT_CLOSED)
 _FOLLOWED, _LIMITED = int(kinematics.IkStatus.FOLLOWED), int(kinematics.IkStatus.LIMITED)
@@ -55,7 +56,7 @@ _NEAR_SINGULAR, _UNREACHABLE = (int(kinematics.IkStatus.NEAR_SINGULAR), int(kine
 def _place(q: Array, g: Array, platform: Array, T: Array) -> None:
     """Write the tip (4, 4) of the arm with its platform at a pose (4, 4) in the Stewart base.
 
-    T may be the platform's pose itself.
+    ``T`` may be the array ``platform`` itself.
     """
     heading = g[_CARRIED] * (q[0] + q[1])
     c, s = math.cos(heading), math.sin(heading)
@@ -83,8 +84,8 @@ def fk(q: Array, geometry: Array, T: Array) -> None:
 def assemble(q: Array, geometry: Array, ask: Array, T: Array, out: Array) -> int:
     """Write ``T_base_tip``, (4, 4), of joints (9,); see :class:`kinematics.Kernels`.
 
-    For similar hexagons, the rotation about the held centre is computed; the six legs may differ from it by
-    :data:`AGREED`. For other layouts, all six degrees of freedom are computed, from the seed if there is one.
+    For similar hexagons, the rotation about the fixed centre is computed; the six leg lengths may deviate from this
+    pose by :data:`AGREED`. For other layouts, all six degrees of freedom are computed, from the seed if there is one.
     """
     g, platform = geometry[_LEGS:_CARRIED], np.empty((4, 4))
     if ask[1] > 0.0:
@@ -98,7 +99,7 @@ def assemble(q: Array, geometry: Array, ask: Array, T: Array, out: Array) -> int
 def assemblies(q: Array, geometry: Array, found: Array) -> int:
     """Write all ``T_base_tip`` of joints (9,); see :class:`kinematics.Kernels`.
 
-    With similar hexagons, whose centre is held, there is at most one.
+    With similar hexagons, whose centre is fixed, there is at most one pose.
     """
     g, joints, out = geometry[_LEGS:_CARRIED], np.empty((2, 6, 3)), np.empty(2)
     if scara_stewart_legs.is_similar(g[3], g[4]):
@@ -112,7 +113,7 @@ def assemblies(q: Array, geometry: Array, found: Array) -> int:
 
 @inner
 def _platform_of(q: Array, g: Array, T: Array, platform: Array) -> None:
-    """Write the platform's pose (4, 4) in the Stewart base of a tip (4, 4): undo `_place`."""
+    """Write the platform's pose (4, 4) in the Stewart base for a tip pose (4, 4): the inverse of `_place`."""
     heading = g[_CARRIED] * (q[0] + q[1])
     c, s = math.cos(heading), math.sin(heading)
     dx = T[0, 3] - g[_L1] * math.cos(q[0]) - g[_L2] * math.cos(q[0] + q[1]) - g[_E] * T[0, 2]
@@ -130,7 +131,8 @@ def _platform_of(q: Array, g: Array, T: Array, platform: Array) -> None:
 def _twists(platform: Array, g: Array, twists: Array) -> None:
     """Write the platform's twist (6, 6) in the Stewart base per leg speed.
 
-    For similar hexagons: least-squares rotation about the held centre; hidden rotations do not appear.
+    For similar hexagons the twist is the least-squares rotation about the fixed centre. It does not contain rotations
+    that leave all leg lengths unchanged.
     """
     J = np.empty((6, 6))
     scara_stewart_legs.leg_slopes(platform, g, J)
@@ -186,9 +188,9 @@ def jacobian(q: Array, geometry: Array, J: Array) -> None:
 def _arm(T: Array, g: Array, is_left: bool, seed: float, arm: Array) -> bool:
     """Write theta1 (modulo a full turn), theta2, d3 (3,) of one elbow; return whether the SCARA reaches the point.
 
-    theta1 = atan2(y, x) - atan2(l2 sin(theta2), l1 + l2 cos(theta2)) needs no choice of sign. On
-    the axis of joint 1, where a folded arm has every theta1, the seed's is kept. A straight arm
-    keeps an elbow of :data:`_STRAIGHT`, so that a path through it remembers its side.
+    theta1 = atan2(y, x) - atan2(l2 sin(theta2), l1 + l2 cos(theta2)) needs no choice of sign. If the point is on the
+    axis of joint 1, a folded arm reaches it with every theta1, and the seed's theta1 is kept. A straight arm keeps an
+    elbow of :data:`_STRAIGHT`, so that a path through this posture keeps its side.
 
     Source:
         Kucuk and Gungor 2016, eqs. 14-16; eq. 15 without its sign.
@@ -208,7 +210,7 @@ def _arm(T: Array, g: Array, is_left: bool, seed: float, arm: Array) -> bool:
 
 @inner
 def _cost(T: Array, seed: Array, limits: Array, g: Array, q: Array) -> float:
-    """Largest move of an elbow's joints from the seed; of the legs only if the elbow turns them."""
+    """Largest joint move of an elbow branch from the seed; legs count only if their move depends on the elbow."""
     q[0] = branches.turned(q[0], seed[0], limits[0, 0], limits[1, 0], False)
     if g[_CARRIED] == 0.0:
         return branches.move_cost(q, seed, limits, 0, 3)
@@ -222,8 +224,8 @@ def _cost(T: Array, seed: Array, limits: Array, g: Array, q: Array) -> float:
 def _choose(T: Array, seed: Array, limits: Array, g: Array, q: Array) -> bool:
     """Write theta1, theta2, d3 of the chosen elbow; return whether the SCARA reaches the point.
 
-    A path keeps the seed's elbow; otherwise the nearer elbow inside the limits is chosen. The two elbows differ at
-    least in the sign of theta2.
+    A path keeps the seed's elbow; otherwise the nearer elbow inside the limits is chosen. The two elbows always differ
+    in the sign of theta2.
     """
     sine = math.sin(seed[1])
     is_reachable = _arm(T, g, sine >= 0.0, seed[0], q)
@@ -240,10 +242,10 @@ def _choose(T: Array, seed: Array, limits: Array, g: Array, q: Array) -> bool:
 
 @inner
 def _swung(angle: float, seed: float, lower: float, upper: float, is_path: bool) -> float:
-    """Joint 1 or 2 at an angle modulo full turns, as near as possible to the seed.
+    """Joint 1 or 2 at an angle plus full turns, as near as possible to the seed.
 
     A path over the axis of joint 1 needs half a turn in either direction; the direction without an end stop is chosen.
-    At its end stop a joint waits until the target is within such a swing.
+    At its end stop a joint does not move until the target is at most :data:`_SWING` away.
     """
     near = branches.turned(angle, seed, lower, upper, is_path)
     if is_path and not lower <= near <= upper:
@@ -257,7 +259,7 @@ def _swung(angle: float, seed: float, lower: float, upper: float, is_path: bool)
 def _held_arm(T: Array, seed: Array, limits: Array, g: Array, q: Array) -> bool:
     """Write theta1, theta2, d3 of q within limits and step; return whether the SCARA reaches the point.
 
-    If joint 1 is held back, joint 2 points the second link at the wanted point.
+    If limits or the step stop joint 1, joint 2 points the second link at the wanted point.
     """
     is_reachable = _choose(T, seed, limits, g, q)
     is_path = math.isfinite(limits[2, 0])
@@ -278,11 +280,11 @@ def _held_arm(T: Array, seed: Array, limits: Array, g: Array, q: Array) -> bool:
 def ik(T: Array, seed: Array, limits: Array, geometry: Array, q: Array, residual: Array) -> int:
     """Write joints (9,) for ``T_base_tip``; see :class:`teleop_core.robots.robot.Kernels`.
 
-    The legs orient the tool as wanted, computed for the arm's real position. If the legs are held back, all legs are
-    slowed by the same factor.
+    The legs orient the tool as wanted; they are computed for the arm's position within limits and step. If a leg cannot
+    move that fast, all legs are slowed by one factor.
 
     Source:
-        Kucuk and Gungor 2016, eqs. 14-25, corrected; carried mode derived from them.
+        Kucuk and Gungor 2016, eqs. 14-25, corrected. The heading "carried" is derived from these equations.
     """
     if not kinematics.is_askable(T, seed):
         return -1
@@ -303,7 +305,7 @@ def ik(T: Array, seed: Array, limits: Array, geometry: Array, q: Array, residual
 
 @kernel
 def ik_all(T: Array, geometry: Array, solutions: Array) -> int:
-    """Write both elbows (2, 9), the positive one first; their number, 0 if there is none."""
+    """Write the joints of the two elbows (2, 9), the positive elbow first; return the number of solutions, 0 to 2."""
     platform, g = np.empty((4, 4)), geometry[_LEGS:_CARRIED]
     for elbow in range(2):
         q = solutions[elbow]
@@ -356,6 +358,6 @@ def _check(row: dict[str, float]) -> None:
         if row[symbol] <= 0.0:
             raise ParameterError(symbol, row[symbol], "a length > 0 m")
     for symbol in ("sigma_b", "sigma_m"):
-        # Up to here the sums of the leg kernels can be divided; joints of two legs meet at 0.52.
+        # Up to this angle the sums of the leg kernels can be divided; at 0.52 rad the joints of two legs meet.
         if abs(row[symbol]) > 0.45:
             raise ParameterError(symbol, row[symbol], "between -0.45 and 0.45 rad")

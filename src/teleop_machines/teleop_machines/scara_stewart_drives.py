@@ -4,8 +4,8 @@ import numpy as np
 
 from teleop_core.robots.drives import ENTRIES, Drives
 
-# Two joints of a small SCARA with their links, a vertical slide, six electric cylinders; the slide
-# and the tool are balanced.
+# Two joints of a small SCARA with their links, a vertical slide, and six electric cylinders. The weight of the slide
+# and of the tool is balanced.
 DRIVES = Drives(
     inertia=np.array([1.5, 0.6, 10.0, *[2.0] * 6]),
     viscous=np.array([2.0, 1.0, 40.0, *[20.0] * 6]),

@@ -1,15 +1,15 @@
-"""Orientation of the hybrid's platform: its leg layout, and the orientation that belongs to six leg lengths.
+"""Orientation of the hybrid's platform: the layout of its legs, and the orientation for six leg lengths.
 
-Legs i = 1..6 stand at 60° (i - 1), base joints shifted by ∓sigma_b and platform joints by ±sigma_m
-(upper sign for odd i). The published layout has no shifts: two similar hexagons in line, which is
-architecturally singular. Its legs determine the orientation only because the hybrid holds the platform's centre at (0,
-0, w_z). They never show whether a level platform is rotated left or right.
+Leg i = 1..6 is at the angle 60° (i - 1). Base joints are shifted by ∓sigma_b and platform joints by ±sigma_m (upper
+sign for odd i). The published layout has no shifts: two similar hexagons in line, which is architecturally singular.
+Its legs determine the orientation only because the platform's centre is fixed at (0, 0, w_z). Leg lengths never show
+whether a level platform is rotated left or right.
 
-With the centre held, squared leg lengths are linear in the upper left block and the third row of
-R. The layout's symmetry splits the six equations into sums that are solved by hand.
+With a fixed centre, squared leg lengths are linear in the upper left block and the third row of R. The symmetry of the
+layout splits the six equations into sums that are solved by hand.
 
 Source:
-    Kucuk and Gungor 2016, eqs. 17-25 (legs); the way back is derived from them.
+    Kucuk and Gungor 2016, eqs. 17-25 (legs). The orientation from leg lengths is derived from these equations.
 """
 
 import math
@@ -20,14 +20,14 @@ from teleop_core.kernels import Array, inner, kernel
 from teleop_core.kinematics import AGREED, FkStatus
 from teleop_machines import stewart_legs, stewart_search
 
-# Sine of sigma_b + sigma_m below which the layout counts as similar hexagons.
+# With a smaller sine of sigma_b + sigma_m, the layout counts as similar hexagons.
 _SIMILAR = 1e-9
-# Of 60° (i - 1).
+# Cosines and sines of 60° (i - 1).
 _COSINES = (1.0, 0.5, -0.5, -1.0, -0.5, 0.5)
 _SINES = (0.0, math.sqrt(0.75), math.sqrt(0.75), 0.0, -math.sqrt(0.75), -math.sqrt(0.75))
-# Largest sum of squared leg errors, divided by r_m², of consistent legs: rounding errors.
+# Largest sum of squared leg errors, divided by r_m², that rounding causes for consistent leg lengths.
 _AGREED = 1e-29
-# Sine of the largest tilt of the platform, 75°: its ball joints' assumed limit.
+# Sine of the largest tilt of the platform, 75°, the assumed limit of its ball joints.
 TILT = math.sin(math.radians(75.0))
 _CLOSED, _NEAR_SINGULAR = int(FkStatus.CLOSED), int(FkStatus.NEAR_SINGULAR)
 _OTHER_MODE, _NOT_CLOSED = int(FkStatus.OTHER_MODE), int(FkStatus.NOT_CLOSED)
@@ -51,7 +51,7 @@ def leg_lengths(T: Array, g: Array, legs: Array) -> float:
     """Write leg lengths (6,) [m] of a platform pose (4, 4).
 
     Returns:
-        Root mean square of the leg speeds per angular speed of the platform about the vertical [m].
+        Root mean square of the leg speeds, divided by the angular speed of the platform about the vertical [m].
     """
     cb, sb, cm, sm = math.cos(g[3]), math.sin(g[3]), math.cos(g[4]), math.sin(g[4])
     turning = 0.0
@@ -87,7 +87,7 @@ def layout(g: Array, joints: Array) -> None:
 
 @kernel
 def turned_and_tilted(turn: float, x: float, y: float, T: Array) -> None:
-    """Write the rotation of T: Rz(turn) after the least tilt whose third row begins x, y."""
+    """Write the rotation of T: Rz(turn) after the smallest tilt whose third row begins with x, y."""
     z = math.sqrt(max(1.0 - x * x - y * y, 0.0))
     c, s = math.cos(turn), math.sin(turn)
     t11, t12, t22 = 1.0 - x * x / (1.0 + z), -x * y / (1.0 + z), 1.0 - y * y / (1.0 + z)
@@ -98,7 +98,7 @@ def turned_and_tilted(turn: float, x: float, y: float, T: Array) -> None:
 
 @inner
 def wanted_platform(T: Array, heading: float, w_z: float, platform: Array) -> None:
-    """Write the platform pose in the Stewart base for T's attitude, tilted as far as it may be."""
+    """Write the platform pose in the Stewart base for T's attitude; the tilt is clipped to its limit."""
     c, s = math.cos(heading), math.sin(heading)
     for j in range(3):
         x, y = T[0, j], T[1, j]
@@ -110,7 +110,7 @@ def wanted_platform(T: Array, heading: float, w_z: float, platform: Array) -> No
     if T[2, 2] > 0.0 and sine <= TILT:
         return
     turn = math.atan2(platform[1, 0] - platform[0, 1], platform[0, 0] + platform[1, 1])
-    if sine < 1e-9:  # upside down, all directions are equally near
+    if sine < 1e-9:  # for an upside-down attitude, all tilt directions are equally near
         x, y, sine = 1.0, 0.0, 1.0
     turned_and_tilted(turn, TILT / sine * x, TILT / sine * y, platform)
 
@@ -120,7 +120,7 @@ def _turn_of_hexagons(cosine: float, z1: complex, tilt: complex, up: float) -> f
     """Rotation of a platform of similar hexagons, from its cosine and from the direction of the tilt.
 
     z1 = -e^(i turn) tilt² / (2 (1 + up)) gives the sign, and the sine if it is small relative to the square of the
-    tilt. On a level platform the sign is unknown, and plus is used.
+    tilt. For a level platform the sign is unknown, and plus is used.
     """
     square = tilt.real * tilt.real + tilt.imag * tilt.imag
     seen = (-2.0 * (1.0 + up) * z1 * (tilt * tilt).conjugate()).imag
@@ -133,7 +133,7 @@ def _turn_of_hexagons(cosine: float, z1: complex, tilt: complex, up: float) -> f
 
 @inner
 def _sums(legs: Array, constant: float, half: int) -> tuple[float, complex]:
-    """Mean and first harmonic of squared legs less ``constant``, odd (half 0) or even ones."""
+    """Mean and first harmonic of (squared leg length - ``constant``), for odd legs (half 0) or even legs (half 1)."""
     mean, x, y = 0.0, 0.0, 0.0
     for i in range(half, 6, 2):
         value = (legs[i] * legs[i] - constant) / 3.0
@@ -143,12 +143,12 @@ def _sums(legs: Array, constant: float, half: int) -> tuple[float, complex]:
 
 @kernel
 def orientation(legs: Array, g: Array, T: Array) -> None:
-    """Write the platform pose for legs (6,) [m] if its centre is at (0, 0, w_z).
+    """Write the platform pose for legs (6,) [m] if the platform's centre is at (0, 0, w_z).
 
     Args:
         legs: Leg lengths (6,) [m]; for inconsistent legs, an approximate orientation is written.
         g: r_b, r_m, w_z [m], sigma_b, sigma_m [rad].
-        T: Platform in the Stewart base (4, 4); its z points up.
+        T: Pose of the platform in the Stewart base (4, 4), written; its z axis points up.
     """
     r_b, r_m, w_z, sigma_b, sigma_m = g[0], g[1], g[2], g[3], g[4]
     constant, K = w_z * w_z + r_b * r_b + r_m * r_m, r_b * r_m
@@ -179,8 +179,8 @@ def orientation(legs: Array, g: Array, T: Array) -> None:
 def platform_pose(legs: Array, g: Array, T: Array) -> None:
     """Write the platform pose (4, 4) in the Stewart base that fits six leg lengths best.
 
-    For similar hexagons: the rotation about the held centre with the smallest squared leg errors. For other layouts:
-    the pose with all six degrees of freedom, found from the pose with the centre held.
+    For similar hexagons, this is the rotation about the fixed centre with the smallest squared leg errors. For other
+    layouts, it is the pose with all six degrees of freedom, found from the pose with a fixed centre.
     """
     orientation(legs, g, T)
     found, square = np.empty(6), 0.0
@@ -207,14 +207,14 @@ def home_side(g: Array) -> float:
 
 @inner
 def close_platform(legs: Array, g: Array, ask: Array, T: Array, out: Array) -> int:
-    """Write the platform pose (4, 4) that legs (6,) [m] close on, from a seed in T if there is one.
+    """Write the platform pose (4, 4) at which legs (6,) [m] close, starting from a seed in T if there is one.
 
     Args:
         legs: Leg lengths (6,) [m].
         g: r_b, r_m, w_z [m], sigma_b, sigma_m [rad].
-        ask: Number of starts of the search if no pose closes near the seed, and whether T is a seed.
-        T: Seed, and platform in the Stewart base (4, 4).
-        out: Largest error of a leg [m], side of the singular poses (2,).
+        ask: Number of starts of the search if no pose closes near the seed; then 1 if T contains a seed, else 0.
+        T: Pose of the platform in the Stewart base (4, 4): seed, then result.
+        out: Written (2,): largest error of a leg [m], then the side of the singular poses.
 
     Returns:
         :class:`FkStatus`.

@@ -2,14 +2,14 @@
 
 A :class:`Layout` contains the twelve joint points and computes leg lengths of a pose, the pose of leg lengths from a
 seed, the leg Jacobian and its rank. On an architecturally singular layout, such as two similar hexagons one above the
-other, the legs fix the platform in no pose; direct kinematics then returns a status instead.
+other, the legs determine the platform in no pose; direct kinematics then returns a status instead.
 
-As a robot, q is the six leg lengths, the tip is the platform frame, and ``fk`` is direct kinematics from the home
-pose: the level platform ``z0`` above the base. If the wanted pose belongs to another assembly than the one nearest to
-home, ``ik`` returns its legs and UNREACHABLE. If there is no assembly near home, :meth:`Robot.fk` searches, and
-:meth:`Robot.fk_all` finds up to 40. On an architecturally singular layout the legs fix no pose: :meth:`Robot.solve_fk`
-returns UNDETERMINED, ``fk`` and ``jacobian`` raise errors, their kernels write NaN, and ``ik`` returns NEAR_SINGULAR.
-``load_robot("stewart", **layout.symbols())`` takes any layout.
+As a robot, q is the six leg lengths, the tip is the platform frame, and ``fk`` is direct kinematics from the home pose:
+the level platform ``z0`` above the base. If the wanted pose does not belong to the assembly nearest to home, ``ik``
+returns the leg lengths of the wanted pose and UNREACHABLE. If there is no assembly near home, :meth:`Robot.fk`
+searches, and :meth:`Robot.fk_all` finds up to 40. On an architecturally singular layout the legs determine no pose.
+Then :meth:`Robot.solve_fk` returns UNDETERMINED, ``fk`` and ``jacobian`` raise errors, their kernels write NaN, and
+``ik`` returns NEAR_SINGULAR. ``load_robot("stewart", **layout.symbols())`` takes any layout.
 
 Source:
     Stewart 1965; Ghosal 2020, lecture 11; Merlet 2006 for the Jacobian and its singularities.
@@ -33,7 +33,7 @@ from teleop_machines.drives import electric_cylinders
 from teleop_machines.stewart_legs import CLOSED, direct, invert, leg_system, moved
 from teleop_machines.stewart_search import NEAR, close_legs, closing_poses
 
-# Smallest over largest singular value of the leg Jacobian that counts as zero in every pose.
+# A leg Jacobian counts as singular if its smallest singular value, divided by the largest, is smaller.
 _RANK = 1e-10
 _FOLLOWED, _LIMITED = int(kinematics.IkStatus.FOLLOWED), int(kinematics.IkStatus.LIMITED)
 _NEAR_SINGULAR, _UNREACHABLE = (int(kinematics.IkStatus.NEAR_SINGULAR), int(kinematics.IkStatus.UNREACHABLE))
@@ -43,9 +43,9 @@ class DirectStatus(IntEnum):
     """Status of direct kinematics."""
 
     SOLVED = 0  # the pose has these leg lengths
-    NEAR_SINGULAR = 1  # the pose has these leg lengths, but the legs hardly fix it
+    NEAR_SINGULAR = 1  # the pose has these leg lengths, but the legs hardly determine it
     CANNOT_ASSEMBLE = 2  # no pose was found from this seed; the pose of least error is returned
-    ARCHITECTURALLY_SINGULAR = 3  # refused, because the legs fix no pose in this layout; the seed is returned
+    ARCHITECTURALLY_SINGULAR = 3  # the legs of this layout determine no pose; the seed is returned
 
 
 class DirectResult(NamedTuple):
@@ -60,7 +60,7 @@ class DirectResult(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Layout:
-    """Joint points of six legs: ``base`` in base, ``platform`` in platform coordinates, (6, 3)."""
+    """Joint points of six legs, (6, 3): ``base`` in base coordinates, ``platform`` in platform coordinates."""
 
     base: Array
     platform: Array
@@ -90,11 +90,11 @@ class Layout:
         return dict(zip(_POINTS, points.tolist(), strict=True))
 
     def legs(self, T: object) -> Array:
-        """Leg lengths (6,) [m] of a pose ``T_base_platform`` (4, 4); always exist."""
+        """Leg lengths (6,) [m] of a pose ``T_base_platform`` (4, 4); every pose has leg lengths."""
         return self._system(T)[0]
 
     def leg_jacobian(self, T: object) -> Array:
-        """Leg speeds (6,) per twist of the platform, linear then angular, base axes: (6, 6)."""
+        """Jacobian (6, 6) from the twist of the platform (linear, then angular, in base axes) to the leg speeds."""
         return self._system(T)[1]
 
     def singular_values(self, T: object) -> Array:
@@ -109,7 +109,7 @@ class Layout:
 
     @property
     def is_architecturally_singular(self) -> bool:
-        """Whether the legs hold the platform in no pose (tried in eight poses in general)."""
+        """Whether the legs hold the platform in no pose; eight poses in general position are tried."""
         rng = np.random.default_rng(0)
         start, T = np.eye(4), np.empty((4, 4))
         for _ in range(8):
@@ -127,11 +127,11 @@ class Layout:
             seed: ``T_base_platform`` (4, 4) to start from.
 
         Returns:
-            :class:`DirectResult`; lengths that do not assemble are not an error.
+            :class:`DirectResult`; if no pose has these lengths, no error is raised.
 
         Raises:
-            ShapeError: Another shape.
-            ParameterError: A negative or infinite length, a seed that is not a rigid transform.
+            ShapeError: ``lengths`` is not (6,), or ``seed`` is not (4, 4).
+            ParameterError: A length is negative or not finite, or the seed is not a rigid transform.
         """
         wanted, T = checked_array("lengths", lengths, (6,)), _rigid("seed", seed).copy()
         if wanted.ndim != 1:
@@ -168,8 +168,8 @@ def _circle(radius: float, angles: Array) -> Array:
 
 
 _POINTS = tuple(f"{body}{i}{axis}" for body in "bm" for i in range(1, 7) for axis in "xyz")
-# No layout is published with the lecture: radii and height of the hybrid of Kucuk and Gungor,
-# joints paired at 15° on either side of 0, 120, 240° (base) and 60, 180, 300° (platform).
+# The lecture publishes no layout. Radii and height are those of the hybrid of Kucuk and Gungor. Joints are paired at
+# 15° on either side of 0, 120, 240° (base) and 60, 180, 300° (platform).
 PAIRED = Layout.circular(
     0.2,
     np.radians([15.0, 105.0, 135.0, 225.0, 255.0, 345.0]),
@@ -194,9 +194,9 @@ def _at_home(geometry: Array, T: Array) -> None:
 def fk(q: Array, geometry: Array, T: Array) -> None:
     """Write ``T_base_tip`` (4, 4) of leg lengths (6,) [m], found from the home pose.
 
-    If no pose closes near home, the pose of least error is written; :func:`assemble` reports this. Measured over legal
-    legs with joints in pairs, this happens for no pose that is rotated by up to 1 rad, 0.2 % up to 1.3 rad, and 8 % up
-    to half a turn.
+    If no pose closes near home, the pose of least error is written; :func:`assemble` reports this. Measured for legal
+    legs with joints in pairs, this happens for no pose rotated by up to 1 rad. It happens for 0.2 % of the poses
+    rotated by up to 1.3 rad, and for 8 % of those rotated by up to half a turn.
     """
     _at_home(geometry, T)
     base, platform = geometry[:18].reshape((6, 3)), geometry[18:36].reshape((6, 3))
@@ -257,7 +257,8 @@ def ik(T: Array, seed: Array, limits: Array, geometry: Array, q: Array, residual
     leg_system(T, base, platform, q, legs)
     is_there = branches.slowed(q, seed, limits, q)
     if geometry[_SINGULAR] > 0.0:
-        # The legs of the pose, although they do not fix it; if the limits held the legs back, legs of a nearby pose.
+        # These are the legs of the pose, although they do not determine it; within limits, they are the legs of a
+        # nearby pose.
         reached[:] = T
         direct(q, base, platform, size, False, reached)
         kinematics.pose_residual(reached, T, residual)
@@ -271,7 +272,7 @@ def ik(T: Array, seed: Array, limits: Array, geometry: Array, q: Array, residual
 
 @kernel
 def ik_all(T: Array, geometry: Array, solutions: Array) -> int:
-    """Write the leg lengths (1, 6) of the pose; their number, 1."""
+    """Write the leg lengths (1, 6) of the pose; return the number of solutions, 1."""
     base, platform = geometry[:18].reshape((6, 3)), geometry[18:36].reshape((6, 3))
     leg_system(T, base, platform, solutions[0], np.empty((6, 6)))
     return 1

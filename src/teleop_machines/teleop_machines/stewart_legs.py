@@ -14,19 +14,19 @@ import numpy as np
 from teleop_core.kernels import Array, inner, kernel
 from teleop_core.kinematics.damped import eliminate
 
-# Legs count as closed within this error of length [m].
+# Legs count as closed if the errors of their lengths are not larger [m].
 CLOSED = 1e-11
 _ITERATIONS = 100
-_ROUNDING = 1e-26  # squared relative error that more iterations cannot improve
-_LARGEST_TURN = 0.5  # largest turn in one iteration [rad]
+_ROUNDING = 1e-26  # more iterations cannot reduce a squared relative error below this value
+_LARGEST_TURN = 0.5  # largest rotation in one iteration [rad]
 
 
 @kernel
 def leg_system(T: Array, base: Array, platform: Array, lengths: Array, J: Array) -> None:
     """Write leg lengths (6,) [m] and the leg Jacobian (6, 6), legs by twist in base axes.
 
-    A row is (u, R m × u), u the unit vector along the leg: leg speed per linear, then angular
-    velocity of the platform frame.
+    A row is (u, R m × u), where u is the unit vector along the leg. It maps linear, then angular velocity of the
+    platform frame to the speed of the leg.
     """
     for i in range(6):
         a, b, c = platform[i, 0], platform[i, 1], platform[i, 2]
@@ -43,7 +43,7 @@ def leg_system(T: Array, base: Array, platform: Array, lengths: Array, J: Array)
 
 @kernel
 def moved(T: Array, move: Array, out: Array) -> None:
-    """Write T after a small move (6,): shift [m], then turn [rad] about its origin, base axes."""
+    """Write T after a small move (6,) in base axes: shift [m], then rotation [rad] about the origin of T."""
     x, y, z = move[3], move[4], move[5]
     angle = math.sqrt(x * x + y * y + z * z)
     s = math.sin(angle) / angle if angle > 1e-8 else 1.0
@@ -69,7 +69,7 @@ def _damped_move(J: Array, gap: Array, damping: float, size: float, A: Array, mo
     ``A`` (6, 6) is overwritten.
 
     Returns:
-        Largest part of the move.
+        Largest component of the move.
     """
     for r in range(6):
         for s in range(r, 6):
@@ -95,7 +95,7 @@ def _damped_move(J: Array, gap: Array, damping: float, size: float, A: Array, mo
 def _gaps(
     T: Array, wanted: Array, base: Array, platform: Array, is_pinned: bool, gap: Array, J: Array
 ) -> tuple[float, float]:
-    """Write the leg errors (6,) [m] and the leg Jacobian (6, 6); if pinned, the platform's origin is held.
+    """Write the leg errors (6,) [m] and the leg Jacobian (6, 6); if ``is_pinned``, the platform's origin is fixed.
 
     Returns:
         Sum of squares and largest magnitude of the leg errors.
@@ -122,9 +122,9 @@ def direct(wanted: Array, base: Array, platform: Array, size: float, is_pinned: 
         wanted: Leg lengths (6,) [m].
         base: Base joints (6, 3) [m].
         platform: Platform joints (6, 3) [m].
-        size: Length [m] at which one metre weighs as one radian.
+        size: Length [m] that counts as much as one radian.
         is_pinned: Whether the platform's origin is fixed, so that T only rotates.
-        T: Start, and result (4, 4).
+        T: Start, then result (4, 4).
 
     Returns:
         Largest remaining error of a leg length [m].

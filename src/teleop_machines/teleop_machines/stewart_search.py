@@ -1,8 +1,8 @@
-"""Assemblies of six legs: the assembly nearest to a seed, and the search for others, as kernels.
+"""Assemblies of six legs: the assembly nearest to a seed, and the search for other assemblies, as kernels.
 
 The search moves a platform from starts, which are spread evenly over orientations and positions, to poses at which the
-legs close. If leg lengths have an assembly, at least a quarter of the starts end in one. The probability that all of
-64 starts miss is therefore 1e-8.
+legs close. If leg lengths have an assembly, at least a quarter of the starts find one. So the probability that none of
+64 starts finds one is 1e-8.
 
 Source:
     Roberts 2018 (even spread, the R sequence); Shoemake 1992 (even attitudes).
@@ -18,21 +18,22 @@ from teleop_core.kinematics import MAX_ASSEMBLIES, REACHED, FkStatus
 from teleop_core.kinematics.damped import is_near_singular
 from teleop_machines.stewart_legs import direct, leg_system
 
-# Smallest divided by largest singular value of the leg Jacobian below which a pose is close to singular.
+# A pose is close to singular if the smallest singular value of its leg Jacobian, divided by the largest, is smaller.
 NEAR = 1e-3
-# Root of x^6 = x + 1: its powers spread points evenly in five dimensions.
+# Root of x^6 = x + 1; its powers spread points evenly in five dimensions.
 _ROOT = 1.1347241384015194
-# Steps of the path from a seed, and the rotation [rad] above which the path is followed. Of 4300 random leg sets with
-# a least-squares pose nearer than 0.6 rad, all had this pose at the path's end.
-WAY, FAR = 48, 0.5
-_SAME = 1e-6  # smallest difference of two assemblies [rad, share of the platform's size]
+WAY = 48  # number of steps of the path from a seed
+# Rotation [rad] above which the path is followed. Of 4300 random leg sets with a least-squares pose nearer than
+# 0.6 rad, all had this pose at the path's end.
+FAR = 0.5
+_SAME = 1e-6  # assemblies with a smaller difference are equal [rad, share of the platform's size]
 _CLOSED, _NEAR_SINGULAR = int(FkStatus.CLOSED), int(FkStatus.NEAR_SINGULAR)
 _OTHER_MODE, _NOT_CLOSED = int(FkStatus.OTHER_MODE), int(FkStatus.NOT_CLOSED)
 
 
 @inner
 def side_of(J: Array) -> float:
-    """Sign of the determinant of J (6, 6), which is destroyed; 0 for a pivot of 0."""
+    """Sign of the determinant of J (6, 6); 0 if a pivot is 0. J is overwritten."""
     sign = 1.0
     for k in range(6):
         best = k
@@ -55,7 +56,7 @@ def side_of(J: Array) -> float:
 
 @inner
 def _start(k: int, reach: float, base: Array, platform: Array, T: Array) -> None:
-    """Write start k of the search (4, 4): joint centres ``reach`` [m] apart, any attitude."""
+    """Write start k of the search (4, 4): any attitude, centres of base and platform ``reach`` [m] apart."""
     u = np.empty(5)
     for i in range(5):
         u[i] = (0.5 + (k + 1) * _ROOT ** -(i + 1.0)) % 1.0
@@ -80,7 +81,7 @@ def _start(k: int, reach: float, base: Array, platform: Array, T: Array) -> None
 
 @inner
 def _away(T: Array, other: Array, size: float) -> float:
-    """Angle [rad] and distance over ``size`` between two poses, added."""
+    """Sum of the angle [rad] and the distance, divided by ``size``, between two poses."""
     square = 0.0
     for r in range(3):
         square += (T[r, 3] - other[r, 3]) ** 2
@@ -95,8 +96,8 @@ def closing_poses(legs: Array, base: Array, platform: Array, size: float, starts
         legs: Leg lengths (6,) [m].
         base: Base joints (6, 3) [m].
         platform: Platform joints (6, 3) [m].
-        size: Length [m] at which one metre weighs as one radian.
-        starts: Starts of the search.
+        size: Length [m] that counts as much as one radian.
+        starts: Number of starts of the search.
         found: Output array for poses (MAX_ASSEMBLIES, 4, 4).
 
     Returns:
@@ -135,7 +136,7 @@ def _nearest(legs: Array, base: Array, platform: Array, size: float, starts: int
 def _is_singular(T: Array, base: Array, platform: Array, size: float, lengths: Array, J: Array) -> tuple[bool, float]:
     """Write leg lengths (6,) [m].
 
-    Return whether the legs hardly fix the pose, and the pose's side of the singular poses.
+    Return whether the legs hardly determine the pose, and the pose's side of the singular poses.
     """
     leg_system(T, base, platform, lengths, J)
     is_near = bool(is_near_singular(J.T, 1.0 / size, NEAR * 2.0 * size))
@@ -171,18 +172,18 @@ def close_legs(
 ) -> int:
     """Move a pose to the nearest assembly with the given leg lengths.
 
-    This is the assembly at the end of the straight path of the leg lengths, if the legs close on the whole path. If
-    the least-squares pose is near, it is used; otherwise the path is followed in :data:`WAY` steps.
+    This is the assembly at the end of the straight path of the leg lengths, if the legs close on the whole path. If the
+    least-squares pose is near the seed, this pose is used; otherwise the path is followed in :data:`WAY` steps.
 
     Args:
         legs: Leg lengths (6,) [m].
         base: Base joints (6, 3) [m].
         platform: Platform joints (6, 3) [m].
-        size: Length [m] at which one metre weighs as one radian.
-        starts: Number of starts of the search that follows if the path does not close.
-        side: Sign of the leg Jacobian's determinant at the seed; 0 to find it.
+        size: Length [m] that counts as much as one radian.
+        starts: Number of starts of the search that follows if the legs do not close on the path.
+        side: Sign of the leg Jacobian's determinant at the seed; 0 if it must be computed.
         T: Seed, then result (4, 4); the pose of least error if no pose closes.
-        out: Largest error of a leg [m], sign of the leg Jacobian's determinant (2,).
+        out: Written (2,): largest error of a leg [m], then the sign of the leg Jacobian's determinant.
 
     Returns:
         :class:`FkStatus`.

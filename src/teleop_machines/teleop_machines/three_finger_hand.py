@@ -1,4 +1,4 @@
-"""Three-fingered hand: three R-R-R fingers that hold a triangle, contacts as ball joints.
+"""Three-fingered hand: three R-R-R fingers that hold a triangle; contacts are ball joints.
 
 The hand has six degrees of freedom (nine joints minus three distances between contacts). As a robot, q is all nine
 joints, theta, psi, phi of each finger. ``fk`` is the object's frame at the three contact points, if the joints hold
@@ -7,7 +7,7 @@ hold the object unless a finger cannot follow. :class:`Hand` computes contact po
 joints that follow from six actuated joints.
 
 Source:
-    Ghosal 2020, lectures 6 and 11, after Salisbury 1982; six freedoms, not three as spoken.
+    Ghosal 2020, lectures 6 and 11, after Salisbury 1982. The hand has six freedoms, not three as said in the lecture.
 """
 
 import math
@@ -38,8 +38,8 @@ from teleop_machines.hand_grasp import (
 
 __all__ = ["GEOMETRY", "Grasp", "GraspResult", "Hand", "make"]
 
-_LIMITS = np.radians([80.0, 110.0, 150.0])  # limits in both directions; assumed
-_NEAR = 0.02  # limits of a near-singular finger: sine of phi, and reach divided by full reach
+_LIMITS = np.radians([80.0, 110.0, 150.0])  # limits of theta, psi, phi in both directions; assumed
+_NEAR = 0.02  # a finger with a smaller sine of phi, or a smaller share of its full reach, is near-singular
 _CLOSED, _NOT_CLOSED = int(kinematics.FkStatus.CLOSED), int(kinematics.FkStatus.NOT_CLOSED)
 _FOLLOWED, _LIMITED = int(kinematics.IkStatus.FOLLOWED), int(kinematics.IkStatus.LIMITED)
 _NEAR_SINGULAR, _UNREACHABLE = (int(kinematics.IkStatus.NEAR_SINGULAR), int(kinematics.IkStatus.UNREACHABLE))
@@ -125,7 +125,7 @@ def ik(T: Array, seed: Array, limits: Array, geometry: Array, q: Array, residual
 
 @kernel
 def ik_all(T: Array, geometry: Array, solutions: Array) -> int:
-    """Write up to 64 joint vectors (k, 9), four branches for each finger; their number."""
+    """Write up to 64 joint vectors (k, 9), with four branches for each finger; return the number of joint vectors."""
     counts, fingers = np.zeros(3, np.int64), np.empty((FINGERS, 4, 3))
     for i in range(FINGERS):
         links, p = links_of(i, geometry), local_point(i, geometry, wanted_contact(i, T, geometry))
@@ -148,9 +148,9 @@ def ik_all(T: Array, geometry: Array, solutions: Array) -> int:
 
 
 def make(**geometry: float | str) -> Robot:
-    """Hand with links l11 ... l33, fingers d beside and h above the thumb, object side [m].
+    """Hand with links l11 ... l33, fingers ``d`` beside and ``h`` above the thumb, object of side ``side`` [m].
 
-    ``gamma`` turns the thumb about y [rad]. At home it holds the object upright before the palm,
+    ``gamma`` rotates the thumb about y [rad]. At home the hand holds the object upright in front of the palm, with the
     fingers bent down and the thumb bent up.
     """
     row = checked_geometry(geometry)

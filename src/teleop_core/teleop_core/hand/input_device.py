@@ -1,4 +1,4 @@
-"""Input device: what a gamepad or a 3-D mouse of this machine gives, as rates and buttons."""
+"""Input device: readings of a gamepad or a 3-D mouse of this machine, as rates and buttons."""
 
 from typing import NamedTuple, Protocol
 
@@ -49,7 +49,7 @@ class Device(Protocol):
         """
 
     def rumble(self, share: float) -> None:
-        """Display a force by vibration, as a share of the largest, 0 to 1; does nothing without a motor."""
+        """Display a force by vibration; ``share`` is 0 to 1 of the largest force. Does nothing without a motor."""
 
     def close(self) -> None:
         """Close the device."""

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from teleop_core.kernels import inner, kernel
 from teleop_core.kernels.geometry import Array, is_rigid, rotation_angle_between
 
-_FLOAT64 = np.dtype(np.float64)  # one shared object; other objects of its kind are copied
+_FLOAT64 = np.dtype(np.float64)  # arrays with this very dtype object are used as they are; others are copied
 _ROW, _TABLE = types.float64[::1], types.float64[:, ::1]
-# Signatures that let one compiled graph run any robot: see Kernels for the arguments.
+# Kernel signatures, shared by all robots, so that one compiled graph can run any robot; the arguments: see Kernels.
 FK = types.void(_ROW, _ROW, _TABLE)
 ASSEMBLE = types.int64(_ROW, _ROW, _ROW, _TABLE, _ROW)
 IK = types.int64(_TABLE, _ROW, _TABLE, _ROW, _ROW, _ROW)
@@ -29,23 +29,22 @@ AssembliesKernel: TypeAlias = Callable[[Array, Array, Array], int]
 DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")
 # A pose counts as reached within this distance [m] and angle [rad].
 REACHED = 1e-9
-# If there are more joint readings than the pose needs, encoder errors and backlash may make
-# them disagree by this much [m].
+# Largest disagreement of redundant joint readings by encoder errors and backlash [m].
 AGREED = 1e-4
-# Largest number of joint vectors of one pose: the three-fingered hand, with four for each finger.
+# Largest number of joint vectors of one pose: 64 for the three-fingered hand, with four branches of each finger.
 MAX_BRANCHES = 64
 # Largest number of poses of one joint vector: a platform on six legs has 40 (Dietmaier 1998).
 MAX_ASSEMBLIES = 64
-# Number of starts: to search an assembly if the one next to the seed does not close, and to search all assemblies.
-# For leg sets that have an assembly, at least a quarter of the starts end in one.
-SEARCH, SEARCH_ALL = 64, 384
+# Numbers of starts of a search. For leg sets that have an assembly, at least a quarter of the starts find one.
+SEARCH = 64  # to find an assembly if the loops do not close in the assembly of the seed
+SEARCH_ALL = 384  # to find all assemblies
 
 
 class IkStatus(IntEnum):
     """How well inverse kinematics reached the wanted pose."""
 
     FOLLOWED = 0  # the joint vector reaches the pose
-    LIMITED = 1  # a joint or speed limit keeps the tip off the pose
+    LIMITED = 1  # a joint or speed limit prevents the tip from reaching the pose
     NEAR_SINGULAR = 2  # the pose is reached, but small moves need large joint moves here
     UNREACHABLE = 3  # no joint vector reaches the position; the nearest joint vector is returned
 
@@ -53,11 +52,11 @@ class IkStatus(IntEnum):
 class FkStatus(IntEnum):
     """Whether forward kinematics found a pose with which the loops of a robot close."""
 
-    CLOSED = 0  # the loops close, in the seed's assembly: they also close along the straight path from the seed
-    NEAR_SINGULAR = 1  # the same, but near a singularity: the joints hardly fix the tip, and assemblies meet
-    OTHER_MODE = 2  # the loops close, but in another assembly: the nearest to the seed that was found
+    CLOSED = 0  # the loops close in the seed's assembly, so they also close along the straight path from the seed
+    NEAR_SINGULAR = 1  # as CLOSED, but near a singularity, where the joints hardly determine the tip's pose
+    OTHER_MODE = 2  # the loops close only in another assembly; of those found, the nearest to the seed is returned
     NOT_CLOSED = 3  # no assembly was found; the pose of least error next to the seed is returned
-    UNDETERMINED = 4  # joints of this layout never fix a pose; the seed is returned
+    UNDETERMINED = 4  # with this geometry, joints never determine a pose; the seed is returned
 
 
 _OTHER_MODE = int(FkStatus.OTHER_MODE)
@@ -68,19 +67,19 @@ Sign = TypeVar("Sign")
 
 
 class FkResult(NamedTuple, Generic[Status, Number, Sign]):
-    """Result of forward kinematics: for one q, or for N of them with a leading axis in each entry."""
+    """Result of forward kinematics for one joint vector; for N of them each entry has a leading axis."""
 
     T: Array
-    """``T_base_tip`` (4, 4) or (N, 4, 4), always finite; ``status`` tells whether the loops are closed."""
+    """``T_base_tip`` (4, 4) or (N, 4, 4), always finite; ``status`` contains whether the loops are closed."""
     status: Status
     """:class:`FkStatus` of one q; for N an integer array (N,) of its values."""
     residual: Number
     """Largest error of loop closure [m], a float or (N,); exactly 0 for a robot without loops."""
     mode: Sign
-    """Side of the singular poses: 1 as at home, -1 the other, 0 without loops; for N (N,).
+    """Side of the singular poses: 1 the side of home, -1 the other side, 0 without loops; an array (N,) for N.
 
-    Every path between two poses of different sign passes a singular pose. Assemblies of the same sign are
-    distinguished by their index in :meth:`~teleop_core.robots.robot.Robot.fk_all`.
+    Every path between two poses of different sign passes a singular pose. Assemblies of the same sign are distinguished
+    by their index in :meth:`~teleop_core.robots.robot.Robot.fk_all`.
     """
 
 
@@ -89,7 +88,7 @@ FkBatch: TypeAlias = FkResult[NDArray[np.int64], Array, NDArray[np.int64]]
 
 
 class IkResult(NamedTuple, Generic[Status]):
-    """Result of inverse kinematics: for one pose, or for N of them with a leading axis in each entry."""
+    """Result of inverse kinematics for one pose; for N poses each entry has a leading axis."""
 
     q: Array
     """Joint vector (n,) or (N, n) [rad, m], always finite and inside the limits."""
@@ -108,23 +107,23 @@ IkBatch: TypeAlias = IkResult[NDArray[np.int64]]
 
 @dataclass(frozen=True, kw_only=True)
 class Kernels:
-    """Functions of one robot, which take its ``geometry`` row: kernels, or plain Python, which is slower.
+    """Functions of one robot, which take its ``geometry`` row; they are kernels or, slower, plain Python.
 
-    ``fk(q, geometry, T)`` and ``jacobian(q, geometry, J)`` write their last argument. ``ik(T, seed, limits, geometry,
-    q, residual)`` writes ``q`` and ``residual`` and returns an :class:`IkStatus`; the rows of ``limits`` (3, n) are
-    lower, upper and the largest step away from the seed. With infinite steps it finds the branch inside the limits
-    that is nearest to the seed. With finite steps, in a path, it never changes the branch. For a T that is not rigid
-    or a seed that is not finite, it writes nothing and returns -1 (:func:`is_askable`). ``ik_all(T, geometry,
-    solutions)`` fills rows of ``solutions`` (:data:`MAX_BRANCHES`, n), ignores limits, and returns the number of
-    solutions.
+    ``fk(q, geometry, T)`` and ``jacobian(q, geometry, J)`` write their last argument.
+    ``ik(T, seed, limits, geometry, q, residual)`` writes ``q`` and ``residual`` and returns an :class:`IkStatus`; the
+    rows of ``limits`` (3, n) are lower limit, upper limit, and largest step from the seed. With infinite steps it finds
+    the branch inside the limits that is nearest to the seed. With finite steps, in a path, it never changes the branch.
+    For a T that is not rigid or a seed that is not finite, it writes nothing and returns -1 (:func:`is_askable`).
+    ``ik_all(T, geometry, solutions)`` fills rows of ``solutions`` (:data:`MAX_BRANCHES`, n), ignores limits, and
+    returns the number of solutions.
 
-    Robots with loops have two more. ``assemble(q, geometry, ask, T, out)`` writes the pose T, and ``out`` (2,):
+    Robots with loops have two more kernels. ``assemble(q, geometry, ask, T, out)`` writes the pose T, and ``out`` (2,):
     residual and mode of :class:`FkResult`; it returns an :class:`FkStatus`. ``ask[0]`` is the number of starts of a
     search if the assembly next to the seed does not close; 0 means no search. ``ask[1]`` is 1 if T contains the seed,
-    and 0 if home is the seed. With home as the seed, T is what ``fk`` writes, unless that does not close and the
-    search finds another pose. ``assemblies(q, geometry, found)`` fills ``found`` (:data:`MAX_ASSEMBLIES`, 4, 4) with
-    all poses that it finds, and returns their number. ``fk`` itself never searches, so that it takes microseconds in a
-    tick. It never fails: if nothing closes next to home, it writes the pose of least error.
+    and 0 if home is the seed. With home as the seed, T is the pose of ``fk``, unless the loops do not close there and
+    the search finds another pose. ``assemblies(q, geometry, found)`` fills ``found`` (:data:`MAX_ASSEMBLIES`, 4, 4)
+    with all poses that it finds, and returns their number. ``fk`` itself never searches, so that it takes microseconds
+    in a tick. It never fails: if the loops do not close in the assembly of home, it writes the pose of least error.
 
     Shapes: ``q`` and ``seed`` (n,), ``T`` (4, 4), ``J`` (6, n), ``residual`` (2,), all float64 in C order and
     writable, because numba would compile a second version for read-only arrays.
@@ -183,8 +182,8 @@ def assemble_batch(
 ) -> None:
     """Write transforms (N, 4, 4), residuals and modes (N, 2), statuses (N,) of joints (N, n).
 
-    The seed of each pose is the content of ``transforms`` at its index, or home; ``ask`` tells which. In a path, the
-    seed of every pose after the first is the last earlier pose in the assembly of the path.
+    The seed of each pose is the content of ``transforms`` at its index, or home; ``ask[1]`` selects one of these. In a
+    path, the seed of every later pose is the last earlier pose in the assembly of the path.
     """
     seed = np.empty((4, 4))
     for i in range(q.shape[0]):
@@ -207,7 +206,7 @@ def ik_batch(
     residuals: Array,
     statuses: NDArray[np.int64],
 ) -> None:
-    """Solve (N, 4, 4): from seeds (N, n), from one seed (1, n), or as a path from that seed."""
+    """Solve poses (N, 4, 4), each from its seed (N, n) or all from one seed (1, n); or as a path from one seed."""
     for i in range(transforms.shape[0]):
         seed = seeds[i] if seeds.shape[0] > 1 else seeds[0]
         if is_path and i > 0:

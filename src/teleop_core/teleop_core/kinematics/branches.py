@@ -6,17 +6,17 @@ from teleop_core.kernels import Array, inner
 
 SLACK = 1e-12
 """Rounding by which a joint on its limit may exceed the limit [rad or m]."""
-# Up to this angle of joint 5 of a spherical wrist [rad] its two branches are neighbours. There limits count in a path
-# too: a wrist that would reach a limit changes to the other branch, which needs only a small move. At larger angles
-# the branch never changes in a path.
+# If joint 5 of a spherical wrist is within this angle of zero [rad], its two branches are neighbours. Then a path
+# considers limits too: before a limit the wrist changes to the other branch by a small move. At larger angles the
+# branch never changes in a path.
 BESIDE = 0.1
-# Added to the cost of a branch outside the limits: larger than any move inside them.
+# Cost added to a branch outside the limits; it is larger than any move inside the limits.
 OUTSIDE = 100.0
 
 
 @inner
 def wrapped(angle: float) -> float:
-    """Same angle [rad] in (-pi, pi]."""
+    """The angle plus whole turns, in (-pi, pi] [rad]."""
     if -math.pi < angle <= math.pi:
         return angle
     return angle - 2.0 * math.pi * math.ceil((angle - math.pi) / (2.0 * math.pi))
@@ -31,7 +31,7 @@ def bounded(wanted: float, seed: float, lower: float, upper: float, step: float)
 
 @inner
 def hold(q: Array, i: int, seed: Array, limits: Array) -> None:
-    """Keep joint i of ``q`` within its step of the seed and inside its limits."""
+    """Clip joint i of ``q`` to its step around the seed and to its limits."""
     q[i] = bounded(q[i], seed[i], limits[0, i], limits[1, i], limits[2, i])
 
 
@@ -39,14 +39,14 @@ def hold(q: Array, i: int, seed: Array, limits: Array) -> None:
 def slowed(wanted: Array, seed: Array, limits: Array, q: Array) -> bool:
     """Write ``q`` on the straight path from the seed to ``wanted``; return whether ``q`` reaches ``wanted``.
 
-    All actuators are slowed by one common factor, so that actuators that move the same body keep their proportion.
-    After that each actuator is kept inside its own limits.
+    All actuators are slowed by one common factor, so that actuators that move the same body keep their proportion. Then
+    each actuator is clipped to its own limits.
 
     Args:
         wanted: Joint positions (n,) [rad or m].
         seed: Joint positions (n,) to start from.
         limits: Rows lower, upper, largest step: (3, n).
-        q: Joint positions (n,) that are allowed; may be ``wanted``.
+        q: Allowed joint positions (n,), written; may be the array ``wanted``.
     """
     n, share = wanted.shape[0], 1.0
     for i in range(n):
@@ -66,8 +66,7 @@ def slowed(wanted: Array, seed: Array, limits: Array, q: Array) -> bool:
 def turned(angle: float, seed: float, lower: float, upper: float, is_path: bool) -> float:
     """The angle plus whole turns [rad]: nearest to the seed, and inside the limits if possible.
 
-    In a path only the angle nearest to the seed is allowed: a joint at its end stop stays there and does not unwind by
-    a turn.
+    In a path only the angle nearest to the seed is allowed, so a joint at its end stop does not jump by a whole turn.
     """
     near = seed if is_path else min(max(seed, lower), upper)
     angle -= 2.0 * math.pi * math.floor((angle - near) / (2.0 * math.pi) + 0.5)
@@ -82,7 +81,7 @@ def turned(angle: float, seed: float, lower: float, upper: float, is_path: bool)
 
 @inner
 def turn(q: Array, seed: Array, limits: Array, first: int, last: int) -> None:
-    """Move joints first..last-1 by whole turns next to the seed, or into their limits."""
+    """Add whole turns to joints first..last-1, so that they are nearest to the seed, or inside their limits."""
     is_path = math.isfinite(limits[2, 0])
     for i in range(first, last):
         q[i] = turned(q[i], seed[i], limits[0, i], limits[1, i], is_path)
@@ -90,9 +89,9 @@ def turn(q: Array, seed: Array, limits: Array, first: int, last: int) -> None:
 
 @inner
 def cost_of(q: Array, seed: Array, limits: Array, first: int, last: int, do_limits_count: bool) -> float:
-    """Largest move of joints first..last-1 from the seed, the metric that orders branches.
+    """Largest move of joints first..last-1 from the seed; branches are sorted by this cost.
 
-    Branches outside the limits come after all others if the limits count.
+    If ``do_limits_count``, branches outside the limits come after all other branches.
     """
     worst, is_outside = 0.0, False
     for i in range(first, last):
@@ -103,7 +102,7 @@ def cost_of(q: Array, seed: Array, limits: Array, first: int, last: int, do_limi
 
 @inner
 def move_cost(q: Array, seed: Array, limits: Array, first: int, last: int) -> float:
-    """:func:`cost_of` joints; in a path limits do not count, so that the branch never changes."""
+    """:func:`cost_of` joints; in a path without limits, so that the branch never changes."""
     return cost_of(q, seed, limits, first, last, not math.isfinite(limits[2, 0]))
 
 

@@ -1,8 +1,8 @@
-"""Damped least squares: the joint vector within a box whose pose is nearest to a wanted one, for any arm.
+"""Damped least squares: for any arm, the joint vector in a box whose pose is nearest to a wanted pose.
 
 The box contains the joint limits, or one speed-limited step around the last joint vector. Inside the box the error is
-reduced to zero if possible, and otherwise to its minimum, through singularities too. The damping shrinks with the
-error. So steps are bounded far from the solution, and convergence is quadratic near it.
+reduced to zero if possible, and otherwise to its minimum, through singularities too. The damping decreases with the
+error. So steps are bounded far from the solution, and convergence near the solution is quadratic.
 
 Source:
     Nakamura and Hanafusa 1986 (damping); Yamashita and Fukushima 2001 (damping by the error).
@@ -17,7 +17,7 @@ from teleop_core.kernels.room import room
 ZERO = 1e-22
 
 
-# Loops instead of slices and numpy calls: the same speed, a fraction of the compile time.
+# Loops are used instead of slices and numpy calls, because they are as fast and compile much faster.
 @inner
 def assign(target: Array, source: Array) -> None:
     """Write the values of ``source`` (m,) into ``target``."""
@@ -49,7 +49,7 @@ def pose_error(reached: Array, wanted: Array, length: float, error: Array) -> fl
             trace += reached[i, j] * wanted[i, j]
     sine = 0.5 * math.sqrt(x * x + y * y + z * z)
     angle = math.atan2(sine, 0.5 * (trace - 1.0))
-    # If the sine is zero the angle is 0 or pi; at pi a rotation about z starts the return.
+    # If the sine is zero, the angle is 0 or pi. At pi the axis is arbitrary, and z is taken.
     scale = 0.5 * angle / sine if sine > 1e-12 else 0.5
     error[3], error[4], error[5] = scale * x, scale * y, scale * z
     if sine <= 1e-12 and angle > 1.0:
@@ -86,7 +86,7 @@ def eliminate(A: Array, b: Array) -> None:
 def gram(J: Array, is_free: Array, damping: float, A: Array) -> None:
     """Write the upper triangle of J Jᵀ + damping I, (6, 6).
 
-    Only the free columns of J (6, n) count: those with 1.0 in ``is_free``.
+    Only the free columns of J (6, n) are used: those with 1.0 in ``is_free``.
     """
     for r in range(6):
         for s in range(r, 6):
@@ -116,7 +116,7 @@ def free_joints(J: Array, error: Array, q: Array, box: Array, is_free: Array) ->
 
 @inner
 def damped_move(J: Array, error: Array, damping: float, is_free: Array, box: Array, q: Array, moved: Array) -> None:
-    """Write ``moved`` (n,): q + Jᵀ (J Jᵀ + damping I)⁻¹ error over the free joints, in the box."""
+    """Write q + Jᵀ (J Jᵀ + damping I)⁻¹ error of the free joints, clipped to the box, into ``moved`` (n,)."""
     A, y = room(6, 6), room(6)
     assign(y, error)
     gram(J, is_free, damping, A)

@@ -1,14 +1,14 @@
 """Kinematics of a Denavit-Hartenberg chain: kernels over constant transforms between its joints.
 
 Every convention can be written as T = F0 J1(q1) F1 J2(q2) F2 ..., where Ji is a rotation about or a slide along the
-local z axis and Fi is constant. The geometry row contains, for n joints: n kinds (+1 or -1 for a rotation, +2 or -2
-for a slide, negative if against the axis); the reach [m]; six weights of the controlled directions (1 or 0); and n + 1
-transforms of twelve numbers, row by row.
+local z axis and Fi is constant. The geometry row contains, for n joints: n kinds (1 for a rotation, 2 for a slide,
+negative if against the axis); the reach [m]; six weights of the controlled directions (1 or 0); and n + 1 transforms of
+twelve numbers, row by row.
 
 In a chain of m motions some motions may follow others (:mod:`teleop_core.robots.dynamics.followers`). The row then
-contains other numbers in place of the transforms: m + 1; the joints of all motions, then their factors, then their
-offsets; and the row of the m motions. The number m + 1 marks such a chain, because the first number of a transform is
-an entry of a rotation and cannot have this value.
+contains other numbers in place of the transforms: m + 1; the joints that the motions follow, the factors and the
+offsets of the motions; and the row of the m motions. The number m + 1 marks such a chain, because the first number of a
+transform is an entry of a rotation and cannot have this value.
 """
 
 import math
@@ -20,23 +20,24 @@ from teleop_core.kernels.room import room
 from teleop_core.kinematics import REACHED, IkStatus, is_askable, pose_residual
 from teleop_core.kinematics.damped import ZERO, damped_move, free_joints, pose_error
 
-_ROUNDS, _PATH_ROUNDS = 60, 12  # largest numbers of rounds of one search
-_DAMPING = 1e-2  # damping divided by squared error, at the start
-_HOPELESS = 1e10  # above this ratio no step improves the result, and the descent ends
-_STARTS = 24  # further searches if the search from the seed fails
-_MOST_STARTS = 120  # searches in all, if these fail too
-_CLOSE = 1e-8  # below this squared error the descent is in a flat valley
-_LONG_ROUNDS = 1000  # rounds of the descent in a flat valley
-_ALL_STARTS = 200  # searches for all branches
-_SAME = 1e-6  # joint vectors this close count as equal [rad, m]
-_NEAR = 0.02  # pivot below which small moves need large joint moves
+_ROUNDS = 60  # largest number of rounds of one search
+_PATH_ROUNDS = 12  # largest number of rounds of one search in a path
+_DAMPING = 1e-2  # initial damping, divided by the squared error
+_HOPELESS = 1e10  # a search stops when its damping, divided by the squared error, exceeds this value
+_STARTS = 24  # number of other starts if the search from the seed fails
+_MOST_STARTS = 120  # number of other starts if none of the first ones succeeds
+_CLOSE = 1e-8  # a squared error below this value may be in a flat valley, where the descent needs more rounds
+_LONG_ROUNDS = 1000  # largest number of these additional rounds
+_ALL_STARTS = 200  # number of searches for all branches
+_SAME = 1e-6  # joint vectors with a smaller distance count as equal [rad, m]
+_NEAR = 0.02  # with a smaller pivot, small moves of the tip need large joint moves
 _FOLLOWED, _LIMITED = int(IkStatus.FOLLOWED), int(IkStatus.LIMITED)
 _NEAR_SINGULAR, _UNREACHABLE = int(IkStatus.NEAR_SINGULAR), int(IkStatus.UNREACHABLE)
 
 
 @inner
 def append_fixed(geometry: Array, n: int, index: int, T: Array) -> None:
-    """Replace T by T times constant transform ``index``."""
+    """Replace T by T times the constant transform of number ``index``."""
     at = n + 7 + 12 * index
     for i in range(3):
         a, b, c = T[i, 0], T[i, 1], T[i, 2]
@@ -72,7 +73,7 @@ def spread(q: Array, followers: Array, motions: Array) -> None:
 
 @inner
 def _motions(n: int, geometry: Array) -> int:
-    """Number of motions of a chain of which some follow others; 0 or less without followers."""
+    """Number of motions of a chain with followers; 0 or less for a chain without followers."""
     return int(geometry[n + 7]) - 1
 
 
@@ -135,7 +136,7 @@ def _chain_jacobian(q: Array, geometry: Array, T: Array, J: Array) -> None:
             T[i, j] = 1.0 if i == j else 0.0
     append_fixed(geometry, n, 0, T)
     for j in range(n):
-        # For now, the angular rows contain the axis, and the linear rows a point on it.
+        # Until the tip is known, the angular rows contain the axis, and the linear rows contain a point on the axis.
         sign = 1.0 if geometry[j] > 0.0 else -1.0
         for i in range(3):
             J[i, j], J[3 + i, j] = T[i, 3], sign * T[i, 2]
@@ -171,7 +172,7 @@ def _weighted_jacobian(q: Array, geometry: Array, J: Array) -> None:
 
 @inner
 def _weigh(n: int, geometry: Array, J: Array) -> None:
-    """Weigh a Jacobian (6, n): divide linear rows by the reach, set uncontrolled rows to zero."""
+    """Divide the linear rows of a Jacobian (6, n) by the reach, and set uncontrolled rows to zero."""
     for r in range(6):
         weight = geometry[n + 1 + r] / (geometry[n] if r < 3 else 1.0)
         for j in range(n):
@@ -213,9 +214,9 @@ def descend(T: Array, box: Array, geometry: Array, rounds: int, q: Array) -> flo
 
 @kernel
 def descend_long(T: Array, box: Array, geometry: Array, q: Array) -> float:
-    """:func:`descend`, with more rounds if it ends close to the pose.
+    """Call :func:`descend`, and again with more rounds if the result is close to the pose.
 
-    That happens near singular postures, where the error has a flat and curved valley.
+    This happens near singular postures, where the error has a flat and curved valley.
     """
     square = descend(T, box, geometry, _ROUNDS, q)
     if ZERO < square < _CLOSE:
@@ -228,7 +229,7 @@ def _start(number: int, box: Array, q: Array) -> None:
     """Write joint vector ``number`` (n,) of a sequence that fills a box (2, n) evenly.
 
     Source:
-        Roberts 2018, the R sequence: multiples of powers of the root of x^(n+1) = x + 1.
+        Roberts 2018, the R sequence, built from the powers of the root of x^(n+1) = x + 1.
     """
     n, root = q.shape[0], 2.0
     for _ in range(40):
@@ -248,9 +249,9 @@ def _distance(a: Array, b: Array) -> float:
 
 @inner
 def _search(T: Array, seed: Array, box: Array, geometry: Array, q: Array) -> None:
-    """Search from starts all over the box; replace ``q`` by the solution nearest to the seed.
+    """Search from starts in the whole box; replace ``q`` by the solution nearest to the seed.
 
-    Poses near singular postures and limits, which few starts reach, are searched for longer.
+    If the first starts find no solution, as often near singular postures and limits, more starts are tried.
     """
     trial, nearest = np.empty(q.shape[0]), math.inf
     for number in range(_MOST_STARTS):
@@ -278,7 +279,7 @@ def is_hardly_moving(q: Array, geometry: Array) -> bool:
 def pose_of_chain(q: Array, geometry: Array, J: Array, T: Array) -> bool:
     """Write the pose (4, 4) of a chain without followers, and return :func:`is_hardly_moving`.
 
-    It needs one pass along the chain in place of two. ``J`` is scratch memory of six rows.
+    It needs one pass along the chain instead of two. ``J`` (6, n) is scratch memory.
     """
     _chain_jacobian(q, geometry, T, J)
     _weigh(q.shape[0], geometry, J)
@@ -289,7 +290,7 @@ def pose_of_chain(q: Array, geometry: Array, J: Array, T: Array) -> bool:
 def _is_flat(n: int, geometry: Array, J: Array) -> bool:
     """Whether some controlled direction of a weighted Jacobian (6, n) needs large joint moves.
 
-    The pivots are squares of those of Cholesky's factor of J Jᵀ.
+    The pivots are the squares of the diagonal of the Cholesky factor of J Jᵀ.
     """
     A = room(6, 6)
     for r in range(6):
@@ -331,9 +332,9 @@ def _status(q: Array, T: Array, box: Array, geometry: Array, residual: Array) ->
 def ik(T: Array, seed: Array, limits: Array, geometry: Array, q: Array, residual: Array) -> int:
     """Write joints (n,) next to ``T_base_tip``; see :class:`teleop_core.robots.robot.Kernels`.
 
-    With free steps it runs damped least squares from the seed inside the limits and, if that fails, from a fixed set
-    of starts. In a path it makes one search inside the step around the seed, so that the branch does not change. A
-    numeric search cannot prove that no solution exists. If it finds none, the status is LIMITED with a joint on its
+    With free steps it runs damped least squares from the seed inside the limits and, if that fails, from a fixed set of
+    starts. In a path it makes one search inside the step around the seed, so that the branch does not change. A numeric
+    search cannot prove that no solution exists. If it finds no solution, the status is LIMITED if a joint is on its
     bound, else UNREACHABLE. Likewise the branch is usually, but not provably, the nearest to the seed.
     """
     if not is_askable(T, seed):
@@ -356,7 +357,7 @@ def ik(T: Array, seed: Array, limits: Array, geometry: Array, q: Array, residual
 def ik_all(T: Array, geometry: Array, solutions: Array) -> int:
     """Write the joint vectors (k, n) that many searches find, ignoring limits; return k.
 
-    Rotations are searched in a full circle, slides in the reach. Solutions that no search finds are missed.
+    Rotations are searched over a full circle, slides over the reach. Solutions that no search finds are missing.
     """
     n, count = solutions.shape[1], 0
     box, trial = np.empty((2, n)), np.empty(n)

@@ -1,8 +1,8 @@
 """Robots: one interface for every arm, whether built in, described by a table or your own.
 
-``load_robot("rcrt1")`` takes a name of :func:`list_robots` or the path of a Denavit-Hartenberg table. A table becomes a
-robot with ``robot_from_table({...})``; :func:`register_robot`, or the entry-point group ``teleop_core.robots`` of an
-installed package, gives a robot a name that ``--set robot=`` takes::
+``load_robot("rcrt1")`` takes a name of :func:`list_robots` or the path of a Denavit-Hartenberg table.
+``robot_from_table({...})`` makes a robot from such a table. :func:`register_robot` gives a robot a name for
+``--set robot=``. So does the entry-point group ``teleop_core.robots`` of an installed package. Example::
 
     from teleop_core.robots import register_robot, robot_from_table
 
@@ -80,8 +80,8 @@ def register_robot(robot: Part, name: str | None = None, *, replace: bool = Fals
     Args:
         robot: A :class:`Robot`, a :class:`~teleop_core.robots.arms.dh.DhTable`, or a function
             ``make(**geometry)`` that returns a robot and whose parameters all have defaults.
-        name: Its name in configurations; None for its own name.
-        replace: Whether it may replace a robot that this program registered before.
+        name: Name of the robot in configurations; None for ``robot.name``.
+        replace: Whether ``robot`` may replace a robot of this name that this program registered before.
 
     Returns:
         The same robot, so that this function can be used as a decorator.
@@ -99,19 +99,18 @@ def load_robot(name: str, **geometry: float | str) -> Robot:
     Args:
         name: One of :func:`list_robots`, or the path of a URDF, which ends in ``.urdf`` or
             ``.xacro``, or of a Denavit-Hartenberg table, which ends in ``.yaml`` or ``.yml``.
-        **geometry: Lengths and angles that replace the published ones [m, rad], by the symbols of the robot's file; a
-            robot may have named options too, such as ``heading="carried"``.
-            A URDF takes ``tip="tool0"`` and ``task="x y z"``
-            (:func:`teleop_core.robots.files.from_urdf.load_urdf`), and a xacro its own arguments,
-            as ``**{"xacro.prefix": "left_"}``. Tables and robots that were registered ready-made
-            take none.
+        **geometry: Lengths and angles [m, rad] that replace the published ones, by the symbols in the robot's file.
+            Some robots also take named options, such as ``heading="carried"``. A URDF takes ``tip="tool0"`` and
+            ``task="x y z"`` (:func:`teleop_core.robots.files.from_urdf.load_urdf`). A xacro also takes its own
+            arguments, such as ``**{"xacro.prefix": "left_"}``. Tables and ready-made registered robots take no
+            geometry.
 
     Returns:
         The robot.
 
     Raises:
-        UnknownNameError: No such robot or no such symbol; the alternatives are listed.
-        ParameterError: A length is not possible, or a table has an impossible entry.
+        UnknownNameError: There is no such robot or symbol; the message lists the alternatives.
+        ParameterError: A length is impossible, or a table contains an impossible entry.
         PartError: A robot of another package cannot be loaded.
         OSError: A table cannot be read.
 
@@ -132,7 +131,7 @@ def _loaded(name: str, geometry: Mapping[str, float | str]) -> Robot:
 
 
 def load_robot_set(name: str, settings: Iterable[str]) -> Robot:
-    """Robot by name, with its geometry as texts ``symbol=value``; gives no warnings.
+    """Load a robot by name, with its geometry as texts ``symbol=value`` and without warnings.
 
     Args:
         name: As in :func:`load_robot`.
@@ -143,18 +142,18 @@ def load_robot_set(name: str, settings: Iterable[str]) -> Robot:
         The robot.
 
     Raises:
-        ParameterError: A text without "="; and all errors of :func:`load_robot`.
+        ParameterError: A text contains no "="; and all errors of :func:`load_robot`.
     """
     return _loaded(name, geometry_of(settings))
 
 
 def geometry_of(settings: Iterable[str]) -> dict[str, float | str]:
-    """Geometry of :func:`load_robot` from texts ``symbol=value``; numbers become numbers.
+    """Geometry for :func:`load_robot` from texts ``symbol=value``.
 
-    Arguments of a xacro stay texts.
+    Texts of numbers are converted to numbers; arguments of a xacro stay texts.
 
     Raises:
-        ParameterError: A text without "=".
+        ParameterError: A text contains no "=".
     """
     geometry: dict[str, float | str] = {}
     for text in settings:

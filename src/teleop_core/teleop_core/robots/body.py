@@ -18,7 +18,7 @@ Indices = NDArray[np.int64]
 
 @inner
 def _follow(parent: Array, origin: Array, out: Array) -> None:
-    """Write the pose (7,) of ``origin``, given in the frame of ``parent``."""
+    """Transform the pose ``origin`` (7,) from the frame of ``parent`` to the base; ``out`` (7,) is written."""
     w, x, y, z = parent[3], parent[4], parent[5], parent[6]
     a, b, c = origin[0], origin[1], origin[2]
     # Twice the cross product of the vector part with the point: p + w t + v × t.
@@ -31,7 +31,7 @@ def _follow(parent: Array, origin: Array, out: Array) -> None:
 
 @inner
 def _move(kind: int, value: float, pose: Array) -> None:
-    """Turn a pose (7,) about its z by ``value`` [rad], or push it along its z [m]."""
+    """Rotate a pose (7,) in place about its z axis by ``value`` [rad], or shift it along that axis [m]."""
     w, x, y, z = pose[3], pose[4], pose[5], pose[6]
     if kind == 1:
         c, s = math.cos(0.5 * value), math.sin(0.5 * value)
@@ -54,7 +54,7 @@ def place(
         free: Poses (N, k, 7) of the free bodies; (1, 0, 7) if there are none.
         parents: Parent of each body (B,), smaller than its own index; -1 for the base.
         kinds: Values of :class:`~teleop_core.robots.body.Joint` (B,).
-        places: Index of each body's coordinate, or of its pose among the free ones (B,).
+        places: For each body (B,), the index of its coordinate, or the index of its pose in ``free``.
         origins: Poses (B, 7) in the parents' frames, with all coordinates at zero.
         out: Poses (N, B, 7): x, y, z [m], quaternion w, x, y, z.
     """
@@ -71,8 +71,8 @@ def place(
 
 
 Coordinates: TypeAlias = Callable[[Array], tuple[Array, Array]]
-"""From joint vectors (N, n): coordinates (N, m) of the tree, of which the first n are the joints
-themselves, and poses (N, k, 7), in the base, of the k free bodies."""
+"""Function from joint vectors (N, n) to two arrays. The first array contains the coordinates (N, m) of the tree; the
+first n of them are the joints. The second array contains the poses (N, k, 7) of the k free bodies in the base."""
 HERE = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
 HERE.setflags(write=False)
 
@@ -81,9 +81,9 @@ class Joint(IntEnum):
     """How a body moves relative to its parent."""
 
     FIXED = 0
-    REVOLUTE = 1  # turns about z of the body's own frame
-    PRISMATIC = 2  # slides along z of the body's own frame
-    FREE = 3  # placed in the base as a whole: legs, platforms
+    REVOLUTE = 1  # rotates about the z axis of the body's own frame
+    PRISMATIC = 2  # slides along the z axis of the body's own frame
+    FREE = 3  # a leg or platform whose whole pose in the base is given
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,12 +91,13 @@ class Body:
     """A rigid body of a robot.
 
     Attributes:
-        name: Unique in the robot; the first is ``base``, the last ``tip``.
-        solids: Its shapes, in its frame.
-        parent: Index of its parent body; -1 for the base.
+        name: Unique name; the first body is called ``base``, the last body ``tip``.
+        solids: Shapes of the body, in its own frame.
+        parent: Index of the parent body; -1 for the base.
         joint: Kind of joint that moves the body.
-        origin: Its pose (7,) in the parent's frame, with its coordinate at zero; unused for a free body.
-        coordinate: Index of its coordinate, or of its pose for a free body; -1 for a fixed body.
+        origin: Pose (7,) of the body in the parent's frame when its coordinate is zero; unused for a free body.
+        coordinate: Index of the coordinate that moves the body; for a free body, the index of its pose; -1 for a fixed
+            body.
     """
 
     name: str
@@ -113,10 +114,10 @@ class Bodies:
     Args:
         bodies: The bodies, parents before their children; the base first, the tip last.
         joints: Number of joints of the robot.
-        coordinates: Function from joint vectors to coordinates of the tree and poses of its free bodies; None if the
-            joints are the coordinates and no body is free.
+        coordinates: Function from joint vectors to coordinates of the tree and poses of its free bodies. None means
+            that the joints are the coordinates and that no body is free.
         joint_body: Index of the body that each joint moves first, (n,).
-        size: Length [m] to which the robot reaches, for cameras and arrows.
+        size: Reach of the robot [m]; cameras and arrows are scaled by it.
     """
 
     def __init__(
@@ -139,17 +140,17 @@ class Bodies:
     def poses(self, q: object) -> Array:
         """Poses of all bodies.
 
-        If the loops of a robot do not close at ``q``, the bodies are apart where the loop is open.
+        If a loop of the robot does not close at ``q``, there is a gap between two of its bodies.
 
         Args:
             q: Joint vector (n,) or batch (N, n) [rad, m]; limits are not applied.
 
         Returns:
-            (B, 7) or (N, B, 7) in slave_base: x, y, z [m], quaternion w, x, y, z. The last pose is that of the tip. If
-            a joint is not finite, neither are the poses of the bodies that it moves.
+            (B, 7) or (N, B, 7) in slave_base: x, y, z [m], quaternion w, x, y, z. The last pose is that of the tip. A
+            joint value that is not finite makes the poses of the bodies that it moves not finite.
 
         Raises:
-            ShapeError: Another shape.
+            ShapeError: ``q`` is neither (n,) nor (N, n).
         """
         joints = np.array(q, dtype=np.float64, order="C")  # a writable copy
         if joints.ndim not in {1, 2} or joints.shape[-1] != self.n:
@@ -161,14 +162,14 @@ class Bodies:
         return out[0] if joints.ndim == 1 else out
 
     def coordinates(self, q: Array) -> tuple[Array, Array]:
-        """Coordinates from which callers can compute the poses of all bodies themselves.
+        """Coordinates of the tree and poses of its free bodies, for callers that compute all poses themselves.
 
         Args:
             q: Joint vectors (N, n) [rad, m].
 
         Returns:
-            Coordinates (N, m) of the tree [rad, m], and poses (N, k, 7) of its free bodies; without
-            any of these (1, 0, 7).
+            Coordinates (N, m) of the tree [rad, m], and poses (N, k, 7) of its free bodies; (1, 0, 7) if there is no
+            free body.
         """
         return (q, self._no_free) if self._coordinates is None else self._coordinates(q)
 
@@ -176,6 +177,6 @@ class Bodies:
         """Index of a body by its name.
 
         Raises:
-            ValueError: There is none of that name.
+            ValueError: No body is called ``name``.
         """
         return self.names.index(name)

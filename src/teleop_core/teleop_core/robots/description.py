@@ -12,7 +12,7 @@ from teleop_core.robots.arm import Arm
 from teleop_core.robots.freedom import freedom, lever
 from teleop_core.robots.rank import directions_of
 
-_OF_CHAINS = "fixed0_00"  # a symbol of chains from tables, whose geometry is a row of matrices
+_OF_CHAINS = "fixed0_00"  # geometry symbol that only chains from tables have: an element of a matrix
 
 
 def short(robot: Arm) -> str:
@@ -22,7 +22,7 @@ def short(robot: Arm) -> str:
 
 
 def text(robot: Arm) -> str:
-    """Page: controlled directions, joints, drives, geometry, room, pose of the tip at home."""
+    """Page with the controlled directions, joints, drives, geometry, room to move, and the pose of the tip at home."""
     lines = [f"{robot.name}: {robot.n} joints [rad, m], controls {controlled(robot)} of the tip"]
     if (rank := directions_of(robot, lever(robot)).rank) < len(DIRECTIONS):
         lines.append(f"the tip moves in {rank} of 6 directions at once; task=... chooses which")
@@ -50,7 +50,7 @@ def html(robot: Arm) -> str:
 
 
 def postures(robot: Arm) -> dict[str, Array]:
-    """Home and start by their names; one entry if they are the same."""
+    """Postures home and start by their names; a single entry if the two postures are equal."""
     if np.array_equal(robot.home, robot.start):
         return {"home and start": robot.home}
     return {"home": robot.home, "start": robot.start}

@@ -22,11 +22,11 @@ def controlled_jacobian(robot: Robot, q: object, length: float = 1.0) -> Array:
         length: Distance [m] that counts as much as one radian; linear rows are divided by it.
 
     Returns:
-        (k, n), k the number of directions in the task mask.
+        (k, n), where k is the number of directions in the task mask.
 
     Raises:
-        ShapeError: ``q`` has another shape.
-        ParameterError: NaN or infinity; or the length is not above 0.
+        ShapeError: The shape of ``q`` is not (n,).
+        ParameterError: ``q`` contains NaN or infinity, or the length is not above 0.
         ClosureError: The loops do not close with these joints.
     """
     _check_length(length)
@@ -44,7 +44,7 @@ def _controlled(robot: Robot, jacobian: Array, length: float) -> Array:
 
 
 def _kernel_jacobian(robot: Robot, q: Array) -> Array:
-    """Jacobian (6, n) where loops may be open, too."""
+    """Jacobian (6, n) of a posture; the loops may be open."""
     jacobian = np.empty((6, robot.n))
     robot.kernels.jacobian(q, robot.geometry_row, jacobian)
     return jacobian
@@ -59,11 +59,11 @@ def singular_values(robot: Robot, q: object, length: float = 1.0) -> Array:
         length: Distance [m] that counts as much as one radian.
 
     Returns:
-        (min(k, n),), falling; the last is 0 at a singularity.
+        Singular values (min(k, n),) in descending order; the last is 0 at a singularity.
 
     Raises:
-        ShapeError: ``q`` has another shape.
-        ParameterError: NaN or infinity; or the length is not above 0.
+        ShapeError: The shape of ``q`` is not (n,).
+        ParameterError: ``q`` contains NaN or infinity, or the length is not above 0.
         ClosureError: The loops do not close with these joints.
     """
     jacobian = controlled_jacobian(robot, q, length)
@@ -73,8 +73,8 @@ def singular_values(robot: Robot, q: object, length: float = 1.0) -> Array:
 def manipulability(robot: Robot, q: object, length: float = 1.0) -> float:
     """Volume of the manipulability ellipsoid up to a constant factor: the product of singular values.
 
-    It is sqrt(det(J Jᵀ)) for arms with as many joints as controlled directions or more, and 0 at a
-    singularity. Arguments and errors as :func:`singular_values`.
+    The manipulability is 0 at a singularity. For arms with at least as many joints as controlled directions it equals
+    sqrt(det(J Jᵀ)). Arguments and errors are those of :func:`singular_values`.
 
     Source:
         Yoshikawa 1985, eq. 6.
@@ -85,10 +85,10 @@ def manipulability(robot: Robot, q: object, length: float = 1.0) -> float:
 def sample_workspace(robot: Robot, count: int, rng: np.random.Generator, length: float = 1.0) -> tuple[Array, Array]:
     """Tip positions and manipulability of joint vectors drawn evenly inside the limits.
 
-    Samples that are uniform in the joints are not uniform in space: the density of points shows how many postures
-    reach a position. Joint vectors at which a robot's loops do not close in home's assembly are left out. If none
-    closes, all count with their pose of least error. This happens for a hand, whose random joints never hold an
-    object.
+    Samples that are uniform in the joints are not uniform in space: the density of points shows how many postures reach
+    a position. Joint vectors at which the loops do not close in the assembly of home are left out. If the loops close
+    at no joint vector, all joint vectors are used, with their poses of least error. This happens for a hand, because
+    random joints never grasp an object.
 
     Args:
         robot: The arm.
@@ -97,7 +97,7 @@ def sample_workspace(robot: Robot, count: int, rng: np.random.Generator, length:
         length: Distance [m] that counts as much as one radian in the manipulability.
 
     Returns:
-        Points in the base (k, 3) [m], and manipulability (k,); k is the count without loops.
+        Points in the base (k, 3) [m], and manipulability (k,). For a robot without loops k equals ``count``.
 
     Raises:
         ParameterError: The count is below 1, or the length is not above 0.
@@ -116,7 +116,7 @@ def sample_workspace(robot: Robot, count: int, rng: np.random.Generator, length:
 
 
 def write_workspace_csv(path: Path | str, points: Array, values: Array) -> None:
-    """Write samples as CSV with the header :data:`COLUMNS`, all digits, one row per sample.
+    """Write samples as CSV: the header :data:`COLUMNS`, then one row per sample, in full precision.
 
     Args:
         path: New or existing file; it is replaced.

@@ -13,7 +13,7 @@ from teleop_core.kernels import Array, kernel
 from teleop_core.robots.inertias import LinkInertia, check_possible
 
 _ROW = types.float64[::1]
-# Signatures that let one compiled slave move any robot: see Dynamics for the arguments.
+# Kernel signatures, shared by all robots, so that one compiled slave can move any robot; the arguments: see Dynamics.
 ACCELERATION = types.void(_ROW, _ROW, _ROW, _ROW, _ROW)
 GRAVITY = types.void(_ROW, _ROW, _ROW)
 AccelerationKernel: TypeAlias = Callable[[Array, Array, Array, Array, Array], None]
@@ -36,7 +36,7 @@ def read_only(name: str, values: object, shape: tuple[int, ...] | None = None) -
     """Read-only copy of finite numbers.
 
     Raises:
-        ShapeError: Not a vector, or another shape than the wanted one.
+        ShapeError: ``values`` is not a vector, or does not have the wanted shape.
         ParameterError: A value is NaN or infinite.
     """
     array = np.array(values, dtype=np.float64)
@@ -53,7 +53,7 @@ class Drives:
     """Drive table of a slave, one entry per joint, (n,) each; the arrays are read-only copies.
 
     Args:
-        inertia: Reflected motor inertia plus, at home, that of the links [kg·m² or kg], > 0.
+        inertia: Reflected inertia of the motor plus the inertia of the links at home [kg·m² or kg], > 0.
         viscous: Viscous friction [N·m·s/rad or N·s/m], >= 0.
         coulomb: Dry friction [N·m or N], >= 0.
         friction_speed: Speed at which dry friction reaches 70 % of its value [rad/s or m/s], > 0.
@@ -65,7 +65,7 @@ class Drives:
 
     Raises:
         ShapeError: Entries are not vectors of one length.
-        ParameterError: A value is not possible.
+        ParameterError: A value is impossible.
         UnknownNameError: A name in ``assumed`` is not an entry.
     """
 
@@ -99,19 +99,20 @@ class Drives:
 class Dynamics:
     """Rigid-body model of a slave over its ``parameters`` row; arrays are read-only copies.
 
-    ``acceleration(q, dq, effort, parameters, ddq)`` and ``gravity(q, parameters, effort)`` write their last argument
-    (n,); both are kernels or plain Python. They take writable arrays: hand them a copy of ``parameters``.
+    ``acceleration(q, dq, effort, parameters, ddq)`` and ``gravity(q, parameters, effort)`` write their result into
+    their last argument (n,). Each is a kernel or a plain Python function. Kernels accept only writable arrays, so pass
+    a copy of ``parameters``.
 
     Args:
         acceleration: Joint accelerations under the net effort.
         gravity: Effort [N·m or N] that holds the arm at rest.
-        parameters: Numbers that both read, in the model's own order.
-        compensated: Axes (n,) whose gravity the published controller feeds forward.
+        parameters: Numbers that ``acceleration`` and ``gravity`` read, in the model's own order.
+        compensated: Whether the published controller compensates the gravity of each axis by feed-forward (n,).
         links: Inertias of the links from which these numbers were computed; () if the model has none.
-        frames: Frames of these links in the base with all joints at home, (k, 4, 4), the k-th moved by joint k; () if
-            they are not known, or if there are no links.
-        unknown: Maps names of numbers that the source does not state to their indices in the row; the real arm may
-            differ in them (:mod:`teleop_lab.fitting`).
+        frames: Frames of these links in the base with all joints at home, (k, 4, 4). Joint k moves the k-th frame. ()
+            if the frames are unknown, or if there are no links.
+        unknown: Names of the parameters that the source does not state, with their indices in ``parameters``. Their
+            values for the real arm may differ (:mod:`teleop_lab.fitting`).
 
     Raises:
         ShapeError: ``parameters`` is not a vector, or the number of frames differs from the number of links.
@@ -150,16 +151,16 @@ def independent_acceleration(q: Array, dq: Array, effort: Array, inertia: Array,
 
 @kernel
 def no_gravity(q: Array, inertia: Array, effort: Array) -> None:
-    """Write zeros: balanced axes."""
+    """Write an effort of zero into ``effort``: the gravity of the axes is balanced."""
     for i in range(effort.shape[0]):
         effort[i] = 0.0
 
 
 def independent_axes(inertia: Array) -> Dynamics:
-    """Model of axes that do not act on each other, with these inertias (n,) [kg·m² or kg].
+    """Model of axes without dynamic coupling, with these inertias (n,) [kg·m² or kg].
 
     Raises:
-        ParameterError: An inertia that is not positive and finite.
+        ParameterError: An inertia is not positive and finite.
     """
     if not (np.isfinite(inertia) & (np.asarray(inertia) > 0.0)).all():
         raise ParameterError("inertia", np.asarray(inertia).tolist(), "> 0 for every joint")

@@ -16,7 +16,7 @@ def solved_one(robot: arm.Arm, q: Array, seed: object, *, search: bool = True) -
     """Pose of a joint vector (n,), by the rules of :meth:`Robot.solve_fk`.
 
     Raises:
-        ShapeError: The seed has another shape.
+        ShapeError: The seed has a wrong shape.
         ParameterError: The seed is not a rigid transform.
     """
     T, numbers = np.empty((4, 4)), np.zeros(2)
@@ -34,7 +34,7 @@ def solved(robot: arm.Arm, joints: Array, seed: object, *, search: bool = True, 
     """Poses of joint vectors (N, n), by the rules of :meth:`Robot.solve_fk`.
 
     Raises:
-        ShapeError: The seed has another shape.
+        ShapeError: The seed has a wrong shape.
         ParameterError: The seed is not a rigid transform.
     """
     count = len(joints)
@@ -65,7 +65,7 @@ def closed_poses(robot: arm.Arm, joints: Array) -> Array:
     """Poses of joint vectors (n,) or (N, n) at which the loops close.
 
     Raises:
-        ClosureError: The loops do not close for some joint vector.
+        ClosureError: The loops do not close for at least one joint vector.
     """
     if joints.ndim == 1:
         one = solved_one(robot, joints, None)
@@ -95,7 +95,7 @@ def all_poses(robot: arm.Arm, joints: Array) -> Array:
 
 
 def distances(T: Array, others: Array) -> Array:
-    """Largest differences (k,) of the entries of a transform (4, 4) to others (k, 4, 4)."""
+    """Largest difference of an element between a transform (4, 4) and each of ``others`` (k, 4, 4); shape (k,)."""
     return np.asarray(np.abs(others - T).max(axis=(1, 2)))
 
 

@@ -1,8 +1,8 @@
 """Freedom: the distance by which the tip can move in every direction, and the posture at which a slave starts.
 
-The tip is moved away from a posture along 26 directions, and rotated about as many axes, in small steps, as a hand
-would move it. A direction ends at a joint limit or near a singularity, where a joint has to move :data:`SWIFT` times
-as far as the tool. The *room* of the posture is the distance in the worst direction.
+The tip is moved away from a posture in small steps, along 26 directions, and rotated about 26 axes, as a hand would
+move it. The motion in a direction stops at a joint limit, or near a singularity, where a joint has to move
+:data:`SWIFT` times as far as the tool. The *room* of the posture is the distance in the worst direction.
 """
 
 import itertools
@@ -17,14 +17,14 @@ from teleop_core.kernels import Array, length, product, raise_pending, rotations
 from teleop_core.kinematics import IkStatus
 from teleop_core.robots import arm
 
-# One step rotates the tool by this angle [rad], or moves it as far as a lever of reach/pi with this angle.
+# Angle of one step of rotation [rad]. The length of one step of translation is this angle times reach/pi.
 STEP = math.radians(2.0)
 STEPS = 45
 # Near a singularity a joint moves more than this many times as far as the tool.
 SWIFT = 3.0
-# Home has enough room if, in the worst direction, the tip can rotate by the first angle [rad] and move as far as the
-# lever does with the second angle: reach/15.
+# Rotation [rad] in the worst direction with which home has enough room.
 ENOUGH = math.radians(30.0)
+# Translation in the worst direction with which home has enough room, divided by reach/pi: reach/15.
 ENOUGH_MOVE = math.radians(12.0)
 # Postures with at least this share of the largest room count as equal.
 EQUAL = 0.9
@@ -51,11 +51,12 @@ def freedom(robot: arm.Arm, q: object) -> Freedom:
         q: Joint vector (n,) [rad, m] inside the limits.
 
     Returns:
-        :class:`Freedom`, in whole steps of 2 degrees and reach/pi times that, up to 90 degrees.
+        :class:`Freedom`, in whole steps. A step of rotation is 2 degrees; a step of translation is 2 degrees [rad]
+        times reach/pi. The search stops after 45 steps (90 degrees).
 
     Raises:
-        ShapeError: Another shape.
-        ParameterError: NaN or infinity.
+        ShapeError: The shape of ``q`` is not (n,).
+        ParameterError: ``q`` contains NaN or infinity.
     """
     postures = np.array(q, dtype=np.float64, ndmin=2)
     moves, turns = _steps(robot, postures)
@@ -65,16 +66,16 @@ def freedom(robot: arm.Arm, q: object) -> Freedom:
 def lever(robot: arm.Arm) -> float:
     """Distance [m] that counts as much as a radian: reach/pi.
 
-    The reach is the largest distance of the tip from the base's origin over the examined postures.
+    The reach is the largest distance between the tip and the origin of the base in the examined postures.
     """
     return float(length(_poses(robot, samples(robot))[:, :3, 3]).max()) / math.pi
 
 
 def samples(robot: arm.Arm) -> Array:
-    """Joint vectors (:data:`SAMPLES`, n) spread evenly inside the limits, the same every time.
+    """Joint vectors (:data:`SAMPLES`, n) spread evenly inside the limits; every call returns the same ones.
 
     Source:
-        Roberts 2018, the R sequence: multiples of powers of the root of x^(n+1) = x + 1.
+        Roberts 2018, the R sequence, built from the powers of the root of x^(n+1) = x + 1.
     """
     root = 2.0
     for _ in range(60):
@@ -85,7 +86,7 @@ def samples(robot: arm.Arm) -> Array:
 
 
 def start_of(robot: arm.Arm) -> Array:
-    """:func:`start_posture`, computed once per program for equal robots."""
+    """Result of :func:`start_posture`, computed once per program for equal robots."""
     arrays = (robot.lower, robot.upper, robot.home, robot.geometry_row, np.array(robot.task_mask))
     key = (robot.kernels, *(array.tobytes() for array in arrays))
     if key not in _KNOWN:
@@ -96,11 +97,11 @@ def start_of(robot: arm.Arm) -> Array:
 def start_posture(robot: arm.Arm) -> Array:
     """Posture from which the tip has room in all directions, by a deterministic rule.
 
-    Home is taken if the tip can rotate by 30 degrees and move by reach/15 there. Otherwise the candidates are the
-    examined postures whose tool has the same orientation as at home, if one of these has as much room; if none has,
-    the candidates are all examined postures. Candidates with at least :data:`EQUAL` of the largest room count as equal.
-    Of these, the one nearest to home is taken: the one whose largest joint motion, as a share of the joint's range, is
-    smallest.
+    Home is taken if it has enough room: a rotation by 30 degrees and a move by reach/15. Otherwise the candidates are
+    the examined postures with the tool attitude of home. If none of these can rotate by 30 degrees and move by 30
+    degrees times reach/pi, all examined postures are candidates. Of the candidates with at least :data:`EQUAL` of the
+    largest room, the one nearest to home is taken. The distance from home is the largest joint difference, divided by
+    the range of the joint.
 
     Args:
         robot: The arm.
@@ -133,7 +134,7 @@ def free_postures(robot: arm.Arm, count: int) -> Array:
         count: Largest number of postures.
 
     Returns:
-        (k, n) [rad, m], k at least 1: postures without room are left out.
+        Postures (k, n) [rad, m] with k >= 1; postures without room are left out.
     """
     spread = samples(robot)
     steps = np.minimum(*_steps(robot, spread))
@@ -143,12 +144,12 @@ def free_postures(robot: arm.Arm, count: int) -> Array:
 
 
 def _poses(robot: arm.Arm, postures: Array) -> Array:
-    """Poses (N, 4, 4) next to home; those of least error for joints at which the loops do not close."""
+    """Poses (N, 4, 4) in the assembly of home; poses of least error for joints at which the loops do not close."""
     return robot.solve_fk_batch(postures, search=False).T
 
 
 def _steps(robot: arm.Arm, postures: Array) -> tuple[Array, Array]:
-    """Steps (N,) that every posture has in its worst direction: of moving, of turning; or inf."""
+    """Steps (N,) of translation, and of rotation, that postures allow in the worst direction; inf without direction."""
     mask = np.array(robot.task_mask)
     return (
         _walk(robot, postures, _directions(mask[:3]), is_turn=False),
@@ -157,14 +158,14 @@ def _steps(robot: arm.Arm, postures: Array) -> tuple[Array, Array]:
 
 
 def _directions(controlled: NDArray[np.bool_]) -> Array:
-    """Unit vectors (k, 3) along the axes that are controlled and halfway between them."""
+    """Unit vectors (k, 3) along the controlled axes, in both directions, and along all diagonals between these axes."""
     every = np.array(list(itertools.product((-1.0, 0.0, 1.0), repeat=3)))
     kept = every[(every != 0.0).any(axis=1) & (every[:, ~controlled] == 0.0).all(axis=1)]
     return kept / length(kept)[:, None]
 
 
 def _walk(robot: arm.Arm, postures: Array, directions: Array, *, is_turn: bool) -> Array:
-    """Steps (N,) that each posture has in its worst direction."""
+    """Number of steps (N,) that each posture allows in its worst direction."""
     count, fan = len(postures), len(directions)
     if not fan:
         return np.full(count, np.inf)
@@ -188,7 +189,7 @@ def _walk(robot: arm.Arm, postures: Array, directions: Array, *, is_turn: bool) 
 
 
 def _moved(begin: Array, offsets: Array, is_turn: bool) -> Array:
-    """Poses (N k, 4, 4): each of N moved by each of k offsets (k, 3) [m], or turned [rad]."""
+    """Poses (N k, 4, 4): each of the N poses, shifted [m] or rotated [rad] by each of the k offsets (k, 3)."""
     poses = np.repeat(begin, len(offsets), axis=0).reshape(len(begin), -1, 4, 4)
     if is_turn:
         angle = length(offsets)[:, None]

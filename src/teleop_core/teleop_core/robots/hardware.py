@@ -22,12 +22,12 @@ class Hardware:
 
     Args:
         coulomb: Dry friction that holds a joint at rest [N·m or N], >= 0.
-        bias: Effort that the amplifier gives at a command of zero [N·m or N].
-        wander: Standard deviation of dry friction, divided by its mean, >= 0.
+        bias: Effort of the motor while the command is zero, an offset of the amplifier [N·m or N].
+        wander: Standard deviation of the dry friction, divided by the mean friction, >= 0.
         play: Half width of the play between encoder and joint [rad or m], >= 0: backlash, and friction behind an
             elastic tendon, which has the same effect.
-        coupling: Motion of a joint per lag of an earlier joint behind its encoder, (n, n), zero on and above the
-            diagonal.
+        coupling: Matrix (n, n), zero on and above the diagonal. Element (i, j) is the motion of joint i per unit of lag
+            of joint j behind the encoder of joint j.
         links: How the links, and the zeros of the joints, differ from the drawing; None for no difference.
         dynamics: Parameter row of the true dynamics; empty if they equal those of the control law.
         motors: Inertias of the motors through their gears (n,) [kg·m² or kg]; empty: not known.
@@ -36,7 +36,7 @@ class Hardware:
 
     Raises:
         ShapeError: The shape of an array does not fit that of ``coulomb``.
-        ParameterError: A number is not possible, or a source has no valid mark.
+        ParameterError: A number is impossible, or a source does not begin with a valid mark.
         UnknownNameError: A name in ``sources`` is not one of the numbers.
     """
 

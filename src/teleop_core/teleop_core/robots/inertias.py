@@ -1,9 +1,9 @@
 """Inertias of links: mass, centre and moments as a value, and whether a body can have them.
 
 A rigid body of positive density has a positive mass and three positive principal moments about its centre of mass, of
-which none exceeds the sum of the other two. All this is equivalent to one condition: the pseudo-inertia (4, 4) ∫ (x,
-1)(x, 1)ᵀ dm is positive definite. A flat plate, whose largest moment equals that sum, is accepted. A point or a line
-is refused, because no physics engine can rotate it.
+which none exceeds the sum of the other two. These conditions together are equivalent to one: the pseudo-inertia (4, 4)
+∫ (x, 1)(x, 1)ᵀ dm is positive definite. A flat plate, whose largest moment equals that sum, is accepted. A point or a
+line is refused, because no physics engine can rotate it.
 
 Source:
     Wensing, Kim and Slotine 2018, Linear matrix inequalities for physically consistent inertial
@@ -18,8 +18,8 @@ import numpy as np
 from teleop_core.base import ParameterError, ShapeError
 from teleop_core.kernels import Array, dot
 
-# Share of the largest moment by which rounding may violate the triangle inequality: for a plate, or for numbers that a
-# source prints with few digits.
+# Tolerance of the triangle inequality, divided by the largest moment. Numbers of a plate, or numbers that a source
+# prints with few digits, violate the inequality by rounding.
 _ROUNDING = 1e-9
 
 
@@ -35,9 +35,9 @@ class LinkInertia:
             off-diagonal elements are -∫xy dm. :meth:`about_origin` accepts either sign.
 
     Raises:
-        ShapeError: Centre or tensor of another shape.
-        ParameterError: Values that are not finite, or a tensor that is not symmetric. Only :func:`check_possible`
-            checks whether a body can have these values.
+        ShapeError: The centre is not (3,), or the tensor is not (3, 3).
+        ParameterError: A value is not finite, or the tensor is not symmetric. Only :func:`check_possible` checks
+            whether a body can have these values.
     """
 
     name: str
@@ -87,13 +87,13 @@ class LinkInertia:
 
     @property
     def central(self) -> Array:
-        """Tensor (3, 3) about the centre of mass [kg·m²], in the same axes (parallel axes)."""
+        """Tensor (3, 3) about the centre of mass [kg·m²], in the axes of the frame (parallel-axis theorem)."""
         c = self.center
         return self.inertia - self.mass * (dot(c, c) * np.eye(3) - np.outer(c, c))
 
     @property
     def pseudo(self) -> Array:
-        """Pseudo-inertia (4, 4) about the origin: second moments [kg·m²], m times center, m."""
+        """Pseudo-inertia (4, 4) about the origin: second moments [kg·m²] (3, 3), mass times centre (3,), and mass."""
         out = np.empty((4, 4))
         out[:3, :3] = 0.5 * np.trace(self.inertia) * np.eye(3) - self.inertia
         out[:3, 3] = out[3, :3] = self.mass * self.center
@@ -105,9 +105,8 @@ def check_possible(links: Iterable[LinkInertia]) -> None:
     """Refuse inertias that no body can have.
 
     Raises:
-        ParameterError: Names the link and its mass, or the eigenvalue that is not possible: a
-            principal moment that is not positive, or a second moment ∫x² dm that is negative, by
-            which one principal moment exceeds the sum of the others.
+        ParameterError: A mass or a principal moment is not positive, or a second moment ∫x² dm is negative, so that one
+            principal moment exceeds the sum of the other two. The message names the link and the value.
     """
     for link in links:
         _check_link(link)
@@ -122,7 +121,7 @@ def _check_link(link: LinkInertia) -> None:
     if moments[0] <= 0.0:
         what = f"smallest principal moment about the centre of mass {of}"
         raise ParameterError(what, float(moments[0]), f"> 0 kg·m²{hint}")
-    # Second moments along the principal axes: half the sum of two moments less the third.
+    # Second moment along a principal axis: half of (the sum of the two other principal moments minus its own moment).
     least = 0.5 * (moments[0] + moments[1] - moments[2])
     if least < -_ROUNDING * moments[2]:
         what = f"smallest second moment about the centre of mass {of}"

@@ -1,17 +1,17 @@
 """Link errors: how a built arm differs from its drawing, as deltas of Denavit-Hartenberg numbers.
 
-Link i of a chain is T_i = Rz(theta) Tz(d) Tx(a) Rx(alpha), the standard convention. A built arm has theta + its error
-of theta and so on; joint offsets are errors of theta on turning and of d on sliding joints.
-:func:`~teleop_core.robots.arms.as_chain.true_chain` returns the geometry row of the arm as built, for which
+Link i of a chain is T_i = Rz(theta) Tz(d) Tx(a) Rx(alpha), the standard convention. The built arm has theta plus the
+error of theta, and so on. A joint offset is an error of theta for a turning joint, and an error of d for a sliding
+joint. :func:`~teleop_core.robots.arms.as_chain.true_chain` returns the geometry row of the arm as built, for which
 :func:`teleop_core.kinematics.dh_kernels.fk` computes the true pose of the tip::
 
     errors = LinkErrors.of(robot, {"d3": 5.5e-3})
     dh_kernels.fk(q, true_chain(robot, errors), T_base_tip)
 
-Arms described in other conventions are converted to this one: every pair of successive axes has a common normal, along
-which a is measured, pointing to the later axis. For parallel axes any common normal is taken. A small rotation of the
-later axis out of the plane of both is then not described by the four numbers (Hayati and Mirmirani 1985). So these
-numbers do not cover all errors of a pair of nearly parallel axes.
+Arms described in other conventions are converted to the standard convention. Every pair of successive axes has a common
+normal, which points to the later axis; a is the length along it. For parallel axes any common normal is taken. The four
+numbers then cannot describe a small rotation of the later axis out of the plane of the two axes (Hayati and Mirmirani
+1985). So these numbers do not cover all errors of a pair of nearly parallel axes.
 
 Source:
     Denavit and Hartenberg 1955; Mooring, Roth and Driels 1991, Fundamentals of manipulator calibration.
@@ -29,25 +29,24 @@ from teleop_core.kernels import Array, inverse_motion, product, rotation, transf
 from teleop_core.robots import arm, drives
 
 SYMBOLS = ("a", "alpha", "d", "theta")
-"""Kinds of errors, in the order of every vector of them: a1 ... an, alpha1 ... thetan."""
-# Sine of the angle between axes below which they count as parallel, and distance [m] below which
-# they count as one line.
-_PARALLEL, _ONE_LINE = 1e-9, 1e-12
+"""Kinds of errors. A vector of errors is sorted by kind: first a1 ... an, then alpha1 ... alphan, then d and theta."""
+_PARALLEL = 1e-9  # axes with a smaller sine of the angle between them count as parallel
+_ONE_LINE = 1e-12  # parallel axes with a smaller distance count as one line [m]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class LinkErrors:
-    """Deltas of each link's Denavit-Hartenberg numbers: built minus drawn; read-only copies.
+    """Errors of each link's Denavit-Hartenberg numbers: value as built minus value as drawn; read-only copies.
 
     Args:
-        a: Along the common normal, (n,) [m].
+        a: Errors of the length along the common normal, (n,) [m].
         alpha: Errors of the twist about the common normal, (n,) [rad].
-        d: Along the joint's axis, (n,) [m]; the offset of a sliding joint.
-        theta: About the joint's axis, (n,) [rad]; the offset of a turning joint.
+        d: Errors of the distance along the joint's axis, (n,) [m]; the offset of a sliding joint.
+        theta: Errors of the angle about the joint's axis, (n,) [rad]; the offset of a turning joint.
 
     Raises:
-        ShapeError: Not four vectors of one length.
-        ParameterError: NaN or infinity.
+        ShapeError: The arguments are not four vectors of equal length.
+        ParameterError: A value is NaN or infinite.
     """
 
     a: Array
@@ -91,8 +90,8 @@ class LinkErrors:
         """Errors by name, such as ``{"d3": 5.5e-3}``; all others are zero.
 
         Raises:
-            UnknownNameError: No such error; the alternatives are listed.
-            ParameterError: A value that is not finite.
+            UnknownNameError: No error has this name; the message lists the names.
+            ParameterError: A value is not finite.
         """
         names = error_names(robot.n)
         vector = np.zeros(len(names))
@@ -107,7 +106,7 @@ class LinkErrors:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Chain:
-    """A serial arm T_base_tip = F0 J1 F1 J2 ... Jn Fn, Ji about or along the local z axis.
+    """A serial arm T_base_tip = F0 J1 F1 J2 ... Jn Fn; each Ji is a motion about or along the local z axis.
 
     Args:
         kinds: Kind of each joint as in :mod:`~teleop_core.kinematics.dh_kernels`, (n,).
@@ -125,10 +124,10 @@ class Chain:
         return len(self.kinds)
 
     def built(self, errors: LinkErrors) -> Array:
-        """Geometry row of the arm with these errors; that of the drawing for none.
+        """Geometry row of the arm with these errors; without errors, the row of the drawing.
 
-        Link i becomes Ji Rz(theta) Tz(d) Fi Si⁻¹ Tx(a) Rx(alpha) Si with the errors alone, Si being
-        what Fi moves along the axis of the next joint.
+        Link i becomes Ji Rz(theta) Tz(d) Fi Si⁻¹ Tx(a) Rx(alpha) Si, where theta, d, a and alpha are the errors alone.
+        Si is the part of Fi that moves along the axis of the next joint.
         """
         row = self.row.copy()
         for i in range(self.n):
@@ -142,7 +141,7 @@ class Chain:
 
 
 def _errors_of_link(errors: LinkErrors, i: int) -> tuple[Array, Array]:
-    """Motions (4, 4) along and about z, and along and about x, by which a link is off."""
+    """Two errors of a link as transforms (4, 4): along and about z, and along and about x."""
     along_z = transform(rotation("z", errors.theta[i]), np.array([0.0, 0.0, errors.d[i]]))
     along_x = transform(rotation("x", errors.alpha[i]), np.array([errors.a[i], 0.0, 0.0]))
     return along_z, along_x
@@ -167,7 +166,7 @@ def next_axis_motion(F: Array) -> Array:
     turn = math.atan2(R[2, 0], R[2, 1])
     if abs(turn) > 0.5 * math.pi + _PARALLEL:  # the normal in the opposite direction
         turn, sine = turn - math.copysign(math.pi, turn), -sine
-    # The first column of Rz(theta) is that of R turned back.
+    # The first column of Rz(theta) is the first column of R, rotated back.
     normal = product(R, rotation("z", -turn)[:, 0])
     slide = (normal[1] * p[0] - normal[0] * p[1]) / sine
     return transform(rotation("z", turn), np.array([0.0, 0.0, slide]))

@@ -22,7 +22,7 @@ DESCRIPTION = "_description"
 """Suffix of names of the package ``robot_descriptions``."""
 ARGUMENT = "xacro."
 """Prefix of xacro arguments in a robot's geometry."""
-# Characters kept of an error message of a user's kernel, which may be pages long.
+# Largest number of characters kept of an error message of a user's kernel; such a message may be pages long.
 _MOST_CHARACTERS = 200
 
 
@@ -36,7 +36,8 @@ class RobotSource(Protocol):
 
 
 RobotPart: TypeAlias = Robot | RobotSource | Callable[..., Robot]
-"""A robot, an object that describes one, or ``make(**geometry)`` that returns one; all arguments have defaults."""
+"""A robot, an object that describes a robot, or a function ``make(**geometry)`` that returns a robot; all its arguments
+have defaults."""
 Part = TypeVar("Part", bound=RobotPart)
 
 
@@ -44,7 +45,7 @@ def built(name: str, part: RobotPart, geometry: Mapping[str, float | str]) -> Ro
     """Robot of a part.
 
     Raises:
-        UnknownNameError: The part's function does not take such a symbol.
+        UnknownNameError: The part's function does not accept one of the symbols.
         ParameterError: A ready robot is given a geometry, or a length is not possible.
         PartError: The part does not make a robot.
     """
@@ -64,7 +65,7 @@ def built(name: str, part: RobotPart, geometry: Mapping[str, float | str]) -> Ro
 
 
 def from_file(path: str, geometry: Mapping[str, float | str]) -> Robot | None:
-    """Robot of a URDF, a description or a Denavit-Hartenberg table; None of other names."""
+    """Robot of a URDF, a description or a Denavit-Hartenberg table; None if ``path`` is none of these."""
     found = file_of(path)
     if found is None:
         return None
@@ -80,7 +81,7 @@ def from_file(path: str, geometry: Mapping[str, float | str]) -> Robot | None:
 
 
 def file_of(name: str) -> tuple[Path, dict[str, str]] | None:
-    """File of a robot's name, and arguments that come with it for a xacro; None of other names.
+    """File that a robot's name means, and the arguments for its xacro; None if the name means no file.
 
     Raises:
         TeleopError: As in :func:`~teleop_core.robots.files.descriptions.description_file`.
@@ -94,13 +95,13 @@ def file_of(name: str) -> tuple[Path, dict[str, str]] | None:
 
 
 def is_urdf(name: str) -> bool:
-    """Whether a robot's name is a URDF, a xacro or a description."""
+    """Whether a robot's name means a URDF, a xacro or a description."""
     is_description = name.endswith(DESCRIPTION) and name not in ROBOTS.names()
     return name.lower().endswith(_URDF_ENDINGS) or is_description
 
 
 def arguments_of(geometry: Mapping[str, float | str]) -> dict[str, str]:
-    """Arguments of a xacro that a robot's geometry holds, by their names."""
+    """Arguments of a xacro in a robot's geometry, by their names without the prefix."""
     given = {n: str(v) for n, v in geometry.items() if n.startswith(ARGUMENT)}
     return {name.removeprefix(ARGUMENT): value for name, value in given.items()}
 
@@ -125,7 +126,7 @@ def _checked(name: str, part: object) -> RobotPart:
         inspect.signature(part).bind()
     except TypeError as error:
         raise PartError("robot", name, f"a function whose parameters all have defaults ({error})") from error
-    except ValueError:  # built into Python: no signature to look at
+    except ValueError:  # a built-in function of Python has no signature
         pass
     return part
 

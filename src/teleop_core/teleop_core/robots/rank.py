@@ -1,8 +1,9 @@
 """Rank: the number of directions in which a tip can move at once, and the choice of the controlled directions.
 
-An arm of five joints cannot reach every pose. If it has to control all six directions, it follows none of them well. Of
-the sets of directions in which it can move at once, those with the most position directions are candidates. The chosen
-set needs the least joint motion in its worst direction, in the median over postures spread evenly within the limits.
+An arm of five joints cannot reach every pose. If it has to control all six directions, its tip follows the goal well in
+none of them. Candidates are the sets of directions in which the tip can move at once. Of these, the sets with the most
+position directions are kept. The chosen set needs the least joint motion in its worst direction: the median over
+postures spread evenly within the limits.
 """
 
 from itertools import combinations
@@ -14,20 +15,21 @@ from teleop_core.kernels.geometry import Array
 from teleop_core.kinematics import DIRECTIONS
 from teleop_core.robots import arm, freedom
 
-_POSTURES, _FEW = 128, 4
-_NONE = 1e-6  # singular value, divided by the lever, of a direction in which the tip cannot move
+_POSTURES = 128  # number of postures that are examined
+_FEW = 4  # number of postures that suffice if the rank is full at one of them
+_NONE = 1e-6  # in a direction with a smaller singular value the tip cannot move
 _POOR = 1e-3  # a set of directions is useless if the median of its least singular value is below this
 
 
 class Directions(NamedTuple):
-    """In how many directions a tip can move at once, and the names of those to control."""
+    """Number of directions in which a tip can move at once, and the names of the directions to control."""
 
     rank: int
     best: tuple[str, ...]
 
 
 def directions_of(robot: arm.Arm, lever: float) -> Directions:
-    """Directions that a robot can control, of all six; ``robot`` itself may be set to control fewer.
+    """Directions that a robot can control, of all six, whatever its own task mask is.
 
     Args:
         robot: The arm.
@@ -58,9 +60,9 @@ def _rank(jacobians: Array) -> int:
 
 
 def _jacobians(robot: arm.Arm, postures: Array, lever: float) -> Array:
-    """Jacobians (k, 6, n) at postures (k, n), with linear rows over the lever."""
+    """Jacobians (k, 6, n) at postures (k, n), with linear rows divided by the lever."""
     found, row = np.empty((len(postures), 6, robot.n)), robot.geometry_row
     for q, jacobian in zip(postures, found, strict=True):
         robot.kernels.jacobian(q.copy(), row, jacobian)
-    found[:, :3] /= lever or 1.0  # 1 for a tip that only turns
+    found[:, :3] /= lever or 1.0  # the lever of a tip that only rotates is 0
     return found

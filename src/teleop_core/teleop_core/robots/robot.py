@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 
 
 class _Start:
-    """Start posture of a robot: the given one, or the one of the rule, computed at its first use."""
+    """Start posture of a robot: the given posture, or the result of ``start_posture``, computed at first use."""
 
     @overload
     def __get__(self, robot: None, owner: type) -> None: ...
@@ -47,7 +47,7 @@ class _Start:
     def __get__(self, robot: "Robot", owner: type) -> Array: ...
     def __get__(self, robot: "Robot | None", owner: type) -> Array | None:
         if robot is None:
-            return None  # the field's default
+            return None  # default of the field ``start``
         if robot.__dict__["start"] is None:
             posture = read_only("start", freedom.start_of(robot), (robot.n,))
             robot.__dict__["start"] = posture
@@ -59,9 +59,9 @@ class _Start:
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Robot:
-    """An arm: names, limits, home and the kinematics over them; metres and radians.
+    """An arm: joint names, limits, home and kinematics, in metres and radians.
 
-    All its arrays are read-only copies; two robots share nothing that can be written.
+    All arrays of a robot are read-only copies; two robots share no writable memory.
 
     Args:
         name: Name in :func:`teleop_core.robots.load_robot`.
@@ -69,26 +69,26 @@ class Robot:
         lower: Smallest joint positions (n,) [rad, m].
         upper: Largest joint positions (n,) [rad, m].
         home: Joint vector (n,) of the published or natural zero, inside the limits.
-        home_is_assumed: Whether home is not known to be a working posture, such as the zero of a URDF, at which many
-            arms are stretched out. No session starts there.
-        start: Joint vector (n,) at which a session starts, inside the limits; None for a posture with room in all
-            directions (:func:`teleop_core.robots.freedom.start_posture`), which is computed at its first use.
-        geometry: Symbols and their values [m, rad], in the order the kernels expect if there is no row.
+        home_is_assumed: Whether home may be no working posture. An example is the zero of a URDF, at which many arms
+            are stretched out. No session starts at an assumed home.
+        start: Joint vector (n,) at which a session starts, inside the limits. None means a posture with room in all
+            directions (:func:`teleop_core.robots.freedom.start_posture`); it is computed at its first use.
+        geometry: Symbols and their values [m, rad]. Without a ``row``, the kernels get these values in this order.
         kernels: Compiled functions.
         row: Numbers for the kernels (k,); None for the values of the geometry.
-        drives: Drive table, None for robots that are not used as slaves.
+        drives: Drive table; None for robots that are not used as slaves.
         dynamics: Rigid-body model; None for independent axes.
         hardware: Differences between the real arm and its model; None if unknown.
         task_mask: Directions that the robot controls: x, y, z, then rotations about x, y, z.
         solution: Text about the method of inverse kinematics; empty if unknown.
-        visuals: Shapes of its links, if its file has them; nothing is read before it is drawn.
-        notes: Texts about content of its file that may have been read differently from the author's intention.
-        describe: Draws its bodies (:func:`teleop_core.robots.bodies.bodies_of`), for joints that are not a chain; None
-            for a chain, or if unknown.
+        visuals: Shapes of the links, if the robot's file contains shapes. Mesh files are read only when they are drawn.
+        notes: Notes on content of the robot's file that the author may have meant differently.
+        describe: Function that returns the bodies of a robot whose joints are not a chain
+            (:func:`teleop_core.robots.bodies.bodies_of`). None for a chain, or if the bodies are unknown.
 
     Raises:
         ShapeError: Limits, home, start or drives are not vectors (n,).
-        ParameterError: Limits that cross, or a home or start outside them.
+        ParameterError: A lower limit is not below the upper limit, or home or start is outside the limits.
     """
 
     name: str
@@ -165,7 +165,7 @@ class Robot:
 
     @property
     def geometry_row(self) -> Array:
-        """Numbers that the kernels take: a new array each time, which the caller may change."""
+        """Numbers that the kernels take. Each call returns a new array, which the caller may change."""
         return self._row.copy()
 
     @cached_property
@@ -175,7 +175,7 @@ class Robot:
 
     @cached_property
     def assemble_pointer(self) -> AssembleKernel | None:
-        """Forward kinematics with its status as an argument for other kernels; None without."""
+        """Forward kinematics with status, as an argument for other kernels; None if the robot has no such kernel."""
         if self.kernels.assemble is None:
             return None
         return cast("AssembleKernel", pointer(self.kernels.assemble, ASSEMBLE))
@@ -191,11 +191,11 @@ class Robot:
 
     @property
     def speed_limit(self) -> Array:
-        """Largest joint speeds (n,) [rad/s or m/s], those of the drives; infinite without drives."""
+        """Largest joint speeds (n,) of the drives [rad/s or m/s]; infinite without drives."""
         return np.full(self.n, np.inf) if self.drives is None else self.drives.speed_limit
 
     def limits(self, dt: float = math.inf) -> Array:
-        """Rows lower, upper, largest step within ``dt`` [s]: (3, n), as the ik kernel takes it.
+        """Limits (3, n) for the ik kernel; rows: lower limit, upper limit, largest step within ``dt`` [s].
 
         Without drives, or without ``dt``, steps are infinite. Each call returns a new array, which the caller may
         change.
@@ -203,11 +203,11 @@ class Robot:
         return np.stack((self.lower, self.upper, self.speed_limit * dt))
 
     def fk(self, q: object) -> Array:
-        """Pose of the tip in the base, in which all loops close.
+        """Pose of the tip in the base; all loops close.
 
-        A robot with loops may have several poses. The result is the one next to home if its loops close, else the
-        nearest to home of those that a search finds. Redundant joints, such as those of a hand on an object, may
-        disagree by 0.1 mm.
+        A robot with loops may have several poses for a joint vector. The result is the pose in the assembly of home if
+        the loops close there, else the nearest pose to home that a search finds. Redundant joints, such as those of a
+        hand that grasps an object, may contradict each other by up to 0.1 mm.
 
         Args:
             q: Joint vector (n,) or batch (N, n) [rad, m]; limits are not applied.
@@ -216,8 +216,8 @@ class Robot:
             ``T_base_tip``, (4, 4) or (N, 4, 4), position in metres.
 
         Raises:
-            ShapeError: Another shape.
-            ParameterError: NaN or infinity.
+            ShapeError: ``q`` is neither (n,) nor (N, n).
+            ParameterError: ``q`` contains NaN or infinity.
             ClosureError: No assembly has these joints; :meth:`solve_fk` returns a result even then.
         """
         joints = checked_array("q", q, (self.n,))
@@ -236,19 +236,19 @@ class Robot:
         """Pose of the tip in the base, and whether the loops close there.
 
         Args:
-            q: Joint vector (n,) [rad, m]; limits are not applied. Many joint vectors (N, n) give the result of
-                :meth:`solve_fk_batch`, which declares its type.
-            seed: Pose ``T_base_tip`` (4, 4). The solution stays in the assembly of this pose; None: in that of home.
-            search: Whether to search for another assembly if the one next to the seed does not close; a tick of a
-                session never searches.
+            q: Joint vector (n,) [rad, m]; limits are not applied. A batch (N, n) gives the result of
+                :meth:`solve_fk_batch`, whose declared types fit batches.
+            seed: ``T_base_tip`` (4, 4); the result stays in its assembly. None for the assembly of home.
+            search: Whether to search for another assembly if the loops do not close in the assembly of the seed. A tick
+                of a session never searches.
 
         Returns:
-            :class:`FkResult`. Joints that do not assemble are not an error: the pose of least
-            error comes back with its status and residual.
+            :class:`FkResult`. If no assembly has these joints, no error is raised: the result is the pose of least
+            error, with its status and residual.
 
         Raises:
-            ShapeError: ``q`` or ``seed`` has a wrong shape.
-            ParameterError: NaN, infinity, or a seed that is not a rigid transform.
+            ShapeError: ``q`` or the seed has a wrong shape.
+            ParameterError: ``q`` contains NaN or infinity, or the seed is not a rigid transform.
         """
         joints = checked_array("q", q, (self.n,))
         if joints.ndim != 1:
@@ -256,12 +256,12 @@ class Robot:
         return forward_kinematics.solved_one(self, joints, seed, search=search)
 
     def solve_fk_batch(self, q: object, seed: object = None, *, search: bool = True) -> FkBatch:
-        """Poses of joint vectors (N, n), each on its own; seed (4, 4) or one for each (N, 4, 4).
+        """Poses of joint vectors (N, n), solved independently; one seed (4, 4), or one for each joint vector (N, 4, 4).
 
-        Arguments and errors as :meth:`solve_fk`.
+        Arguments and errors are those of :meth:`solve_fk`.
 
         Returns:
-            :class:`FkResult` with a leading axis; its status holds values of :class:`FkStatus`.
+            :class:`FkResult` with a leading axis; its ``status`` is an array of values of :class:`FkStatus`.
         """
         joints = checked_array("q", q, (self.n,)).reshape(-1, self.n)
         return forward_kinematics.solved(self, joints, seed, search=search)
@@ -270,32 +270,33 @@ class Robot:
         """Poses along a path of joint vectors; the path stays in its assembly as long as the loops close there.
 
         Args:
-            q: Joint vectors (N, n) [rad, m], near one another.
-            seed: ``T_base_tip`` (4, 4) before the first; None for home's assembly.
+            q: Joint vectors (N, n) [rad, m], each near the previous one.
+            seed: ``T_base_tip`` (4, 4) before the first joint vector; None for the assembly of home.
 
         Returns:
-            :class:`FkResult` with a leading axis. If the path leaves the assembly, beyond a singular pose, the status
-            is NOT_CLOSED, and no other assembly is searched. Later poses start from the last pose that closed.
+            :class:`FkResult` with a leading axis. Where the path leaves the assembly, beyond a singular pose, the
+            status is NOT_CLOSED, and no other assembly is searched. Later poses are solved from the last pose at which
+            the loops closed.
 
         Raises:
-            ShapeError: ``q`` or ``seed`` has a wrong shape.
-            ParameterError: NaN, infinity, or a seed that is not a rigid transform.
+            ShapeError: ``q`` or the seed has a wrong shape.
+            ParameterError: ``q`` contains NaN or infinity, or the seed is not a rigid transform.
         """
         joints = checked_array("q", q, (self.n,)).reshape(-1, self.n)
         return forward_kinematics.solved(self, joints, seed, search=False, is_path=True)
 
     def fk_all(self, q: object) -> Array:
-        """All poses that a joint vector can have, that of :meth:`fk` first, then by distance.
+        """All poses that a joint vector can have: first the pose of :meth:`fk`, then the others by distance from it.
 
         Args:
             q: Joint vector (n,) [rad, m]; limits are not applied.
 
         Returns:
-            ``T_base_tip`` (k, 4, 4); k = 0 when nothing closes, 1 for a robot without loops.
+            ``T_base_tip`` (k, 4, 4); k = 0 if the loops close in no assembly, k = 1 for a robot without loops.
 
         Raises:
-            ShapeError: Another shape.
-            ParameterError: NaN or infinity.
+            ShapeError: The shape of ``q`` is not (n,).
+            ParameterError: ``q`` contains NaN or infinity.
         """
         joints = checked_array("q", q, (self.n,))
         if joints.ndim != 1:
@@ -312,8 +313,8 @@ class Robot:
             (6, n): linear velocity of the tip point [m/s], then angular velocity [rad/s], per unit joint speed.
 
         Raises:
-            ShapeError: Another shape.
-            ParameterError: NaN or infinity.
+            ShapeError: The shape of ``q`` is not (n,).
+            ParameterError: ``q`` contains NaN or infinity.
             ClosureError: No assembly has these joints.
         """
         joints = checked_array("q", q, (self.n,))
@@ -326,7 +327,7 @@ class Robot:
         return out
 
     def forward_dynamics(self, q: object, dq: object, effort: object, wrench: object = None) -> Array:
-        """Joint accelerations (n,) [rad/s² or m/s²] under efforts, and a wrench on the tip.
+        """Joint accelerations (n,) [rad/s² or m/s²] under efforts of the drives and a wrench on the tip.
 
         Args:
             q: Joint vector (n,) [rad, m].
@@ -336,8 +337,8 @@ class Robot:
                 no wrench.
 
         Raises:
-            ShapeError: Another shape.
-            ParameterError: NaN or infinity, or a robot without drives and dynamics.
+            ShapeError: An argument has a wrong shape.
+            ParameterError: An argument contains NaN or infinity, or the robot has neither drives nor dynamics.
             ClosureError: No assembly has these joints.
         """
         if self.dynamics is None:
@@ -354,17 +355,17 @@ class Robot:
         """Joint vector inside the limits that reaches a pose, on the branch next to the seed.
 
         Args:
-            T: Wanted ``T_base_tip`` (4, 4). Several of them, (N, 4, 4), are answered as by
-                :meth:`ik_batch`, which has the type for it.
-            seed: Joint vector (n,) to stay next to [rad, m]; home when None.
+            T: Wanted ``T_base_tip`` (4, 4). A batch (N, 4, 4) gives the result of :meth:`ik_batch`, whose declared
+                types fit batches.
+            seed: Joint vector (n,) [rad, m]; the result stays next to it. None for home.
 
         Returns:
-            :class:`IkResult`. A pose that cannot be reached is not an error: the nearest joint
-            vector comes back with its status and residual.
+            :class:`IkResult`. If the pose cannot be reached, no error is raised: the result is the nearest joint
+            vector, with its status and residual.
 
         Raises:
-            ShapeError: Another shape.
-            ParameterError: NaN, infinity, or a matrix that is not a rigid transform.
+            ShapeError: ``T`` or the seed has a wrong shape.
+            ParameterError: An argument contains NaN or infinity, or ``T`` is not a rigid transform.
         """
         pose = T if is_ready(T, (4, 4)) else checked_array("T", T, (4, 4))
         if pose.ndim != 2:
@@ -377,22 +378,22 @@ class Robot:
         status = self._ik(pose, start, self._free, self._row, q, residual)
         if status < 0:
             raise ParameterError("T or seed", (pose.tolist(), list(start)), _ASKABLE)
-        # What IkResult(...) does, without a call of Python.
+        # This does the same as IkResult(...), without a Python function call.
         return tuple.__new__(IkResult, (q, _STATUS[status], residual))
 
     def ik_batch(self, T: object, seed: object = None) -> IkBatch:
-        """Joint vectors that reach many poses, each on its own.
+        """Joint vectors that reach many poses, solved independently.
 
         Args:
             T: Wanted poses (N, 4, 4).
-            seed: Joint vector (n,) to stay next to, (N, n) one for each; home when None.
+            seed: Joint vector (n,), or one for each pose (N, n); the results stay next to it. None for home.
 
         Returns:
-            :class:`IkResult` with a leading axis; its status holds values of :class:`IkStatus`.
+            :class:`IkResult` with a leading axis; its ``status`` is an array of values of :class:`IkStatus`.
 
         Raises:
-            ShapeError: Another shape.
-            ParameterError: NaN, infinity, or a matrix that is not a rigid transform.
+            ShapeError: ``T`` or the seed has a wrong shape.
+            ParameterError: An argument contains NaN or infinity, or a matrix of ``T`` is not a rigid transform.
         """
         poses = checked_array("T", T, (4, 4)).reshape(-1, 4, 4)
         seeds = self._home if seed is None else checked_array("seed", seed, (self.n,))
@@ -401,20 +402,20 @@ class Robot:
         return self._solve(poses, np.atleast_2d(seeds), self._free, is_path=False)
 
     def follow(self, T: object, seed: object = None, dt: float = 0.001) -> IkBatch:
-        """Joint path along poses, with joint speeds inside the drive limits and no branch flip.
+        """Joint path along poses, with joint speeds inside the drive limits and without a change of branch.
 
         Args:
-            T: Wanted poses (N, 4, 4), ``dt`` apart.
-            seed: Joint vector (n,) before the first pose; home when None.
+            T: Wanted poses (N, 4, 4), one every ``dt``.
+            seed: Joint vector (n,) before the first pose; None for home.
             dt: Time between poses [s].
 
         Returns:
-            :class:`IkResult` with a leading axis; if the speed limit holds the arm back, the status is LIMITED and the
-            residual is the remaining error.
+            :class:`IkResult` with a leading axis. Where the speed limit makes the arm lag, the status is LIMITED and
+            the residual is the remaining error.
 
         Raises:
-            ShapeError: Another shape.
-            ParameterError: NaN, infinity, or a matrix that is not a rigid transform.
+            ShapeError: ``T`` or the seed has a wrong shape.
+            ParameterError: An argument contains NaN or infinity, or a matrix of ``T`` is not a rigid transform.
         """
         poses = checked_array("T", T, (4, 4)).reshape(-1, 4, 4)
         start = self._home if seed is None else checked_array("seed", seed, (self.n,))
@@ -438,11 +439,11 @@ class Robot:
             T: Wanted ``T_base_tip`` (4, 4).
 
         Returns:
-            (k, n) [rad, m]; k = 0 when no branch reaches the pose.
+            (k, n) [rad, m]; k = 0 if no branch reaches the pose.
 
         Raises:
-            ShapeError: Another shape.
-            ParameterError: NaN, infinity, or a matrix that is not a rigid transform.
+            ShapeError: The shape of ``T`` is not (4, 4).
+            ParameterError: ``T`` contains NaN or infinity, or is not a rigid transform.
         """
         pose = checked_array("T", T, (4, 4))
         if pose.ndim != 2 or not is_rigid(pose):
@@ -456,11 +457,11 @@ _STATUS = tuple(IkStatus)
 
 
 def geometry_of(defaults: Mapping[str, float], given: Mapping[str, float | str]) -> dict[str, float]:
-    """Published geometry with the given symbols in its place.
+    """Published geometry, with the values of the given symbols replaced.
 
     Raises:
-        UnknownNameError: A symbol the robot does not have.
-        ParameterError: A value that is not a finite number.
+        UnknownNameError: The robot does not have such a symbol.
+        ParameterError: A value is not a finite number.
     """
     for symbol, value in given.items():
         if symbol not in defaults:

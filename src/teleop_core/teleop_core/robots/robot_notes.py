@@ -19,12 +19,13 @@ def notes_on_robot(robot: Robot, file: str, has_task: bool) -> list[str]:
 
 
 def rank_note(robot: Robot, file: str, has_task: bool) -> str:
-    """Note on the directions that an arm does not control because it cannot move in all at once; else empty.
+    """Note on directions that an arm does not control because it cannot move in all six at once; else empty.
 
     Args:
         robot: The robot as loaded from the file.
         file: Path of the file, for the text.
-        has_task: Whether the user chose the controlled directions; then only too many of them are noted.
+        has_task: Whether the user chose the controlled directions. Then there is a note only if the user chose too
+            many.
     """
     rank, best = directions_of(robot, lever(robot))
     pairs = list(zip(DIRECTIONS, robot.task_mask, strict=True))
@@ -45,8 +46,8 @@ def assumed_note(robot: Robot, file: str) -> str:
     """Note on the drive limits that a URDF does not state for at least one joint; empty if it states all.
 
     Args:
-        robot: As it was loaded from the file.
-        file: Its path, for the text.
+        robot: The robot as loaded from the file.
+        file: Path of the file, for the text.
     """
     words = {"effort_limit": "effort", "speed_limit": "velocity"}
     drives = robot.drives

@@ -1,4 +1,4 @@
-"""Selection of a robot: which arm a stage works for, for every stage whose topics have joints."""
+"""Selection of a robot: the arm of a stage, for every stage whose topics contain joint values."""
 
 from dataclasses import dataclass
 
@@ -8,7 +8,7 @@ from teleop_core.robots import load_robot_set
 
 @dataclass(frozen=True, kw_only=True)
 class RobotParameters:
-    """The arm; all stages of one arm must name the same."""
+    """The arm; all stages of one arm must name the same robot."""
 
     robot: str = fixed("rcrt1", doc="slave robot, one of `teleop robot`")
     geometry: tuple[str, ...] = fixed(
@@ -17,9 +17,9 @@ class RobotParameters:
 
     @property
     def joint_names(self) -> tuple[str, ...]:
-        """Names of its joints.
+        """Names of the robot's joints.
 
         Raises:
-            TeleopError: There is no such robot, or it has no such lengths.
+            TeleopError: No robot has this name, or the robot does not have such a length.
         """
         return load_robot_set(self.robot, self.geometry).joint_names

@@ -12,7 +12,7 @@ Kind = Literal["capsule", "box", "sphere", "cylinder"]
 Role = Literal["base", "link", "joint", "leg", "platform", "tool"]
 
 SIZES: dict[Kind, int] = {"capsule": 2, "box": 3, "sphere": 1, "cylinder": 2}
-"""Number of sizes of each kind."""
+"""Number of sizes that each kind of solid has."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,14 +21,14 @@ class Solid:
 
     Args:
         kind: Kind of solid.
-        size: All in metres. Capsule and cylinder: radius, and length along z between the centres of
-            the capsule's ends or of the cylinder's faces. Box: x, y, z. Sphere: radius.
-        pose: Its centre in the body's frame (7,): x, y, z [m], quaternion w, x, y, z.
+        size: Sizes in metres. Capsule: radius, and length along z between the centres of its half spheres. Cylinder:
+            radius, and length along z between its faces. Box: x, y, z. Sphere: radius.
+        pose: Pose of the solid's centre in the body's frame (7,): x, y, z [m], quaternion w, x, y, z.
         role: Part of the robot to which it belongs, for its colour.
 
     Raises:
-        ShapeError: A kind has another number of sizes, or the pose is not (7,).
-        ParameterError: A size that is negative or not finite.
+        ShapeError: The number of sizes is wrong for the kind, or the pose is not (7,).
+        ParameterError: A size is negative or not finite.
     """
 
     kind: Kind
@@ -49,7 +49,7 @@ class Solid:
 
 
 def capsule(start: Array, end: Array, radius: float, role: Role) -> Solid:
-    """Capsule whose ends are about two points (3,) [m] of the body."""
+    """Capsule whose half spheres have their centres at two points (3,) [m] of the body."""
     way = end - start
     size = float(length(way))
     pose = np.concatenate((0.5 * (start + end), along(way[None])[0]))
@@ -68,16 +68,16 @@ def ball(center: Array, radius: float, role: Role) -> Solid:
 
 
 def rim(points: Array, radius: float, role: Role) -> tuple[Solid, ...]:
-    """Capsules around a polygon (k, 3) [m] of the body."""
+    """Capsules along the sides of a polygon (k, 3) [m] of the body."""
     ends = np.roll(points, -1, axis=0)
     pairs = zip(points, ends, strict=True)
     return tuple(capsule(a, b, radius, role) for a, b in pairs if length(b - a) > 0.0)
 
 
 def along(directions: Array) -> Array:
-    """Quaternions (N, 4), w, x, y, z, of the least turns that bring z to directions (N, 3).
+    """Quaternions (N, 4), w, x, y, z, of the smallest rotations of the z axis to directions (N, 3).
 
-    A direction of length zero keeps z; the opposite of z turns about x.
+    A direction of length zero gives no rotation; the direction -z gives a rotation about x.
     """
     lengths = length(directions)[:, None]
     unit = np.divide(directions, lengths, out=np.zeros_like(directions), where=lengths > 0.0)

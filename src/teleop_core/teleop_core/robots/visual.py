@@ -18,10 +18,10 @@ class Visual:
         joints: Number of movable joints between the base and the link.
         place: Pose of the shape (4, 4) in the base, with the arm at home [m].
         kind: Kind of shape.
-        size: For a mesh, scales along x, y and z; for a box x, y, z; for a cylinder radius and length; for a sphere
-            its radius [m].
-        file: Name of a mesh as the file gives it; empty for other kinds.
-        urdf: The file.
+        size: Mesh: scale factors along x, y and z. Box: x, y, z [m]. Cylinder: radius and length [m]. Sphere: radius
+            [m].
+        file: Name of the mesh as written in the URDF; empty for other kinds.
+        urdf: Path of the URDF.
     """
 
     link: str

@@ -1,6 +1,6 @@
 """Shapes: bodies with a signed distance to a point, and with lines to draw them.
 
-Each shape is one file of this folder. A virtual fixture keeps the hand inside or outside a shape
+Each shape is one file of this folder. A virtual fixture constrains the hand to the inside or outside of a shape
 (:mod:`teleop_core.coupling.fixtures`); an object that the slave's tool touches has a shape
 (:mod:`teleop_core.slave.world`).
 """
@@ -31,16 +31,16 @@ class Shape:
     """A body in space.
 
     Attributes:
-        name: Its name in ``--set fixture=`` and ``--set world=``.
-        parameters: Its parameter group: real numbers and tuples of them. A text parameter ``file`` is the path of a
-            file that recordings keep.
+        name: Name of the shape in ``--set fixture=`` and ``--set world=``.
+        parameters: Parameter group of the shape: real numbers and tuples of numbers. A text parameter ``file`` is the
+            path of a file; recordings store a copy of this file.
         distance: ``distance(offset, numbers, out)``, a kernel or a plain function. ``offset`` (3,) [m] runs from the
-            middle of the shape to a point; ``numbers`` holds the parameters in their order; ``out`` (3,) gets a vector
-            of any length except 0 that points out of the shape at its nearest surface. Returns the distance of the
-            point from the surface [m], negative inside.
-        outline: ``outline(parameters)`` gives points (N, 3) [m] of one line along its edges around
-            its middle; a row of NaN lifts the pen.
-        numbers: ``numbers(parameters)`` returns ``numbers``, if they are not the parameters.
+            middle of the shape to a point; ``numbers`` contains the parameters in their order. The outward normal of
+            the nearest surface is written to ``out`` (3,), with any length except 0. The kernel returns the distance of
+            the point from the surface [m], negative inside.
+        outline: ``outline(parameters)`` returns points (N, 3) [m] of a line along the edges, relative to the middle; a
+            row of NaN interrupts the line.
+        numbers: ``numbers(parameters)`` returns the ``numbers`` of ``distance``, if they differ from the parameters.
     """
 
     name: str
@@ -76,7 +76,7 @@ def moved(value: Any, files: Mapping[str, str]) -> Any:
     return files.get(value) or _FILE.sub(lambda said: said[0].replace(said[1], files.get(said[1], said[1])), value)
 
 
-_STEP = 1e-6  # step outwards [m], over which the distance must grow by the same amount
+_STEP = 1e-6  # over a step outwards of this length [m], the distance must grow by this length
 _TRIED = np.array([(0.31, 0.02, 0.05), (0.01, 0.43, -0.03), (-0.02, 0.04, 0.37), (-0.29, 0.23, -0.41)])
 """Offsets at which a shape is tried [m]."""
 
@@ -100,7 +100,7 @@ def _try(part: Shape) -> None:
 
 
 def _fault_at(part: Shape, numbers: Array, offset: Array) -> str:
-    """Requirement that a shape does not meet at one point; empty if it meets all."""
+    """Requirement that the shape violates at one point; empty if it meets all requirements."""
     (given, _), (out, fence) = fenced(numbers), fenced(np.zeros(3))
     distance = float(part.distance(offset, given, out))
     size, place = float(np.linalg.norm(out)), f"at {offset.tolist()} m from its middle"

@@ -1,4 +1,4 @@
-"""Box: a cuboid along the axes, as the RCRT-1 source has it for the hand."""
+"""Box: a cuboid along the axes, as the RCRT-1 source uses it to limit the hand."""
 
 import math
 from dataclasses import dataclass
@@ -26,8 +26,9 @@ class BoxParameters:
 def box_distance(offset: Array, size: Array, out: Array) -> float:
     """Write the outward direction of a box (3,); return the distance [m] of a point (3,) outside it.
 
-    For a point outside, the direction is that from the nearest point of the box, so it rotates around edges. For a
-    point inside, it is the normal of the nearest face; of equally near faces x comes before y, and y before z.
+    For a point outside, the direction is the one from the nearest point of the box, so it rotates smoothly around
+    edges. For a point inside, it is the normal of the nearest face. Of equally near faces, x comes before y, and y
+    before z.
     """
     square, face, depth = 0.0, 0, -math.inf
     for i in range(3):
@@ -45,7 +46,7 @@ def box_distance(offset: Array, size: Array, out: Array) -> float:
 
 
 def box_outline(parameters: BoxParameters) -> Array:
-    """All edges of the box, (16, 3) [m] around its middle."""
+    """All edges of the box, (16, 3) [m] relative to its middle."""
     return edges_of(parameters.size)
 
 

@@ -1,4 +1,4 @@
-"""Cone: a funnel that leads to its tip, such as to a port."""
+"""Cone: a funnel that leads to its tip, for example to a port."""
 
 import math
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ from teleop_core.kernels import Array, dot, kernel
 from teleop_core.shapes import Shape
 from teleop_core.shapes.basis import directions, drawing
 
-_LEAST = 0.01  # half of the height that is drawn of a cone whose tip is at the middle [m]
+_LEAST = 0.01  # half of the drawn height of a cone whose tip is at the middle [m]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -64,7 +64,7 @@ def cone_distance(offset: Array, numbers: Array, out: Array) -> float:
 
 
 def cone_outline(parameters: ConeParameters) -> Array:
-    """A rim as far from the middle as the tip, on the opposite side, and four lines from the rim to the tip."""
+    """A rim and four lines from the rim to the tip; the middle of the shape is halfway between rim and tip."""
     axis, tip = drawing.unit_vector(parameters.axis), np.array(parameters.apex)
     height = 2.0 * max(-float(dot(axis, tip)), _LEAST)
     rim = drawing.ring(tip + height * axis, axis, height * math.tan(parameters.half_angle))

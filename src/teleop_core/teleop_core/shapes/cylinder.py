@@ -57,7 +57,7 @@ def cylinder_distance(offset: Array, numbers: Array, out: Array) -> float:
 
 
 def cylinder_outline(parameters: CylinderParameters) -> Array:
-    """Both ends and four lines between them, (N, 3) [m] around the middle."""
+    """Circles of the two ends and four lines between them, (N, 3) [m] relative to the middle."""
     axis = drawing.unit_vector(parameters.direction)
     half = 0.5 * (parameters.length or drawing.DRAWN) * axis
     ends = [drawing.ring(end, axis, parameters.radius) for end in (-half, half)]

@@ -1,4 +1,4 @@
-"""Half-space: everything in front of a plane, such as the room above a floor under the hand."""
+"""Half-space: everything in front of a plane, such as the space above a floor under the hand."""
 
 from dataclasses import dataclass
 
@@ -37,7 +37,7 @@ def half_space_numbers(parameters: HalfSpaceParameters) -> Array:
 
 
 def half_space_outline(parameters: HalfSpaceParameters) -> Array:
-    """A square of 100 mm of the plane, (5, 3) [m], around the point of it below the middle."""
+    """A square of 100 mm in the plane, (5, 3) [m], around the point of the plane below the middle."""
     normal = drawing.unit_vector(parameters.normal)
     drawn: Array = drawing.square(normal) - parameters.room * normal
     return drawn

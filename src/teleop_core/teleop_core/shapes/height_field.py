@@ -25,12 +25,12 @@ def _grid(p: HeightFieldParameters) -> DistanceGrid:
 
 
 def height_field_numbers(parameters: HeightFieldParameters) -> Array:
-    """Numbers of the grid, as :func:`mesh_distance` takes them; raises as :func:`distance_grid`."""
+    """Numbers of the grid for :func:`mesh_distance`; raises the errors of :func:`distance_grid`."""
     return _grid(parameters).numbers
 
 
 def height_field_outline(parameters: HeightFieldParameters) -> Array:
-    """Edges of the field and three sections through its middle, (N, 3) [m]; raises the errors of the numbers."""
+    """Edges of the field and three sections through its middle, (N, 3) [m]; errors as :func:`height_field_numbers`."""
     return _grid(parameters).outline
 
 

@@ -13,7 +13,7 @@ from teleop_core.shapes.basis import directions, drawing
 
 @dataclass(frozen=True, kw_only=True)
 class HoleParameters:
-    """A round plate and a hole through it; its middle is that of the hole's mouth."""
+    """A round plate with a hole; the middle of the shape is the middle of the hole's mouth."""
 
     radius: float = parameter(0.0055, Within(1e-4, 1.0, "m"), "radius of the hole")
     thickness: float = parameter(0.03, Within(1e-3, 1.0, "m"), "thickness of the plate")
@@ -43,7 +43,7 @@ class HoleParameters:
         return np.array(self.axis) / length(self.axis)
 
     def depth(self, ways: Array) -> float:
-        """Largest depth [m] in the hole, of points (N, 3) [m] relative to its mouth; 0 if none is inside."""
+        """Largest depth [m] in the hole of points (N, 3) [m], given relative to the mouth; 0 if no point is inside."""
         deep = -(ways * self.out).sum(axis=1)
         beside = length(ways + deep[:, None] * self.out)
         is_inside = (beside < self.radius + self.chamfer) & (deep <= self.thickness)
@@ -54,7 +54,7 @@ class HoleParameters:
 def _section_depth(out: float, up: float, shape: Array) -> tuple[float, float, float]:
     """Distance of a point from the plane of the nearest face; above 0 for a point outside.
 
-    Arguments and results as in :func:`_section_distance`.
+    Arguments and results are those of :func:`_section_distance`.
     """
     radius, thickness, rim, chamfer = shape[0], shape[1], shape[2], shape[3]
     diagonal = math.sqrt(0.5)
@@ -73,10 +73,10 @@ def _section_depth(out: float, up: float, shape: Array) -> tuple[float, float, f
 
 @inner
 def _section_distance(out: float, up: float, shape: Array) -> tuple[float, float, float]:
-    """Distance outside the plate, of a point in the section through the axis.
+    """Distance of a point from the plate, in a section through the axis.
 
     The section is convex: its faces are top, chamfer, wall of the hole, bottom and rim. For a point inside, the
-    nearest face counts; for a point outside, the nearest point of all faces.
+    distance from the nearest face is taken; for a point outside, the distance from the nearest point of all faces.
 
     Args:
         out: Distance from the axis [m].
@@ -84,7 +84,8 @@ def _section_distance(out: float, up: float, shape: Array) -> tuple[float, float
         shape: Radius of the hole, thickness and radius of the plate, width of the chamfer [m].
 
     Returns:
-        The distance [m], negative inside; and the outward direction, along ``out`` and along ``up``.
+        The distance [m], negative inside; the component of the outward direction along ``out``; its component along
+        ``up``.
     """
     distance, way_out, way_up = _section_depth(out, up, shape)
     if distance <= 0.0:
@@ -115,7 +116,7 @@ def _section_distance(out: float, up: float, shape: Array) -> tuple[float, float
 def hole_distance(offset: Array, numbers: Array, out: Array) -> float:
     """Write the outward direction of the plate (3,); return the distance [m] of a point (3,) outside it.
 
-    On the axis all directions to the wall are equally long; one of them is taken.
+    For a point on the axis all directions to the wall are equally long; an arbitrary direction is taken.
     """
     axis = directions.unit(numbers[4], numbers[5], numbers[6])
     up = directions.part_along(offset, axis)
@@ -131,7 +132,7 @@ def hole_distance(offset: Array, numbers: Array, out: Array) -> float:
 
 
 def hole_outline(parameters: HoleParameters) -> Array:
-    """Both ends of the chamfer, of the hole and of the plate, (N, 3) [m] around the middle."""
+    """Circles at both ends of the chamfer, of the hole and of the plate, (N, 3) [m] relative to the middle."""
     p, axis = parameters, drawing.unit_vector(parameters.axis)
     rings = (
         (p.radius + p.chamfer, 0.0),

@@ -1,4 +1,4 @@
-"""Intersection: the points inside all of several shapes, such as a box without a ball."""
+"""Intersection: the points that are inside every one of several shapes, such as a box without a ball."""
 
 from dataclasses import dataclass
 
@@ -9,13 +9,13 @@ from teleop_core.shapes import Shape
 from teleop_core.shapes.basis import combined, directions
 
 _ROUNDS = 200  # largest number of rounds
-_STILL = 1e-12  # moves that count [m]
-_INSIDE = 1e-8  # distance that counts as zero [m]
+_STILL = 1e-12  # a smaller move counts as no move [m]
+_INSIDE = 1e-8  # a smaller distance counts as zero [m]
 
 
 @dataclass(frozen=True, kw_only=True)
 class IntersectionParameters:
-    """Shapes whose common part it is."""
+    """Shapes whose common part is the intersection."""
 
     parts: tuple[str, ...] = combined.parts_parameter(
         ("box size=[0.03, 0.03, 0.03]", "not sphere radius=0.01 at=[0.0, 0.02, 0.0]"),
@@ -30,8 +30,8 @@ class IntersectionParameters:
 def _project(numbers: Array, place: Array) -> None:
     """Move a point (3,) [m] to the nearest point inside all parts, if the parts are convex.
 
-    The point is projected onto the parts in turn; before each projection the move by that part in the last round is
-    undone.
+    The point is projected onto the parts in turn. Before each projection onto a part, the move by the projection onto
+    the same part in the previous round is undone.
 
     Source:
         Boyle and Dykstra 1986.
@@ -57,8 +57,9 @@ def intersection_distance(offset: Array, numbers: Array, out: Array) -> float:
     """Write the outward direction (3,); return the distance [m] of a point (3,) outside the intersection.
 
     For a point outside, the direction comes from the nearest point inside if all parts are convex. Next to parts that
-    are not convex (paths, the outside of a shape) it comes from some near point inside. If no such point is found, and
-    for points inside, it is the outward direction of the part with the largest distance.
+    are not convex (paths, the outside of a shape), the direction comes from a near point inside, perhaps not the
+    nearest. If no such point is found, and for points inside, it is the outward direction of the part with the largest
+    distance.
     """
     farthest = combined.extreme_part(offset, numbers, 1.0, out)
     if farthest <= 0.0:

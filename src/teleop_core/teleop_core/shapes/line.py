@@ -1,4 +1,4 @@
-"""Line: all points within a radius of a straight line, such as guidance along it, or a wire."""
+"""Line: all points within a radius of a straight line; for guidance along the line, or as a wire."""
 
 import math
 from dataclasses import dataclass
@@ -50,14 +50,14 @@ def rod_distance(offset: Array, numbers: Array, out: Array) -> float:
 
 
 def endless_if_zero(parameters: object) -> Array:
-    """Numbers of a shape whose second number is a length; a length of 0 becomes infinite."""
+    """Numbers of a shape whose number 1 (counted from 0) is a length; a length of 0 becomes infinite."""
     numbers = numbers_of(parameters)
     numbers[1] = numbers[1] or math.inf
     return numbers
 
 
 def line_outline(parameters: LineParameters) -> Array:
-    """The line itself, (2, 3) [m] around the middle."""
+    """End points of the line, (2, 3) [m] relative to the middle."""
     length = parameters.length or drawing.DRAWN
     half = 0.5 * length * drawing.unit_vector(parameters.direction)
     return np.stack((-half, half))

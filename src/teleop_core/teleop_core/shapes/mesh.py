@@ -1,7 +1,7 @@
-"""Mesh: a closed surface of triangles from a file, read from a grid of distances.
+"""Mesh: a closed surface of triangles from a file; its distance is interpolated in a grid.
 
-The distances are computed once, see :mod:`teleop_core.shapes.basis.distance_grid`. Between the nodes they are a cubic
-spline, so that the normal, which is the spline's gradient, is continuous.
+The distances at the nodes of the grid are computed once, see :mod:`teleop_core.shapes.basis.distance_grid`. Between the
+nodes the distance is a cubic spline. Its gradient is the normal, which is therefore continuous.
 """
 
 import math
@@ -32,10 +32,11 @@ class MeshParameters:
 
 @inner
 def _cell(offset: float, shape: Array, axis: int) -> tuple[int, float, float]:
-    """Position of a point in the grid along an axis, or the end of the grid for a point beyond.
+    """Position of a point in the grid along an axis; for a point outside the grid, the end of the grid.
 
     Returns:
-        Second of the four nodes around the point; share of a step after that node; distance beyond the grid [m].
+        Index of the second of the four nodes around the point; distance from that node in steps; distance outside the
+        grid [m].
     """
     wanted = (offset - shape[4 + axis]) / shape[3]
     last = shape[axis] - 1.0 - distance_grid.EDGE
@@ -73,10 +74,10 @@ def _gradient(shape: Array, at: tuple[int, int, int], share: tuple[float, float,
 def mesh_distance(offset: Array, numbers: Array, out: Array) -> float:
     """Write the outward unit vector of a mesh (3,); return the distance [m] of a point (3,) outside it.
 
-    Where the distance ``f`` has a ridge (behind an edge, in the middle of the mesh) its spline has a slope below 1.
-    The returned value is ``f |∇f|``. Then a spring along the outward direction pushes with the gradient of ``f²``, and
-    no path around the ridge gains energy. Beyond the grid, the distance is measured from the surface point nearest to
-    the end of the grid.
+    Where the distance ``f`` has a ridge (behind an edge, in the middle of the mesh), the slope of its spline is below
+    1. The returned value is ``f |∇f|``. So the force of a spring along the outward direction is proportional to the
+    gradient of ``f²``, and a closed path around the ridge gains no energy. Outside the grid, the distance is measured
+    from the surface point that is nearest to the end of the grid.
     """
     i, u, x = _cell(offset[0], numbers, 0)
     j, v, y = _cell(offset[1], numbers, 1)
@@ -100,12 +101,12 @@ def _grid(p: MeshParameters) -> distance_grid.DistanceGrid:
 
 
 def mesh_numbers(parameters: MeshParameters) -> Array:
-    """Numbers of the grid, as :func:`mesh_distance` takes them; raises as :func:`distance_grid`."""
+    """Numbers of the grid for :func:`mesh_distance`; raises the errors of :func:`distance_grid`."""
     return _grid(parameters).numbers
 
 
 def mesh_outline(parameters: MeshParameters) -> Array:
-    """Sharp edges of the mesh and three sections through its middle, (N, 3) [m]; raises the errors of the numbers."""
+    """Sharp edges of the mesh and three sections through its middle, (N, 3) [m]; errors as :func:`mesh_numbers`."""
     return _grid(parameters).outline
 
 

@@ -27,7 +27,7 @@ class PlaneParameters:
 
 @kernel
 def plane_distance(offset: Array, numbers: Array, out: Array) -> float:
-    """Write a plane's normal (3,); return the height [m] of a point (3,) above the plane.
+    """Write the unit normal of a plane to ``out`` (3,); return the height [m] of the point ``offset`` (3,) above it.
 
     ``numbers``: the normal, of any length, and the plane's height above the middle [m].
     """

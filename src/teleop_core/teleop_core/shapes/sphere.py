@@ -1,4 +1,4 @@
-"""Sphere: the same distance from the middle in all directions."""
+"""Sphere: a ball around the middle."""
 
 import math
 from dataclasses import dataclass
@@ -20,9 +20,9 @@ class SphereParameters:
 
 @kernel
 def sphere_distance(offset: Array, numbers: Array, out: Array) -> float:
-    """Write the vector from the middle (3,), or z at the middle; return the distance of a point outside."""
+    """Write the vector (3,) from the middle to a point, or z at the middle; return the point's distance outside [m]."""
     x, y, z = offset[0], offset[1], offset[2]
-    distance = math.sqrt(x * x + y * y + z * z)  # products, because powers are rounded differently in Python
+    distance = math.sqrt(x * x + y * y + z * z)  # products, because plain Python rounds powers differently
     out[0], out[1], out[2] = x, y, z
     if distance <= directions.MIDDLE:
         out[2] = 1.0

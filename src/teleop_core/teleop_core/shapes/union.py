@@ -1,4 +1,4 @@
-"""Union: the points inside any of several shapes, such as a ball with a channel that leads out of it."""
+"""Union: the points inside at least one of several shapes, such as a ball with a channel that leads out of it."""
 
 from dataclasses import dataclass
 
@@ -9,7 +9,7 @@ from teleop_core.shapes.basis import combined
 
 @dataclass(frozen=True, kw_only=True)
 class UnionParameters:
-    """Shapes of which it consists."""
+    """Shapes of which the union consists."""
 
     parts: tuple[str, ...] = combined.parts_parameter(
         ("sphere radius=0.015", "cylinder radius=0.005 length=0.05 direction=[1.0, 0.0, 0.0]"),
@@ -22,7 +22,7 @@ class UnionParameters:
 
 @kernel
 def union_distance(offset: Array, numbers: Array, out: Array) -> float:
-    """Write the outward direction of the nearest part (3,); return the distance [m] of a point (3,) outside."""
+    """Write the outward direction (3,) of the part nearest to a point; return the point's distance outside [m]."""
     return combined.extreme_part(offset, numbers, -1.0, out)
 
 

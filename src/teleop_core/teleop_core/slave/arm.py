@@ -11,7 +11,7 @@ class ArmModel(NamedTuple):
     fk: Any
     jacobian: Any
     geometry: Array
-    setpoint: Array  # rooms for joints (n,)
+    setpoint: Array  # the next arrays are scratch arrays for joints (n,)
     joints: Array
     effort: Array
     T: Array
@@ -41,7 +41,7 @@ class Arm(NamedTuple):
     measured: Array
     feedforward: Array  # (n,); (2 n + n²,) for control laws that use the model
     limit: Array
-    joints: Array  # room for joints
+    joints: Array  # scratch array for joints
     tip: Array  # true joint positions (n,), behind the transmission
     T: Array
     shape: Array  # numbers of the object

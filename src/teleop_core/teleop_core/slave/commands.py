@@ -16,10 +16,10 @@ from teleop_core.slave.operation.watch import ServerParameters, ServerState, fai
 class CommandStatus(IntEnum):
     """How the slave took the command of this tick."""
 
-    FRESH = 0  # followed
+    FRESH = 0  # the command is new and followed
     STALE = 1  # no command came for longer than the command timeout: the last command is held
-    REFUSED = 2  # too far from the command in force to be the same motion: the last command is held
-    MOVING = 3  # moves to a goal, such as the start position, or at a wanted speed: no servo_jp is followed
+    REFUSED = 2  # too far from the present command to belong to one motion: the last command is held
+    MOVING = 3  # the arm moves to a goal, such as the start position, or at a wanted speed; servo_jp is ignored
     CLOSED = 4  # not enabled, or not homed: no command is followed
     BLIND = 5  # no recent measured position of the arm: the arm holds
 
@@ -33,7 +33,7 @@ class SlaveRow(Row):
 class SlaveNumbers(ServerParameters, WayParameters):
     """Parameter record of an arm's server."""
 
-    start: PerJoint  # position from which it starts to follow commands [rad or m]
+    start: PerJoint  # joint position at which the arm starts to follow commands [rad or m]
     braking: PerJoint  # deceleration of the drives [rad/s² or m/s²]
     acceleration: PerJoint
     rest_speed: PerJoint
@@ -41,7 +41,7 @@ class SlaveNumbers(ServerParameters, WayParameters):
     filter_gain: float
     filter_zero: float
     filter_pole: float
-    start_speed: float  # share of the rated speeds
+    start_speed: float  # largest speed of moves, divided by the rated speeds
     tool_speed: float  # [m/s]
     tool_acceleration: float  # [m/s²]
     is_filtered: int
@@ -143,7 +143,7 @@ def move_joint(p: SlaveNumbers, s: SlaveState, i: int, step: float, dt: float) -
 
 @inner
 def forget_way(s: SlaveState) -> None:
-    """Make the setpoint the wanted value, and drop the command that is still being interpolated."""
+    """Set the command to the setpoint, and drop the command that is still being interpolated."""
     for i in range(s.setpoint.shape[0]):
         s.command[i] = s.target[i] = s.filtered[i] = s.setpoint[i]
     s.span, s.ticks = 0, 1
@@ -183,7 +183,7 @@ def _not_followed(s: SlaveState, row: SlaveRow) -> int:
 
 @inner
 def _age_of_command(p: SlaveNumbers, s: SlaveState, now_ns: int) -> int:
-    """FRESH or STALE; the arm pauses if the stream of commands was silent for too long."""
+    """Status FRESH or STALE; the arm changes to PAUSED if no command of the stream came for too long."""
     silence_ns = now_ns - s.arrival_ns
     if silence_ns <= p.timeout_ns:
         return _FRESH
@@ -197,9 +197,9 @@ def _age_of_command(p: SlaveNumbers, s: SlaveState, now_ns: int) -> int:
 def take_command(p: SlaveNumbers, s: SlaveState, row: SlaveRow, dt: float) -> int:
     """Accept a new servo_jp unless it is a jump; return the :class:`CommandStatus`.
 
-    A jump is farther from the command in force than the joint moves at full speed in the longer of two times. They are
-    the command timeout and the time since the previous message. The latter counts as half a second at most, and as
-    half a second for the first message.
+    A jump is a command farther from the present command than a joint moves at full speed during a time T. T is the
+    command timeout or the time since the previous message, whichever is longer. The time since the previous message
+    counts as half a second at most; for the first message it counts as half a second.
     """
     stamp, now_ns = row.slave_servo_jp_ns, row.now_ns
     if stamp > now_ns + _FUTURE_NS:  # if such a stamp were accepted, every later command would count as old
@@ -215,7 +215,7 @@ def take_command(p: SlaveNumbers, s: SlaveState, row: SlaveRow, dt: float) -> in
         far = max(p.timeout_ns, _SLOWEST_NS if is_first else period_ns) * 1e-9
         for i in range(s.command.shape[0]):
             near = abs(row.slave_servo_jp[i] - s.target[i]) <= p.speed_limit[i] * far
-            if not near:  # NaN is not near either
+            if not near:  # also for NaN
                 s.refused += 1
                 _age_of_command(p, s, now_ns)
                 return _REFUSED
@@ -240,7 +240,8 @@ def _longest_gap(p: SlaveNumbers, s: SlaveState) -> int:
 def follows(p: SlaveNumbers, s: SlaveState, now_ns: int) -> bool:
     """Whether to follow the command.
 
-    It is fresh, or it is a single command rather than the last one of a broken stream.
+    A fresh command is followed. An old command is followed if it is a single command, but not if it is the last command
+    of a broken stream.
     """
     if s.state != _ENABLED or s.is_busy or not s.is_homed:
         return False
@@ -275,7 +276,7 @@ def advance_setpoint(p: SlaveNumbers, s: SlaveState, before: Array, dt: float) -
 
 @inner
 def stoppable(room: float, most: float) -> float:
-    """Largest step from which a setpoint can stop within ``room`` if each step is smaller by ``most``.
+    """Largest step from which a setpoint can stop within the distance ``room`` if each step is smaller by ``most``.
 
     A step r that shrinks by ``most`` each tick needs the distance r (r + most) / (2 most) to come to rest.
     """
@@ -286,8 +287,8 @@ def stoppable(room: float, most: float) -> float:
 def _eased(ahead: float, flow: float, step: float, most: float) -> float:
     """Next step of a setpoint towards a moving target; the step may change by ``most`` a tick.
 
-    The target is ``ahead`` of the setpoint and moves by ``flow`` a tick. Relative to the target, the setpoint is never
-    faster than it can brake.
+    The distance to the target is ``ahead``; the target moves by ``flow`` per tick. The speed relative to the target is
+    never so high that the setpoint could not stop at the target.
     """
     relative = min(stoppable(abs(ahead), most), abs(ahead))
     wanted = flow + (relative if ahead > 0.0 else -relative)
@@ -301,8 +302,8 @@ def limit_tool(p: SlaveNumbers, s: SlaveState, arm: ArmModel, last: Array, dt: f
     Args:
         p: Parameters with ``tool_speed`` [m/s] and ``tool_acceleration`` [m/s²].
         s: State with ``setpoint`` and its last ``step`` (n,); written.
-        arm: Its ``setpoint`` and ``T``, the pose of the setpoint, are written.
-        last: Pose (7,) of the setpoint a tick ago.
+        arm: Arm model; its ``setpoint`` and ``T``, the pose of the setpoint, are written.
+        last: Pose (7,) of the setpoint one tick ago.
         dt: Tick [s].
     """
     copy(s.setpoint, arm.setpoint)

@@ -1,7 +1,7 @@
 """Elastic joints: motors that move links through gears that bend.
 
-Encoders sit on the motors. So control acts on one side of a spring, and the load is on the other side. Friction acts
-on the motor. Joints with a rigid gear move by the rigid model, in the same arm.
+Encoders sit on the motors. So the control law acts on one side of a spring, and the load is on the other side. Friction
+acts on the motor. An arm may also have joints with rigid gears; these move as in the rigid model.
 """
 
 from typing import Any
@@ -14,7 +14,7 @@ from teleop_core.slave.friction import FrictionState, bend, friction
 from teleop_core.slave.joints import JointNumbers
 from teleop_core.slave.world.contact import add_push
 
-_DAMPING = 0.02  # assumed: damping of a gear on its spring, as a share of critical damping with the motor alone
+_DAMPING = 0.02  # damping of a gear, divided by the critical damping of motor and spring; assumed
 
 
 class ElasticNumbers(JointNumbers):
@@ -99,14 +99,14 @@ def integrate_elastic(
 
     Args:
         acceleration: Pointer to the robot's rigid-body model, motors included.
-        dynamics: Its parameter row.
+        dynamics: Parameter row of the model.
         p: Parameters.
         s: State; written.
         contacts: :class:`~teleop_core.slave.world.contact.ContactState` of each point (N,).
         steps: Number of equal Runge-Kutta steps, >= 1.
         effort: Drive effort (n,) [N·m or N].
         q: Motor positions behind their gears (n,) [rad or m]; written.
-        dq: Their speeds (n,) [rad/s or m/s]; written.
+        dq: Motor speeds behind their gears (n,) [rad/s or m/s]; written.
         dt: Tick [s].
 
     Source:
@@ -141,7 +141,7 @@ def integrate_elastic(
 
 @inner
 def _sum_up(total: Array, slopes: Array, h: float) -> None:
-    """Add a step of classical Runge-Kutta to ``total`` (2, n), of slopes (4, 2, n)."""
+    """Add a classical Runge-Kutta step with the slopes (4, 2, n) to ``total`` (2, n)."""
     for side in range(2):
         for i in range(total.shape[1]):
             middle = slopes[1, side, i] + slopes[2, side, i]

@@ -1,7 +1,7 @@
 """Force observer: the force on the tip without a sensor, from drive efforts and joint motion.
 
-The generalised momentum of the arm changes by drives, weight and friction, which are known, and by external forces.
-The external forces are the remainder, as accurate as the friction model.
+Drives, weight, friction and external forces change the generalised momentum of the arm. All except the external forces
+are known, so the remaining change gives the external forces. They are as accurate as the friction model.
 """
 
 import math
@@ -19,7 +19,7 @@ from teleop_core.slave.friction import FrictionNumbers
 _DAMPING = 1e-4
 """Damping of the map from efforts to force, divided by its mean square gain.
 
-In a direction with a hundredth of the sensitivity of others, the estimate is half of the true force.
+In a direction whose sensitivity is a hundredth of that of the other directions, the estimate is half of the true force.
 """
 
 
@@ -47,10 +47,10 @@ class ObserverState(Fields):
 
 @inner
 def _lag(s: ObserverState, effort: Array, model: Array, share: float) -> None:
-    """Low-pass the drive efforts, less those of the arm's own model, so that they lag as much as the measured speeds.
+    """Low-pass the drive efforts minus the efforts of the arm's model, so that they lag as much as the measured speeds.
 
-    Speeds are differences of positions. From the middle of one tick to the middle of the next, the arm therefore moves
-    under the mean of both efforts, and its weight is that at the time in between.
+    Speeds are differences of positions, so they belong to the middles of ticks. Between the middles of two ticks, the
+    mean of the two efforts acts on the arm. The weight of the arm is taken at the time between these ticks.
     """
     for i in range(effort.shape[0]):
         mean = 0.5 * (s.last_effort[i] + effort[i]) - model[i]
@@ -60,7 +60,7 @@ def _lag(s: ObserverState, effort: Array, model: Array, share: float) -> None:
 
 @inner
 def _known_effort(p: ObserverNumbers, s: ObserverState, i: int) -> float:
-    """Effort of joint ``i`` that drives, the arm itself and friction account for [N·m or N]."""
+    """Effort of joint ``i`` that is explained by drives, the arm itself and friction [N·m or N]."""
     speed, scale = s.speed[i], p.friction_speed[i]
     dry = p.coulomb[i] * (speed / math.sqrt(speed * speed + scale * scale))
     return s.lagged[i] - p.viscous[i] * speed - dry
@@ -68,7 +68,7 @@ def _known_effort(p: ObserverNumbers, s: ObserverState, i: int) -> float:
 
 @inner
 def _observe(p: ObserverNumbers, s: ObserverState, model: Array, dt: float) -> None:
-    """Bring the residual (n,) [N·m or N] to the present tick, and keep what the next tick needs.
+    """Update the residual (n,) [N·m or N] to the present tick, and store the values that the next tick needs.
 
     Args:
         p: Parameter record.
@@ -98,16 +98,16 @@ def _observe(p: ObserverNumbers, s: ObserverState, model: Array, dt: float) -> N
 
 @kernel
 def force_of_efforts(J: Array, efforts: Array, scale: Array, force: Array) -> None:
-    """Write the force (3,) [N] on a tip that explains efforts (n,) of the joints best.
+    """Write the force (3,) [N] on the tip that best explains the joint efforts (n,).
 
-    Minimises Σ ((Jᵀ f - efforts)ᵢ / scaleᵢ)² + damping |f|². In the direction in which a singular arm feels nothing,
-    the force is zero. If the Jacobian is not finite, the whole force is zero.
+    Minimises Σ ((Jᵀ f - efforts)ᵢ / scaleᵢ)² + damping |f|². In a direction in which a force causes no joint effort, as
+    in a singular arm, the estimated force is zero. If the Jacobian is not finite, the whole force is zero.
 
     Args:
-        J: Jacobian (6, n) of the tip; its linear rows count, for a push makes no torque there.
+        J: Jacobian (6, n) of the tip; only its linear rows are used, because the force acts at the tip without torque.
         efforts: Joint efforts caused by the force [N·m or N].
         scale: Scale of each joint's effort, > 0: its largest effort.
-        force: Written.
+        force: Resulting force; written.
     """
     A, b = np.zeros((3, 3)), np.zeros(3)
     for k in range(3):
@@ -130,7 +130,7 @@ def force_of_efforts(J: Array, efforts: Array, scale: Array, force: Array) -> No
 
 @inner
 def forget(s: ObserverState, wrench: Array) -> None:
-    """Restart at the next estimate; until then there is no estimate, and the wrench (6,) is zero."""
+    """Restart the observer at the next estimate; until then there is no estimate, so the wrench (6,) is zero."""
     s.is_observed = 0
     for i in range(s.residual.shape[0]):
         s.residual[i] = s.lagged[i] = 0.0
@@ -140,15 +140,15 @@ def forget(s: ObserverState, wrench: Array) -> None:
 
 @inner
 def estimate(p: ObserverNumbers, s: ObserverState, arm: Arm, lag: float, dt: float, wrench: Array) -> None:
-    """Write the force on the tip in axes of the slave's base, without torque, estimated from the joints.
+    """Write the estimated force on the tip in axes of the slave's base, with a torque of zero.
 
     The estimate uses encoder positions, amplifier efforts, the control law's model and the plant's mean friction. The
-    residual is that of the last tick.
+    residual of the previous tick is used.
 
     Args:
         p: Parameters.
         s: State; written.
-        arm: Its scratch arrays ``measured``, ``joints`` and ``J`` are written.
+        arm: Arm; its scratch arrays ``measured``, ``joints`` and ``J`` are written.
         lag: Time constant of the measured speeds [s].
         dt: Tick [s].
         wrench: Written (6,) [N, N·m].
@@ -158,7 +158,7 @@ def estimate(p: ObserverNumbers, s: ObserverState, arm: Arm, lag: float, dt: flo
     copy(s.measured, arm.measured)
     copy(s.speed, arm.joints)
     write_model(arm.acceleration, arm.model, arm.measured, arm.joints, model)
-    if not s.is_observed:  # until now the arm was held in balance or by its brakes
+    if not s.is_observed:  # until this tick the arm was held at rest or by its brakes
         copy(model[:n], s.last_effort)
         copy(s.speed, s.last_speed)
     _observe(p, s, model, dt)

@@ -15,8 +15,8 @@ from teleop_core.kernels import Fields, Wrench, inner
 from teleop_core.slave.arm import Arm
 
 STANDARD_GRAVITY = 9.80665
-"""Weight of a mass [m/s²]; it pulls along -z of the slave's base."""
-_STREAM = 3  # number of the random stream, used with the seed; streams 1 and 2 are the human operator's
+"""Weight divided by mass [m/s²]; the weight acts along -z of the slave's base."""
+_STREAM = 3  # number of the random stream, used with the seed; the human operator uses streams 1 and 2
 
 
 class SensorNumbers(Fields):
@@ -110,7 +110,7 @@ class SensorNoise(Noise):
         self.reset()
 
     def reset(self) -> None:
-        """Begin again."""
+        """Restart the noise from its first sample."""
         self.begin(np.random.default_rng((self._seed, _STREAM)))
 
 
@@ -123,7 +123,7 @@ def sense(p: SensorNumbers, s: SensorState, arm: Arm, row: Row) -> None:
     Args:
         p: Parameters.
         s: State; written.
-        arm: Its ``noises`` are standard normal numbers (N, 6).
+        arm: Arm; its ``noises`` are standard normal numbers (N, 6).
         row: Signals.
     """
     for i in range(6):

@@ -1,10 +1,11 @@
 """Friction: viscous, and dry friction that either grows smoothly with speed or sticks.
 
 Friction that sticks is the LuGre bristle in the elasto-plastic form of Dupont, Hayward, Armstrong and Altpeter (2002),
-with the deflection of break-away equal to that of steady sliding: the bristle bends with the joint until it carries
-the dry friction, and then slips. Of the known models it alone always holds a load below dry friction (plain LuGre
-creeps under vibration) without a switch between two sets of equations (as Karnopp's needs). LuGre is stiff because of
-the slip at high speed. Here the bristle is returned to its bound instead, which is exact at any step size.
+with the deflection of break-away equal to that of steady sliding: the bristle bends with the joint until it carries the
+dry friction, and then slips. It is the only known model with two properties: a load below the dry friction never
+creeps, and there is one set of equations. Plain LuGre creeps under vibration, and Karnopp's model switches between two
+sets of equations. LuGre is stiff because of its slip at high speed. Here the bristle is clipped to its bound instead,
+which is exact at any step size.
 """
 
 import math
@@ -12,10 +13,10 @@ from typing import Any
 
 from teleop_core.kernels import Fields, IntegerPerJoint, PerJoint, inner
 
-# Noise: the multiplicative generator of Lewis, Goodman and Miller (1969), multiplier of Park,
-# Miller and Stockmeyer (1993).
-_MULTIPLIER, _MODULUS = 48271, 2147483647
-_DAMPING = 1.0  # damping of a stuck joint on its bristle, as a share of critical damping
+# Random numbers: the multiplicative generator of Lewis, Goodman and Miller (1969).
+_MULTIPLIER = 48271  # of Park, Miller and Stockmeyer (1993)
+_MODULUS = 2147483647
+_DAMPING = 1.0  # damping of a stuck joint on its bristle, divided by critical damping
 
 
 class FrictionNumbers(Fields):
@@ -34,7 +35,7 @@ class FrictionState(Fields):
     """Fields of a state record with the friction of each joint."""
 
     bent: PerJoint  # bend of the bristle at the start of the step [rad or m]
-    grip: PerJoint  # share of dry friction in force
+    grip: PerJoint  # present dry friction, divided by its mean
     slipped: PerJoint
     astray: PerJoint
     noise: IntegerPerJoint
@@ -78,9 +79,9 @@ def bend(p: FrictionNumbers, s: FrictionState, i: int, moved: float) -> None:
 def wander(p: FrictionNumbers, s: FrictionState) -> None:
     """Vary the dry friction of joints that slipped: first-order noise of mean 1 over the slipped distance.
 
-    As a joint moves, teeth and balls meet other parts of their tracks; at rest they stay, so the friction does not
-    change. The share never falls below a tenth. Its noise is uniform within a tick, and so approximately normal over
-    the distance on which the friction changes.
+    As a joint moves, its teeth and balls touch other parts of their tracks, so the friction changes. At rest the
+    friction is constant. It never falls below a tenth of its mean. The noise has a uniform distribution in each tick.
+    Over the distance on which the friction changes, the sum is therefore approximately normal.
     """
     for i in range(s.grip.shape[0]):
         if p.wander[i] > 0.0 and s.slipped[i] > 0.0:

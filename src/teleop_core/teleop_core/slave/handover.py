@@ -1,8 +1,8 @@
 """Handover: the effort that a control law loses when its gains change.
 
 An integrator holds more than a load. While a joint moves, it also balances the effort that the derivative subtracts.
-After a sudden change of gains this balance is lost, and the arm would run away. So the integrator takes over the
-difference, and the effort makes no step.
+After a sudden change of gains this balance is lost, and the arm would run away. So the difference is added to the
+integrator, and the effort is continuous.
 
 Source:
     Åström and Hägglund 1995, PID Controllers, chapter 3 (bumpless parameter changes).
@@ -15,21 +15,21 @@ import numpy as np
 from teleop_core.kernels import Array, kernel
 from teleop_core.slave.arm import Arm
 
-_NO_LIMIT = 1e6  # times a drive's limit: effort that the limit would cut off counts as well
-_TICKS = 20  # ticks after which a derivative's filter has forgotten the noise of one difference
+_NO_LIMIT = 1e6  # factor on the drives' limits, so that the compared efforts are not clipped
+_TICKS = 20  # number of ticks after which the filter of a derivative has forgotten one difference
 
 
 def missing_effort(arm: Arm, speed: Array, before: Array, dt: float, ticks: int = _TICKS) -> Array:
-    """Effort (n,) of the gains ``before``, less that of the present gains [N·m or N].
+    """Effort (n,) with the gains ``before`` minus the effort with the present gains [N·m or N].
 
     Both efforts are computed for an arm that continues at its present, constant speed. The arm itself is not changed.
 
     Args:
-        arm: The arm; its gains are the new ones.
+        arm: The arm; it has the new gains.
         speed: Joint speeds, shape (n,) [rad/s or m/s].
-        before: Gains until now, shape (n, k).
+        before: Previous gains, shape (n, k).
         dt: Tick [s].
-        ticks: Number of ticks at constant speed; 0 compiles the kernels, and calls no control law.
+        ticks: Number of ticks at constant speed. With 0, the kernels are compiled, but no control law is called.
     """
     efforts = np.zeros((2, len(speed)))
     for gains, effort in zip((before, arm.gains), efforts, strict=True):
@@ -44,7 +44,7 @@ def _go_on(
     control: Any, gains: Array, memory: Array, setpoint: Array, measured: Array, speed: Array,
     feedforward: Array, limit: Array, dt: float, ticks: int, effort: Array,
 ) -> None:  # fmt: skip
-    """Write the effort for an arm that moved on at constant speed for some ticks."""
+    """Write the effort for an arm that continues at constant speed for some ticks."""
     for _ in range(ticks):
         for i in range(speed.shape[0]):
             setpoint[i] += speed[i] * dt

@@ -1,4 +1,4 @@
-"""Interpolation: the path from command to command if commands come more slowly than ticks."""
+"""Interpolation: the path from command to command if the period of commands is longer than a tick."""
 
 from teleop_core.kernels import Array, Fields, PerJoint, inner
 
@@ -14,16 +14,16 @@ class WayParameters(Fields):
 
 
 class WayState(Fields):
-    """Fields of a state record with the path to the newest command; slopes are per whole path."""
+    """Fields of a state record with the path to the newest command; derivatives are by the share of the path."""
 
     command: PerJoint  # present position on the path [rad or m]
     target: PerJoint  # the newest command
     begin: PerJoint
-    slope: PerJoint  # first slope at the beginning
-    bend: PerJoint  # second slope there
+    slope: PerJoint  # first derivative at the start
+    bend: PerJoint  # second derivative at the start
     end_slope: PerJoint
     ticks: int  # number of finished ticks
-    span: int  # ticks in all
+    span: int  # total number of ticks
 
 
 @inner
@@ -56,7 +56,7 @@ def begin_way(p: WayParameters, s: WayState, command: Array, period_ns: int, dt:
 
 @inner
 def _coefficients(s: WayState, i: int) -> tuple[float, float, float, float, float]:
-    """Coefficients of the quintic in the share of the path, first to fifth power."""
+    """Coefficients of a polynomial in the share of the path, from the first to the fifth power."""
     rise, a, b, e = s.target[i] - s.begin[i], s.slope[i], s.bend[i], s.end_slope[i]
     return (
         a,
@@ -69,7 +69,7 @@ def _coefficients(s: WayState, i: int) -> tuple[float, float, float, float, floa
 
 @inner
 def _slopes(s: WayState, i: int) -> tuple[float, float]:
-    """First and second derivative of joint i at its present point of the path; 0 if it waits at the end."""
+    """First and second derivative of joint i at the present point of the path; 0 at the end of the path."""
     if s.ticks > s.span:
         return 0.0, 0.0
     x = s.ticks / s.span
@@ -80,9 +80,9 @@ def _slopes(s: WayState, i: int) -> tuple[float, float]:
 
 @inner
 def advance_on_way(p: WayParameters, s: WayState) -> None:
-    """Move the command on by one tick; at the end of the path it is exactly the newest command.
+    """Advance the command by one tick; at the end of the path it equals the newest command exactly.
 
-    The polynomial of fifth degree with given position, speed and acceleration at its ends is the minimum-jerk path.
+    The minimum-jerk path is the polynomial of fifth degree with given positions, speeds and accelerations at both ends.
 
     Source:
         Flash and Hogan 1985, eq. 3.

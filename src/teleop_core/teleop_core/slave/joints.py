@@ -1,4 +1,4 @@
-"""Joints: how the arm moves on during one control tick, by classical Runge-Kutta steps."""
+"""Joints: motion of the arm during one control tick, integrated by classical Runge-Kutta steps."""
 
 from typing import Any
 
@@ -10,7 +10,7 @@ from teleop_core.slave.world.contact import WorldNumbers, add_push
 
 
 class JointNumbers(FrictionNumbers, WorldNumbers):
-    """Fields of a parameter record with what acts on joints in motion."""
+    """Fields of a parameter record with the efforts and friction that act on moving joints."""
 
 
 @inner
@@ -47,11 +47,11 @@ def integrate(
     dq: Array,
     dt: float,
 ) -> None:
-    """Move ``q`` and ``dq`` (n,) on by one tick under constant drive effort.
+    """Advance ``q`` and ``dq`` (n,) by one tick under constant drive effort.
 
     Args:
         acceleration: Pointer to the robot's rigid-body model.
-        dynamics: Its parameter row.
+        dynamics: Parameter row of the model.
         p: Parameters.
         s: State; written.
         contacts: :class:`~teleop_core.slave.world.contact.ContactState` of each point (N,).
@@ -70,7 +70,7 @@ def integrate(
             start[i] = q[i]
         _derivative(acceleration, dynamics, p, s, contacts, effort, start, q, dq, net, k[0])
         for stage in range(1, 4):
-            # Positions of the stages follow from the speeds of the stages before.
+            # Positions of the Runge-Kutta stages follow from the speeds of the previous stages.
             share = h if stage == 3 else 0.5 * h
             for i in range(n):
                 slope = dq[i] if stage == 1 else speed[i]
@@ -79,7 +79,7 @@ def integrate(
                 speed[i] = dq[i] + share * k[stage - 1, i]
             _derivative(acceleration, dynamics, p, s, contacts, effort, start, position, speed, net, k[stage])
         for i in range(n):
-            # Sum of the four stage speeds, written with the accelerations they came from.
+            # Sum of the speeds of the four stages, expressed by the accelerations of the stages.
             q[i] += h * dq[i] + h * h / 6.0 * (k[0, i] + k[1, i] + k[2, i])
             dq[i] += h / 6.0 * (k[0, i] + 2.0 * k[1, i] + 2.0 * k[2, i] + k[3, i])
             bend(p, s, i, q[i] - start[i])

@@ -1,8 +1,8 @@
 """Motion commands: commands to an arm other than a stream of joint references.
 
-They are those of CRTK (Collaborative Robotics Toolkit): moves to a goal, speeds of joints and tip, steps relative to
-the last command, hold. All of them pass the limits, states and faults of the slave's step. Only one command moves the
-arm at a time:
+The commands are those of CRTK (Collaborative Robotics Toolkit): moves to a goal, speeds of joints and tip, steps
+relative to the last command, and hold. The limits, states and faults of the slave's step apply to all of them. Only one
+command moves the arm at a time:
 
 - a move replaces any other motion, and only another move or a hold replaces a move; - of several streams the first one
 moves the arm, until it is silent for the command timeout; - hold ends a move, a speed command, and a single reference.
@@ -21,7 +21,7 @@ from teleop_core.slave.operation.states import Answer, Event, State
 from teleop_core.slave.velocity import Motion
 
 _REACHED = (IkStatus.FOLLOWED, IkStatus.NEAR_SINGULAR)
-# A goal may exceed a limit by this rounding, such as that of a setpoint at the limit [rad or m].
+# A goal may exceed a limit by this much [rad or m], because a setpoint at the limit is rounded.
 _SLACK = 1e-6
 Told = tuple[Answer, str]
 """Answer to a command, and its text."""
@@ -41,8 +41,8 @@ class Commanded(Protocol):
 class MotionCommands:
     """Takes motion commands for a slave, between two ticks.
 
-    Every command returns an :class:`~teleop_core.slave.operation.Answer` and the same in words. A command that the arm
-    cannot do, or may not do in its state, is refused and changes nothing.
+    Every command returns an :class:`~teleop_core.slave.operation.Answer` and a text with the same content. A command
+    that the arm cannot do, or may not do in its state, is refused and changes nothing.
 
     Args:
         slave: The slave; its state is written.
@@ -55,13 +55,13 @@ class MotionCommands:
 
     @property
     def goal(self) -> Array:
-        """Joint positions (n,) of the goal of a move, or of the last reference, at which the arm holds [rad or m]."""
+        """Joint positions (n,) [rad or m] at which the arm will rest: the goal of a move, or the last reference."""
         s = self._slave.state
         return np.array(s["move_to"] if s["is_busy"] else s["target"], dtype=np.float64)
 
     @property
     def source(self) -> str:
-        """What moves the arm: ``move``, ``velocity``, ``servo``, or ``nothing``."""
+        """Kind of command that moves the arm: ``move``, ``velocity``, ``servo``, or ``nothing``."""
         s = self._slave.state
         if s["is_busy"]:
             return "home" if s["is_homing"] else "move"
@@ -78,7 +78,7 @@ class MotionCommands:
             goal: Joints (n,) [rad or m].
 
         Raises:
-            ShapeError: Another number of joints.
+            ShapeError: The length of ``goal`` is not the number of joints.
         """
         wanted = np.asarray(goal, dtype=np.float64)
         if refusal := self._unfit(wanted):
@@ -128,7 +128,7 @@ class MotionCommands:
             now_ns: Time of arrival, on the clock of the ticks [ns].
 
         Raises:
-            ShapeError: Another number of joints.
+            ShapeError: The length of ``speed`` is not the number of joints.
         """
         return self._drive(Motion.JOINTS, self._joints(speed), "drive", now_ns)
 
@@ -150,7 +150,7 @@ class MotionCommands:
         """Follow a joint reference (n,) [rad or m], like one of ``slave/servo_jp``.
 
         Raises:
-            ShapeError: Another number of joints.
+            ShapeError: The length of ``joints`` is not the number of joints.
         """
         wanted = self._joints(joints)
         if refusal := self._unfit(wanted) or self._refusal():

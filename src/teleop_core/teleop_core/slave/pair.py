@@ -21,13 +21,13 @@ class ArmParameters(slave.SlaveParameters, slave_sim.SlaveSimParameters):
 
 @kernel
 def arm_step(steps: Any, server: Any, simulated: Any, row: commands.SlaveRow, dt: float) -> None:
-    """One tick of both on one row of signals.
+    """One tick of the server and its simulated arm on one row of signals.
 
     Args:
-        steps: The kernels of both, as :func:`~teleop_core.kernels.apart` gives them.
+        steps: Kernels of server and simulated arm, as returned by :func:`~teleop_core.kernels.apart`.
         server: Arguments of :func:`~teleop_core.slave.step.slave_step`.
         simulated: Arguments of :func:`~teleop_core.slave.simulation.simulation_step`.
-        row: Signals of both; the server reads measured values of the last tick.
+        row: Signals of server and simulated arm; the server reads measured values of the previous tick.
         dt: Tick [s].
     """
     steps[0](server[0], server[1], server[2], row, dt)
@@ -39,7 +39,7 @@ class SimulatedArm(RunningStage):
     """A server and its simulated arm, stepped together without a graph.
 
     Args:
-        parameters: Parameters of both.
+        parameters: Parameters of server and simulated arm.
         dt: Tick [s].
 
     Attributes:
@@ -67,13 +67,13 @@ class SimulatedArm(RunningStage):
         self.reset()
 
     def reset(self) -> None:
-        """Go back to home, at rest, with no command in force."""
+        """Return to home, at rest, without any command."""
         assign(self.signals, self._begin)
         for stage in (self.server, self.simulated):
             stage.reset()
 
     def prepare(self, ticks: int) -> None:
-        """Get ready for the next steps."""
+        """Prepare the next steps: draw the noise of the simulated arm."""
         self.simulated.prepare(ticks)
 
     def retune(self, parameters: ArmParameters) -> None:

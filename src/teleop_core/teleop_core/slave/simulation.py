@@ -25,7 +25,7 @@ class SimulationNumbers(ElasticNumbers, DriveNumbers, SensorNumbers, ObserverNum
     """Parameter record of a simulated arm."""
 
     encoder_step: PerJoint  # [rad or m]
-    compensated: PerJoint  # share of gravity that is fed forward
+    compensated: PerJoint  # share of the gravity effort that is fed forward
     braking: PerJoint  # deceleration by the brakes [rad/s² or m/s²]
     steps: int
     has_gears: int
@@ -102,7 +102,7 @@ def _estimate(p: SimulationNumbers, s: SimulationState, arm: Arm, row: Row, dt: 
 
 @inner
 def _move_on(p: SimulationNumbers, s: SimulationState, arm: Arm, braked: bool, dt: float) -> None:
-    """Move the arm by a tick: by its brakes, or under the effort of its drives."""
+    """Advance the arm by a tick, decelerated by its brakes or driven by its drives."""
     if braked:
         _brake(p, s, arm, dt)
         for i in range(arm.q.shape[0]):
@@ -119,7 +119,7 @@ def simulation_step(p: SimulationNumbers, s: SimulationState, arm: Arm, row: Row
     """One control tick of a simulated arm: write its encoder positions and the pose of its tip.
 
     Measured values are sampled at the start of the tick, together with the setpoint with which they are compared. Then
-    the arm moves on under constant effort. With brakes on, its drives are off.
+    the arm moves for a tick under constant effort. While the brakes are on, the drives are off.
 
     Args:
         p: Parameter record.

@@ -30,7 +30,7 @@ _TIMES = {
 }
 _STOP, _PRESSED = int(Event.STOP), int(Fault.STOP)
 _FILTER_SOURCE = "published: Vongbunyong 2008, eq. 6.2.8"
-_NEAR = 1e-3  # rad or m, in addition to an encoder step: an arm farther from home is not at home
+_NEAR = 1e-3  # an arm farther from home than this plus an encoder step is not at home [rad or m]
 INTERPOLATIONS = ("none", "linear", "minimum_jerk")
 
 
@@ -122,7 +122,7 @@ class Slave(RunningStage):
         self._load_commands()
 
     def reset(self) -> None:
-        """Go back to home, with no command in force."""
+        """Return to home, without any command."""
         s, home = self.state, self.robot.home
         assign(s, 0)
         for name in ("command", "filtered", "setpoint", "target", "move_from", "measured"):
@@ -176,7 +176,7 @@ class Slave(RunningStage):
     # -- operation -------------------------------------------------------------------------------
 
     def _load_commands(self) -> None:
-        """Compile the functions of commands and faults, so that no stop waits for the compiler."""
+        """Compile the functions of commands and faults, so that no stop is delayed by the compiler."""
         spare = records(self.state.dtype)[0]
         _request(self.parameters, spare, int(Event.STOP))
         _fail(self.parameters, spare, int(Fault.STALL), 0.0, 0.0)
@@ -200,7 +200,7 @@ class Slave(RunningStage):
             self.parameters["event_ns"][index] = round(seconds * 1e9)
 
     def _take_operation(self, given: OperationParameters) -> None:
-        """Write bounds of motion and of faults; bounds without a given value follow from the drives."""
+        """Write bounds of motion and of faults; bounds that are not given are computed from the drives."""
         robot, p, drives = self.robot, self.parameters, self.robot.drives
         assert drives is not None
         p["braking"] = drives.effort_limit / drives.inertia
@@ -224,7 +224,7 @@ class Slave(RunningStage):
             event: The command, one of :data:`~teleop_core.slave.operation.states.COMMANDS`.
 
         Returns:
-            The answer to the command, and the same in words.
+            The answer to the command, and a text with the same content.
 
         Raises:
             UnknownNameError: There is no such command.
@@ -242,8 +242,8 @@ class Slave(RunningStage):
 
         Args:
             is_pressed: Whether any button holds the stop pressed.
-            heard_ns: Time of the last message of the button that has been silent longest [ns]; the
-                heartbeat counts from then.
+            heard_ns: Time of the last message of the button that has been silent longest [ns]; the heartbeat timeout
+                starts then.
         """
         self.state["is_pressed"], self.state["heard_ns"] = is_pressed, heard_ns
         if is_pressed:
@@ -260,7 +260,7 @@ class Slave(RunningStage):
         _fail(self.parameters, self.state, int(fault), value, bound)
 
     def answer_measured(self) -> None:
-        """Write the pose of the measured joints into the signals, for a session without a running step."""
+        """Write the tip pose of the measured joints into the signals, for a session that does not call the step."""
         row, transform = self.signals, np.empty((4, 4))
         joints = row["slave_measured_js"][: self.robot.n].copy()
         self.robot.kernels.fk(joints, self.arm.geometry, transform)
@@ -277,7 +277,7 @@ class Slave(RunningStage):
 
     @property
     def refused(self) -> int:
-        """Commands refused so far because they were jumps."""
+        """Number of commands refused so far because they were jumps."""
         return int(self.state["refused"])
 
 

@@ -71,8 +71,8 @@ class SlaveSimParameters(RobotParameters):
 class SlaveSim(RunningStage):
     """Stage that simulates an arm: a discrete control law on continuous drives and links.
 
-    The arm begins at home, at rest and in balance: the control law holds the gravity that is not compensated, if it
-    can. Its tip can touch the world, and the contact force acts on the drives.
+    The arm begins at home, at rest and in balance: the control law balances the uncompensated gravity if it has an
+    integral. Its tip can touch the world, and the contact force acts on the drives.
 
     Raises:
         ParameterError: The robot has no drives, the length of a list is not its number of joints, errors do not decay
@@ -132,11 +132,11 @@ class SlaveSim(RunningStage):
         handover.missing_effort(self.arm, np.zeros(n), self.arm.gains, dt, ticks=0)  # compiles the kernels
 
     def reset(self) -> None:
-        """Go back to home, at rest."""
+        """Return to home, at rest."""
         self._rest_at(self.robot.home)
 
     def _rest_at(self, home: Array) -> None:
-        """Stand at joints (n,), at rest and in balance."""
+        """Place the arm at joints (n,), at rest and in balance."""
         s, arm = self.state, self.arm
         assign(s, 0)
         assign(arm.contacts, 0)
@@ -170,7 +170,7 @@ class SlaveSim(RunningStage):
 
     @property
     def depth(self) -> float:
-        """Depth of the tip in the channel of its last puncture, a tick ago [m]; 0 outside."""
+        """Depth of the tip in the channel of the last puncture, one tick ago [m]; 0 outside the channel."""
         tip = self.arm.contacts[0]
         return max(-float(tip["gap"]), 0.0) if tip["is_open"] else 0.0
 
@@ -199,7 +199,8 @@ class SlaveSim(RunningStage):
         """Take new parameters from the next tick on; a law with ``shift`` keeps the effort continuous.
 
         Raises:
-            ParameterError: As in :meth:`examine`, which runs first if it did not yet; nothing has changed then.
+            ParameterError: As in :meth:`examine`, which is called first if it has not run for these parameters. If it
+                fails, no parameter changes.
         """
         if parameters is not self._examined:
             self.examine(parameters)
@@ -250,7 +251,7 @@ class SlaveSim(RunningStage):
         """Pose (4, 4) of the tip at the robot's start.
 
         Raises:
-            ParameterError: The forward kinematics cannot close the robot's loops there.
+            ParameterError: The forward kinematics cannot close the robot's loops at the start.
         """
         try:
             return self.robot.fk(self.robot.start)
@@ -259,7 +260,7 @@ class SlaveSim(RunningStage):
             raise ParameterError("world.place", (), text) from error
 
     def _check_world(self, world: WorldParameters) -> None:
-        """Make sure that the tool begins outside the object.
+        """Raise an error if the tool begins inside the object.
 
         Raises:
             ParameterError: The tool begins inside the object.
@@ -280,17 +281,17 @@ class SlaveSim(RunningStage):
         stability.check_stable(self._law, self.robot, loop, are_large_tried=parameters.trials == "all")
 
     def _hand_over(self) -> None:
-        """Move the effort that the new gains no longer give into the integrators, once these gains are in force."""
+        """Add the effort that the law loses by its new gains to the integrators, after these gains were set."""
         if np.array_equal(self.arm.gains, self._gains_in_force):
             return
-        if self.signals["now_ns"] > 0:  # before the first tick nothing moves, so no effort must be handed over
+        if self.signals["now_ns"] > 0:  # before the first tick the arm is at rest, so no effort is lost
             speed = np.array(self.state["speed"])
             missing = handover.missing_effort(self.arm, speed, self._gains_in_force, self.dt)
             self._law.shift(self.arm.memory, missing)
         self._gains_in_force = self.arm.gains.copy()
 
     def _physics(self, parameters: SlaveSimParameters) -> Physics:
-        """Numbers of the plant, with the friction that the slave's own parameters give."""
+        """Numbers of the plant; friction values of the slave's own parameters replace those of the plant."""
         chosen, robot = parameters.plant.kind, self.robot
         made = PLANTS.find(chosen.kind).physics(chosen.parameters, robot)
         viscous = per_joint(robot, "viscous", parameters.viscous, made.viscous)

@@ -1,7 +1,7 @@
 """Stability: whether a slave's control loop follows, comes to rest, and lets errors decay.
 
-A loop is tried on copies of the arm before it is used. The result depends on nothing else, so a loop that has passed
-is not tried again in this process.
+A loop is tried on copies of the arm before it is used. The result depends only on the loop and the arm, so a loop that
+has passed is not tried again in this process.
 """
 
 from collections.abc import Callable
@@ -19,17 +19,20 @@ from teleop_core.slave.controllers import Controller
 from teleop_core.slave.plants import PER_JOINT
 from teleop_core.slave.simulation import SimulationNumbers, SimulationState, simulation_step
 
-_TICKS, _LAST = 400, 100
+_TICKS = 400  # duration of a trial [ticks]
+_LAST = 100  # number of ticks at the end of a trial in which the error is measured
 # After _TICKS no error may exceed its initial value by this factor. Laws that learn may let errors grow for a while,
 # within bounds; unstable loops exceed this factor by orders of magnitude.
 _GROWTH = 100.0
-# Initial error in encoder steps, and the factor on the encoder steps during the trial.
-_ERROR, _FINE = 1e-2, 1e-6
-# Ticks of a dash: bursts of full speed with rests between, then a run at full speed.
-_BURSTS, _BURST, _RUN = 2, 50, 150
-# Within the longest of these rests [ticks], but after the shortest, the error must have fallen to this share of the
-# dash's largest error.
-_SHORTEST, _LONGEST, _LEFT = 300, 2000, 0.5
+_ERROR = 1e-2  # initial error [encoder steps]
+_FINE = 1e-6  # factor on the encoder steps during the trial
+# A dash consists of bursts at full speed with rests between them, then a run at full speed.
+_BURSTS = 2  # number of bursts
+_BURST = 50  # duration of a burst [ticks]
+_RUN = 150  # duration of the run [ticks]
+_SHORTEST = 300  # shortest rest after a dash [ticks]
+_LONGEST = 2000  # longest rest after a dash [ticks]
+_LEFT = 0.5  # the error must fall to this share of the largest error of the dash before the longest rest is over
 # Share of a joint's free range that a dash may use.
 _ROOM = 0.8
 # Stability limit of classical Runge-Kutta: -h times a real pole.
@@ -161,7 +164,7 @@ def _check_small(name: str, loop: ClosedLoop) -> None:
 
 
 def _held(loop: ClosedLoop, by: Array) -> Array:
-    """Positions (N, n) in the last ticks of a trial that begins ``by`` (n,) off the setpoint."""
+    """Positions (N, n) in the last ticks of a trial that begins with a distance ``by`` (n,) from the setpoint."""
     loop = loop.copied()
     for field in ("encoder_step", "effort_step"):
         loop.p[field] *= _FINE
@@ -177,7 +180,7 @@ def _held(loop: ClosedLoop, by: Array) -> Array:
 def _check_large(name: str, robot: Robot, loop: ClosedLoop) -> None:
     for joint in range(len(loop.arm.q)):
         left = _left(robot, loop, joint)
-        if not left <= _LEFT:  # NaN is left as well
+        if not left <= _LEFT:  # also for NaN
             needed = (
                 f"one that settles: {_LONGEST * loop.dt:g} s after a stop from full speed, joint "
                 f"{joint + 1} still has {left:.2g} of its largest error; raise its gains, or limit its "
@@ -187,9 +190,9 @@ def _check_large(name: str, robot: Robot, loop: ClosedLoop) -> None:
 
 
 def dash(lower: float, upper: float, start: float, speed: float, dt: float) -> Array:
-    """Setpoints (N,) of a joint that dashes from ``start`` towards the farther of its limits.
+    """Setpoints (N,) of a joint that moves in a dash from ``start`` towards its farther limit.
 
-    Periods of full speed and of standstill alternate; the last period is at full speed.
+    Bursts at full speed alternate with rests; the dash ends with a long run at full speed.
 
     Args:
         lower: Lower limit [rad or m].
@@ -207,7 +210,7 @@ def dash(lower: float, upper: float, start: float, speed: float, dt: float) -> A
 
 
 def _left(robot: Robot, loop: ClosedLoop, joint: int) -> float:
-    """Share of a joint's largest error that remains at rest after its setpoint has dashed."""
+    """Error of a joint at rest after a dash of its setpoint, divided by the largest error of the dash."""
     loop = loop.copied()
     setpoint, arm, step = loop.row.slave_setpoint_js, loop.arm, loop.step()
 

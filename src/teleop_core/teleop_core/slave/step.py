@@ -39,7 +39,7 @@ def _is_near(p: commands.SlaveNumbers, s: commands.SlaveState) -> bool:
 
 @inner
 def _begin_where_it_is(p: commands.SlaveNumbers, s: commands.SlaveState, arm: ArmModel, row: commands.SlaveRow) -> None:
-    """Begin the setpoint of an arm that is not at home at its measured position; the arm homes from there."""
+    """Set the setpoint of an arm that is not at home to its measured position; homing starts from there."""
     if _is_near(p, s):
         return
     for i in range(s.setpoint.shape[0]):
@@ -78,7 +78,7 @@ def _take_measured(p: commands.SlaveNumbers, s: commands.SlaveState, arm: ArmMod
         for i in range(n):
             s.full_ns[i] = 0
     else:
-        # What happened in a longer gap is unknown.
+        # The motion of the arm in a longer gap is unknown.
         watch.watch_joints(p, s, arm.effort, min(stamp_ns - before_ns, p.timeout_ns))
         watch.watch_tip(p, s, row.slave_setpoint_cp, row.slave_measured_cp)
     watch.find_rest(s, _moves(p, s), stamp_ns)
@@ -126,7 +126,7 @@ def slave_step(
     joints = arm.joints
     _take_measured(p, s, arm, row)
     watch.begin_tick(p, s, row.now_ns)
-    if s.asked_ns != 0:  # the same as a message of servo_jp
+    if s.asked_ns != 0:  # works as a message of servo_jp
         copy(s.asked, row.slave_servo_jp)
         row.slave_servo_jp_ns, s.asked_ns = s.asked_ns, 0
     row.command_status = commands.take_command(p, s, row, dt)

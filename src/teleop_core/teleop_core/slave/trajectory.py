@@ -1,4 +1,4 @@
-"""Trajectory: joint-space cubics for autonomous moves, all joints from rest to rest together."""
+"""Trajectory: joint-space cubics for autonomous moves; all joints start and stop together, at rest."""
 
 import math
 

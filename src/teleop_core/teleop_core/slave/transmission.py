@@ -1,4 +1,4 @@
-"""Transmission: drives from commanded to given effort; play and tendons behind the encoders."""
+"""Transmission: from the commanded effort to the effort of the motors; play and tendons behind the encoders."""
 
 from typing import Annotated
 
@@ -33,14 +33,14 @@ def follow_encoders(p: DriveNumbers, s: DriveState, q: Array, coupling: Array, t
     """Write the true joint positions (n,) of motors at ``q`` (n,) [rad or m].
 
     A joint stays at its position until its motor has crossed the play; then the motor drags the joint. The lag of a
-    joint behind its motor moves the later joints whose tendons pass it.
+    joint behind its motor moves later joints, whose tendons run over the joint.
 
     Args:
         p: Parameters.
         s: State; written.
         q: Motor positions, seen through their gears.
-        coupling: (n, n), below its diagonal.
-        tip: Written.
+        coupling: Motion of a joint per lag of an earlier joint, (n, n), zero on and above the diagonal.
+        tip: True joint positions, written.
     """
     for i in range(q.shape[0]):
         pull = q[i]
@@ -58,7 +58,7 @@ def drive(p: DriveNumbers, s: DriveState, arm: Arm) -> None:
     Args:
         p: Parameters.
         s: State; written.
-        arm: Its ``effort`` is written.
+        arm: Arm; its ``effort`` is written.
     """
     if p.delay_ticks > 0:  # in the first ticks the delayed effort is the first effort, which holds the arm
         count = s.late.shape[0]

@@ -20,10 +20,10 @@ class Motion(IntEnum):
 
 
 _FOLLOWING, _TIP = int(Motion.FOLLOWING), int(Motion.TIP)
-# Radians per second at the tip that count as much as metres per second: its inverse [m].
+# Length [m] that relates rotation to translation: 1 rad/s of the tip counts as much as this length per second.
 _LENGTH = 0.1
-# Damping added to the squares of the weighted singular values. Assumed: where these are 1, speeds lose a
-# ten-thousandth; next to a singularity joints are at most 50 times as fast as the weighted tip speed.
+# Damping added to the squares of the weighted singular values; assumed. With singular values of 1, it reduces speeds by
+# a ten-thousandth. Near a singularity, joints are at most 50 times as fast as the weighted tip speed.
 _DAMPING = 1e-4
 
 
@@ -32,10 +32,10 @@ def joint_speeds(arm: ArmModel, q: Array, twist: Array, speed: Array) -> None:
     """Write the joint speeds (n,) that follow a twist best in the damped least-squares sense.
 
     ``dq = Jᵀ (J Jᵀ + damping I)⁻¹ v``, with the linear rows of J and v divided by a length. Near a singularity the tip
-    lags, and the joints stay slow. Components that the robot cannot do are left out.
+    lags, and the joints stay slow. Components of the twist in directions that the robot does not control are left out.
 
     Args:
-        arm: Its ``jacobian`` and ``geometry``; its scratch arrays ``J`` and ``is_free`` are written.
+        arm: Arm with ``jacobian`` and ``geometry``; its scratch arrays ``J`` and ``is_free`` are written.
         q: Joints (n,) [rad or m].
         twist: Twist of the tip (6,) in base axes [m/s, rad/s].
         speed: Joint speeds (n,) [rad/s or m/s]; written.
@@ -60,7 +60,7 @@ def joint_speeds(arm: ArmModel, q: Array, twist: Array, speed: Array) -> None:
 
 @inner
 def _share_of_limits(p: SlaveNumbers, s: SlaveState, dt: float) -> float:
-    """Largest share, at most 1, of the wanted speeds within all speed limits and, for a tip twist, all joint limits."""
+    """Largest factor, at most 1, by which the wanted speeds stay within speed limits and, for a twist, joint limits."""
     share = 1.0
     for i in range(s.drive.shape[0]):
         fast = abs(s.drive[i])
@@ -76,7 +76,7 @@ def _share_of_limits(p: SlaveNumbers, s: SlaveState, dt: float) -> float:
 
 @inner
 def advance_velocity(p: SlaveNumbers, s: SlaveState, arm: ArmModel, now_ns: int, dt: float) -> None:
-    """Move the setpoint at the wanted speed; without a fresh command it brakes to rest, and stays.
+    """Move the setpoint at the wanted speed; without a fresh command the setpoint brakes to rest.
 
     All joints stay within their speed limits, change their speed no faster than their drives can brake, and stop at
     their joint limits. If the joints are too slow for the wanted twist, the tip moves more slowly in the same
@@ -84,7 +84,7 @@ def advance_velocity(p: SlaveNumbers, s: SlaveState, arm: ArmModel, now_ns: int,
 
     Args:
         p: Parameters.
-        s: State; its setpoint is written.
+        s: State; the setpoint is written.
         arm: As in :func:`joint_speeds`.
         now_ns: Time of the tick [ns].
         dt: Tick [s].

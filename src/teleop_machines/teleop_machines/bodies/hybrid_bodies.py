@@ -80,7 +80,7 @@ def _coordinates(robot: Robot, legs: parallel.Telescope, points: Array) -> Coord
 
 
 def _seat(g: Mapping[str, float], q: Array) -> Array:
-    """Centre of the Stewart base (N, 3) [m]: end of the rod."""
+    """Centre of the Stewart base (N, 3) [m], which is the end of the rod."""
     turned = q[:, 0] + q[:, 1]
     x = g["l1"] * np.cos(q[:, 0]) + g["l2"] * np.cos(turned)
     y = g["l1"] * np.sin(q[:, 0]) + g["l2"] * np.sin(turned)

@@ -1,4 +1,4 @@
-"""MMA: bodies of the arm with a parallelogram. The branch over link 3 is modelled as a serial chain.
+"""MMA: bodies of the arm with a parallelogram. The side of the parallelogram with link 3 is modelled as a serial chain.
 
 The chain has the joints 1, 2, 3', then a rotation of link 4 by θ3 - θ3', which the parallelogram causes, then the
 wrist. Links 3a and 3b close the parallelogram on the other side.
@@ -17,13 +17,14 @@ from teleop_machines.bodies.planar import pivoted
 from teleop_machines.mma_models import SHORT_SIDE
 
 _NAMES = ("link1", "link2", "link3", "link4", "link6", "link8", "link10")
-# Coordinates of the chain: joints, then θ3 - θ3'. The last coordinate is θ3' - θ3 of link 3b.
+# For each joint of the chain, the index of its coordinate: joint readings, then θ3 - θ3', then θ3' - θ3 of link 3b.
 _CHAIN = (0, 1, 3, 7, 4, 5, 6)
-_ELBOW, _ANKLE = 3, 4  # bodies that rotate about these axes: link 3, link 4
+_ELBOW = 3  # index of link 3 among the bodies
+_ANKLE = 4  # index of link 4 among the bodies
 
 
 def mma_bodies(robot: Robot) -> Bodies:
-    """Links of the chain, both links of the parallelogram's other side, and the tip."""
+    """Links of the chain, the two links of the parallelogram's other side, and the tip."""
     home = robot.fk(robot.home)
     tip, reference = frames.pose_of(home), _coordinates(robot.home[None])[0][0]
     mixing = np.zeros((7, 7))  # joint speeds per speed of the chain's coordinates
@@ -47,7 +48,7 @@ def _coordinates(q: Array) -> tuple[Array, Array]:
 
 
 def _other_side(bodies: Sequence[Body], long_side: float) -> tuple[Body, Body]:
-    """Link 3a on link 2, about the axis of link 3, and link 3b on it, parallel to link 3."""
+    """Link 3a, which rotates on link 2 about the axis of link 3, and link 3b on link 3a, parallel to link 3."""
     x, y = bodies[_ANKLE].origin[:2]  # end of link 3 in its own frame
     root = frames.moved(bodies[_ELBOW].origin, Joint.REVOLUTE, math.atan2(y, x))
     radius = 0.03 * long_side

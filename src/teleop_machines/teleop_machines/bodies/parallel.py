@@ -12,7 +12,7 @@ from teleop_core.robots.robot import Robot
 from teleop_core.robots.solids import Solid, along, ball, capsule, rim
 from teleop_machines.rps3_loop import COSINES, SINES
 
-_SHARE = 0.95  # length of a tube as a share of the shortest leg
+_SHARE = 0.95  # length of a tube, divided by the length of the shortest leg
 _THINNER = 0.72  # radius of a tube divided by the radius of the tube around it
 
 
@@ -22,7 +22,7 @@ class Telescope:
 
     Args:
         shortest: Length of the shortest leg [m], > 0.
-        longest: Length of the longest leg [m]; beyond it the tubes come apart.
+        longest: Length of the longest leg [m]; in a longer leg the tubes do not overlap.
         radius: Radius of the outer tube [m].
     """
 
@@ -45,7 +45,7 @@ class Telescope:
 
         Args:
             legs: Number of legs.
-            first: Index of the first among the free bodies of the robot.
+            first: Index of the first tube among the free bodies of the robot.
         """
         end, found = np.array([0.0, 0.0, self.tube]), []
         for leg in range(legs):
@@ -68,14 +68,14 @@ class Telescope:
 
 
 def plate(points: Array, radius: float, is_base: bool = False) -> tuple[Solid, ...]:
-    """Rim of a plate through joint points (k, 3) [m] about its z axis, with a ball at each."""
+    """Rim of a plate through joint points (k, 3) [m], sorted about the z axis, with a ball at each point."""
     turned = points - points.mean(axis=0)
     order = np.argsort(arctangent(turned[:, 1], turned[:, 0]))
     balls = (ball(point, 1.8 * radius, "joint") for point in points)
     return (*rim(points[order], radius, "base" if is_base else "platform"), *balls)
 
 
-_RADIUS = 0.06  # radius of a leg's outer tube, as a share of the platform's size
+_RADIUS = 0.06  # radius of a leg's outer tube, divided by the platform's size
 
 
 def stewart_bodies(robot: Robot) -> Bodies:
@@ -93,7 +93,7 @@ def rps3_bodies(robot: Robot) -> Bodies:
 def _platform_on_legs(robot: Robot, base: Array, platform: Array) -> Bodies:
     """Bodies of a platform, which is the tip, on legs whose lengths are the joints.
 
-    Joint points (n, 3) [m] of the base are in base coordinates, those of the platform in platform coordinates.
+    Joint points (n, 3) [m] of the base are in base coordinates; those of the platform are in platform coordinates.
     """
     radius = _RADIUS * float(length(platform).max())
     legs = Telescope(float(robot.lower.min()), float(robot.upper.max()), radius)

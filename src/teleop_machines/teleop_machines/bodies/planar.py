@@ -17,7 +17,8 @@ _UP = np.array([0.0, 0.0, 1.0])
 def four_bar_bodies(robot: Robot) -> Bodies:
     """Crank, coupler and rocker; if the loop does not close, the coupler's end is not at the rocker's end.
 
-    Further coordinates: angle of the coupler relative to the crank, and of the rocker relative to the base [rad].
+    Coordinates after the joint: angle of the coupler relative to the crank, angle of the rocker relative to the base
+    [rad].
     """
     g = robot.geometry
     loop, mode = FourBar(g["l0"], g["l1"], g["l2"], g["l3"]), 0 if g["mode"] > 0.0 else 1

@@ -1,4 +1,4 @@
-"""Architectures: what the hand feels of the slave, one file per kind.
+"""Architectures: how the force on the hand follows from the slave's force and position, one file per kind.
 
 Each kind computes a push on the hand from the force on the slave's tip and from the distance between the tip and its
 command. All kinds share the handling of axes, silence, the largest push and passivity
@@ -23,7 +23,7 @@ _ROW = types.float64[::1]
 PUSH = types.void(_ROW, _ROW, _ROW, _ROW, types.float64, _ROW)
 """Signature of a push kernel, so that one compiled stage serves every kind."""
 MEMORY = 12
-"""Numbers that an architecture remembers."""
+"""Number of values that an architecture remembers."""
 
 
 def unscaled(parameters: object) -> float:
@@ -42,19 +42,19 @@ class Architecture:
 
     Attributes:
         name: Name of the architecture in ``--set reflection.architecture=``.
-        parameters: Its parameter group.
+        parameters: Parameter group of the architecture.
         push: ``push(numbers, memory, felt, away, period, out)``, a kernel or a plain function, called for every sample
-            of the master. ``numbers`` are those of the parameters; ``memory`` (12,) is kept from sample to sample, and
-            zero at the start; ``felt`` (3,) is the force on the tip [N]; ``away`` (3,) is the vector from the
-            commanded to the measured tip position [m]. Both are in axes of the slave's base, have the delay of the
-            network, and are zero while nothing arrives. ``period`` is the time since the last sample [s]. Writes the
-            push (3,) in axes of the slave's base into ``out`` [N].
-        numbers: ``numbers(parameters)`` returns the ``numbers`` of ``push``, if they are not the numbers of the
+            of the master. ``numbers`` are the numbers of the parameters. ``memory`` (12,) is kept from sample to
+            sample, and is zero at the start. ``felt`` (3,) is the force on the tip [N]. ``away`` (3,) is the vector
+            from the commanded to the measured tip position [m]. ``felt`` and ``away`` are in axes of the slave's base,
+            have the delay of the network, and are zero while no values arrive. ``period`` is the time since the last
+            sample [s]. The push (3,) [N], in axes of the slave's base, is written into ``out``.
+        numbers: ``numbers(parameters)`` returns the ``numbers`` of ``push``, if they differ from the numbers of the
             parameters in their order.
         force_scale: ``force_scale(parameters)`` returns the force at the hand, divided by the tip force that causes
             it, > 0. Energies of hand and slave are compared by this factor.
-        lead_gain: ``lead_gain(parameters)`` returns the force on the slave's tip per force with which the hand resists
-            the push [N/N], for the stage ``impedance``.
+        lead_gain: ``lead_gain(parameters)`` returns the force on the slave's tip, divided by the force with which the
+            hand resists the push, for the stage ``impedance``.
         needs_impedance: Whether the architecture needs a stage ``impedance``.
     """
 
@@ -71,7 +71,7 @@ class Architecture:
 
 
 def _try(part: Architecture) -> None:
-    """Push for some samples, so that errors are reported before anything runs."""
+    """Call the kernel for some samples, so that errors are reported before anything runs."""
     needs = "one with push(numbers, memory, felt, away, period, out) and parameters that all have defaults"
     with tried("architecture", part.name, needs):
         numbers, _ = fenced(part.numbers(part.parameters()))  # an index one too large reads NaN

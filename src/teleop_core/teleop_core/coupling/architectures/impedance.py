@@ -1,8 +1,8 @@
 """Impedance as a stage: the slave's tip yields to the force on it, as a mass with spring and damper does.
 
 An arm is commanded by positions, so the force on its tip shifts the commanded position. If the architecture sends the
-hand's force, this force shifts it in the opposite sense. The stages after this one work as before: passivity, reach,
-limits and faults see only the resulting command.
+hand's force, this force shifts the commanded position in the opposite direction. The later stages get only the
+resulting command: passivity, reach, limits and faults work as without this stage.
 """
 
 import math
@@ -18,7 +18,7 @@ _LONGEST = 0.1
 
 @dataclass(frozen=True, kw_only=True)
 class ImpedanceParameters:
-    """The mass, spring and damper between the hand's command and the command that the slave gets."""
+    """Mass, spring and damper between the hand's command and the slave's command."""
 
     mass: float = parameter(
         1.0,
@@ -51,12 +51,12 @@ class ImpedanceState(Fields):
 
     way: Vector3  # shift of the command [m]
     speed: Vector3  # [m/s]
-    last_ns: int  # stamp of the command before
+    last_ns: int  # stamp of the previous command
 
 
 @inner
 def _yield(p: ImpedanceParameters, s: ImpedanceState, row: Row, time: float) -> None:
-    """Advance shift and speed by ``time`` [s] under both forces."""
+    """Advance shift and speed by ``time`` [s] under the forces of tip and hand."""
     lead = 1.0 if row.slave_setpoint_cp_ns > topics.NO_COMMAND_NS else 0.0
     inertia, square = p.mass + time * (p.damping + time * p.stiffness), 0.0
     for i in range(3):
@@ -73,7 +73,7 @@ def _yield(p: ImpedanceParameters, s: ImpedanceState, row: Row, time: float) -> 
 
 @kernel
 def impedance_step(p: ImpedanceParameters, s: ImpedanceState, row: Row, dt: float) -> None:
-    """One command: yield for the time since the last command, and write impedance_servo_cp.
+    """One command: advance the shift by the time since the last command, and write impedance_servo_cp.
 
     The step is backward Euler, stable for any mass and time: ``speed = (M speed + t (f - K way)) / (M + t B + t² K)``.
     While the slave does not follow the hand, forces are ignored, so that following begins without a shift; a remaining

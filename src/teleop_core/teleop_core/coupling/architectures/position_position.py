@@ -9,7 +9,7 @@ from teleop_core.kernels import Array, kernel
 
 @dataclass(frozen=True, kw_only=True)
 class PositionPositionParameters:
-    """The spring that the hand feels."""
+    """Stiffness of the spring that the hand feels."""
 
     stiffness: float = parameter(
         150.0,

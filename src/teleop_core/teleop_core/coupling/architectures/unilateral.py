@@ -1,4 +1,4 @@
-"""Unilateral: the slave gets the hand's position, the hand gets nothing back."""
+"""Unilateral: the slave gets the hand's position, and the hand gets no force."""
 
 from teleop_core.base import NoParameters
 from teleop_core.coupling.architectures import Architecture

@@ -1,7 +1,7 @@
 """Tremor filters: they remove tremor from the hand's position, one file per kind.
 
-Each kind filters one coordinate. The start, the behaviour after a pause or a jump, and the choice of samples are the
-same for all (:mod:`teleop_core.coupling.filters.tremor_filter`).
+Each kind filters one coordinate. All kinds share the start, the behaviour after a pause or a jump, and the choice of
+samples (:mod:`teleop_core.coupling.filters.tremor_filter`).
 """
 
 import math
@@ -23,7 +23,7 @@ _ROW = types.float64[::1]
 FILTER = types.float64(_ROW, _ROW, types.float64, types.float64)
 """Signature of a filter kernel, so that one compiled stage serves every kind."""
 MEMORY = 32
-"""How many numbers a filter remembers for each coordinate."""
+"""Number of values that a filter remembers for each coordinate."""
 LONGEST_NS = 10_000_000
 """Longest period that a filter gets [ns]; a longer period is split."""
 
@@ -33,15 +33,15 @@ class TremorFilter:
     """A kind of tremor filter.
 
     Attributes:
-        name: Its name in ``--set tremor_filter.kind=``.
-        parameters: Its parameter group.
+        name: Name of the filter in ``--set tremor_filter.kind=``.
+        parameters: Parameter group of the filter.
         filter: ``filter(numbers, memory, value, period)``, a kernel or a plain function, called for every sample of
-            each coordinate except the first. ``numbers`` are those of the parameters; ``memory`` (32,) is kept from
-            sample to sample, and is zero at the start; ``value`` is the displacement from the first sample [m];
-            ``period`` is the time since the last sample [s], 10 ms at most. Returns the filtered value [m]. It must
-            return 0 as long as all values are 0.
-        numbers: ``numbers(parameters)`` returns the ``numbers`` of ``filter``, if they are not the numbers of
-            the parameters in their order.
+            each coordinate except the first. ``numbers`` are the numbers of the parameters. ``memory`` (32,) is kept
+            from sample to sample, and is zero at the start. ``value`` is the displacement from the first sample [m].
+            ``period`` is the time since the last sample [s], 10 ms at most. The function returns the filtered value
+            [m]. It must return 0 as long as all values are 0.
+        numbers: ``numbers(parameters)`` returns the ``numbers`` of ``filter``, if they differ from the numbers of the
+            parameters in their order.
     """
 
     name: str

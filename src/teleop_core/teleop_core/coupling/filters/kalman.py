@@ -8,17 +8,17 @@ from teleop_core.coupling.filters import TremorFilter
 from teleop_core.kernels import Array, inner, kernel
 from teleop_core.kernels.room import room
 
-_COVARIANCE, _HAS_BEGUN = 4, 20
-"""Indices in the memory, after position and speed of the hand and of its tremor: their covariance (4, 4), and whether
-there is a covariance.
-"""
+_COVARIANCE = 4
+"""Index in the memory of the covariance (4, 4) of position and speed of hand and tremor."""
+_HAS_BEGUN = 20
+"""Index in the memory of the flag whether there is a covariance."""
 FASTEST = 1.0
 """Standard deviation of a hand's initial speed [m/s]."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class KalmanParameters:
-    """How much the hand accelerates and trembles, and how exact readings are; independent of the sample rate."""
+    """Accelerations and tremor of the hand, and noise of the readings; all are independent of the sample rate."""
 
     acceleration_noise: float = parameter(
         0.02,
@@ -75,7 +75,7 @@ def _model(numbers: Array, period: float, F: Array, W: Array) -> None:
 
 @inner
 def _begin(numbers: Array, spread: float, memory: Array) -> None:
-    """Begin with what the first reading shows: position plus tremor is 0."""
+    """Initialise the estimate with the first reading, at which the sum of position and tremor is 0."""
     damping, rate = 2.0 * math.pi * numbers[3], 2.0 * math.pi * numbers[2]
     tremor, P = numbers[4] * numbers[4], memory[_COVARIANCE:]
     memory[_HAS_BEGUN] = 1.0
@@ -87,8 +87,8 @@ def _begin(numbers: Array, spread: float, memory: Array) -> None:
 def kalman_filter(numbers: Array, memory: Array, value: float, period: float) -> float:
     """Position of the intended motion; the reading is the sum of intended motion and tremor.
 
-    Both are predicted: the hand at constant speed, and the tremor by its oscillation. Then both are corrected towards
-    the reading, each in proportion to its uncertainty.
+    Intended motion and tremor are predicted: the hand at constant speed, and the tremor as an oscillation. Then each is
+    corrected towards the reading, in proportion to its uncertainty.
 
     Source:
         Kalman 1960, theorem 3; Bar-Shalom, Li and Kirubarajan 2001, section 6.2.2 (white noise

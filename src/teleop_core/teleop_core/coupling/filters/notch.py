@@ -35,7 +35,7 @@ class NotchParameters:
 def notch_filter(numbers: Array, memory: Array, value: float, period: float) -> float:
     """Value without frequencies near the notch's frequency.
 
-    The width is prewarped by its tangent, so it is also right after the bilinear transform.
+    The width is prewarped by its tangent, so that it is correct after the bilinear transform.
 
     Source:
         Orfanidis 1996 (Introduction to Signal Processing), section 11.3.

@@ -3,12 +3,12 @@
 from teleop_core.kernels import Array, inner
 
 WIDTH = 3
-"""Numbers that a section remembers: band-pass, low-pass, and its input."""
+"""Number of values that a section remembers: band-pass, low-pass, and input."""
 
 
 @inner
 def advance_section(memory: Array, at: int, value: float, slope: float, damping: float) -> None:
-    """Bring the band-pass and the low-pass of a section to the next sample.
+    """Advance the band-pass and the low-pass of a section to the next sample.
 
     With the input u, band-pass b and low-pass l obey ``db/dt = w (u - l - damping b)`` and ``dl/dt = w b``. They are
     integrated by the trapezoidal rule. For a constant period this is the bilinear transform; for a changing period it
@@ -19,7 +19,7 @@ def advance_section(memory: Array, at: int, value: float, slope: float, damping:
         at: Index in ``memory`` at which the section's :data:`WIDTH` numbers begin.
         value: Input.
         slope: ``tan(w period / 2)`` of the section's frequency w.
-        damping: 2 for critical damping, the inverse of the quality.
+        damping: Inverse of the quality; 2 for critical damping.
     """
     band, low, before = memory[at], memory[at + 1], memory[at + 2]
     stiff = slope * (damping + slope)

@@ -1,8 +1,8 @@
 """Tremor filter: a stage between the master and the mapping, which removes tremor from the hand's motion.
 
-The slave follows the filtered stylus. The unfiltered stylus is what the operator sees and feels, and what
-``master/measured_cp`` contains. Forces on the hand use the unfiltered stylus too, because a delayed force returns more
-energy than it took.
+The slave follows the filtered stylus. The operator sees and feels the unfiltered stylus, and ``master/measured_cp``
+contains it. Forces on the hand are computed from the unfiltered stylus too, because a delayed force returns more energy
+than it took.
 """
 
 import math
@@ -36,8 +36,8 @@ class FilterState(plausibility.PlausibilityState):
     """State record of the tremor filter."""
 
     origin: Vector3  # reading at which the filter began [m]
-    value: Vector3  # last reading, from there
-    told: Vector3  # last answer
+    value: Vector3  # last reading, relative to ``origin`` [m]
+    told: Vector3  # last filtered position [m]
     shift: Vector3  # remaining step of the output at a change of parameters
     begun: int
     is_retuned: int
@@ -45,7 +45,7 @@ class FilterState(plausibility.PlausibilityState):
 
 
 class Part(NamedTuple):
-    """The kind's filter, its numbers, and its memory of each coordinate (3, 32)."""
+    """The filter of the kind, its numbers, and its memory for each coordinate (3, 32)."""
 
     filter: Any
     numbers: Array
@@ -152,7 +152,7 @@ class RunningTremorFilter(RunningStage):
         self.reset()
 
     def reset(self) -> None:
-        """Forget everything: the next reading is the first one."""
+        """Forget all readings: the next reading counts as the first one."""
         assign(self.state, 0)
         assign(self.signals, self._begin)
         self._part.memory[:] = 0.0
@@ -174,7 +174,7 @@ class RunningTremorFilter(RunningStage):
         self.state["is_retuned"] = self.state["is_other"] = 1
 
     def concerns(self) -> list[str]:
-        """Implausible readings, in words."""
+        """Text about implausible readings."""
         count, told = int(self.state["implausible"]), self._told
         self._told = count
         if count <= told:

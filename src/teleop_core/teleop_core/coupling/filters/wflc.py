@@ -9,15 +9,19 @@ from teleop_core.kernels import Array, inner, kernel
 
 _SECOND, _THIRD = sections.WIDTH, 2 * sections.WIDTH
 _PHASE, RATE, _HEARD, _SUBTRACTED = range(3 * sections.WIDTH, 3 * sections.WIDTH + 8, 2)
-"""Indices in the memory, after three sections: phase [rad]; rate minus initial rate [rad/s]; weights of sine and
-cosine [m] of the first combiner, which finds the rate, and of the second, which is subtracted.
+"""Indices in the memory, after the three sections.
+
+The values are: phase [rad]; rate minus initial rate [rad/s]; weights of sine and cosine [m] of the first combiner,
+which finds the rate; weights of sine and cosine [m] of the second combiner, whose output is subtracted.
 """
 _REACH = 2.0 * math.pi * 2.0
-"""Largest difference of the learned rate from the initial rate [rad/s]: 8 to 12 Hz."""
+"""Largest difference of the learned rate from the initial rate [rad/s]; from 10 Hz this allows 8 to 12 Hz."""
 _FAINT = 5e-6
 """Amplitude below which the frequency of a tremor can hardly be estimated [m]."""
-_DAMPING, _WIDE = math.sqrt(2.0), 0.6
-"""Damping of the high-pass (Butterworth); width of the band-passes, divided by their frequency."""
+_DAMPING = math.sqrt(2.0)
+"""Damping of the high-pass (Butterworth)."""
+_WIDE = 0.6
+"""Width of the band-passes, divided by their frequency."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -53,13 +57,14 @@ def _band_pass(memory: Array, at: int, value: float, slope: float) -> float:
 
 @kernel
 def wflc_filter(numbers: Array, memory: Array, value: float, period: float) -> float:
-    """Value without the sine that has been learned.
+    """Value minus the learned sine of the tremor.
 
     Two combiners learn the weights of the same sine by least mean squares. The second combiner gets the value after a
     high-pass; its sine is subtracted. The first combiner gets the value after two more band-passes, which leave hardly
-    any intended motion, and finds the rate. It uses its error times the sine's derivative, here divided by the squared
-    amplitude, so that large and small tremors are learned equally fast. The high-pass changes the tremor's phase and
-    amplitude. At the learned rate both changes are known, so the sine before the high-pass is subtracted.
+    any intended motion, and finds the rate. The rate changes by the combiner's error times the sine's derivative. Here
+    this product is divided by the squared amplitude, so that large and small tremors are learned equally fast. The
+    high-pass changes the tremor's phase and amplitude. At the learned rate both changes are known, so the sine before
+    the high-pass is subtracted.
 
     Source:
         Riviere, Rader and Thakor 1998 (IEEE Trans. Biomed. Eng. 45, 7): the weighted-frequency combiner behind a

@@ -1,8 +1,9 @@
 """Following: whether the slave follows the hand, and what is sent while it does not.
 
-Values from the slave may be old because of a network. The slave counts as following while the stamps of its commands
-in force increase. When they stop, the last command is held for the time of an answer, because it may still be
-followed. After that the slave counts as moving by itself, and the command is set to the slave's position.
+Values from the slave may be old because of a network. The slave reports the stamp of the command that it follows. While
+these stamps increase, the slave counts as following. When they stop, the last command is held for the time of an
+answer, because the slave may still follow it. After that time the slave counts as moving by itself, and the command is
+set to the slave's position.
 """
 
 from teleop_core.graph import Row, topics
@@ -21,19 +22,19 @@ class FollowingState(Fields):
 
     last_ns: int  # stamp of the last command
     is_engaged: int
-    in_force_ns: int  # stamp in force
-    rose_ns: int  # time at which the stamp last rose
-    lag_ns: int  # time by which the setpoint was behind the last command then
+    in_force_ns: int  # stamp of the command that the slave follows
+    rose_ns: int  # time at which ``in_force_ns`` last increased
+    lag_ns: int  # lag of the setpoint behind the last command at the time ``rose_ns``
     lost_ns: int  # time since which the slave does not follow
     felt_ns: int  # stamp of the slave's force
-    felt_at_ns: int  # when that rose last
+    felt_at_ns: int  # time at which ``felt_ns`` last increased
     seen_ns: int  # stamp of the measured pose
-    seen_at_ns: int  # when that rose last
+    seen_at_ns: int  # time at which ``seen_ns`` last increased
 
 
 @inner
 def hear(s: FollowingState, row: Row) -> None:
-    """Record when values from the slave last came.
+    """Record the times at which values from the slave last arrived.
 
     Args:
         s: State; written.
@@ -52,19 +53,19 @@ def hear(s: FollowingState, row: Row) -> None:
 
 @inner
 def is_felt(p: FollowingNumbers, s: FollowingState, row: Row) -> bool:
-    """Whether a force of the slave came recently; a constant force is sent rarely."""
+    """Whether a force of the slave arrived recently; a constant force is sent rarely."""
     return bool(row.master_measured_cp_ns - s.felt_at_ns <= p.timeout_ns + topics.SELDOM_NS)
 
 
 @inner
 def is_seen(p: FollowingNumbers, s: FollowingState, row: Row) -> bool:
-    """Whether a measured pose of the slave came recently."""
+    """Whether a measured pose of the slave arrived recently."""
     return bool(row.master_measured_cp_ns - s.seen_at_ns <= p.timeout_ns)
 
 
 @inner
 def follows(p: FollowingNumbers, s: FollowingState, row: Row) -> bool:
-    """Whether the slave had the last command in force, or newer ones keep coming into force.
+    """Whether the slave follows the last command, or continues to report newer commands.
 
     After a pause of the master the slave does not follow.
     """

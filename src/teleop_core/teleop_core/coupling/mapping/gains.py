@@ -22,7 +22,7 @@ MODES = ("coarse", "fine")
 
 @dataclass(frozen=True, kw_only=True)
 class FixtureParameters:
-    """The fixture that the fixture button puts around the hand."""
+    """The fixture that a press of the fixture button puts around the hand."""
 
     kind: Choice = choice(SHAPES, "box", doc="shape of the fixture")
     place: tuple[float, ...] = parameter(

@@ -1,4 +1,4 @@
-"""Inverse kinematics as a stage: every slave pose becomes joint references, within joint speeds."""
+"""Inverse kinematics as a stage: it converts every slave pose to joint references, within the joint speeds."""
 
 import math
 from dataclasses import dataclass
@@ -49,7 +49,7 @@ class InverseKinematicsParameters(RobotParameters):
 class SolverNumbers(Fields):
     """Parameter record of the inverse kinematics."""
 
-    speed: PerJoint  # rated [rad/s or m/s]
+    speed: PerJoint  # rated speeds [rad/s or m/s]
     longest_ns: int
     timeout_ns: int
     tolerance: Annotated[Array, 2]  # tolerances of position and rotation [m, rad]
@@ -74,10 +74,10 @@ class Solver(NamedTuple):
     geometry: Array
     T: Array
     reached: Array
-    seed: Array  # the last answer (n,)
+    seed: Array  # joints of the last solution (n,)
     q: Array
     free: Array  # the answer without a time limit
-    before: Array  # the slave's setpoint at the last command, while no command is in force
+    before: Array  # the slave's setpoint at the last command, while the slave follows no command
     residual: Array
 
 
@@ -113,7 +113,7 @@ def _joint_at_limit(q: Array, limits: Array) -> int:
 
 @inner
 def _explain(p: SolverNumbers, solver: Solver, reach: Array) -> None:
-    """Write why the arm does not reach the command, and by how much the command is out of reach.
+    """Write the reason why the arm does not reach the command, and the distance by which it is out of reach.
 
     The pose is solved again without a time limit. If this solution reaches the command, the arm only lags. A lag is
     reported if it exceeds the tolerance.
@@ -144,7 +144,7 @@ def _explain(p: SolverNumbers, solver: Solver, reach: Array) -> None:
 
 @inner
 def _has_own_way(s: SolverState, solver: Solver, row: Row, timeout_ns: int) -> bool:
-    """Whether the slave does not follow: its setpoint is old, or moves by itself."""
+    """Whether the slave does not follow, because its setpoint is old or moves by itself."""
     if row.slave_setpoint_js_ns > topics.NO_COMMAND_NS:
         return bool(s.last_ns - row.slave_setpoint_js_ns > timeout_ns)
     moves = False
@@ -165,7 +165,7 @@ def _goes_far(p: SolverNumbers, solver: Solver) -> bool:
 
 @inner
 def _solve(p: SolverNumbers, solver: Solver, time: float, is_alone: bool) -> int:
-    """Write the answer within ``time`` [s] of full speed; for a single command, write the whole motion.
+    """Write the joints that the arm can reach in ``time`` [s] at full speed; for a single command, the final joints.
 
     Next to a singularity a tremor of the first command would cause large useless joint motions. So joints move far
     only if the pose would otherwise be outside the tolerances.

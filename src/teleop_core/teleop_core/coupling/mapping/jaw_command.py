@@ -1,6 +1,6 @@
 """Jaw command: the jaw angle that the master's side commands.
 
-It is set by how far the hand closes its handle, or by a button of the stylus.
+The closing of the hand's handle, or a button of the stylus, determines the angle.
 """
 
 from dataclasses import dataclass

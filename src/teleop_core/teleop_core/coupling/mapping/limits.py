@@ -1,8 +1,8 @@
 """Limits: a command that the arm cannot follow is drawn back, without wind-up.
 
-The command is drawn back to a pose that the arm can reach, so that it moves immediately when the hand turns back. The
-depth of the hand beyond the limit is measured from the point where it met the limit. Beyond a bound the limit is
-dragged along with the hand. The hand feels this depth, and the state reports it.
+The command is drawn back to a pose that the arm can reach, so that it moves immediately when the hand reverses. The
+depth of the hand beyond the limit is measured from the point at which the hand met the limit. When the depth exceeds a
+bound, this point moves with the hand. The hand feels the depth, and the state reports it.
 """
 
 import math
@@ -17,7 +17,7 @@ SENT = 8192
 
 
 class Sent(Fields):
-    """Sum of what was cut off all commands before a sent command."""
+    """Sum of the cuts of all commands before a sent command."""
 
     stamp_ns: int
     moved: Vector3
@@ -35,7 +35,7 @@ class LimitState(Fields):
     hand: Vector3  # position to which the hand moves the slave [m]
     tool: Quaternion  # tool orientation that the hand commands
     alignment: Quaternion
-    moved: Vector3  # sum of everything that was cut off commands so far
+    moved: Vector3  # sum of all cuts of commands so far
     turned: Quaternion
     answered_ns: int  # index of the command that was answered last
     sent: int  # number of sent commands
@@ -48,7 +48,7 @@ class LimitState(Fields):
     turn_anchor: Quaternion
     turn_out: Vector3
     turn_depth: float
-    met: float  # depths at the last cut; a hand farther out than that has left the limit
+    met: float  # depth at the last cut; a hand with a larger depth has left the limit
     turn_met: float
 
 
@@ -56,10 +56,11 @@ _LIMIT, _JOINT, _CUT = (topics.SLAVE_REACH.columns.index(name) for name in ("lim
 _NONE, _AT_JOINT, _BEYOND = int(topics.Limit.NONE), int(topics.Limit.JOINT), int(topics.Limit.WORKSPACE)
 # A limit is reported for this long after the last command that met it [ns].
 _TOLD_NS = 100_000_000
-# A rotation beyond a limit counts up to this value [rad].
+# Largest rotation beyond a limit that is measured [rad].
 _MOST_TURN = 0.05
-# The limit is left at this distance beyond the point of the last cut [m, rad].
-_PAST, _TURN_PAST = 2e-4, 5e-3
+# The hand has left the limit when its depth exceeds the depth at the last cut by more than these tolerances.
+_PAST = 2e-4  # tolerance of position [m]
+_TURN_PAST = 5e-3  # tolerance of rotation [rad]
 # A cut smaller than this is rounding [m or rad].
 _ROUNDING = 1e-9
 
@@ -73,7 +74,7 @@ def forget_limits(s: LimitState) -> None:
 
 @inner
 def remember(s: LimitState, sent: Sequence[Sent], stamp_ns: int) -> None:
-    """Store how far the command that is sent now is already drawn back."""
+    """Store the sum of the cuts of the command that is sent now."""
     entry = sent[s.sent % len(sent)]
     entry.stamp_ns = stamp_ns
     for i in range(3):
@@ -96,9 +97,9 @@ def _found(s: LimitState, sent: Sequence[Sent], stamp_ns: int) -> int:
 
 @inner
 def draw_back(s: LimitState, sent: Sequence[Sent], gain: float, row: Row) -> None:
-    """Take the answer to an earlier command: draw the present command back by the cut of the earlier one.
+    """Take the answer to an earlier command: draw the present command back by the cut of the earlier command.
 
-    What was already cut off since the earlier command was sent is not cut again.
+    Cuts that were made since the earlier command was sent are not made again.
 
     Args:
         s: State record with ``command`` (7,), ``hand`` (3,) [m] in the slave's axes and ``tool``
@@ -169,7 +170,7 @@ def _turn_back(s: LimitState, entry: Sent, reach: geometry.Array) -> None:
 
 @inner
 def align(s: LimitState) -> None:
-    """Align: the hand's present orientation now corresponds to that of the command."""
+    """Align: from now on the hand's present orientation corresponds to the orientation of the command."""
     inverse = room(4)
     geometry.invert_quaternion(s.tool, inverse)
     geometry.multiply_quaternions(s.command[3:7], inverse, s.alignment)
@@ -177,7 +178,7 @@ def align(s: LimitState) -> None:
 
 @inner
 def _anchor_turn(s: LimitState) -> None:
-    """Put the anchor at the hand's orientation, minus the depth."""
+    """Set the anchor to the hand's orientation, rotated back by the depth."""
     x, y, z = s.turn_out[0], s.turn_out[1], s.turn_out[2]
     back = -s.turn_depth
     geometry.rotate_by_vector(s.tool, back * x, back * y, back * z, s.turn_anchor)
@@ -189,7 +190,7 @@ def measure_depth(s: LimitState, most: float, now_ns: int) -> None:
 
     Args:
         s: State record.
-        most: Depth [m] beyond which the limit is dragged along.
+        most: Depth [m] beyond which the anchor moves with the hand.
         now_ns: Time [ns].
     """
     if s.depth > 0.0:

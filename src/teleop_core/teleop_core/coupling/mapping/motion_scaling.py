@@ -31,7 +31,7 @@ class ScalingNumbers(
 ):
     """Parameter record of the motion scaling."""
 
-    gain: Annotated[Array, 2]  # coarse, fine
+    gain: Annotated[Array, 2]  # gains of the coarse and the fine mode
     stylus_tool: Quaternion
     slave_master: Quaternion
     axis: Annotated[Integers, 3]
@@ -58,7 +58,7 @@ class ScalingState(
     is_fixture_on: int
     stylus: Vector3
     has_led: int  # whether the last sample moved the slave
-    aligned: int  # numbers of restarts of following and of alignment
+    aligned: int  # number of times that hand and slave were aligned again
 
 
 _FOLLOWING, _CLUTCHED = STATE["is_following"], STATE["is_clutched"]
@@ -80,14 +80,14 @@ def to_slave_axes(p: ScalingNumbers, master: Array, slave: Array) -> None:
 
 @kernel
 def mapped_orientation(p: ScalingNumbers, stylus: Array, tool: Array) -> None:
-    """Write the slave tool's quaternion that matches a stylus quaternion, before alignment."""
+    """Write the quaternion of the slave's tool that corresponds to a stylus quaternion, before alignment."""
     multiply_quaternions(p.slave_master, stylus, tool)
     multiply_quaternions(tool, p.stylus_tool, tool)
 
 
 @inner
 def _take_tool(p: ScalingNumbers, s: ScalingState, pose: Array, turn: Array) -> None:
-    """Store the orientation that the hand commands and, if only a share of it counts, its rotation."""
+    """Store the orientation that the hand commands, and its rotation if only a share of it is used."""
     if p.rotation_gain == 1.0:
         mapped_orientation(p, pose[3:7], s.tool)
         return
@@ -116,7 +116,7 @@ def _toggle_fixture(s: ScalingState, buttons: Array, position: Array) -> None:
 
 @inner
 def _latch(s: ScalingState, stylus: Array) -> None:
-    """Hold the command and measure further motion from the present pose; this never causes a step.
+    """Hold the command, and measure later motion from the present pose, so that the command never jumps.
 
     The fixture moves with the hand, so that it does not move relative to the slave.
     """
@@ -173,7 +173,7 @@ def _wall(p: ScalingNumbers, s: ScalingState, fixture: Held, period: float, styl
 
 @inner
 def _push_back(p: ScalingNumbers, s: ScalingState, force: Array) -> None:
-    """Add the push of the slave's limit, in the master's base, to the force (3,) [N]."""
+    """Add the push that the slave's limit causes to the force (3,) [N], in the master's base."""
     push = p.reach_stiffness * s.depth
     if push > 0.0:
         for i in range(3):
@@ -195,7 +195,7 @@ def _report(p: ScalingNumbers, s: ScalingState, gain: float, is_following: bool,
             offset[i] = s.center[i] - s.master[i] + s.beyond[i]
         to_slave_axes(p, offset, offset)
         for i in range(3):
-            # Rounded to a nanometre: a fixture that stands still reports no change.
+            # Rounded to a nanometre, so that a fixture at rest reports no change.
             state[_CENTER + i] = round((s.command[i] + gain * offset[i]) * 1e9) / 1e9
             state[_SIZE + i] = gain * p.size[p.axis[i]]
     state[_LIMIT], state[_JOINT] = s.limit, s.joint
@@ -344,7 +344,7 @@ class MotionScaling(RunningStage):
             self.state["is_fine"] = gains.MODES.index(parameters.mode)
         turned = ("tool_roll", "axes", "tool_axes")
         if any(getattr(parameters, name) != getattr(self._values, name) for name in turned):
-            self.state["must_latch"] = 1  # align again, so that the tool does not turn
+            self.state["must_latch"] = 1  # a new alignment, so that the tool does not rotate
         self._values = parameters
 
     def present(self) -> gains.MotionScalingParameters:
@@ -391,7 +391,7 @@ class MotionScaling(RunningStage):
             len(law.numbers),
             len(law.kept),
         ):
-            law.numbers[:], law.kept[:] = numbers, kept  # the tick that is composed already goes on
+            law.numbers[:], law.kept[:] = numbers, kept  # in place, so that the composed tick stays valid
             return
         if part.push_pointer is not law.push:
             # a new force starts from zero
@@ -404,11 +404,11 @@ class MotionScaling(RunningStage):
         self._bound = None
 
     def fall_silent(self) -> None:
-        """Report that the slave follows no hand, because no sample came for a long time."""
+        """Report that the slave follows no hand, because no sample arrived for a long time."""
         self.signals["teleop_state"][_FOLLOWING] = 0.0
 
     def concerns(self) -> list[str]:
-        """Implausible samples, and buttons that fell silent, in words."""
+        """Texts about implausible samples, and about buttons whose messages stopped."""
         found, told = [], self._told
         count, aligned = self._told = int(self.state["implausible"]), int(self.state["aligned"])
         if count > told[0]:

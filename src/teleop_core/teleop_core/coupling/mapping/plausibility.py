@@ -45,7 +45,7 @@ class HandLimits:
 
 @dataclass(frozen=True, kw_only=True)
 class PlausibilityParameters(HandLimits):
-    """Bounds of the motion that a hand on the master can make, and of the silence of its buttons."""
+    """Bounds of the motion of a hand on the master, and of the time without messages of its buttons."""
 
     button_silence: float = parameter(
         0.5,
@@ -56,7 +56,7 @@ class PlausibilityParameters(HandLimits):
 
 
 class PlausibilityNumbers(Fields):
-    """Fields of a parameter record with what a hand can do."""
+    """Fields of a parameter record with the bounds of a hand's motion."""
 
     hand_speed: float  # [m/s]
     hand_acceleration: float  # [m/s²]
@@ -80,19 +80,20 @@ class PlausibilityState(Fields):
     buttons_ns: int
 
 
-# Samples closer together than this [s] count as this far apart, because stamps may be uneven.
+# A shorter time between two samples counts as this time [s], because stamps may be uneven.
 _SHORTEST = 1e-3
-# In a gap of the samples, a motion cannot be told from a jump. So the hand may move no farther than its speed limit
-# allows in this time [s], or in two periods of a slower stream.
+# In a gap of the samples, a motion cannot be distinguished from a jump. So the hand may move no farther than its speed
+# limit allows in this time [s], or in two periods of a slower stream.
 _GAP = 20e-3
-# This number of messages, no farther apart than this time [ns], is a stream. The count is at most twice this number,
-# and a pause reduces it by this number. After one pause in which the poses were silent too there is still a stream;
-# after two there is none.
-_STREAM, _STREAM_NS = 20, 100_000_000
+# Buttons are a stream after this number of messages without a pause. The count is at most twice this number, and a
+# pause reduces it by this number. So one pause in which the poses also stopped does not end the stream; a second one
+# does.
+_STREAM = 20
+_STREAM_NS = 100_000_000  # a longer time between two messages is a pause [ns]
 
 
 def take_hand(p: PlausibilityNumbers, hand: HandLimits) -> None:
-    """Write what a hand can do into a parameter record."""
+    """Write the bounds of a hand's motion into a parameter record."""
     p["hand_speed"], p["hand_acceleration"] = hand.speed, hand.acceleration
     p["hand_turn"], p["hand_reach"] = hand.turn, hand.reach
 
@@ -105,7 +106,7 @@ def is_plausible(p: PlausibilityNumbers, s: PlausibilityState, pose: Array, stam
         p: Parameters.
         s: State; written.
         pose: Sample (7,).
-        stamp_ns: Its stamp [ns].
+        stamp_ns: Stamp of the sample [ns].
     """
     elapsed_ns = stamp_ns - s.raw_ns
     period = max(1e-9 * elapsed_ns, _SHORTEST)
@@ -146,9 +147,9 @@ def _turn(before: Array, after: Array) -> float:
 
 @inner
 def has_lost_buttons(p: PlausibilityNumbers, s: PlausibilityState, row: Row) -> bool:
-    """Whether the buttons came as a stream and are silent now, so that the state of the clutch is unknown.
+    """Whether a stream of button messages has stopped, so that the state of the clutch is unknown.
 
-    Masters that send buttons only at a change have no stream of them.
+    A master that sends buttons only at a change has no such stream.
     """
     stamp_ns = row.master_buttons_ns
     if stamp_ns != s.buttons_ns:

@@ -35,7 +35,7 @@ class ReflectionNumbers(FollowingNumbers):
     law: float  # kind of passivity
     force_scale: float  # force at the hand, divided by that on the tip
     lead_gain: float  # force that moves the slave, divided by that of the hand
-    gain: Annotated[Array, 2]  # motion of the slave, divided by the hand's: coarse, fine
+    gain: Annotated[Array, 2]  # motion of the slave, divided by the hand's motion, in the coarse and the fine mode
     axis: Annotated[Integers, 3]  # axes of master and slave
     sign: Vector3
 
@@ -43,13 +43,13 @@ class ReflectionNumbers(FollowingNumbers):
 class ReflectionState(FollowingState):
     """Fields of a state record with the forces on the hand."""
 
-    heard: float  # share of the force that counts
-    seen: float  # share of the slave's place that counts
+    heard: float  # share of the slave's force that is reflected, 0 to 1
+    seen: float  # share of the slave's position error that is reflected, 0 to 1
     push: Vector3  # last push [N]
     pushed_at: Vector3  # position at which the push began [m]
-    scale: float  # the hand's energy, divided by the slave's
+    scale: float  # the hand's energy, divided by the slave's energy
     command: PoseRow  # position to which the hand moves the slave
-    led_from: PoseRow  # the same before
+    led_from: PoseRow  # the previous value of ``command``
     is_fine: int
 
 
@@ -68,8 +68,8 @@ class Law(NamedTuple):
     away: Array
     out: Array
     hand: Any
-    kept: Array  # numbers of the passivity
-    left: Array  # memory of the passivity
+    kept: Array  # numbers of the kind of passivity
+    left: Array  # memory of the kind of passivity
     last: Array
     moved: Array
     led: Array
@@ -78,10 +78,10 @@ class Law(NamedTuple):
     heard: Array  # energies of the slave, its wave along the master's base
     port: Array
     wall: Array  # force of fixture and limits since the last sample [N]
-    walls: Array  # energies of this force
+    walls: Array  # energies of the force ``wall``
 
     def clear(self) -> None:
-        """Forget what happened."""
+        """Set memory, forces and energies to zero."""
         for array in (
             self.memory, self.felt, self.away, self.out, self.left, self.last, self.moved,
             self.led, self.asked, self.flow, self.heard, self.port, self.wall, self.walls,
@@ -90,7 +90,7 @@ class Law(NamedTuple):
 
 
 def make_law(part: Architecture, numbers: Array, passivity: Passivity, kept: Array) -> Law:
-    """The law of an architecture and a passivity, at rest."""
+    """The law of an architecture and a kind of passivity, with zero memory."""
     return Law(
         part.push_pointer, numbers, np.zeros(MEMORY), np.zeros(3), np.zeros(3), np.zeros(3),
         passivity.hand_pointer, kept, np.zeros(PASSIVE_MEMORY), np.zeros(3), np.zeros(3),
@@ -103,7 +103,7 @@ def make_law(part: Architecture, numbers: Array, passivity: Passivity, kept: Arr
 def reflect(
     p: ReflectionNumbers, s: ReflectionState, law: Law, is_following: bool, period: float, stylus: Array, row: Row
 ) -> None:
-    """Add the reflected force of the slave (3,) [N] to the hand's force. The force of a silent slave fades.
+    """Add the reflected force of the slave (3,) [N] to the hand's force; it fades out if the slave's values stop.
 
     Args:
         p: Parameters.
@@ -115,7 +115,7 @@ def reflect(
         row: Signals.
     """
     if p.is_reflected == 0:
-        if row.master_energy[LAW] != 0.0:  # the slave's side gets no more requests
+        if row.master_energy[LAW] != 0.0:  # 0 ends the requests to the slave's side
             begin_round(row.master_energy, 0.0, 1e-9 * row.master_measured_cp_ns)
         return
     _count(p, s, law, is_following, stylus, row)
@@ -141,8 +141,8 @@ def reflect(
 def _hold_wall(law: Law, force: Array) -> None:
     """Limit the force (3,) of fixture and limits so that they return no more energy than they absorbed.
 
-    With passivity this holds for a wall of any stiffness. The energy of the wall is counted separately, so that
-    reflection cannot use it.
+    If a kind of passivity is active, this limit is applied to walls of any stiffness. The energy of the wall is counted
+    separately, so that reflection cannot use it.
     """
     square = way = 0.0
     for i in range(3):
@@ -160,7 +160,7 @@ def _hold_wall(law: Law, force: Array) -> None:
 def lead_by_force(p: ReflectionNumbers, s: ReflectionState, row: Row) -> None:
     """Write slave_servo_cf: the force with which the hand resists the slave's push.
 
-    This is how a freely movable device passes on the hand's force, because it has no force sensor.
+    A freely movable device has no force sensor. So the hand's force is taken as the opposite of the push.
     """
     for i in range(3):
         row.slave_servo_cf[i] = -p.lead_gain * p.sign[i] * s.push[p.axis[i]]
@@ -190,7 +190,7 @@ def _count(p: ReflectionNumbers, s: ReflectionState, law: Law, is_following: boo
         s.scale = scale
         begin_round(law.port, p.law, 1e-9 * row.master_measured_cp_ns)
         copy(s.command, s.led_from)
-        copy(stylus, s.pushed_at)  # the last position may belong to another grip, or may not exist
+        copy(stylus, s.pushed_at)  # the last position may be older than a release of the stylus, or may not exist
     for i in range(3):
         law.moved[i] = stylus[i] - s.pushed_at[i]
         s.pushed_at[i] = stylus[i]

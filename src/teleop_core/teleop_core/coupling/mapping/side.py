@@ -1,11 +1,11 @@
 """Side: whether a virtual fixture confines the hand, the slave, or both.
 
 A confined slave follows a proxy of the hand: a point that stays in the fixture, as near to the hand as possible. The
-command moves like the proxy. So a hand that returns from 3 mm beyond the wall moves the slave only after it has passed
-the wall again.
+command moves like the proxy. So a hand that is 3 mm beyond the wall moves the slave only after it has returned through
+the wall.
 
-At each sample the proxy moves no farther than the hand. So the slave never jumps, even if a shape has two equally
-short ways back, or if the shape was changed.
+At each sample the proxy moves no farther than the hand. So the slave never jumps, even if there are two equally short
+paths back into the shape, or if the shape was changed.
 
 Source:
     Zilles and Salisbury 1995, a constraint-based god-object method; bounded by the hand's steps here.
@@ -37,12 +37,12 @@ class SideState(Fields):
     beyond: Vector3  # vector from the proxy to the hand; zero if the slave is not confined
 
 
-# Depth up to which a position is allowed [m]: a tenth of the nanometre to which reports are rounded, because the
-# slave's gain is 10 at most.
+# Depth up to which a position is allowed [m]. Reports are rounded to a nanometre, and the slave's gain is 10 at most,
+# so this depth is a tenth of a nanometre.
 _ALLOWED = 1e-10
-# Most iterations to move a point into the shape. Our own shapes need one.
+# Largest number of iterations to move a point into the shape. Our own shapes need one.
 _ROUNDS = 8
-# Shares of a step that are tried: near a curved wall the whole step may be too long.
+# Fractions of a step that are tried, because near a curved wall the whole step may be too long.
 _SHARES = 4
 # Rounding of differences of positions [m].
 _ROUNDING = 1e-13
@@ -102,7 +102,7 @@ def _approach(fixture: Held, last: Array, aim: Array, most: float) -> None:
 
 @inner
 def hold_slave(s: SideState, fixture: Held, step: Array) -> None:
-    """Replace the hand's step (3,) [m] by that of its proxy, which is at most as long.
+    """Replace the hand's step (3,) [m] by the step of its proxy, which is at most as long.
 
     If the hand reaches an allowed position that the proxy cannot reach, for example through a forbidden body, the
     hand's position becomes that of the proxy: see :func:`let_go`.

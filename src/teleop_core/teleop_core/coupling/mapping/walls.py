@@ -1,13 +1,13 @@
 """Walls: the force of a fixture on a hand that is beyond it.
 
 The source's wall is a spring up to a constant force (:func:`wall_force`). A sampled spring returns more energy than it
-took: its force belongs to the position at the beginning of a period, and is held for the whole period. So the force is
-too small on the way in and too large on the way out, by the motion of half a period. A damped wall
-(:func:`damped_wall`) compensates this, up to :func:`passive_stiffness`.
+took. Its force belongs to the position at the beginning of a period, but acts for the whole period. So the force is too
+small while the hand moves in and too large while it moves out, by the stiffness times the motion of half a period. A
+damped wall (:func:`damped_wall`) compensates this, up to :func:`passive_stiffness`.
 
-A passivity controller (Hannaford and Ryu 2002) was tried in addition, and left out. It cuts the force when the energy
-that a contact took is used up. With an encoder in steps and a compliant device it switches on and off. Contacts that
-the damper alone makes passive then gave energy.
+A passivity controller (Hannaford and Ryu 2002) was also tried, but is not used. It cuts the force when the energy that
+a contact took is used up. With encoder steps and a compliant device this controller switches on and off. Contacts that
+are passive with the damper alone then generated energy.
 """
 
 import math
@@ -28,15 +28,16 @@ class WallNumbers(Fields):
 class WallState(Fields):
     """Fields of a state record with the last sample."""
 
-    felt: Vector3  # place [m]
+    felt: Vector3  # last measured position of the hand [m]
     rate: Vector3  # smoothed rate of the hand [m/s]
 
 
-# The speed is that of the readings after a first-order lag. Its time constant is the time in which the hand moves this
-# far [m], within bounds [s]. Without the lag, an encoder step within a period would act as an impact that throws the
-# light device back. So slow motion needs a long window, and fast motion a short one (Janabi-Sharifi, Hayward and Chen
-# 2000 adapt it for the same reason).
-_SMOOTH_WAY, _SMOOTH_LEAST, _SMOOTH_MOST = 0.3e-3, 1e-3, 20e-3
+# The speed is that of the readings after a first-order lag. Without the lag, an encoder step within a period would act
+# as an impact that throws the light device back. So slow motion needs a long time constant, and fast motion a short one
+# (Janabi-Sharifi, Hayward and Chen 2000 adapt it for the same reason).
+_SMOOTH_WAY = 0.3e-3  # the time constant is the time in which the hand moves this far [m]
+_SMOOTH_LEAST = 1e-3  # least time constant [s]
+_SMOOTH_MOST = 20e-3  # largest time constant [s]
 # The damping grows to its full value over this depth [m], an encoder step, so that the force is continuous at the
 # surface.
 _RAMP = 0.05e-3
@@ -46,21 +47,21 @@ _LEAST = 0.05
 SOFT_ZONE = 1e-3
 """Depth over which the source's wall reaches its full force [m] (Vongbunyong 2008, section 7.6)."""
 HARD_STIFFNESS = 3300.0
-"""Stiffness of the hard wall [N/m]: full force after 1 mm, as the source's. No axis of the device
-renders more. It is not passive: contacts give back up to twice what they took
-(:func:`passive_stiffness`), and dry friction of the device takes the rest."""
-# Effective part of the wall's damping: at most so many [N·s/m], and this share. Measured on the simulated device with
-# slow presses, tremor, hovering and sliding. Encoder steps, the lag of the speed and the compliance of the device use
-# up the rest; more damping does not help.
-_DAMPING_COUNTS, _SHARE_COUNTS = 10.0, 0.05
+"""Stiffness of the hard wall [N/m]. It gives the full force after 1 mm, as the source's wall does, and no axis of the
+device can render more. The wall is not passive: contacts return up to twice the energy that they took
+(:func:`passive_stiffness`), and dry friction of the device absorbs the excess."""
+# Only a share of the wall's damping is effective. Encoder steps, the lag of the speed and the compliance of the device
+# use up the rest. Both numbers were measured on the simulated device with slow presses, tremor, hovering and sliding.
+_DAMPING_COUNTS = 10.0  # damping above this value has no effect [N·s/m]
+_SHARE_COUNTS = 0.05  # effective share of the damping up to that value
 
 
 class Wall(NamedTuple):
     """A wall by name.
 
     Attributes:
-        stiffness: Stiffness of the spring [N/m]; None for that of the parameters.
-        is_full_at: In place of the stiffness: depth at which the force is full [m]; 0 to use the stiffness.
+        stiffness: Stiffness of the spring [N/m]; None for the stiffness of the parameters.
+        is_full_at: Depth at which the force is full [m], which determines the stiffness; 0 to use ``stiffness``.
         is_damped: Whether the wall is damped, and so returns less energy than it took.
     """
 
@@ -82,20 +83,20 @@ WALLS = {
     "soft": Wall(None, 0.0, is_damped=False),
     "step": Wall(math.inf, 0.0, is_damped=False),
 }
-"""Walls by name. ``damped`` is passive up to :func:`passive_stiffness`; ``source`` is what the
-source built, ``soft`` the same with a stiffness of one's own, ``step`` its limit without a zone."""
+"""Walls by name. ``damped`` is passive up to :func:`passive_stiffness`. ``source`` is the wall of the source. ``soft``
+is the wall of the source with the stiffness of the parameters. ``step`` has its full force at any depth."""
 
 
 @kernel
 def wall_force(depth: Array, length: float, stiffness: float, largest: float, force: Array) -> None:
     """Write the wall's push (3,) [N] back into the fixture; zero inside.
 
-    A soft wall is a spring of ``stiffness`` [N/m] until it reaches the ``largest`` force [N],
-    which stays constant deeper in; a wall of infinite stiffness is a step of force.
+    A soft wall is a spring of ``stiffness`` [N/m] up to the ``largest`` force [N]; deeper in, the force is constant.
+    For infinite stiffness the force is a step.
 
     Source:
-        Vongbunyong 2008, eqs. 6.3.1-6.3.2, with the interval and the sign put right and the
-        per-axis force replaced by one along the penetration, which is right at edges too.
+        Vongbunyong 2008, eqs. 6.3.1-6.3.2, with interval and sign corrected. The force per axis is replaced by a force
+        along the penetration, which is also correct at edges.
     """
     push = min(stiffness * length, largest) if length > 0.0 else 0.0
     for i in range(3):
@@ -104,7 +105,7 @@ def wall_force(depth: Array, length: float, stiffness: float, largest: float, fo
 
 @inner
 def _along(rate: Array, depth: Array, length: float) -> float:
-    """Part of a rate (3,) out of the fixture; all of it inside."""
+    """Component of a rate (3,) along the depth, out of the fixture; the size of the rate for a point inside."""
     square = along = 0.0
     for i in range(3):
         square += rate[i] * rate[i]
@@ -116,13 +117,11 @@ def _along(rate: Array, depth: Array, length: float) -> float:
 def damped_wall(
     p: WallNumbers, s: WallState, place: Array, depth: Array, length: float, period: float, force: Array
 ) -> None:
-    """Write the force (3,) [N] of a damped wall: dissipative, if the wall is soft enough.
+    """Write the force (3,) [N] of a damped wall; the wall is dissipative up to :func:`passive_stiffness`.
 
-    How soft is :func:`passive_stiffness`.
-
-    Spring and damper, together between a twentieth of the spring's force and the largest force. The
-    damping is at least stiffness times period: twice what a force lacks that is held for a period.
-    The extra damping absorbs the energy added by encoder steps and device compliance.
+    The force is the sum of spring and damper, between a twentieth of the spring's force and the largest force. The
+    damping is at least stiffness times period: twice the damping that compensates a force that is constant for a
+    period. The extra damping absorbs the energy added by encoder steps and device compliance.
 
     Args:
         p: Parameters.
@@ -130,12 +129,12 @@ def damped_wall(
         place: Measured position of the hand (3,) [m].
         depth: Vector (3,) [m] from the nearest point of the fixture to the hand.
         length: Length of ``depth`` [m]; 0 inside.
-        period: Time since the last sample [s], for which the push will be held too.
-        force: Written.
+        period: Time since the last sample [s]; the push is assumed to act for the same time.
+        force: Resulting force; written.
 
     Source:
-        Colgate and Schenkel 1997, b > K T / 2 + |B|: the damping b that a wall of stiffness K needs
-        when sampled with period T, part of which the wall itself gives here.
+        Colgate and Schenkel 1997, b > K T / 2 + |B|: the damping b that a wall of stiffness K with the sample period T
+        needs. Here the wall itself gives a part of b.
     """
     before = _along(s.rate, depth, length)
     lag = min(max(_SMOOTH_WAY / (abs(before) + 1e-9), _SMOOTH_LEAST), _SMOOTH_MOST)
@@ -154,8 +153,8 @@ def damped_wall(
 def passive_stiffness(damping: float, period: float, delay: float, friction: float, step: float) -> float:
     """Largest stiffness [N/m] at which contacts with a damped wall return no more energy than they took.
 
-    The result is on the safe side for the simulated device. At 1 kHz without delay it is 1000 N/m, while 1260 N/m is
-    not passive. With a delay of 1 ms it is 333 N/m, while 500 N/m is still passive and 1000 N/m is not.
+    The result is conservative for the simulated device. At 1 kHz without delay it is 1000 N/m; there 1260 N/m is not
+    passive. With a delay of 1 ms it is 333 N/m; there 500 N/m is still passive, and 1000 N/m is not.
 
     Args:
         damping: Damping of the wall [N·s/m]; 0 for a pure spring, which is never passive.
@@ -165,8 +164,8 @@ def passive_stiffness(damping: float, period: float, delay: float, friction: flo
         step: Encoder step of the device [m]; 0: no steps.
 
     Source:
-        Colgate and Schenkel 1997, K (T / 2 + delay) <= b, with the share of b that counts measured
-        here; Abbott and Okamura 2005, K <= 2 friction / step.
+        Colgate and Schenkel 1997, K (T / 2 + delay) <= b, where the effective share of b was measured here. Abbott and
+        Okamura 2005, K <= 2 friction / step.
     """
     counted = _SHARE_COUNTS * min(damping, _DAMPING_COUNTS)
     ringing = 2.0 * friction / step if step > 0.0 else math.inf

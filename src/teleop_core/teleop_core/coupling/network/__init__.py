@@ -1,7 +1,7 @@
 """Network: how packets travel between the master's side and the slave's, one file per kind.
 
-A kind gives for every packet its delay beyond the least delay, or that the packet is lost. Order, rate, and contents
-of packets are the same for all (:mod:`teleop_core.coupling.network.link`).
+For every packet a kind determines the delay beyond the least delay, or the loss of the packet. Order, rate and contents
+of packets are the same for all kinds (:mod:`teleop_core.coupling.network.link`).
 """
 
 import math
@@ -24,8 +24,10 @@ DRAW = types.float64(_ROW, _ROW, _ROW, types.float64)
 """Signature of a draw kernel, so that one compiled stage serves every kind."""
 LOST = -1.0
 """Result of a draw for a lost packet."""
-CHANCES, MEMORY = 3, 4
-"""Random numbers that every packet has, and numbers that a direction remembers."""
+CHANCES = 3
+"""Number of random numbers for each packet."""
+MEMORY = 4
+"""Number of values that a direction remembers."""
 
 
 @dataclass(frozen=True)
@@ -33,13 +35,13 @@ class Network:
     """A kind of network, for one direction.
 
     Attributes:
-        name: Its name in ``--set network.there.kind=``.
-        parameters: Its parameter group.
+        name: Name of the kind in ``--set network.there.kind=``.
+        parameters: Parameter group of the kind.
         draw: ``draw(numbers, memory, chances, now)``, a kernel or a plain function, called once for every packet.
-            ``numbers`` are those of the parameters; ``memory`` (4,) is kept from packet to packet, and zero at the
-            start; ``chances`` (3,) are random numbers, uniform from 0 to 1; ``now`` is the time since the start [s].
-            Returns the delay beyond the least delay [s], or :data:`LOST`.
-        numbers: ``numbers(parameters)`` returns the ``numbers`` of ``draw``, if they are not the numbers of the
+            ``numbers`` are the numbers of the parameters. ``memory`` (4,) is kept from packet to packet, and is zero at
+            the start. ``chances`` (3,) are random numbers, uniform from 0 to 1. ``now`` is the time since the start
+            [s]. The function returns the delay beyond the least delay [s], or :data:`LOST`.
+        numbers: ``numbers(parameters)`` returns the ``numbers`` of ``draw``, if they differ from the numbers of the
             parameters in their order.
     """
 
@@ -53,7 +55,7 @@ class Network:
 
 
 def _try(part: Network) -> None:
-    """Draw for some packets, so that errors are reported before anything runs."""
+    """Call the kernel for some packets, so that errors are reported before anything runs."""
     needs = "one with draw(numbers, memory, chances, now) -> float and parameters that all have defaults"
     with tried("network", part.name, needs):
         numbers, _ = fenced(part.numbers(part.parameters()))  # an index one too large reads NaN

@@ -1,8 +1,8 @@
 """Deadband: a packet is sent when its values differ enough from those of the last packet.
 
 The hand does not feel a force change smaller than a share of the force (Weber's law), so such a change need not be
-sent. The receiver keeps the last packet. A packet is sent after ``longest_pause`` in any case, so that a receiver
-without packets knows that the other side is gone.
+sent. The receiver keeps the values of the last packet. After ``longest_pause`` a packet is sent in any case. So a
+receiver that gets no packets knows that the other side is gone.
 
 Source:
     Perception-based deadband coding, Hinterseer, Hirche, Chaudhuri, Steinbach and Buss 2008; the idea of the codec of
@@ -77,7 +77,7 @@ def take_deadband(p: DeadbandNumbers, parameters: DeadbandParameters, dt: float)
 
 @inner
 def is_worth_telling(p: DeadbandNumbers, s: DeadbandState, k: int, pose: Array, force: Array) -> bool:
-    """Whether a packet of direction ``k`` with this pose (7,) and force (3,) is to be sent.
+    """Whether a packet of direction ``k`` with this pose (7,) and force (3,) must be sent.
 
     Args:
         p: Parameters.
@@ -109,8 +109,8 @@ def _has_moved(p: DeadbandNumbers, told: Array, pose: Array) -> bool:
     for i in range(3, 7):
         turn += (pose[i] - told[i]) * (pose[i] - told[i])
         other += (pose[i] + told[i]) * (pose[i] + told[i])
-    # Squares of the distances to the sent quaternion and to its opposite, which is the same attitude. A distance is
-    # twice the sine of a quarter of the rotation angle.
+    # Squares of the distances to the sent quaternion and to its negative, which describes the same attitude. A distance
+    # is twice the sine of a quarter of the rotation angle.
     chord = min(turn, other)
     return bool(way > p.place * p.place or chord > p.chord * p.chord)
 

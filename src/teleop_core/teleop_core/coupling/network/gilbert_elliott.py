@@ -1,4 +1,4 @@
-"""Gilbert-Elliott: packets are lost in bursts, which are longer in bad times."""
+"""Gilbert-Elliott: packets are lost in bursts; the bursts are longer in bad periods."""
 
 from dataclasses import dataclass
 
@@ -39,16 +39,16 @@ class GilbertElliottParameters:
 def gilbert_elliott_draw(numbers: Array, memory: Array, chances: Array, now: float) -> float:
     """Return 0, no delay beyond the least delay, or :data:`LOST`.
 
-    Good and bad times can change at every packet, within bursts too. The packet after a burst passes.
+    A good or bad period can end at every packet, within bursts too. The packet after a burst is not lost.
 
-    ``memory`` contains how many packets of the burst are still to be lost, and whether times are bad.
+    ``memory`` contains the number of packets of the burst that will still be lost, and whether the period is bad.
     """
     border = numbers[1] if memory[1] > 0.0 else numbers[0]
     memory[1] = 1.0 if chances[0] < border else 0.0
     if memory[0] < 1.0:
         at = 4 if memory[1] > 0.0 else 2
         length = numbers[at + 1] * ((1.0 - chances[1]) ** (-1.0 / numbers[at]) - 1.0)
-        memory[0] = float(int(min(length, 1e9))) + 1.0  # the burst, and one packet that passes
+        memory[0] = float(int(min(length, 1e9))) + 1.0  # the burst, and one packet that is not lost
     memory[0] -= 1.0
     return LOST if memory[0] >= 1.0 else 0.0
 

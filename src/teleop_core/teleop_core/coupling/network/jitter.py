@@ -1,4 +1,4 @@
-"""Jitter: packets have different delays, each its own delay, or many in a row the same delay."""
+"""Jitter: packets have random delays, drawn for each packet or for many successive packets."""
 
 import math
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ from teleop_core.kernels import Array, kernel
 
 @dataclass(frozen=True, kw_only=True)
 class JitterParameters:
-    """Delay beyond the least delay: most packets have one mean, some packets another mean."""
+    """Delay beyond the least delay: its mean for most packets, and another mean for slow packets."""
 
     mean: float = parameter(
         0.02, Within(0.0, 5.0, "s"), "mean delay of most packets; delays are exponentially distributed"
@@ -29,7 +29,7 @@ class JitterParameters:
 def jitter_draw(numbers: Array, memory: Array, chances: Array, now: float) -> float:
     """Delay beyond the least delay [s]: a new random delay, or the delay of the last packet.
 
-    ``memory`` contains the delay, when the last packet was sent, and whether there was one.
+    ``memory`` contains the delay, the time at which the last packet was sent, and whether there was a packet.
     """
     held = memory[2] > 0.0 and numbers[3] > 0.0
     if held and chances[0] < math.exp(-(now - memory[1]) / numbers[3]):

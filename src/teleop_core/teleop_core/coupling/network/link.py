@@ -1,4 +1,4 @@
-"""Link: packets in transit, one direction of a network.
+"""Link: packets in transit in one direction of a network.
 
 A packet waits in a queue while the line is busy with earlier packets. Its transmission begins at ``max(sent, end of
 the previous transmission)`` and lasts its size divided by the bandwidth: a queue of one server (Kleinrock 1975,
@@ -19,36 +19,36 @@ LONGEST = 16384
 QUEUE = 1024
 """Largest number of packets in a queue."""
 BLOCK = 1000
-"""Ticks for which random numbers are drawn at once."""
+"""Number of ticks for which random numbers are drawn at once."""
 _BothWays = Annotated[Integers, 2]
 
 
 class LinkNumbers(Fields):
-    """Fields of a parameter record with both directions."""
+    """Fields of a parameter record with the numbers of both directions."""
 
     least_delay: Annotated[Array, 2]  # [s]
     loss: Annotated[Array, 2]
     keeps_order: _BothWays
     every: _BothWays  # smallest number of ticks between two packets
     byte_ticks: Annotated[Array, 2]  # ticks that a byte takes; 0 without a bound
-    queue: _BothWays  # packets that wait at most
+    queue: _BothWays  # largest number of waiting packets
 
 
 class LinkState(Fields):
-    """Fields of a state record with both directions."""
+    """Fields of a state record with the state of both directions."""
 
     tick: int
-    next: int  # random numbers used
-    behind: int  # ticks by which the present tick is late
+    next: int  # number of random numbers used so far
+    behind: int  # number of ticks by which the present tick is late
     sent: _BothWays
     lost: _BothWays
-    newest: _BothWays  # newest packets that arrived
-    last_due: _BothWays  # tick
+    newest: _BothWays  # numbers of the newest packets that arrived
+    last_due: _BothWays  # latest arrival tick of a packet so far
     sent_tick: _BothWays
     arrived: _BothWays  # whether a packet arrived in this tick
     free: Annotated[Array, 2]  # tick, with fractions, at which the line is free
     head: _BothWays  # index of the packet that has waited longest
-    waits: _BothWays  # packets that wait
+    waits: _BothWays  # number of waiting packets
 
 
 class Way(NamedTuple):
@@ -57,10 +57,10 @@ class Way(NamedTuple):
     draw: Any
     numbers: Array
     memory: Array
-    chances: Array  # (BLOCK, CHANCES + 1)
-    packet: Array  # values of the packet that is made (W,), and stamps of its topics (K,)
+    chances: Array  # random numbers of a block of ticks (BLOCK, CHANCES + 1)
+    packet: Array  # values (W,) of the packet that is made; the next array contains the stamps of its topics (K,)
     packet_ns: Any
-    came: Array  # the same of the newest packet that arrived
+    came: Array  # values and stamps of the newest packet that arrived
     came_ns: Any
     values: Array  # calendar: values (LONGEST, W), stamps (LONGEST, K), tick and number of each
     stamps: Any
@@ -96,13 +96,13 @@ def make_way(width: int, sizes: Array, draw: Any, numbers: Array) -> Way:
 
 @inner
 def may_send(p: LinkNumbers, s: LinkState, k: int) -> bool:
-    """Whether the rate of packets of direction ``k`` allows one more in this tick."""
+    """Whether the rate of packets of direction ``k`` allows another packet in this tick."""
     return bool(s.sent[k] == 0 or s.tick - s.sent_tick[k] >= p.every[k])
 
 
 @inner
 def _due(p: LinkNumbers, s: LinkState, way: Way, k: int, dt: float) -> int:
-    """Tick at which the packet arrives whose transmission ends at ``s.free``; 0 if it is lost."""
+    """Arrival tick of the packet whose transmission ends at ``s.free``; 0 if the packet is lost."""
     chances = way.chances[s.next]
     drawn = way.draw(way.numbers, way.memory, chances[:CHANCES], s.tick * dt)
     if drawn < 0.0 or chances[CHANCES] < p.loss[k]:
@@ -129,14 +129,14 @@ def _packet_bytes(way: Way) -> float:
 
 @inner
 def send_packet(p: LinkNumbers, s: LinkState, way: Way, k: int, dt: float) -> None:
-    """Send ``way.packet``; the motion in ``way.moved[0]`` goes with it.
+    """Send ``way.packet`` with the motion in ``way.moved[0]``.
 
-    If the queue is full, its oldest packet is lost, or this packet if order is kept.
+    If the queue is full, its oldest packet is lost. If the order of packets is kept, the new packet is lost instead.
 
     Args:
         p: Parameters.
         s: State; written.
-        way: Written.
+        way: The direction; written.
         k: Index of the direction.
         dt: Tick [s].
     """
@@ -177,7 +177,7 @@ def serve_line(p: LinkNumbers, s: LinkState, way: Way, k: int, dt: float) -> Non
     Args:
         p: Parameters.
         s: State; written.
-        way: Written.
+        way: The direction; written.
         k: Index of the direction.
         dt: Tick [s].
     """
@@ -201,7 +201,7 @@ def _put_in_calendar(way: Way, waiting: int, due: int) -> None:
         way.due[at] = due
         for i in range(3):
             way.way[at, i] = 0.0
-    way.number[at] = way.waiting_ns[waiting, topics]  # newer than the packet already due at that tick
+    way.number[at] = way.waiting_ns[waiting, topics]  # this packet is newer than the packet already due at that tick
     for i in range(width):
         way.values[at, i] = way.waiting[waiting, i]
     for i in range(topics):
@@ -212,7 +212,7 @@ def _put_in_calendar(way: Way, waiting: int, due: int) -> None:
 
 @inner
 def take_packet(s: LinkState, way: Way, k: int) -> None:
-    """Take the packets that are due now: ``way.came`` is the newest packet, ``s.arrived`` whether it is new.
+    """Take the packets that are due now; write the newest into ``way.came``, and whether it is new into ``s.arrived``.
 
     ``way.moved[1]`` gets the summed motion of all due packets, including overtaken packets.
     """

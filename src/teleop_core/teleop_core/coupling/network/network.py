@@ -1,7 +1,7 @@
 """Network: a stage between the master's side and the slave's, which delays and loses packets.
 
-Commands go to the slave, and the slave's values come back. The readers on either side get the values that arrived,
-with their original stamps, so that their age is known.
+Commands go to the slave, and the slave's values come back. The stages on each side get the values that arrived, with
+the original stamps, so that the age of the values is known.
 """
 
 import math
@@ -39,9 +39,9 @@ from teleop_core.kernels import Array, Vector3, inner, kernel, record
 
 THERE, BACK = 0, 1
 _TOLD = 20
-"""Ticks from one report to the next."""
+"""Number of ticks from one report to the next."""
 _FOLLOWS_NS = 100_000_000
-"""A slave whose setpoint belongs to a command older than this does not follow [ns]."""
+"""A slave does not follow if the command of its setpoint is older than this [ns]."""
 _SETPOINT, _POSE, _FORCE, _REACH = 0, 7, 14, 20
 _ENERGY = _REACH + len(SLAVE_REACH.columns)
 """Indices in a packet from the slave: setpoint, measured pose, force, reach, energies."""
@@ -92,7 +92,7 @@ def _clock_ahead(p: NetworkNumbers, s: NetworkState, time_ns: int) -> int:
 
 @inner
 def _as_stamped_there(p: NetworkNumbers, s: NetworkState, stamp_ns: int) -> int:
-    """Stamp on the slave's clock of a sample at a time [ns] of our clock."""
+    """Stamp on the slave's clock of a sample whose time on our clock is ``stamp_ns`` [ns]."""
     if stamp_ns <= NO_COMMAND_NS:
         return stamp_ns
     # A stamp of 0 or less means that there is no sample.
@@ -125,7 +125,7 @@ def _send_there(p: NetworkNumbers, s: NetworkState, there: link.Way, row: Row, d
 
 @inner
 def _send_back(p: NetworkNumbers, s: NetworkState, back: link.Way, row: Row, dt: float) -> None:
-    """Send the slave's values, once there are any."""
+    """Send the slave's values as soon as there are values."""
     if row.slave_setpoint_cp_ns == 0 or not link.may_send(p, s, BACK):
         return
     force = row.slave_measured_cf[:3]
@@ -137,7 +137,7 @@ def _send_back(p: NetworkNumbers, s: NetworkState, back: link.Way, row: Row, dt:
     _pack(row.slave_measured_cf, back.packet, _FORCE)
     _pack(row.slave_reach, back.packet, _REACH)
     _pack(row.slave_energy, back.packet, _ENERGY)
-    # Setpoint and reach have the stamp of a command, of our clock; the rest is of the slave's.
+    # Setpoint and reach have the stamp of a command, on our clock; all other stamps are on the slave's clock.
     back.packet_ns[0], back.packet_ns[3] = row.slave_setpoint_cp_ns, row.slave_reach_ns
     back.packet_ns[1] = _as_stamped_there(p, s, row.slave_measured_cp_ns)
     back.packet_ns[2] = _as_stamped_there(p, s, row.slave_measured_cf_ns)
@@ -184,13 +184,13 @@ def _take_back(s: NetworkState, back: link.Way, row: Row) -> None:
 
 @kernel
 def network_step(p: NetworkNumbers, s: NetworkState, there: link.Way, back: link.Way, row: Row, dt: float) -> None:
-    """One tick: send what is new on either side, and write what arrives at the other.
+    """One tick: send the new values of each side, and write the values that arrive at the other side.
 
     Args:
         p: Parameter record.
         s: State record; written.
         there: :class:`~teleop_core.coupling.network.link.Way` to the slave; written.
-        back: The same from the slave.
+        back: :class:`~teleop_core.coupling.network.link.Way` from the slave; written.
         row: Signals.
         dt: Tick [s].
     """
@@ -284,7 +284,7 @@ class NetworkLink(RunningStage):
         self.state["next"] = 0
 
     def concerns(self) -> list[str]:
-        """A direction in which no packets arrive, in words."""
+        """Text about a direction in which no packets arrive."""
         s, found = self.state, []
         for k, way in ((THERE, "to the slave"), (BACK, "from the slave")):
             behind = int(s["sent"][k] - s["newest"][k])

@@ -1,4 +1,4 @@
-"""Outages: at times nothing passes."""
+"""Outages: periods in which all packets are lost."""
 
 from dataclasses import dataclass
 
@@ -35,11 +35,11 @@ class OutagesParameters:
 def outages_draw(numbers: Array, memory: Array, chances: Array, now: float) -> float:
     """Return 0, no delay beyond the least delay, or :data:`LOST`.
 
-    The first packet begins an outage. The packet that begins one is lost; the first one at or after
-    its end passes, and begins the pause (NetFI's communication loss).
+    The first packet begins an outage. The packet that begins an outage is lost. The first packet at or after the end of
+    the outage arrives, and begins the pause (NetFI's communication loss).
 
-    ``memory`` holds when the outage or pause ends [s or packets], whether it is an outage, and the
-    number of packets before this one.
+    ``memory`` contains the end of the outage or pause [s or packets], whether it is an outage, and the number of
+    earlier packets.
     """
     at = memory[2] if numbers[2] > 0.0 else now
     memory[2] += 1.0

@@ -21,7 +21,7 @@ def message_size(topic: Topic) -> int:
     """Bytes of one message of a topic without joints, in CDR.
 
     Args:
-        topic: The topic; its frame and the names of its numbers count, since the message contains them.
+        topic: The topic; its frame and the names of its numbers add to the size, because the message contains them.
     """
     size, names = _text(_STAMP, topic.frame_id), topic.names(())
     if not topic.kind.has_names:
@@ -43,5 +43,5 @@ def _aligned(size: int, step: int) -> int:
 
 
 def _text(size: int, text: str) -> int:
-    """Size after adding a text: its length field, its bytes, and a zero."""
+    """Size after a text was added: the text's length field, its bytes, and a zero."""
     return _aligned(size, _LENGTH) + _LENGTH + len(text.encode()) + 1

@@ -57,8 +57,8 @@ PRESETS: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
     "iss": _far(0.4, 0.05),
     "ets7": _far(3.4, 0.1),
 }
-"""Networks by name. Loss, delay and outages are the nine levels of the UVA-DSA telesurgery QoS analysis 2026; they
-affect only packets to the slave. The table of that analysis gives outages in milliseconds, but its program counts
+"""Networks by name. Levels of loss, delay and outages are the nine levels of the UVA-DSA telesurgery QoS analysis 2026;
+they affect only packets to the slave. The table of that analysis gives outages in milliseconds, but its program counts
 packets (``_packets``); its recording has 517 packets a second. ``iss`` has a round trip of 0.8 to 1 s, ``ets7`` of 7 s
 (ETS-VII 1999); the variation of these two delays is assumed."""
 

@@ -13,7 +13,7 @@ from teleop_core.coupling.network import LOST, Network
 from teleop_core.kernels import Array, kernel
 
 _NAME = "trace.file"
-_SLOW = 20.0  # [s] from row to row: with a longer interval the network would hardly change during a session
+_SLOW = 20.0  # largest interval of rows [s]; with a longer one the network would hardly change during a session
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -77,13 +77,13 @@ def _row(path: str, number: int, line: list[str], before: float) -> tuple[float,
 
 
 def trace_numbers(parameters: TraceParameters) -> Array:
-    """Numbers of the file; without a file, those of a network without delay."""
+    """Numbers of the file; without a file, the numbers of a network without delay."""
     return read_trace(parameters.file) if parameters.file else np.array([0.0, 0.0, 1.0, 0.0])
 
 
 @kernel
 def trace_draw(numbers: Array, memory: Array, chances: Array, now: float) -> float:
-    """Delay of the last row before now [s]; the last gap of the file is as long as its first.
+    """Delay of the last row before now [s]; the file is repeated, after an interval equal to its first interval.
 
     ``memory`` contains the row in the file, and the total length of the earlier passes through it [s].
     """

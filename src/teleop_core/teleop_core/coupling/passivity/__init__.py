@@ -1,9 +1,9 @@
 """Passivity: prevents delayed forces from generating energy, one file per kind.
 
-Hand and slave are connected at two ports. The hand's port has the push on the hand and its motion. The slave's port
-has the force on the tip and the tip's motion. The energy into and out of both ports is counted for every kind
-(:mod:`teleop_core.coupling.passivity.port`). A kind defines how each side uses it: a side knows its own port and what
-it received from the other side.
+Hand and slave are connected at two ports. The hand's port has the push on the hand and its motion. The slave's port has
+the force on the tip and the tip's motion. The energy into and out of both ports is counted for every kind
+(:mod:`teleop_core.coupling.passivity.port`). A kind defines how each side uses this energy. A side knows only its own
+port and the values that it received from the other side.
 """
 
 from collections.abc import Callable
@@ -26,7 +26,7 @@ HAND = types.void(_ROW, _ROW, _ROW, _ROW, _ROW, _ROW, _ROW, _ROW, _ROW, types.fl
 SLAVE = types.void(_ROW, _ROW, _ROW, _ROW, _ROW, _ROW, _ROW, _ROW, _ROW, types.float64)
 """Signatures of both kernels, so that one compiled stage serves every kind."""
 MEMORY = 12
-"""How many numbers each side of a kind remembers."""
+"""Number of values that each side of a kind remembers."""
 
 
 @kernel
@@ -41,15 +41,15 @@ def leave_command(
 class Passivity:
     """A kind of passivity: how it changes the push on the hand and the slave's command.
 
-    Both kernels may write to ``port``, their row of :data:`~teleop_core.graph.topics.ENERGY`. They get ``heard``, the
-    other side's row as it arrived. Energies are in the slave's scale [J]. ``flow`` (3,) contains, since the last call,
-    the energy that the other side credited, and the energy into and out of this port. ``memory`` (12,) is kept from
-    call to call, and zero at the start; energies begin anew with every ``round``, and at the slave ``memory`` with
-    them.
+    The kernels of both sides may write to ``port``, their row of :data:`~teleop_core.graph.topics.ENERGY`. ``heard`` is
+    the other side's row as it arrived. Energies are in the slave's scale [J]. ``flow`` (3,) contains three energies
+    since the last call: the credit from the other side, the energy into this port, and the energy out of this port.
+    ``memory`` (12,) is kept from call to call, and is zero at the start. With every new ``round`` all energies restart
+    from zero, and so does ``memory`` at the slave.
 
     Attributes:
-        name: Its name in ``--set reflection.passivity=``.
-        parameters: Its parameter group.
+        name: Name of the kind in ``--set reflection.passivity=``.
+        parameters: Parameter group of the kind.
         hand: ``hand(numbers, memory, last, moved, led, flow, heard, port, push, scale, period)``, called for every
             sample of the master. ``last`` (3,) is the push since the last sample [N]; ``moved`` (3,) is the motion of
             the hand since then; ``led`` (3,) is the commanded motion of the slave, divided by the motion gain [m]; all
@@ -57,13 +57,13 @@ class Passivity:
             allowed push. ``scale`` is the hand's energy divided by that of the slave; ``period`` is the time since the
             last sample [s].
         slave: ``slave(numbers, memory, flow, force, tip, last, heard, port, command, period)``, called for every
-            command that arrives, only if there is a stage ``passivity``. ``numbers`` are those of that stage;
-            ``force`` (6,) is the wrench on the tip [N, N m], whose pose is ``tip`` (7,); ``last`` (7,) is the last
-            command given to the slave; ``command`` (7,) is the command that came, and must be overwritten with the
-            command to give.
-        numbers: ``numbers(parameters)`` returns the ``numbers`` of ``hand``, if they are not the numbers of the
+            command that arrives, only if there is a stage ``passivity``. ``numbers`` are the numbers of that stage.
+            ``force`` (6,) is the wrench on the tip [N, N m], and ``tip`` (7,) is the pose of the tip. ``last`` (7,) is
+            the last command given to the slave. ``command`` (7,) is the command that arrived; it must be overwritten
+            with the command to give.
+        numbers: ``numbers(parameters)`` returns the ``numbers`` of ``hand``, if they differ from the numbers of the
             parameters in their order.
-        needs_slave: Whether it works only together with a stage ``passivity``.
+        needs_slave: Whether the kind works only together with a stage ``passivity``.
     """
 
     name: str

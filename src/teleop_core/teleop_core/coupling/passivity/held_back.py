@@ -23,7 +23,7 @@ def hold_back(force: Array, size: float, last: Array, left: float, least: float,
         left: Work that the command may do against the force [J]; if negative, the command must go back.
         least: A force of at most this size counts as no contact [N].
         port: Drift and the work that was withheld; written.
-        command: Written.
+        command: Pose (7,) of the original command; overwritten with the command to give.
 
     Returns:
         Work that the command does [J].
@@ -81,10 +81,10 @@ def hold_lead(
 ) -> None:
     """Let the command (7,) be ahead of the tip only as far as the remaining energy pays for the distance.
 
-    The arm moves on to its command whatever it touches. So the energy for the distance from tip to command is reserved
-    before the motion begins. It is computed for a spring that already has the present force, with friction as large in
-    addition. Rotations against the torque are paid for too. Back from the last contact the command may move freely. If
-    no energy is left, this is the only motion allowed.
+    The arm moves to its command even against a contact. So the energy for the distance from tip to command is reserved
+    before the motion begins. It is computed for a spring that already has the present force, plus friction of equal
+    size. Rotations against the torque use energy too. The command may always move back from the last contact. If no
+    energy is left, this is the only allowed motion.
 
     Args:
         numbers: Numbers of :func:`teleop_core.coupling.passivity.tdpa.tdpa_slave`.
@@ -94,7 +94,7 @@ def hold_lead(
         force: Wrench on the tip (6,).
         tip: Pose of the tip (7,).
         port: Drift and the work that was withheld; written.
-        command: Written.
+        command: Pose (7,) of the original command; overwritten with the command to give.
     """
     size, away, spring = norm(force), memory[1:4], numbers[6]
     left, lead, inwards = max(left, 0.0), room(3), 0.0

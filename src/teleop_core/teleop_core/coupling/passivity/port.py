@@ -1,8 +1,8 @@
 """Port: the connection of hand or slave to the system between them, and the energy that flows through it.
 
 The power of a port is force times velocity plus torque times angular velocity. Energy in and energy out are counted
-separately, so that both only grow. So a message with them that is lost, late or doubled does not make the next message
-wrong.
+separately, so that both only increase. So a lost, late or doubled message with these energies does not make the next
+message wrong.
 
 Source:
     Hannaford and Ryu 2002 for the observer; Ryu, Artigas and Preusche 2010 for monotone energies

@@ -1,7 +1,7 @@
 """Passivity as a stage: the slave's port, between the arriving commands and inverse kinematics.
 
-It counts the energy through the slave's tip, and applies the passivity law that the hand's side names to the command.
-Without this stage the energy that the slave gives is not limited.
+The stage counts the energy through the slave's tip. It applies the passivity law that the hand's side selects to the
+command. Without this stage the energy that the slave gives to its environment is not limited.
 """
 
 from dataclasses import dataclass
@@ -80,7 +80,7 @@ class Laws(NamedTuple):
     numbers: Array
     memory: Array
     flow: Array  # energies since the last command: received from the other side, in, out
-    last: Array  # the command that was given last (7,)
+    last: Array  # the last command that was given (7,)
 
 
 class PortState(Fields):
@@ -99,8 +99,8 @@ class PortState(Fields):
 def _observe(s: PortState, laws: Laws, row: Row, port: Array) -> None:
     """Count the energy through the tip since its last measurement.
 
-    The force is the mean of the forces at both measured ends of the motion, so that a spring takes and returns the
-    same energy.
+    The force is the mean of the measured forces at start and end of the motion, so that a spring takes and returns
+    equal energies.
     """
     is_late = row.slave_measured_cf_ns > row.slave_measured_cp_ns
     for i in range(6):
@@ -136,7 +136,7 @@ def _begin(s: PortState, laws: Laws, heard: Array, port: Array) -> None:
 
 @kernel
 def passivity_step(p: Fields, s: PortState, laws: Laws, row: Row, dt: float) -> None:
-    """One tick: count the energy at the tip, and answer a command that has come.
+    """One tick: count the energy at the tip, and process a command that has arrived.
 
     Args:
         p: Not used.
@@ -156,7 +156,8 @@ def passivity_step(p: Fields, s: PortState, laws: Laws, row: Row, dt: float) -> 
     s.command_ns = row.slave_servo_cp_ns
     copy(row.slave_servo_cp, row.passivity_servo_cp)
     law = int(port[LAW])
-    # The first command of a round is the slave's position; so are all commands while the slave does not follow.
+    # The first command of a round is the slave's position. While the slave does not follow, all commands are its
+    # position.
     if s.has_last and 0 <= law < len(laws.slaves):
         laws.slaves[law](
             laws.numbers, laws.memory, laws.flow, s.force, s.tip, laws.last, heard, port,

@@ -1,9 +1,9 @@
-"""TDPA: observers and controllers at both ports, by energies that only grow.
+"""TDPA: passivity observers and controllers at both ports, with energies that only increase.
 
-Each side credits the other side with energy that came in at its own port. The hand's push is no larger than the
-received credit pays for until the next sample. The slave's command is ahead of the tip only as far as the received
-credit pays for. The drift that results is removed later, when energy is left. While the slave has little energy, a
-drag on the hand supplies it.
+Each side credits the other side with energy that came in at its own port. The hand's push is so small that its energy
+until the next sample does not exceed the received credit. The slave's command is ahead of the tip only as far as the
+received credit pays for. The drift that results is removed later, when energy is left. While the slave has little
+energy, a drag on the hand supplies it.
 """
 
 import math
@@ -26,7 +26,7 @@ _SPEED = 1
 
 @dataclass(frozen=True, kw_only=True)
 class StoreParameters:
-    """Energy that the hand's side keeps, and the least energy that it leaves to the slave."""
+    """Energy that the hand's side stores, and the least energy that it leaves to the slave."""
 
     kept_way: float = parameter(
         3e-4,
@@ -53,7 +53,7 @@ class StoreParameters:
 
 @inner
 def tell(port: Array, kept: float) -> None:
-    """Credit the other side with the energy that came in here, minus ``kept`` [J] and minus debts."""
+    """Credit the other side with the energy that came in at this port, minus ``kept`` [J] and minus debts."""
     told = min(port[IN] - port[TOLD], port[MARGIN] - kept)
     if told > 0.0:
         port[TOLD] += told
@@ -67,14 +67,15 @@ def tdpa_hand(
 ) -> None:  # fmt: skip
     """Make the push (3,) [N] no larger than the remaining energy can pay for until the next sample.
 
-    The remaining energy is what was heard and what came in, minus what was told and what went out. After a contact it
-    is set to zero, but a debt stays. If values of a slave's port arrive, the slave is credited with what came in.
-    While the slave has less than its store, or while there is a debt here, a drag on the hand supplies energy.
+    The remaining energy is the received credit plus the energy in, minus the sent credit and the energy out. After a
+    contact it is set to zero, but a debt stays. If values of a slave's port arrive, the slave is credited with the
+    energy in. While the slave has less than its store, or while there is a debt at this port, a drag on the hand
+    supplies energy.
 
     Source:
-        Ryu, Artigas and Preusche 2010 for the law. Their law is a damper that uses a measured speed; here the bound
-        for the next sample, which needs no speed, is that of the tank. The drag is the
-        tank level controller of Franken, Stramigioli, Misra, Secchi and Macchelli 2011.
+        Ryu, Artigas and Preusche 2010 for the law. Their law is a damper that uses a measured speed. Here the push is
+        bounded for the next sample as in the tank, which needs no speed. The drag is the tank level controller of
+        Franken, Stramigioli, Misra, Secchi and Macchelli 2011.
     """
     way = square = 0.0
     for i in range(3):
@@ -97,9 +98,9 @@ def tdpa_hand(
 
 @inner
 def pay_push(port: Array, push: Array, size: float, way: float, scale: float) -> None:
-    """Make a push (3,) of some size [N] no larger than the margin pays for until the next sample.
+    """Reduce a push (3,) of the given size [N] so that the margin pays for its energy until the next sample.
 
-    The hand moved by ``way`` [m], the sum over its axes, since the last sample.
+    ``way`` [m] is the motion of the hand since the last sample, summed over its axes.
     """
     most = SPARE + scale * max(port[MARGIN], 0.0) / (READING + 2.0 * way)
     if size > most:
@@ -123,7 +124,7 @@ def lead_slave(
     numbers: Array, memory: Array, flow: Array, force: Array, tip: Array, last: Array, port: Array,
     command: Array, stop: float, period: float,
 ) -> None:  # fmt: skip
-    """Replace the command (7,) that came by the command to give to the slave; see :func:`tdpa_slave`."""
+    """Replace the command (7,) that arrived by the command to give to the slave; see :func:`tdpa_slave`."""
     left, drift = keep_account(numbers, flow, force, port), port[DRIFT : DRIFT + 3]
     met = held_back.met_way(command, last, drift) if held_back.norm(force) <= numbers[2] else 0.0
     held_back.make_up(numbers, drift, met, period)
@@ -139,22 +140,22 @@ def tdpa_slave(
 ) -> None:  # fmt: skip
     """Let the command (7,) be ahead of the tip as far as the remaining energy pays for.
 
-    The remaining energy is counted at the tip, from its wrench and its motion on all six axes. It is what was heard
-    and what came in, minus what was told and what went out, plus the credit, which is given only once. The last numbers
-    of ``port`` are the drift, from the given to the original command [m].
+    The remaining energy is counted at the tip, from its wrench and its motion on all six axes. It is the received
+    credit plus the energy in, minus the sent credit and the energy out, plus the arm's credit, which is given only
+    once. The last numbers of ``port`` are the drift, from the given to the original command [m].
 
     Args:
         numbers: Time constant [s] and largest speed [m/s] with which drift decays; the force below which there is no
             contact [N]; the largest credit of the arm [J]; two unused numbers; and the stiffness for which a lead is
             paid [N/m].
         memory: Direction of the last force; written.
-        flow: Heard, in, out [J].
+        flow: Received credit, energy in, energy out [J].
         force: Wrench on the tip (6,).
         tip: Pose of the tip (7,).
         last: Last command given to the slave.
         heard: Not used.
-        port: Written.
-        command: Written.
+        port: Energies of this port; written.
+        command: Command that arrived; overwritten with the command to give.
         period: Time since the last command [s].
 
     Source:

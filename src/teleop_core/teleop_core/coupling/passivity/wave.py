@@ -1,7 +1,7 @@
 """Wave: hand and slave exchange waves, each a mix of force and speed.
 
-A wave carries energy: the energy in the two-port is that of the waves in transit. Packets contain the wave's integral
-and its energy, which are both sums. So a lost, late or doubled packet does not make the next one wrong and adds no
+A wave carries energy: the energy in the two-port is the energy of the waves in transit. Packets contain the sums of the
+wave's integral and of its energy. So a lost, late or doubled packet does not make the next packet wrong, and adds no
 energy.
 """
 
@@ -31,17 +31,17 @@ class WaveParameters:
 
 
 DRAG = 1.5
-"""Drag on the hand, divided by what its wave takes; the part above 1 pays for energy that the wave lacks."""
+"""Drag on the hand, divided by the power that its wave takes; the part above 1 supplies energy that the wave lacks."""
 HASTE = 0.01
-"""Time in which energy is spent on a wave that lags behind its wanted integral [s]."""
+"""Time in which the energy is spent if a wave lags behind its wanted integral [s]."""
 KEPT_WAY = 3e-4
 """Distance over which the hand's side reserves energy for the push, as in TDPA [m]."""
 RESERVE, TAKEN, OWED, SPEED = 1, 2, 5, 8
 """Indices in the memory of either side.
 
-They are: received energy that is not yet given [J]; integral of the received wave that was given; integral of the own
-wave that is not yet sent [√W s]; the hand's speed [m/s]. Index 0 is the round at the hand, and the energy that the
-command left over at the slave.
+RESERVE: received energy that is not yet given [J]. TAKEN: integral of the received wave that was already given [√W s].
+OWED: integral of the own wave that is not yet sent [√W s]. SPEED: the hand's speed [m/s]. Index 0 is the round at the
+hand; at the slave it is the energy that the command did not use.
 """
 
 
@@ -49,8 +49,8 @@ command left over at the slave.
 def draw(owed: Array, energy: float, period: float, haste: float, wave: Array) -> float:
     """Take the part of a wave's integral that is due now; return its energy [J].
 
-    The integral of a constant wave is given in the same time in which it arrived. The energy of any wave suffices for
-    its whole integral, because a constant wave needs the least energy for a given integral.
+    The integral of a constant wave is given in the time in which it arrived. The energy of any wave suffices for its
+    whole integral, because a constant wave needs the least energy for a given integral.
 
     Args:
         owed: Remaining integral of the wave (3,) [√W s]; written.
@@ -60,7 +60,7 @@ def draw(owed: Array, energy: float, period: float, haste: float, wave: Array) -
         wave: Wave during that time (3,) [√W]; written.
 
     Source:
-        Niemeyer and Slotine 1998, integral and energy of a wave as what travels.
+        Niemeyer and Slotine 1998, where integral and energy of a wave are transmitted.
     """
     square = 0.0
     for i in range(3):
@@ -81,7 +81,7 @@ def _take(memory: Array, gained: float, heard: Array, port: Array, period: float
     """Return the received wave (3,) [√W] for the next ``period``; add its energy to the margin."""
     owed, wave = np.zeros(3), np.zeros(3)
     memory[RESERVE] += gained
-    if heard[ROUND] == port[ROUND] and heard[TOLD] == port[HEARD]:  # the newest of this round
+    if heard[ROUND] == port[ROUND] and heard[TOLD] == port[HEARD]:  # the newest values of this round
         for i in range(3):
             owed[i] = heard[WAVE + i] - memory[TAKEN + i]
     spent = draw(owed, memory[RESERVE], period, math.inf, wave)
@@ -94,7 +94,7 @@ def _take(memory: Array, gained: float, heard: Array, port: Array, period: float
 
 @inner
 def _tell(memory: Array, port: Array, kept: float, period: float) -> None:
-    """Send as much of the own wave as the margin, minus ``kept`` [J], pays for."""
+    """Send the part of the own wave whose energy the margin, minus ``kept`` [J], pays for."""
     wave = np.zeros(3)
     spent = draw(memory[OWED : OWED + 3], port[MARGIN] - kept, period, HASTE, wave)
     port[TOLD] += spent
@@ -110,9 +110,9 @@ def wave_hand(
 ) -> None:  # fmt: skip
     """Write the push (3,) [N] that results from the slave's wave and the hand's speed.
 
-    With impedance b, speed v and received wave w, the push is ``sqrt(2 b) w - b v`` and the sent wave is ``sqrt(2 b) v
-    - w``; both are in the slave's scale of energy. The first part of the push is no larger than the margin pays for
-    until the next sample, as in TDPA.
+    With impedance b, speed v and received wave w, the push is ``sqrt(2 b) w - b v`` and the sent wave is
+    ``sqrt(2 b) v - w``; push and wave are in the slave's scale of energy. The first term of the push is limited so that
+    the margin pays for its energy until the next sample, as in TDPA.
 
     Source:
         Niemeyer and Slotine 1991.
@@ -142,7 +142,7 @@ def wave_hand(
 def pay_command(
     numbers: Array, memory: Array, force: Array, last: Array, port: Array, command: Array, period: float
 ) -> None:
-    """Let the command (7,) go against the force as far as the remaining energy pays for; the rest is drift.
+    """Let the command (7,) move against the force as far as the remaining energy allows; the rest is drift.
 
     Arguments are those of :func:`wave_slave`.
     """
@@ -161,10 +161,10 @@ def wave_slave(
 ) -> None:  # fmt: skip
     """Write the command (7,) that results from the hand's wave and the force on the tip.
 
-    A damper of the impedance b matches the port. With force f and received wave u, the speed of the command is ``u /
-    sqrt(2 b) + f / (2 b)``, and the sent wave is ``f / sqrt(2 b)``. So waves from the hand are not reflected, and
-    without contact the command is the hand's. Against the force the command moves as far as is paid for, as in TDPA;
-    without contact drift decays.
+    A damper of the impedance b matches the port. With force f and received wave u, the speed of the command is
+    ``u / sqrt(2 b) + f / (2 b)``, and the sent wave is ``f / sqrt(2 b)``. So waves from the hand are not reflected, and
+    without contact the command equals the hand's command. Against the force the command moves only as far as the
+    remaining energy allows, as in TDPA; without contact drift decays.
 
     Source:
         Niemeyer and Slotine 1991, with their matching of impedance at the slave.

@@ -18,14 +18,14 @@ _RUMBLE_TIME = 0.2  # a rumble that is not renewed ends [s]
 _HINTS = {
     "SDL_VIDEODRIVER": "dummy",  # events need a video driver; this one opens no window
     "SDL_JOYSTICK_ALLOW_BACKGROUND_EVENTS": "1",
-    "SDL_NO_SIGNAL_HANDLERS": "1",  # signals are the node's
+    "SDL_NO_SIGNAL_HANDLERS": "1",  # the node handles signals
     "PYGAME_HIDE_SUPPORT_PROMPT": "1",
 }
 
 
 @dataclass(frozen=True, kw_only=True)
 class GamepadParameters(pilot.PilotParameters):
-    """How a gamepad moves the stylus, and how it displays the force."""
+    """How a gamepad moves the stylus, and how the gamepad displays the force."""
 
     rumble: float = fixed(1.0, Within(0.0, 1.0), "strength of the rumble at the device's peak force; 0: no rumble")
     triggers: str = fixed(
@@ -102,7 +102,7 @@ class Gamepad:
         rates = np.array(
             [
                 axis(pad.CONTROLLER_AXIS_LEFTX),
-                -axis(pad.CONTROLLER_AXIS_RIGHTY),  # pushed away is negative
+                -axis(pad.CONTROLLER_AXIS_RIGHTY),  # SDL reports a stick that is pushed away as negative
                 axis(pad.CONTROLLER_AXIS_LEFTY),
                 button(pad.CONTROLLER_BUTTON_DPAD_DOWN) - button(pad.CONTROLLER_BUTTON_DPAD_UP),
                 -axis(pad.CONTROLLER_AXIS_RIGHTX),
@@ -137,7 +137,7 @@ class Gamepad:
 
 
 def open_gamepad(parameters: GamepadParameters) -> Gamepad:
-    """Open the gamepad that the parameters name; raises as :class:`Gamepad`."""
+    """Open the gamepad that the parameters name; raises the errors of :class:`Gamepad`."""
     return Gamepad(parameters.device, leads_jaw=parameters.triggers == "jaw")
 
 

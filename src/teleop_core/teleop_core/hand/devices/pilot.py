@@ -9,8 +9,8 @@ from teleop_core.hand.devices import Reading
 from teleop_core.hand.operators.remote import RemoteHand
 from teleop_core.kernels import Array, length, turn_by
 
-_NEAR = 0.02  # share of the jaw's travel: a trigger within this of its former position has returned to it
-_LONGEST = 0.05  # time beyond this between two readings is not integrated [s]
+_NEAR = 0.02  # a trigger within this share of its travel from its former position has returned to that position
+_LONGEST = 0.05  # a longer time between two readings is integrated as this time [s]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,7 +59,7 @@ def steer(pose: Array, rates: Array, time: float, parameters: RateParameters, lo
 
 
 class Pilot:
-    """Sends the poses to which a person steers the stylus to a hand.
+    """Integrates a person's readings of a device to poses of the stylus, and sends these poses to a hand.
 
     Args:
         hand: The hand that receives the poses.
@@ -96,7 +96,7 @@ class Pilot:
         self._leads_jaw = False
 
     def _close(self, reading: Reading) -> None:
-        """Close the jaw as far as the device's trigger is pressed.
+        """Close the jaw by the share by which the device's trigger is pressed.
 
         A device that was reconnected reports an unpressed trigger. It moves the jaw again only after the trigger was
         pressed as far as the jaw is closed.

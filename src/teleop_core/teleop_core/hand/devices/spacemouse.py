@@ -15,12 +15,13 @@ from teleop_core.hand.operators.remote import AHEAD, make_remote
 from teleop_core.kernels.geometry import Array
 
 _MAKER = 0x256F  # 3Dconnexion
-_OLD_MAKER, _OLD = 0x046D, range(0xC603, 0xC640)  # models that Logitech sold
+_OLD_MAKER = 0x046D  # Logitech
+_OLD = range(0xC603, 0xC640)  # product numbers of the 3-D mice that Logitech sold
 _USAGE = (0x01, 0x08)  # generic desktop, multi-axis controller
 _MOVED, _TURNED, _PRESSED = 1, 2, 3  # kinds of reports
 _FULL = 350.0
-_LONGEST = 64  # bytes of a report
-_REST = 0.5  # a cap at rest for longer counts as released; without reports for longer it is at rest [s]
+_LONGEST = 64  # largest number of bytes in a report
+_REST = 0.5  # a cap at rest for longer counts as released; a cap without reports for longer counts as at rest [s]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,7 +38,7 @@ class Reports:
 
     Attributes:
         deflection: Translation and rotation of the cap in the mouse's axes, -1 to 1, shape (6,).
-        buttons: Bits of the buttons, the first one lowest.
+        buttons: Bits of the buttons; the lowest bit is the first button.
     """
 
     def __init__(self) -> None:
@@ -67,7 +68,8 @@ class Reports:
 class SpaceMouse:
     """An open 3-D mouse; see :class:`teleop_core.hand.devices.Device`.
 
-    It moves the stylus while its cap is touched. Its first button is the fixture, its second one the mode.
+    It moves the stylus while its cap is touched. The first button is the fixture button, the second one the mode
+    button.
 
     Args:
         wanted: Part of the mouse's name; if empty, the first mouse is opened.
@@ -125,7 +127,7 @@ def space_mice() -> list[tuple[str, bytes]]:
         (entry["product_string"] or "3-D mouse", entry["path"])
         for entry in _hid().enumerate()
         if is_space_mouse(entry["vendor_id"], entry["product_id"])
-        and (entry["usage_page"], entry["usage"]) in {_USAGE, (0, 0)}  # 0: not known
+        and (entry["usage_page"], entry["usage"]) in {_USAGE, (0, 0)}  # 0 means unknown
     ]
 
 
@@ -143,7 +145,7 @@ def _hid() -> Any:
 
 
 def open_space_mouse(parameters: SpaceMouseParameters) -> SpaceMouse:
-    """Open the mouse that the parameters name; raises as :class:`SpaceMouse`."""
+    """Open the mouse that the parameters name; raises the errors of :class:`SpaceMouse`."""
     return SpaceMouse(parameters.device, parameters.dead_zone)
 
 

@@ -1,4 +1,4 @@
-"""Contact: the energy that the hand gave to the device and got back during one continuous force."""
+"""Contact: energy that the hand gives to the device and gets back, while the force of the device is not zero."""
 
 import math
 
@@ -19,7 +19,7 @@ class ContactState(Fields):
 
 @inner
 def account(s: ContactState, force: Array, friction: float, moved: float, place: Array, contact: Array) -> None:
-    """Add the energy of a tick to the present contact; a new contact begins when the force begins.
+    """Add the energy of a tick to the present contact; a new contact begins when the force becomes nonzero.
 
     The force is constant within a tick, so force times displacement of the device is exactly its work. The wall takes
     energy while the hand pushes the device against the force, and returns energy while the device moves with the

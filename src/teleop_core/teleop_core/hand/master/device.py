@@ -1,4 +1,4 @@
-"""Device: how the haptic master measures the hand, as a Phantom Omni or as a jointed handle."""
+"""Device: measurements of the hand by the haptic master, which is a Phantom Omni or a jointed handle."""
 
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -23,7 +23,7 @@ _OMNI = "published: Vongbunyong 2008, table 5.1"
 
 @dataclass(frozen=True, kw_only=True)
 class DeviceParameters:
-    """The Phantom Omni: numbers that its maker publishes, and derived or assumed numbers."""
+    """Numbers of the Phantom Omni: published by its maker, derived or assumed."""
 
     workspace: tuple[float, ...] = parameter(
         (0.16, 0.12, 0.07),
@@ -128,7 +128,7 @@ def read_phantom(p: ReadingNumbers, position: Array, attitude: Array, noise: Arr
         pose[i] = position[i]
         if p.resolution > 0.0:
             pose[i] = round(position[i] / p.resolution) * p.resolution
-        # The bound counts as two standard deviations, and the noise never exceeds it.
+        # The bound is taken as two standard deviations; larger noise is clipped to the bound.
         wobble[i] = p.gimbal * min(max(0.5 * noise[i], -1.0), 1.0)
     rotate_by_vector(attitude, wobble[0], wobble[1], wobble[2], pose[3:7])
 
@@ -171,7 +171,7 @@ def measure_twist(s: ReadingState, pose: Array, twist: Array, dt: float) -> None
     multiply_quaternions(pose[3:7], back, back)
     sign = 1.0 if back[0] >= 0.0 else -1.0
     for i in range(3):
-        # For a small rotation between two samples: twice the vector part, in base axes.
+        # A small rotation vector between two samples is twice the vector part of the quaternion, in base axes.
         s.turning[i] += (sign * 2.0 * back[1 + i] / dt - s.turning[i]) * share
         twist[3 + i] = s.turning[i]
     for i in range(4):
@@ -179,7 +179,7 @@ def measure_twist(s: ReadingState, pose: Array, twist: Array, dt: float) -> None
 
 
 def make_handle(parameters: DeviceParameters, T_base_rest: Array) -> Handle | None:
-    """Arguments of :func:`read_handle` for the wanted handle, None for the Phantom.
+    """First argument of :func:`read_handle` for the chosen handle; None for the Phantom.
 
     The base of the handle is placed so that its home pose is the rest pose of the stylus. So the same paths and the
     same motion scaling work for every device.
@@ -192,7 +192,7 @@ def make_handle(parameters: DeviceParameters, T_base_rest: Array) -> Handle | No
         The handle; its joints start at home.
 
     Raises:
-        UnknownNameError: No such robot or symbol.
+        UnknownNameError: There is no such robot, or the robot has no such symbol.
     """
     if not parameters.handle:
         return None

@@ -10,12 +10,12 @@ from teleop_core.kernels import Array, Fields, Integers, kernel
 _FRAMES = 512
 """Largest number of frames in the latency of the screen."""
 SHOWS = ("slave", "command")
-"""What a frame shows: the slave's measured pose, or its commanded pose."""
+"""Choices for what a frame shows: the slave's measured pose, or its commanded pose."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class DisplayParameters:
-    """How often and how late the operator sees the slave."""
+    """Frame rate and latency with which the operator sees the slave."""
 
     rate: float = parameter(
         60.0,
@@ -53,9 +53,9 @@ class DisplayNumbers(Fields):
 class DisplayState(Fields):
     """Frames that are taken but not yet shown."""
 
-    taken: int  # frames so far
+    taken: int  # number of frames taken so far
     shown: int
-    due_ns: int  # when the next frame is taken
+    due_ns: int  # time at which the next frame is taken
     frames: Annotated[Array, 7 * _FRAMES]
     stamps: Annotated[Integers, _FRAMES]
     times: Annotated[Integers, _FRAMES]

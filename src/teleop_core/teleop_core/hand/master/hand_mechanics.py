@@ -1,4 +1,4 @@
-"""Hand: the operator's hand as a mass that a spring and a damper pull along the wanted path."""
+"""Hand: the operator's hand as a mass; a spring and a damper pull it along the wanted path."""
 
 import math
 from dataclasses import dataclass
@@ -48,7 +48,7 @@ class HandParameters:
 class HandNumbers(Fields):
     """Fields of a parameter record with the mechanics of hand and device."""
 
-    friction: float  # dry, of the device [N]
+    friction: float  # dry friction of the device [N]
     steps: int  # number of equal steps in a tick
     flow: Annotated[Array, 2, 3, 4, 6]  # matrices of join()
     center: Vector3  # centre of the workspace [m]
@@ -67,13 +67,13 @@ class HandState(Fields):
 
 @inner
 def move_hand(p: HandNumbers, s: HandState, wanted: Array, force: Array, dt: float) -> None:
-    """Move hand and device on by one tick under the motors' force (3,) [N].
+    """Advance hand and device by one tick under the motors' force (3,) [N].
 
     The model has two masses on each axis. A spring and a damper pull the hand along its path. The device has motors,
-    encoders and dry friction. The device's structure, a spring and a damper, connects both masses. Within a tick the
-    motor force is constant and the path is straight, so each step is exact. Friction is a force of any direction up to
-    its bound, constant during a step. It takes as much speed as it can. So the device sticks, without creep, until the
-    pulling force exceeds the bound.
+    encoders and dry friction. The device's structure, a spring and a damper, connects hand and device. Within a tick
+    the motor force is constant and the path is straight, so each step is exact. Friction is a force of any direction up
+    to its bound, constant during a step. It reduces the speed as much as possible. So the device sticks, without creep,
+    until the pulling force exceeds the bound.
 
     Source:
         Exact step of a linear system under held input, as in any book on sampled control (Astrom and Wittenmark 1997,
@@ -87,10 +87,10 @@ def move_hand(p: HandNumbers, s: HandState, wanted: Array, force: Array, dt: flo
     for i in range(3):
         s.wanted[i] = wanted[i]
         low, high = p.center[i] - p.half[i], p.center[i] + p.half[i]
-        if s.position[i] < low or s.position[i] > high:  # the device's stops
+        if s.position[i] < low or s.position[i] > high:  # the device is at a stop
             s.position[i] = min(max(s.position[i], low), high)
             s.speed[i] = 0.0
-            # The stops are in the device's joints; a hand that pushes against one must not bend the structure.
+            # The stops are in the device's joints, so a hand that pushes against a stop must not bend the structure.
             s.hand[i], s.hand_speed[i] = s.position[i], 0.0
 
 
@@ -130,10 +130,10 @@ def _flows(row: Array, given: Array) -> float:
 def join(p: HandNumbers, hand: HandParameters, device: DeviceParameters, dt: float) -> None:
     """Write the exact step of hand and device, and the number of steps in a tick.
 
-    ``flow[0]`` (3, 4, 6) is a matrix for each axis. Its results after a step are displacement and speed of the device,
-    and displacement and speed of the hand. Its inputs are the speeds of device and hand, the hand relative to the
-    device, the aim relative to the hand, the speed of the aim, and the force on the device. ``flow[1]`` is the same
-    while friction holds the device.
+    ``flow[0]`` (3, 4, 6) contains a matrix for each axis. The matrix gives four results after a step: displacement and
+    speed of the device, displacement and speed of the hand. It is multiplied by six inputs: speeds of device and hand,
+    position of the hand relative to the device, position of the aim relative to the hand, speed of the aim, force on
+    the device. ``flow[1]`` contains the matrices for a device that friction holds.
 
     Args:
         p: Parameter record; ``flow`` and ``steps`` are written.

@@ -27,12 +27,12 @@ from teleop_core.slave.operation.states import State
 _DOUBT_NS = 1_000_000_000
 """Time for which forces are ignored after a force was out of range [ns]."""
 _GRIP_NS = 300_000_000
-"""Time for which the clutch stays pressed after a hand that had let go grips again [ns].
+"""Time for which the clutch stays pressed after a hand grips the stylus again [ns].
 
 Within this time the hand brings the stylus to its wanted position.
 """
-_FASTEST = 3.0  # a hand that moves faster than this between two samples [m/s] has begun a new grip
-_NEAR = 2e-3  # a hand that has moved by no more than this after a silence [m] continues the same grip
+_FASTEST = 3.0  # a hand that moves faster between two samples has begun a new grip [m/s]
+_NEAR = 2e-3  # a hand that moved by no more than this during a silence continues its grip [m]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -87,9 +87,9 @@ _MOST = topics.MASTER_CONTACT.columns.index("largest_force")
 
 @inner
 def _is_sound(p: MasterNumbers, s: MasterState, force: Array, now_ns: int) -> bool:
-    """Whether the force (6,) may be applied: it is within its range, and was so for the last second."""
+    """Whether the force (6,) may be applied: the command was within its range for the last second, and is so now."""
     square = force[0] * force[0] + force[1] * force[1] + force[2] * force[2]
-    if not square <= p.force_range * p.force_range:  # NaN is not
+    if not square <= p.force_range * p.force_range:  # also for NaN
         s.doubted_ns, s.doubted = now_ns, square**0.5
     elif s.doubted_ns != 0 and now_ns - s.doubted_ns > _DOUBT_NS:
         s.doubted_ns = 0
@@ -100,8 +100,8 @@ def _is_sound(p: MasterNumbers, s: MasterState, force: Array, now_ns: int) -> bo
 def _holds(p: MasterNumbers, s: MasterState, row: Row) -> bool:
     """Return whether a hand holds the stylus; if so, store its wanted pose.
 
-    A hand that jumps, or returns elsewhere after a silence, begins a new grip: it brings the stylus to its wanted pose
-    before the clutch is released.
+    A hand that jumps, or that is at another position after a silence, begins a new grip. It then brings the stylus to
+    its wanted pose before the clutch is released.
     """
     silence_ns = row.now_ns - s.heard_ns
     if row.hand_servo_cp_ns != s.told_ns:
@@ -180,7 +180,7 @@ class HapticMaster(RunningStage):
     def reset(self) -> None:
         """Put the stylus into the inkwell, restart the random numbers from the seed, and wait for a hand."""
         rng = np.random.default_rng(self._fixed.seed)
-        rng.uniform(0.0, 2.0 * math.pi, PHASES)  # skip the random numbers of the operator, who uses the same seed
+        rng.uniform(0.0, 2.0 * math.pi, PHASES)  # skip the random numbers that the operator takes from the same seed
         self._noise.begin(rng)
         rest = transform(rotation("x", REST_TILT), np.array(REST_POSITION))
         self.handle = make_handle(self._fixed.device, rest)

@@ -9,7 +9,7 @@ from teleop_core.base import Within, fixed
 from teleop_core.hand.devices.pilot import RateParameters, steer
 from teleop_core.kernels import Array
 
-_LONGEST = 0.1  # time beyond this between two messages is not integrated [s]
+_LONGEST = 0.1  # a longer time between two messages is integrated as this time [s]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,7 +42,7 @@ class JoyRates:
         self.pose: Array = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
 
     def step(self, axes: Sequence[float], buttons: Sequence[int], stamp_ns: int) -> str:
-        """Integrate up to the stamp [ns] of a message; return what is wrong with the message, empty if nothing.
+        """Integrate up to the stamp [ns] of a message; return a text about its fault, empty for a valid message.
 
         A wrong message does not move the pose.
         """

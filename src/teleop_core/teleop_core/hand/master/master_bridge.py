@@ -1,7 +1,7 @@
 """Master bridge: the stage that connects a real device, in place of ``haptic_master``.
 
-It publishes the pose of the device's stylus in ``master_base``, and sends the commanded force to the device. It does
-not pass on samples that cannot be true; the slave holds then.
+It publishes the pose of the device's stylus in ``master_base``, and sends the commanded force to the device. It drops
+samples that cannot be true; without samples the slave stops.
 """
 
 import math
@@ -26,7 +26,7 @@ POSE_MESSAGES = (
     "geometry_msgs/msg/Pose",
     "sensor_msgs/msg/JointState",
 )
-"""Message types with the pose of a stylus; the last type has joint positions instead."""
+"""Message types with the pose of a stylus; the last type contains joint positions instead."""
 RATE_MESSAGE = "sensor_msgs/msg/Joy"
 """Message type in which gamepads and 3-D mice send the speed of the stylus."""
 _OFF_UNIT = 1e-2  # tolerance of a quaternion's length
@@ -185,7 +185,7 @@ class MasterBridge(RunningStage):
         return True
 
     def hear_joints(self, names: Sequence[str], position: Sequence[float], stamp_ns: int, now_ns: int) -> bool:
-        """Take the joint positions of a jointed device [rad or m]; the rest is as in :meth:`hear`."""
+        """Take the joint positions of a jointed device [rad or m]; other arguments and result as in :meth:`hear`."""
         places = self._joints.places(names)
         if isinstance(places, str) or len(position) != len(names):
             self.wrong = places if isinstance(places, str) else "not one position for each name"
@@ -198,7 +198,7 @@ class MasterBridge(RunningStage):
         return self.hear(pose, stamp_ns, now_ns)
 
     def hear_joy(self, axes: Sequence[float], buttons: Sequence[int], stamp_ns: int, now_ns: int) -> bool:
-        """Take the axes of a Joy message, as rates of the stylus; the rest is as in :meth:`hear`."""
+        """Take the axes of a Joy message as rates of the stylus; other arguments and result as in :meth:`hear`."""
         if text := self._rates.step(axes, buttons, stamp_ns):
             self.wrong = text
             self.refused["form"] += 1
@@ -216,7 +216,7 @@ class MasterBridge(RunningStage):
         return True
 
     def is_heard(self, now_ns: int) -> bool:
-        """Whether a valid pose of the device came recently; ``now_ns`` is the time [ns]."""
+        """Whether a valid pose of the device arrived recently; ``now_ns`` is the present time [ns]."""
         silence = 1e-9 * (now_ns - self.heard_ns)
         return self.heard_ns > 0 and silence <= self.parameters.force_timeout
 
@@ -226,7 +226,7 @@ class MasterBridge(RunningStage):
         Zero if no force was commanded recently, or if the pose of the device is unknown.
 
         Args:
-            age: Time since ``master/servo_cf`` came [s]; infinite before the first.
+            age: Time since the last ``master/servo_cf`` arrived [s]; infinite before the first.
             now_ns: Time [ns].
         """
         p = self.parameters
@@ -239,7 +239,7 @@ class MasterBridge(RunningStage):
         return share * dot(self._rows.T, asked)
 
     def concerns(self) -> list[str]:
-        """Why the pose of the stylus is not published."""
+        """Reason why the pose of the stylus is not published."""
         if self.wrong:
             return [f"the device's messages are refused: {self.wrong}"]
         if not self.heard_ns:

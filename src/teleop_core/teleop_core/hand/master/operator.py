@@ -22,7 +22,7 @@ from teleop_core.kernels.room import room
 class OperatorNumbers(Fields):
     """Parameter record of the operator."""
 
-    tremor: float  # amplitude [m]
+    tremor: float  # amplitude of the tremor [m]
     frequency: float  # frequency of the tremor [Hz]
     patience_ns: int
 
@@ -43,7 +43,7 @@ _IS_FOLLOWING = STATE["is_following"]
 
 @inner
 def _begins(p: OperatorNumbers, s: OperatorState, row: Row) -> bool:
-    """Whether the operator moves the hand: after the slave first followed, or after the operator's patience ended.
+    """Whether the operator moves the hand: once the slave has followed, or the operator's patience has ended.
 
     A state older than the first sample belongs to another master.
     """
@@ -61,7 +61,7 @@ def _begins(p: OperatorNumbers, s: OperatorState, row: Row) -> bool:
 def tremble(p: OperatorNumbers, s: OperatorState, noise: Array, tremor: Array, dt: float) -> None:
     """Write the wanted tremor (3,) [m]: one sine per axis whose frequency varies within its band."""
     for i in range(3):
-        # Ornstein-Uhlenbeck process of unit variance and half a second of memory.
+        # Ornstein-Uhlenbeck process with unit variance and a time constant of half a second.
         s.wander[i] += -s.wander[i] * (dt / 0.5) + noise[i] * math.sqrt(2.0 * dt / 0.5)
         width = min(2.0, p.frequency - 8.0, 12.0 - p.frequency)
         s.phase[i] += 2.0 * math.pi * dt * (p.frequency + width * math.tanh(s.wander[i]))
@@ -74,14 +74,14 @@ def operator_step(
 ) -> None:
     """One tick: write the wanted pose of the hand, its tremor and the buttons.
 
-    The hand rests until the slave follows, as a person's would. So none of its motion is lost.
+    The hand rests until the slave follows, as a person's hand would. So the slave follows the whole motion.
 
     Args:
         p: Parameter record.
         s: State record; written.
         wanted: One record for this tick and each coming tick: ``wanted`` position (3,) [m] in the master's base;
-            ``attitude`` of the stylus, quaternion (4,); ``buttons`` (3,): clutch, fixture, mode; ``tremor`` (3,) [m]
-            of the tip, independent of friction and force; and how far the ``jaw`` is closed.
+            ``attitude`` of the stylus, quaternion (4,); ``buttons`` (3,): clutch, fixture, mode; ``tremor`` (3,) [m] of
+            the tip, independent of friction and force; ``jaw``, the closing of the jaw.
         noises: Standard normal numbers of the coming ticks (N, 6), of which x, y, z are the tremor's noise.
         row: Signals.
         dt: Tick [s].
@@ -168,7 +168,7 @@ class RunningOperator(RunningStage):
         return self._motion if isinstance(self._motion, RemoteHand) else None
 
     def prepare(self, ticks: int) -> None:
-        """Compute the wanted motion of the next ticks, as far ahead as the operator allows."""
+        """Compute the wanted motion of the next ticks, of as many as the operator allows at once."""
         self._noise.prepare(self.state, ticks)
         now = int(self.state["next"])
         left = self._end - now  # number of remaining records, including that of the present tick
@@ -230,7 +230,7 @@ class RunningOperator(RunningStage):
             return question(*arguments)
         except TeleopError:
             raise
-        except Exception as error:  # whatever a user's operator raises, one line names this operator
+        except Exception as error:  # one line names the operator for any exception that a user's operator raises
             reason = f"{type(error).__name__}: {' '.join(str(error).split())}"
             text = "one with make(parameters, setting) -> motion and motion(times) -> rows"
             name = self._fixed.kind.kind
@@ -253,7 +253,7 @@ def _held(presses: tuple[float, ...], times: Array) -> Array:
 
 @kernel
 def _turn_all(rest: Array, turns: Array, attitudes: Array) -> None:
-    """Write the rest attitude turned by each rotation vector (N, 3) into ``attitudes`` (N, 4)."""
+    """Rotate the rest attitude by each rotation vector (N, 3); the results are written to ``attitudes`` (N, 4)."""
     for i in range(turns.shape[0]):
         rotate_by_vector(rest, turns[i, 0], turns[i, 1], turns[i, 2], attitudes[i])
 

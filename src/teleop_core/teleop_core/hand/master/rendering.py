@@ -4,7 +4,7 @@ import math
 
 from teleop_core.kernels import Array, Fields, inner
 
-# The peak force falls to the continuous force while the motors take up the last quarter of their allowed heat.
+# While the heat rises through the last quarter of its allowed range, the peak force falls to the continuous force.
 _LAST = 0.25
 
 
@@ -40,7 +40,7 @@ def largest_force(p: RenderingNumbers, s: RenderingState) -> float:
         return p.peak_force
     left = max(bearable - s.heat, 0.0)
     square = bearable + (p.peak_force * p.peak_force - bearable) * min(left / (_LAST * bearable), 1.0)
-    # If a tick is long compared with the time constant: no more force than fills the remaining heat.
+    # If a tick is long compared with the time constant, the force is limited so that the heat stays in its range.
     return math.sqrt(min(square, s.heat + left / p.warming))
 
 

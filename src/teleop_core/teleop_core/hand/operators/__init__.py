@@ -19,24 +19,23 @@ if TYPE_CHECKING:
 __all__ = ["OPERATORS", "Motion", "Operator", "Seen", "Setting", "following", "register_operator"]
 
 Motion = Callable[[Array], Array]
-"""Times (N,) since the start [s] to rows (N, 3), (N, 6), (N, 9), (N, 12) or (N, 13).
+"""Function from times (N,) since the start [s] to rows (N, 3), (N, 6), (N, 9), (N, 12) or (N, 13).
 
 Columns: position x, y, z [m] and rotation vector [rad] relative to the start, in the master's base; then the buttons
-clutch, fixture, mode (1 pressed); then tremor x, y, z [m], an offset of the tip that friction does not reduce; then
-how far the jaw is closed, from 0 to 1. Missing columns count as zero.
+clutch, fixture, mode (1 pressed); then tremor x, y, z [m], an offset of the tip that friction does not reduce; then the
+closing of the jaw, from 0 to 1. Missing columns count as zero.
 """
 
 
 class Seen(NamedTuple):
     """Data that an operator sees and feels, at the operator's last step.
 
-    The attributes are views of the signals: read them when the motion is asked for. An operator that reacts to them
-    should have ``ahead=1``, so that its motion is requested as late as possible. The slave's values come with the
-    declared delay,
-    such as ``delays=["slave/measured_cp@operator=0.3"]``.
+    The attributes are views of the signals: read them when the motion is requested. An operator that reacts to them
+    should have ``ahead=1``, so that its motion is requested as late as possible. The slave's values have the declared
+    delay, such as ``delays=["slave/measured_cp@operator=0.3"]``.
 
     Attributes:
-        slave: Pose (7,) of the slave's tip in its base; zero before the first value comes.
+        slave: Pose (7,) of the slave's tip in the slave's base; zero before the first value arrives.
         stylus: Pose (7,) of the stylus in the master's base.
         force: Force and torque (6,) of the device on the hand.
         state: Numbers of ``teleop/state``, as :data:`~teleop_core.graph.topics.TELEOP_STATE` names them.
@@ -56,8 +55,8 @@ class Setting(NamedTuple):
 
     Attributes:
         common: The whole parameter group ``operator``.
-        phases: Random phases (6, 4) [rad] of the session's seed, the same for every operator.
-        seed: Seed of the session, for more random numbers.
+        phases: Random phases (6, 4) [rad] from the session's seed; they do not depend on the operator.
+        seed: Seed of the session, for other random numbers.
         seen: Data that the operator sees and feels; None if only the length of a motion is requested.
     """
 
@@ -72,15 +71,16 @@ class Operator:
     """A kind of operator.
 
     Attributes:
-        name: Its name in ``--set operator=``.
-        make: ``make(parameters, setting)`` gives the :data:`Motion` of one session.
-        parameters: Its parameter group, beside those that all operators share.
-        ahead: Largest number of ticks per request of its motion; 1 for an operator that reacts to measurements.
-        trembles: Whether its motion contains its own tremor, so that ``operator.tremor_amplitude`` is not added.
-        approaches: Whether it begins with a smooth move to ``operator.center`` that takes ``operator.approach_time``.
-        length: ``length(parameters, setting)`` returns the duration of its motion [s]. A session without a given
-            duration lasts as long. None for a motion without end.
-        needs: Names of the stages that it needs; without them it does nothing.
+        name: Name of the operator in ``--set operator=``.
+        make: ``make(parameters, setting)`` returns the :data:`Motion` of one session.
+        parameters: Parameter group of the operator, in addition to the parameters that all operators share.
+        ahead: Largest number of ticks per request of the motion; 1 for an operator that reacts to measurements.
+        trembles: Whether the motion contains its own tremor, so that ``operator.tremor_amplitude`` is not added.
+        approaches: Whether the motion begins with a smooth move to ``operator.center`` that takes
+            ``operator.approach_time``.
+        length: ``length(parameters, setting)`` returns the duration of the motion [s]. It is the duration of a session
+            without a given duration. None for a motion without end.
+        needs: Names of the stages that the operator needs; without them it does nothing.
         is_here: False if another node sends ``hand/servo_cp`` in place of this operator.
         opens: ``opens(parameters)`` opens a device of this machine that moves the hand, in live sessions only. The
             hand is then a :class:`~teleop_core.hand.operators.remote.RemoteHand`.

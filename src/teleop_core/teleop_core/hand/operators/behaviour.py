@@ -10,12 +10,12 @@ from teleop_core.hand.operators import OPERATORS
 from teleop_core.kernels import Array
 
 PRESS_TIME = 0.1
-"""How long the operator presses the fixture or the mode button [s]."""
+"""Time for which the operator presses the fixture or the mode button [s]."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class ButtonParameters:
-    """When the operator uses the buttons [s]; each press of fixture or mode lasts 0.1 s."""
+    """Times at which the operator uses the buttons [s]; each press of fixture or mode lasts 0.1 s."""
 
     clutch: tuple[float, ...] = fixed(
         (), Within(0.0, None, "s"), "times of press, release, press, release, … of the clutch button"
@@ -135,11 +135,11 @@ class OperatorParameters:
 
 
 def insist_on_virtual(stage: str, group: object) -> None:
-    """Make sure that a stage's operator, if it is one, can move the hand in virtual time.
+    """Raise an error if the stage is an operator that cannot move the hand in virtual time.
 
     Args:
         stage: Name of the stage.
-        group: Its parameters.
+        group: Parameters of the stage.
 
     Raises:
         ParameterError: The operator needs a person at a device; the message names operators that work.

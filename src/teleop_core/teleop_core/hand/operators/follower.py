@@ -20,7 +20,7 @@ MOST = 4
 class Wanted(Fields):
     """Pose, buttons, tremor and jaw that a hand wants in a tick, in the master's base."""
 
-    wanted: Vector3  # place of the stylus [m]
+    wanted: Vector3  # position of the stylus [m]
     attitude: Quaternion
     buttons: Vector3  # clutch, fixture, mode: 1 pressed
     tremor: Vector3  # [m]
@@ -35,7 +35,7 @@ class Bounds(Fields):
     acceleration: float
     turn_speed: float
     turn_acceleration: float
-    low: Vector3  # corners of the room [m]
+    low: Vector3  # low corner of the stylus's range [m]; the high corner follows
     high: Vector3
 
 
@@ -44,7 +44,7 @@ class FollowerState(Fields):
 
     time: float  # [s]
     next: float  # time of the next tick [s]
-    tick: float  # length of each [s]
+    tick: float  # length of a tick [s]
     pose: PoseRow
     velocity: Vector3
     turning: Vector3
@@ -86,7 +86,7 @@ def follow(b: Bounds, s: FollowerState, rows: Any) -> None:
 
 @inner
 def _approach(gap: Array, velocity: Array, rate: float, fastest: float, hardest: float, h: float) -> None:
-    """Change a velocity (3,) over ``h`` [s] so that it closes a gap (3,) at critical damping.
+    """Change a velocity (3,) over ``h`` [s] so that a gap (3,) closes with critical damping.
 
     The wanted velocity is so small that half of the allowed acceleration can stop it in time.
     """
@@ -152,22 +152,22 @@ class Follower:
         return np.array(self._state["pose"])
 
     def aim(self, pose: Array) -> None:
-        """Go for a pose (7,) from now on."""
+        """Move towards a pose (7,) from now on."""
         self._state["target"] = pose
 
     def brake(self) -> None:
-        """Come to rest from now on, as soon as possible without moving back."""
+        """Brake to rest from now on, as soon as possible without moving back."""
         s, b = self._state, self._bounds
         s["target"] = s["pose"]
         s["target"][:3] += s["velocity"] / b["rate"]
         turn_by(s["turning"] / b["rate"], s["target"][3:])
 
     def press(self, buttons: tuple[bool, ...]) -> None:
-        """Show buttons clutch, fixture and mode from now on."""
+        """Set the states of the buttons clutch, fixture and mode from now on."""
         self._state["buttons"] = buttons
 
     def go_on(self, first: float, tick: float, count: int) -> Any:
-        """Go on for some ticks.
+        """Continue the motion for some ticks.
 
         Args:
             first: Time of the first tick [s], not before :attr:`time`.

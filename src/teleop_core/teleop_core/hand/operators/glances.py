@@ -1,4 +1,4 @@
-"""Glances: what a visually guided operator has seen and felt recently, interpolated in time."""
+"""Glances: data that a visually guided operator has recently seen and felt, interpolated in time."""
 
 from collections import deque
 from typing import NamedTuple
@@ -11,7 +11,7 @@ STILL_TIME = 0.02
 
 
 class Glance(NamedTuple):
-    """What is on the screen and in the hand at a time [s]: tip (7,), goal (3,) [m], force on the hand (3,) [N]."""
+    """Data seen and felt at a time [s]: tip (7,) and goal (3,) [m] on the screen, force on the hand (3,) [N]."""
 
     time: float
     tip: Array
@@ -34,7 +34,7 @@ class Glances:
         return bool(self._kept)
 
     def take(self, now: float, seen: Seen, goal: Array) -> None:
-        """Store what is seen and felt at a time [s], and drop glances that are no longer needed."""
+        """Store the data seen and felt at a time [s], and drop glances that are no longer needed."""
         kept = self._kept
         if seen.slave[:3].any():  # otherwise no pose has been shown yet
             kept.append(Glance(now, seen.slave.copy(), goal.copy(), seen.force[:3].copy()))
@@ -42,7 +42,7 @@ class Glances:
             kept.popleft()
 
     def at(self, when: float) -> Glance:
-        """What can be used at a time [s]: the state one eye delay earlier, interpolated between two glances."""
+        """Glance that can be used at a time [s]: the data one eye delay earlier, interpolated between two glances."""
         at, kept = when - self._eye, self._kept
         later = next((i for i, glance in enumerate(kept) if glance.time > at), len(kept))
         if later in {0, len(kept)}:
@@ -57,7 +57,7 @@ class Glances:
         return [glance for glance in self._kept if begin <= glance.time <= until - self._eye]
 
     def speed_of_goal(self, width: float) -> Array:
-        """Velocity of the goal (3,) [m/s] since it last jumped by more than its width [m]."""
+        """Velocity of the goal (3,) [m/s] since the goal last jumped by more than its width [m]."""
         first = last = self._kept[-1]
         for glance in reversed(self._kept):
             if float(length(first.goal - glance.goal)) > width:

@@ -10,7 +10,7 @@ _REST = np.array([1.0, 0.0, 0.0, 0.0])
 
 
 def turned(attitude: Array, turn: Array) -> tuple[Array, Array]:
-    """An attitude (4,) turned by a rotation vector (3,) in its own frame, and its rotation vector (3,) [rad]."""
+    """An attitude (4,) rotated by a vector (3,) in its own frame; the result also as a rotation vector (3,) [rad]."""
     found, vector = np.empty(4), np.empty(3)
     rotate_by_vector(attitude, turn[0], turn[1], turn[2], found)
     turn_within(_REST, found, vector)
@@ -35,7 +35,7 @@ class HandRoom:
         return next((s for s in shares if length(turned(hand[3:], s * turn)[1]) <= self._turn), 0.0)
 
     def back(self, hand: Array, step: Array, turn: Array) -> tuple[Array, Array]:
-        """Step (3,) [m] and turn (3,) [rad] that bring a hand to where it has most room for the coming motion."""
+        """Step (3,) [m] and turn (3,) [rad] that bring a hand to the pose with most room for the coming motion."""
         middle, angle = 0.5 * (self._low + self._high), np.zeros(3)
         begin = -min(0.5, self._turn / max(float(length(turn)), 1e-12)) * turn
         turn_within(hand[3:], turned(_REST, begin)[0], angle)

@@ -23,14 +23,14 @@ from teleop_core.kernels import Array, dot, length
 _TRIES = 50  # number of targets drawn before any target in the region is accepted
 _LINES = 16  # number of sines of the tremor, per axis
 _TREMOR_BAND = (8.0, 12.0)
-# Middle and half width of the tremor's spectral peak, and the cut-off frequencies [Hz]. The peak is known to lie
-# within the band; its width is assumed.
-_PEAK, _HALF_WIDTH, _CUT = 10.0, 1.5, (4.0, 20.0)
+_PEAK = 10.0  # middle of the tremor's spectral peak, which is known to lie within the band [Hz]
+_HALF_WIDTH = 1.5  # half width of that peak [Hz]; assumed
+_CUT = (4.0, 20.0)  # lower and upper cut-off frequency [Hz]
 
 
 @dataclass(frozen=True, kw_only=True)
 class HumanParameters:
-    """How the hand reaches, errs, corrects, rests and trembles."""
+    """Numbers of reaches, errors, corrections, rests and tremor of the hand."""
 
     reach: float = fixed(
         0.0105,
@@ -142,7 +142,7 @@ class HumanParameters:
 
 
 class Submovement(NamedTuple):
-    """A minimum-jerk movement: its begin [s], its duration [s] and its displacement.
+    """A minimum-jerk movement: start time [s], duration [s] and displacement.
 
     ``step`` (6,) is the displacement [m] and the rotation vector [rad].
     """
@@ -153,7 +153,7 @@ class Submovement(NamedTuple):
 
     @property
     def end(self) -> float:
-        """Time of its end [s]."""
+        """Time at which the movement ends [s]."""
         return self.begin + self.duration
 
 
@@ -184,7 +184,7 @@ def _spread(median: float, spread: float, rng: np.random.Generator) -> float:
 
 
 def _next_target(p: HumanParameters, room: Array, place: Array, rng: np.random.Generator) -> Array:
-    """Target (6,) in the region, about ``p.reach`` away if the region is large enough."""
+    """Target (6,) in the region, at a distance of about ``p.reach`` if the region is large enough."""
     half, largest = room[:3], room[3:]
     turn = np.clip(place[3:] + p.turn * largest * rng.standard_normal(3), -largest, largest)
     for _ in range(_TRIES):
@@ -220,7 +220,7 @@ def _reach(
 
 
 def _blurred(p: HumanParameters, way: Array, duration: float, rng: np.random.Generator) -> Array:
-    """A wanted displacement and rotation (6,) with the noise of execution; a zero displacement gets no noise."""
+    """A wanted displacement and rotation (6,) plus the noise of execution; a zero displacement gets no noise."""
     out = way.copy()
     for part in (slice(0, 3), slice(3, 6)):
         size = float(length(way[part]))
@@ -271,7 +271,7 @@ class _Walk:
 
 
 def tremor(size: float, rng: np.random.Generator) -> Motion:
-    """Tremor of the tip: times (N,) [s] to offsets (N, 3) [m], the same for the same times.
+    """Tremor of the tip: a function from times (N,) [s] to offsets (N, 3) [m]; equal times give equal offsets.
 
     The tremor is a sum of sines of random frequencies and phases, which is close to noise and never repeats. Most
     frequencies are near 10 Hz and fewer farther away, so that the spectrum is that of a resonance.
@@ -295,7 +295,7 @@ def tremor(size: float, rng: np.random.Generator) -> Motion:
     def motion(times: Array) -> Array:
         sines = times[:, None, None] * rates
         sines += phases
-        np.sin(sines, out=sines)  # in place: allocating memory would take as long as the sines
+        np.sin(sines, out=sines)  # in place, because allocating memory would take as long as the sines
         found: Array = amplitude * sines.sum(axis=2)
         return found
 

@@ -1,9 +1,9 @@
 """Observer: an operator who looks at the slave, plans from what it saw, moves, and looks again.
 
 Each look-move cycle is one submovement towards the goal of a task, with the noise of a fast hand. The next submovement
-begins only after the operator has seen the end of the last one, late by display, network and eye. So a delay lengthens
-each cycle, although the operator does not know the length of the delay. Contact is felt, which no display delays. The
-sources of the constants are in ``docs/tasks.md``.
+begins only after the operator has seen the end of the last one. Display, network and eye delay this moment. So a delay
+lengthens each cycle, although the operator does not know the length of the delay. Contact is felt without the delay of
+the display. The sources of the constants are in ``docs/tasks.md``.
 """
 
 import math
@@ -28,15 +28,15 @@ _COLUMNS = ("number", "act", "goal_x", "width", "goal_qw", "turn", "force", "cle
 _NUMBER, _ACT, _GOAL, _WIDTH, _ATTITUDE, _TURN, _FORCE, _CLEARANCE = map(topics.TASK_STATE.columns.index, _COLUMNS)
 _BOX, _SIZE = STATE["fixture_center_x"], STATE["fixture_size_x"]
 _ENDS = (topics.Limit.JOINT, topics.Limit.WORKSPACE)
-_PRESS_TIME = 0.06  # times for which the hand stays closed, and the clutch is pressed before and after a motion [s]
+_PRESS_TIME = 0.06  # duration of a press of the hand, and of the clutch's press before and after a motion [s]
 _STILL = 0.05  # a tip that moves less than this share of its path in STILL_TIME is at rest
-_SHORTEST = 0.1  # share of a goal's width; shorter displacements need no submovement
+_SHORTEST = 0.1  # displacements shorter than this share of a goal's width need no submovement
 _FELT = 0.03  # least force that is felt [N]
-_SURE = 2.0  # standard deviations that a submovement's end stays off a wall
+_SURE = 2.0  # distance of a submovement's end from a wall, divided by the standard deviation of that end
 
 
 class Observer:
-    """Motion of one session; it reads what is seen at the time of each call.
+    """Motion of one session; each call reads the data that are seen at that time.
 
     Args:
         p: Constants of the operator.
@@ -57,11 +57,11 @@ class Observer:
         self._move: Move | None = None
         self._turns = False  # whether the last submovement turns the stylus
         self._number = 0.0
-        self._next = 0.0  # time before which it does not move, whatever it sees [s]
-        self._half_seen = math.inf  # when half of the last motion was seen [s]
-        self._is_still = self._was_felt = False  # whether the end of the last motion was seen, or only felt
-        self._close = -math.inf  # when the hand closes for a moment [s]
-        self._holds, self._since = False, -math.inf  # whether the hand stays closed, and since when
+        self._next = 0.0  # time before which the operator does not move [s]
+        self._half_seen = math.inf  # time at which half of the last motion was seen [s]
+        self._is_still = self._was_felt = False  # whether the end of the last motion was seen; whether it was only felt
+        self._close = -math.inf  # time at which the hand closes for a moment [s]
+        self._holds, self._since = False, -math.inf  # whether the hand stays closed, and since which time [s]
         self._lag = -1.0  # delay with which the last motion was seen, without the eye's delay [s]; < 0: not known
 
     def __call__(self, times: Array) -> Array:
@@ -97,7 +97,7 @@ class Observer:
             rows[:, 6] = (times >= move.begin - _PRESS_TIME) & (times < move.begin + move.duration + _PRESS_TIME)
 
     def _decide(self, now: float, until: float) -> bool:
-        """Begin the next submovement, or press, if the time for either comes before ``until``.
+        """Begin the next submovement or press, if it is due before ``until``.
 
         Returns:
             Whether a submovement begins.
@@ -121,7 +121,7 @@ class Observer:
         return False
 
     def _way(self, glance: Glance) -> Way:
-        """The motion to be made, by what is seen and, during a press, by what is felt."""
+        """The motion to be made, from the data seen and, during a press, from the force felt."""
         p, task, turn, lever, missing = self._p, self._seen.task, np.zeros(3), 0.0, 0.0
         is_moving = int(task[_ACT]) == Act.PASS
         goal = glance.goal if is_moving else task[_GOAL : _GOAL + 3]
@@ -155,10 +155,10 @@ class Observer:
         return -float(dot(product(self._hand_of_slave, move.way.step), force)) / max(float(length(force)), _FELT)
 
     def _seen_at(self, until: float) -> float:
-        """When the end of the last submovement is seen or felt [s]; infinite if this is after ``until``.
+        """Time at which the end of the last submovement is seen or felt [s]; infinite if it is after ``until``.
 
-        The end is expected as long after the half of the motion was seen, as the hand took from the half to the end. A
-        slower arm is seen to move on.
+        From the time at which half of the motion was seen, the operator expects the end after the time that the hand
+        took from half to end. If the arm is slower, the operator sees that it still moves.
         """
         move = self._move
         if move is None or move.is_clutched:  # no submovement begins while the arm is seen to move to its start
@@ -184,12 +184,12 @@ class Observer:
         return when
 
     def _is_at_rest(self, until: float) -> bool:
-        """Whether the tip was recently seen to stand still."""
+        """Whether the operator recently saw the tip at rest."""
         gone = self._gone(self._glances.at(until - STILL_TIME), self._glances.at(until))
         return bool(length(gone) <= _STILL * self._seen.task[_WIDTH])
 
     def _is_felt(self, move: Move, when: float, until: float) -> bool:
-        """Whether the force at rest shows the result of a submovement; not while the force is still the former one."""
+        """Whether the force at rest already shows the result of a submovement, and not the force before it."""
         if when > until:
             return False
         still = _STILL * float(self._seen.task[_FORCE])
@@ -224,14 +224,14 @@ class Observer:
         return math.inf
 
     def _patience(self) -> float:
-        """How long the operator waits, after the end of a motion, for the motion to become visible [s]."""
+        """Time for which the operator waits, after the end of a motion, until the motion becomes visible [s]."""
         p = self._p
         if self._lag < 0.0:
             return p.longest_wait
         return min(p.longest_wait, p.eye + 1.5 * self._lag + p.reaction)
 
     def _begin(self, now: float, seen: Glance, way: Way) -> None:
-        """Begin a submovement; or bring the hand back if the hand or the arm is at the end of its range."""
+        """Begin a submovement; bring the hand back instead if the hand or the arm is at the end of its range."""
         p, task = self._p, self._seen.task
         gain, width = float(self._seen.state[STATE["gain"]]) or 1.0, float(task[_WIDTH])
         distance, angle = float(length(way.step)), float(length(way.turn))
@@ -260,7 +260,7 @@ class Observer:
             self._press(now + duration, Act.PRESS)
 
     def _careful(self, tip: Array, step: Array) -> float:
-        """Duration [s] for which the noise of a step (3,) [m] stays clear of walls and edges; 0 without any.
+        """Duration [s] at which the noise of a step (3,) [m] does not reach walls or edges; 0 without walls and edges.
 
         The fixture's walls are those of its box. The operator aims no more exactly than the goal requires.
         """
@@ -282,7 +282,7 @@ class Observer:
         return way + p.noise * distance / duration * (ahead + p.noise_across * (noise - ahead))
 
     def _bring_back(self, now: float, seen: Glance, step: Array, turn: Array) -> None:
-        """Clutch, and bring the hand to where it has most room for a step (3,) [m] and a turn (3,) [rad]."""
+        """Clutch, and bring the hand to the pose with most room for a step (3,) [m] and a turn (3,) [rad]."""
         p = self._p
         way, angle = self._room.back(self._hand, step, turn)
         duration = max(p.least_time, float(length(way)) / p.fastest, float(length(angle)) / p.fastest_turn)
@@ -291,7 +291,7 @@ class Observer:
         self._next += 2.0 * _PRESS_TIME
 
     def _go(self, move: Move) -> None:
-        """Make a submovement the present one."""
+        """Store a submovement as the present one."""
         self._move, self._turns = move, bool(move.turn.any() or move.start[4:].any())
         self._hand = np.concatenate((move.start[:3] + move.step, turned(move.start[3:], move.turn)[0]))
         self._next, self._half_seen = move.begin + move.duration, math.inf

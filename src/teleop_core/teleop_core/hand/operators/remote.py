@@ -1,7 +1,7 @@
 """Remote: a hand whose wanted poses a person or a program sends.
 
-Poses come at any low rate, from a mouse, a gamepad or a program; the stylus follows them smoothly. Before the first
-pose, and after a silence, the hand counts as absent: the clutch is pressed, so that the slave holds.
+Poses may arrive at a low rate, from a mouse, a gamepad or a program; the stylus follows them smoothly. Before the first
+pose, and after a time without poses, the hand counts as absent: the clutch is pressed, so that the slave does not move.
 """
 
 import math
@@ -20,7 +20,8 @@ __all__ = ["REMOTE", "Person", "RemoteHand", "RemoteParameters", "remote_operato
 AHEAD = follower.MOST
 """Largest number of ticks per call. A new target takes effect at most this many ticks late."""
 BUTTONS = ("clutch", "fixture", "mode")
-_PRESSED, _BETWEEN = 0.1, 0.05  # shortest times for which a button is pressed, and released [s]
+_PRESSED = 0.1  # shortest time for which a button is pressed [s]
+_BETWEEN = 0.05  # shortest time for which a button is released between two presses [s]
 _UNIT = 1e-3  # tolerance of a quaternion's length
 _FARTHEST = 10.0  # poses farther than this from the master's base are refused [m]
 
@@ -75,8 +76,8 @@ Person = Callable[["RemoteHand", float], None]
 class _Wanted(NamedTuple):
     """The last wanted pose.
 
-    ``time`` is its time [s]; NaN means the time when it is first read. ``grip`` is how often the stylus was let go of
-    before.
+    ``time`` is the time of the pose [s]; NaN means the time at which the pose is first read. ``grip`` is the number of
+    times that the stylus was released before.
     """
 
     pose: geometry.Array
@@ -85,21 +86,21 @@ class _Wanted(NamedTuple):
 
 
 class RemoteHand:
-    """Hand of a remote person: follows wanted poses, and lets go when no poses come.
+    """Hand of a remote person: follows wanted poses, and releases the stylus when no poses arrive.
 
-    A grip is relative: its first pose stands for the present pose of the stylus, and later poses move the stylus by
-    their difference from the first. One thread may call :meth:`want`, :meth:`press` and :meth:`let_go`, and another
-    one :meth:`motion`.
+    A grip is relative: its first pose corresponds to the present pose of the stylus, and later poses move the stylus by
+    their difference from the first pose. :meth:`motion` may be called by a different thread than :meth:`want`,
+    :meth:`press` and :meth:`let_go`.
 
     Args:
         parameters: Delay, timeout and bounds.
-        start: Pose (7,) of the stylus at the beginning: place [m] in the master's base, quaternion w, x, y, z; None
+        start: Pose (7,) of the stylus at the beginning: position [m] in the master's base, quaternion w, x, y, z; None
             for the rest pose of the haptic master's stylus.
-        room: Corners low and high (3,) [m] of the box that the stylus stays in; None for no bound.
+        room: Low and high corner (3,) [m] of the box that bounds the stylus; None for no bound.
 
     Attributes:
-        room: Corners low and high (3,) [m] of the box that the stylus stays in.
-        closing: Share by which the hand closes the jaw, 0 open to 1 closed; it does not change when no poses come.
+        room: Low and high corner (3,) [m] of the box that bounds the stylus.
+        closing: Share by which the hand closes the jaw, 0 open to 1 closed; it does not change when no poses arrive.
         refused: Number of poses that were not used.
     """
 
@@ -128,7 +129,7 @@ class RemoteHand:
     # -- what the person wants, in any thread ----------------------------------------------------
 
     def want(self, pose: geometry.Array, time: float | None = None) -> bool:
-        """Set the wanted pose; the first pose after a silence stands for the present pose of the stylus.
+        """Set the wanted pose; the first pose of a grip corresponds to the present pose of the stylus.
 
         Args:
             pose: Position [m] in the master's base and quaternion w, x, y, z of unit length, (7,).
@@ -156,7 +157,7 @@ class RemoteHand:
         return True
 
     def let_go(self) -> None:
-        """Let go now; the next pose is a new grip."""
+        """Release the stylus now; the next pose begins a new grip."""
         self._wanted = _Wanted(self._wanted.pose, -math.inf, self._wanted.grip + 1)
 
     def press(self, name: str, *, is_pressed: bool = True) -> None:
@@ -164,7 +165,7 @@ class RemoteHand:
 
         Args:
             name: ``clutch``, ``fixture`` or ``mode``.
-            is_pressed: Whether it is pressed from now on.
+            is_pressed: Whether the button is pressed from now on.
 
         Raises:
             UnknownNameError: There is no such button.
@@ -176,7 +177,7 @@ class RemoteHand:
         self._down[name] = is_pressed
 
     def close(self, share: float) -> None:
-        """Close the jaw to ``share``: 0 open to 1 closed. Values beyond are clipped; NaN changes nothing."""
+        """Close the jaw to ``share``, 0 open to 1 closed. Other values are clipped; NaN changes nothing."""
         if not math.isnan(share):
             self.closing = min(max(share, 0.0), 1.0)
 
@@ -206,7 +207,7 @@ class RemoteHand:
         """Motion of the stylus: the :data:`~teleop_core.hand.operators.Motion` of an operator.
 
         Args:
-            times: Times (N,) [s], a tick apart from each other, later than those of the last call.
+            times: Times (N,) [s] of successive ticks, later than the times of the last call.
 
         Returns:
             Rows (N, 13): position and rotation vector relative to the start, buttons, zero tremor, and the jaw.
@@ -283,7 +284,7 @@ class RemoteHand:
 
 
 class _Button:
-    """Button of which no press is missed, however short the presses and the pauses between them are.
+    """Button whose presses are never missed, even if presses and pauses are very short.
 
     Attributes:
         presses: Number of presses so far.
@@ -297,7 +298,7 @@ class _Button:
     def at(self, now: float, *, is_down: bool) -> bool:
         """Whether the button is pressed at the time ``now`` [s], which increases from call to call.
 
-        The button is released between two presses, even if no call came between them.
+        The button is released between two presses, even if there was no call between them.
         """
         if self._shown < self.presses and now >= self._next:
             if self._is_pressed:
@@ -327,14 +328,14 @@ def _row(name: str, pose: object) -> geometry.Array:
 
 
 def hand_of(setting: Setting) -> RemoteHand:
-    """Hand for a session, within the room of its device; its parameters are ``operator.remote``."""
+    """Hand for a session, within the range of its device; the hand's parameters are ``operator.remote``."""
     p = cast(RemoteParameters, setting.common.kind.groups["remote"])
     start, (low, high) = rest.rest_pose(), setting.common.device.corners
     return RemoteHand(p, start, (start[:3] + low, start[:3] + high))
 
 
 def make_remote(_: object, setting: Setting) -> Motion:
-    """Make a remote hand; callers get it as ``hand`` of the stage ``operator``, to send poses to it."""
+    """Make a remote hand; callers that send poses get the hand as ``hand`` of the stage ``operator``."""
     return hand_of(setting)
 
 

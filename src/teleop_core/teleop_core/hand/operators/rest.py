@@ -9,7 +9,7 @@ from teleop_core.kernels.geometry import Array, quaternion_from_rotation, rotati
 REST_TILT = math.radians(-23.4)
 """Tilt of the stylus in its inkwell about x [rad].
 
-Vongbunyong 2008, table 6.1; the sign is the one that agrees with the slave's home.
+Vongbunyong 2008, table 6.1; the sign is chosen so that it agrees with the slave's home.
 """
 REST_POSITION = (0.0, -0.065511, -0.088114)
 """Position of the stylus tip in the inkwell [m], in the master's base."""

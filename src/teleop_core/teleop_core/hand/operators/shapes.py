@@ -21,11 +21,11 @@ def minimum_jerk(share: Array) -> Array:
     return x * x * x * (10.0 - 15.0 * x + 6.0 * x * x)
 
 
-# Parts of random motion: cycles per period, incommensurate so that it does not repeat.
+# Components of random motion, in cycles per period; they are incommensurate, so that the motion does not repeat.
 _CYCLES = np.array([1.0, math.sqrt(3.0), math.sqrt(7.0), math.sqrt(13.0)])
 _SHARES = np.array([0.5, 0.4, 0.25, 0.15])
 PHASES = (6, len(_CYCLES))
-"""Shape of the random phases: three axes of position and three of rotation."""
+"""Shape of the array of random phases: three axes of position and three of rotation, with 4 phases each."""
 Shape = Callable[[OperatorParameters, Array, Array], Array]
 """Function of parameters, phases (6, 4) and times (N,) [s] since the approach; returns positions (N, 3) [m]."""
 
@@ -40,8 +40,8 @@ def smooth(p: OperatorParameters, phases: Array, shape: Shape, *, grows: bool = 
         grows: Whether the shape grows over its first second, so that it starts at rest.
 
     Returns:
-        Times (N,) to position [m] and rotation vector [rad] relative to the start (N, 6), both at
-        rest and zero at time 0.
+        Function from times (N,) to position [m] and rotation vector [rad] relative to the start, (N, 6); at time 0
+        these are zero and at rest.
     """
 
     def motion(times: Array) -> Array:
@@ -80,7 +80,7 @@ def _circle(p: OperatorParameters, phases: Array, times: Array) -> Array:
 
 def _points(p: OperatorParameters, phases: Array, times: Array) -> Array:
     stops = np.vstack((np.zeros(3), np.reshape(p.points, (-1, 3))))
-    # The last fifth of each leg is a rest at the stop.
+    # In the last fifth of each leg the hand rests at the stop.
     leg = np.minimum(times / p.period, len(stops) - 1 - 1e-9)
     index = leg.astype(int)
     share = minimum_jerk((leg - index) / 0.8)[:, None]

@@ -1,4 +1,4 @@
-"""Submovement: one movement of an operator who corrects by sight, and its wanted displacement."""
+"""Submovement: one movement of an operator who corrects by sight, and the wanted displacement."""
 
 from typing import NamedTuple
 
@@ -27,7 +27,7 @@ class Move(NamedTuple):
 
     begin: float
     duration: float
-    start: Array  # position (3,) [m] and attitude (4,) of the hand at its start, relative to rest
+    start: Array  # position (3,) [m] and attitude (4,) of the hand when the movement starts, relative to rest
     step: Array  # displacement of the hand (3,) [m]
     turn: Array  # rotation of the stylus in its own frame (3,) [rad]
     seen: Glance  # data that were seen when the submovement began

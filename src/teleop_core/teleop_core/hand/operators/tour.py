@@ -18,7 +18,7 @@ from teleop_core.kernels.geometry import Array
 
 @dataclass(frozen=True, kw_only=True)
 class TourParameters:
-    """Where a tour goes, and how fast."""
+    """Points of a tour, and times for its legs, rests and lines."""
 
     points: tuple[float, ...] = fixed(
         (), Within(-0.3, 0.3, "m"), "x, y, z of each point relative to the centre, one point after the other"
@@ -60,7 +60,7 @@ class TourParameters:
 def through(points: Array, share: Array) -> Array:
     """Smooth line (M, 3) through points (N, 3), N >= 2, at shares (M,) of its length, 0 to 1.
 
-    Between neighbours the line is a cubic. Its slope at a point is that from the previous point to the next point.
+    Between neighbours the line is a cubic. Its slope at a point is the slope from the previous point to the next point.
 
     Source:
         Catmull and Rom 1974.

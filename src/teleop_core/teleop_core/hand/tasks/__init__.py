@@ -1,8 +1,8 @@
-"""Tasks: what an operator has to do, and whether it was done, one file per task.
+"""Tasks: goals for an operator, and the judgement whether they are reached, one file per task.
 
-A task sets the goal of the tip, its width, and the action at the goal. It reads the true pose of the tip and the
-closing of the hand, and counts attempts, successes and errors. People and simulated operators do the same tasks. The
-state of a task is a topic, and a score.
+A task sets the goal of the tip, the width of the goal, and the action at the goal. It reads the true pose of the tip
+and the closing of the hand, and counts attempts, successes and errors. People and simulated operators do the same
+tasks. The state of a task is published as a topic, and evaluated as a score.
 """
 
 from collections.abc import Callable
@@ -25,31 +25,32 @@ _ROW = types.float64[::1]
 JUDGE = types.void(_ROW, _ROW, _ROW, _ROW)
 """Signature of a task's kernel, so that one compiled stage serves every task."""
 MEMORY = 64
-"""Numbers that a task remembers."""
+"""Number of values that a task remembers."""
 SCENE = (
     "time", "x", "y", "z", "qw", "qx", "qy", "qz", "closing", "fx", "fy", "fz", "is_second",
     "grips", "other_grips", "transferred", "dropped",
     *(f"{axis}{i}" for i in range(topics.JAW_OBJECTS) for axis in "xyz"),
 )  # fmt: skip
-"""Inputs of a task: time since it began [s]; the tip's true pose in slave_base [m]; how far the hand closes, 0 to 1;
-the contact force on the tip [N]; whether the arm is the second one; whether its jaw grips, and the other arm's jaw;
-how many blocks came onto another peg, and onto none; the middle of each block [m], zero for a missing block.
+"""Inputs of a task: time since it began [s]; the tip's true pose in slave_base [m]; closing of the hand, 0 to 1;
+contact force on the tip [N]; whether the arm is the second one; whether its jaw grips; whether the other arm's jaw
+grips; number of blocks that came onto another peg; number of blocks that came onto no peg; the middle of each block
+[m], zero for a missing block.
 """
 
 
 class Act(IntEnum):
-    """What the operator has to do at the goal."""
+    """Action of the operator at the goal."""
 
-    PRESS = 0  # close the hand there for a moment, like a mouse click
-    PASS = 1  # be there
-    GRIP = 2  # be there, and keep the hand closed from then on
-    LET_GO = 3  # be there, and keep the hand open from then on
+    PRESS = 0  # close the hand at the goal for a moment, like a mouse click
+    PASS = 1  # be at the goal, without an action of the hand
+    GRIP = 2  # be at the goal, and keep the hand closed from then on
+    LET_GO = 3  # be at the goal, and keep the hand open from then on
 
 
 class Miss(IntEnum):
-    """What was wrong with an attempt at a task."""
+    """Error in an attempt at a task."""
 
-    NONE = 0  # nothing
+    NONE = 0  # no error
     BESIDE = 1  # the attempt ended beside the goal
     LATE = 2  # the attempt took too long
     FORCE = 3  # the tip pressed too hard
@@ -62,14 +63,14 @@ class Task:
     """A task.
 
     Attributes:
-        name: Its name in ``--set task=``.
-        parameters: Its parameter group.
+        name: Name of the task in ``--set task=``.
+        parameters: Parameter group of the task.
         judge: ``judge(numbers, memory, scene, state)``, a kernel or a plain function, called every tick once the slave
-            follows. ``numbers`` are those of the parameters; ``memory`` (64,) is kept from tick to tick, and zero at
-            first; ``scene`` has the numbers that :data:`SCENE` names; ``state`` has the numbers of ``task/state`` of
-            the last tick, and is written.
-        numbers: ``numbers(parameters)`` returns the ``numbers`` of ``judge``, if they are not the numbers of
-            the parameters in their order.
+            follows. ``numbers`` are the numbers of the parameters. ``memory`` (64,) is kept from tick to tick, and is
+            zero at the start. ``scene`` contains the numbers that :data:`SCENE` names. ``state`` contains the numbers
+            of ``task/state`` of the last tick, and is overwritten.
+        numbers: ``numbers(parameters)`` returns the ``numbers`` of ``judge``, if they differ from the numbers of the
+            parameters in their order.
     """
 
     name: str
@@ -82,7 +83,7 @@ class Task:
 
 
 def _try(part: Task) -> None:
-    """Judge some ticks, so that errors are reported before anything runs."""
+    """Call the judge for some ticks, so that errors are reported before anything runs."""
     needs = "one with judge(numbers, memory, scene, state) and parameters that all have defaults"
     with tried("task", part.name, needs):
         numbers, _ = fenced(part.numbers(part.parameters()))  # an index one too large reads NaN
@@ -101,7 +102,7 @@ def _try(part: Task) -> None:
         text = "one that sets a first goal at once, with a width > 0"
         raise PartError("task", part.name, f"{text}; it writes {state.tolist()}")
     tried_once, done, act = (state[topics.TASK_STATE.columns.index(name)] for name in ("attempts", "successes", "act"))
-    if not done and act not in (Act.GRIP, Act.LET_GO):  # other goals need no jaw
+    if not done and act not in (Act.GRIP, Act.LET_GO):  # these two actions need a jaw
         text = "one that counts a success at its goal: `end_attempt` of tasks.attempts with NONE, or `tell_attempt`"
         came = f"{tried_once:.0f} attempts without one" if tried_once else "no attempt"
         raise PartError("task", part.name, f"{text}; in ten minutes at its goals it counts {came}")

@@ -1,7 +1,7 @@
-"""Attempts: functions that tasks share: detect presses, set goals, and count attempts.
+"""Attempts: functions that tasks share to detect presses, set goals, and count attempts.
 
-A task's memory contains, from :data:`KEPT` on: the position of the tip when the goal was set (3,) [m], the time of
-that [s], and whether the hand was closed.
+A task's memory contains, from index :data:`KEPT` on: the position of the tip when the goal was set (3,) [m], the time
+when the goal was set [s], and whether the hand was closed.
 """
 
 import math
@@ -17,7 +17,8 @@ PRESS, PASS, GRIP, LET_GO = map(int, Act)
 NONE, BESIDE, LATE, FORCE, DROP, WRONG = map(int, Miss)
 """Integer values of :class:`Act` and :class:`Miss` for kernels."""
 _SINCE, _CLOSED = KEPT + 3, KEPT + 4
-_OPENS, _CLOSES = 0.4, 0.6  # closing at which a hand counts as open again, and as closed again
+_OPENS = 0.4  # a hand whose closing falls below this counts as open
+_CLOSES = 0.6  # a hand whose closing rises above this counts as closed
 (_NUMBER, _ACT, _GOAL, _, _, _WIDTH, _ATTEMPTS, _SUCCESSES, _ERRORS, _WAY, _OFF, _TIME, _MISS) = range(13)
 _ATTITUDE, _TURN = (topics.TASK_STATE.columns.index(name) for name in ("goal_qw", "turn"))
 _PUSH = SCENE.index("fx")
@@ -99,7 +100,7 @@ class PressedParameters:
 
 @inner
 def failed(numbers: Array, memory: Array, scene: Array) -> int:
-    """:class:`Miss` of an attempt by :class:`PressedParameters`: FORCE or LATE; NONE without an error so far."""
+    """:class:`Miss` of an attempt within the bounds of :class:`PressedParameters`: FORCE, LATE, or NONE so far."""
     square = 0.0
     for i in range(3):
         square += scene[_PUSH + i] * scene[_PUSH + i]
@@ -116,7 +117,7 @@ def tell_attempt(memory: Array, scene: Array, state: Array) -> None:
 
 @dataclass(frozen=True, kw_only=True)
 class LedParameters:
-    """How following a moving goal is judged; these are the first numbers of such a task."""
+    """Numbers to judge how the tip follows a moving goal; they are the first numbers of such a task."""
 
     width: float = parameter(
         0.006, Within(1e-4, 0.1, "m"), "twice the distance within which the tip counts as near the moving goal"
@@ -130,10 +131,10 @@ class LedParameters:
 
 @inner
 def lead_on(numbers: Array, memory: Array, scene: Array, state: Array, y: float, z: float) -> None:
-    """Put a moving goal at (y, z) [m] from the start of the task, and judge each step.
+    """Set a moving goal at (y, z) [m] from the start of the task, and judge each step.
 
     Args:
-        numbers: Numbers of the task, those of :class:`LedParameters` first.
+        numbers: Numbers of the task; the first ones are those of :class:`LedParameters`.
         memory: Memory of the task: the position at its start (3,), and the time of the next step [s].
         scene: Data that the task sees.
         state: State of the task; written.

@@ -1,4 +1,4 @@
-"""Follow: stay near a point with unpredictable motion, as in tests of pilots."""
+"""Follow: keep the tip near a point with unpredictable motion, as in tests of pilots."""
 
 import math
 from dataclasses import dataclass
@@ -27,9 +27,9 @@ class FollowParameters(attempts.LedParameters):
 
 @kernel
 def follow_judge(numbers: Array, memory: Array, scene: Array, state: Array) -> None:
-    """Move the goal on, and count at each step whether the tip is near it.
+    """Move the goal, and count at each step whether the tip is near the goal.
 
-    Of the three sines of an axis, faster ones have smaller amplitudes.
+    Of the three sines of an axis, the faster ones have smaller amplitudes.
     """
     angle, y, z = 2.0 * math.pi * scene[0] / numbers[3], 0.0, 0.0
     for i in range(3):

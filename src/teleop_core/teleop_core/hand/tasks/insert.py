@@ -13,7 +13,7 @@ _CLEARANCE = topics.TASK_STATE.columns.index("clearance")
 
 @dataclass(frozen=True, kw_only=True)
 class InsertParameters(attempts.PressedParameters):
-    """Position of the hole, and how deep to go; the object with the hole is a part of the world."""
+    """Position of the hole, and depth of the insertion; the object with the hole is a part of the world."""
 
     place: tuple[float, ...] = parameter(
         (0.3, 0.0, 0.0),

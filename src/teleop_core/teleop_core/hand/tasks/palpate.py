@@ -1,4 +1,4 @@
-"""Palpate: press down on one place after another with a given force, hold the force, and release."""
+"""Palpate: press down on one point after another with a given force, hold the force, and release."""
 
 import math
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ _FORCE = topics.TASK_STATE.columns.index("force")
 
 @dataclass(frozen=True, kw_only=True)
 class PalpateParameters(attempts.PressedParameters):
-    """Places below a row of points along y; the tip is in the middle of the row when the task begins."""
+    """Points to press, below a row of points along y; the tip is in the middle of the row when the task begins."""
 
     count: int = parameter(5, Within(1, 99), "number of places in the row")
     spacing: float = parameter(0.005, Within(0.0, 0.1, "m"), "distance between neighbouring places")
@@ -29,9 +29,10 @@ class PalpateParameters(attempts.PressedParameters):
 
 @kernel
 def palpate_judge(numbers: Array, memory: Array, scene: Array, state: Array) -> None:
-    """Set the goal above a place, then down until the force is right, then on after the force was held.
+    """Set the goal above a point, then lower until the force is right, then at the next point after the hold.
 
-    ``memory`` contains the start position (3,), whether the tip presses, and since when the force is right [s].
+    ``memory`` contains the start position (3,), whether the tip presses, and the time since which the force is right
+    [s].
     """
     if state[0] == 0.0:
         for i in range(3):

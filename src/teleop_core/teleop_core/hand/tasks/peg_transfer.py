@@ -14,7 +14,7 @@ _ONE_WAY, _WAYS = 2, 2 * JAW_OBJECTS
 
 @dataclass(frozen=True, kw_only=True)
 class PegTransferParameters:
-    """What to do with the blocks of ``jaw_sim``; the kinds are those of Hwang et al. 2020, arXiv 2012.12844."""
+    """How to transfer the blocks of ``jaw_sim``; the kinds are those of Hwang et al. 2020, arXiv 2012.12844."""
 
     arms: str = parameter(
         "one",

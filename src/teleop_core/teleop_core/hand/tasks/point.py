@@ -34,7 +34,7 @@ def point_judge(numbers: Array, memory: Array, scene: Array, state: Array) -> No
 
     Successive targets are on opposite sides of the ring (ISO/TS 9241-411 2012, annex B).
 
-    ``memory`` contains the middle of the ring (3,), then what :mod:`~teleop_core.hand.tasks.attempts` keeps.
+    ``memory`` contains the middle of the ring (3,), then the values of :mod:`~teleop_core.hand.tasks.attempts`.
     """
     if state[0] == 0.0:
         for i in range(3):

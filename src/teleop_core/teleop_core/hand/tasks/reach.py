@@ -1,4 +1,4 @@
-"""Reach: go to one pose after another, anywhere in a box, as fast as possible."""
+"""Reach: move to one pose after another, anywhere in a box, as fast as possible."""
 
 import math
 from dataclasses import dataclass

@@ -24,7 +24,7 @@ class TaskParameters:
 
 
 class TaskState(Fields):
-    """When the task began."""
+    """State record of the stage: the time at which the task began."""
 
     begin_ns: int
 
@@ -40,7 +40,7 @@ class Part(NamedTuple):
 
 @kernel
 def task_step(p: TaskState, s: TaskState, part: Part, row: Row, dt: float) -> None:
-    """One tick: show the task the scene and let it write task_state, once the slave follows.
+    """One tick: call the task's judge with the scene, once the slave follows; the judge writes task_state.
 
     Args:
         p: Not used.
@@ -85,7 +85,7 @@ class RunningTask(RunningStage):
         self.reset()
 
     def reset(self) -> None:
-        """Go back to the state in which no goal is set yet."""
+        """Return to the state without a goal."""
         assign(self.state, 0)
         assign(self.signals, self._begin)
         self._part.memory[:] = 0.0

@@ -18,7 +18,7 @@ class TraceParameters(attempts.LedParameters):
 
 @kernel
 def trace_judge(numbers: Array, memory: Array, scene: Array, state: Array) -> None:
-    """Move the goal on, and count at each step whether the tip is near it."""
+    """Move the goal, and count at each step whether the tip is near the goal."""
     radius, angle = 0.5 * numbers[2], 2.0 * math.pi * scene[0] / numbers[3]
     y, z = radius * math.sin(angle), radius * (1.0 - math.cos(angle))
     attempts.lead_on(numbers, memory, scene, state, y, z)

@@ -1,9 +1,9 @@
 """Transfer: steps that bring a block from peg to peg, by one arm or two, and the judgement of each block.
 
-A task's memory contains the number of the block, -1 once all are done; the height to which to lift it, above its
-start; how many blocks were on another peg and on none when the attempt began; the initial positions of all blocks; and
-how often the block was picked up. Its numbers are lift, width, longest, kind, x and y of six displacements, clearance,
-tries.
+A task's memory contains: the number of the block, -1 once all are done; the height above its start to which the block
+is lifted; the numbers of blocks on another peg, and on no peg, when the attempt began; the initial positions of all
+blocks; and the number of times that the block was picked up. The task's numbers are lift, width, longest, kind, x and y
+of six displacements, clearance, tries.
 """
 
 import math
@@ -13,7 +13,8 @@ from teleop_core.hand.tasks import SCENE, attempts
 from teleop_core.kernels import Array, inner
 
 KINDS = ("one", "two", "hand_over")
-"""Which arm transfers: one arm all blocks; each arm every other block; the second arm takes blocks from the first."""
+"""Kinds of transfer: one arm moves all blocks; each arm moves every other block; the second arm takes blocks from the
+first arm."""
 STEPS = ("wait", "reach", "grasp", "lift", "meet", "take", "release", "retreat", "carry", "place")
 """Steps of an arm; a transfer with a hand-over uses the nine steps after the first one."""
 (_WAIT, _REACH, _GRASP, _LIFT, _MEET, _TAKE, _RELEASE, _RETREAT, _CARRY, _PLACE) = range(len(STEPS))
@@ -23,7 +24,7 @@ _SECOND, _X0 = SCENE.index("is_second"), SCENE.index("x0")
 _STARTS = 4
 _TRIES = _STARTS + 3 * topics.JAW_OBJECTS
 _MEETS = 0.01  # a block within this distance of the meeting point has reached it [m]
-_RESTS = 5e-4  # a block no higher than this above its start stands on the table or a peg [m]
+_RESTS = 5e-4  # a block that is no higher above its start rests on the table or on a peg [m]
 
 
 @inner
@@ -73,7 +74,7 @@ def _begin_step(numbers: Array, memory: Array, scene: Array, state: Array, step:
 
 @inner
 def _is_done(numbers: Array, memory: Array, scene: Array, state: Array) -> bool:
-    """Whether the present step is done, judged by what the jaws hold or by the tip's position."""
+    """Whether the present step is done, judged by the grips of the jaws or by the tip's position."""
     step, is_second, block = int(state[_STEP]), scene[_SECOND] > 0.0, int(memory[0])
     grips, other = scene[_SECOND + 1] > 0.0, scene[_SECOND + 2] > 0.0
     if step == _MEET and is_second:  # the block has reached the meeting point
@@ -106,7 +107,7 @@ def _next_step(numbers: Array, memory: Array, scene: Array, step: int) -> int:
 
 @inner
 def _take_up(numbers: Array, memory: Array, scene: Array, state: Array) -> None:
-    """Begin with the block that ``memory`` names, at its present position; wait if there is no block."""
+    """Begin the transfer of the block that ``memory`` names, from its present position; wait if there is no block."""
     memory[2], memory[3] = scene[_SECOND + 3], scene[_SECOND + 4]
     begin = _MEET if int(numbers[3]) == _HAND_OVER and scene[_SECOND] > 0.0 else _REACH
     if memory[0] >= topics.JAW_OBJECTS or memory[_STARTS + 3 * int(memory[0])] == 0.0:
@@ -116,7 +117,7 @@ def _take_up(numbers: Array, memory: Array, scene: Array, state: Array) -> None:
 
 @inner
 def _next_block(numbers: Array, memory: Array, scene: Array, state: Array) -> None:
-    """Begin with the block after the present one; wait if no block is left."""
+    """Begin the transfer of the next block; wait if no block is left."""
     stride = 2.0 if int(numbers[3]) == _TWO else 1.0
     first = 1.0 if stride == 2.0 and scene[_SECOND] > 0.0 else 0.0
     memory[0], memory[_TRIES] = (first if state[0] == 0.0 else memory[0] + stride), 1.0
@@ -125,7 +126,7 @@ def _next_block(numbers: Array, memory: Array, scene: Array, state: Array) -> No
 
 @inner
 def _end_transfer(numbers: Array, memory: Array, scene: Array, state: Array, miss: int) -> None:
-    """Count a transfer; up to ``tries`` times, pick a dropped block up again, or go on with a late held block."""
+    """Count a transfer. Up to ``tries`` times, pick up a dropped block again, or continue with a late held block."""
     attempts.end_attempt(memory, scene, state, miss)
     is_held = scene[_SECOND + 1] + scene[_SECOND + 2] > 0.0
     goes_on = miss == attempts.DROP or (miss == attempts.LATE and is_held)

@@ -1,16 +1,16 @@
 """Closed forms of chains: the steps that all of them share, from the wanted pose to the status.
 
-A closed form treats the arm as G = Rz(q1) F1 Rz(q2) F2 ... Rz(qn), with constant transforms between the joints and
-every joint about its own z axis. An arm that decomposes from the tip is treated from tip to base. The constants of the
-closed form follow those of the chain in the geometry row (:mod:`teleop_core.kinematics.dh_kernels`): 1 or -1 for the
-order, n signs, n groups, then transforms of twelve numbers each: before and after G, and those between the joints.
+A closed form describes the arm as G = Rz(q1) F1 Rz(q2) F2 ... Rz(qn), with constant transforms between the joints and
+every joint about its own z axis. An arm that decomposes from the tip is described from tip to base. The constants of
+the closed form follow those of the chain in the geometry row (:mod:`teleop_core.kinematics.dh_kernels`): 1 or -1 for
+the order, n signs, n groups, then transforms of twelve numbers each: before and after G, and those between the joints.
 Then come the additional numbers of the class of arms. The last number is 1 for an arm that fits its class only
 approximately (:mod:`teleop_core.kinematics.closed_form.decomposition`).
 
-Branches are candidates: joint vectors in the arm's own order, followed by one number. It is 1.0 if the branch reaches
-the pose, 0.0 if it only comes nearest, and :data:`UNKNOWN` if the branch cannot be the answer and was not computed.
-The best branch is brought into limits and steps. If it then misses the pose, damped least squares on the whole chain
-reduce the remaining error.
+Branches are candidates: joint vectors in the arm's own order, followed by one number. This number is 1.0 if the branch
+reaches the pose, and 0.0 if the branch only comes nearest. It is :data:`UNKNOWN` if the branch cannot be the answer and
+was not computed. The best branch is clipped to limits and steps. If it then misses the pose, damped least squares on
+the whole chain reduce the remaining error.
 """
 
 import math
@@ -22,11 +22,12 @@ from teleop_core.kernels.room import room
 from teleop_core.kinematics import IkStatus, damped, dh_kernels, pose_residual
 from teleop_core.kinematics.branches import OUTSIDE, SLACK, cost_of, is_allowed, slowed, turn, turned, wrapped
 
-_ROUNDS, _PATH_ROUNDS = 60, 12  # rounds of the search that improves a branch out of limits
-_FEW_ROUNDS = 8  # rounds of the search next to the seed
+_ROUNDS = 60  # largest number of rounds of a search from a branch outside the limits
+_PATH_ROUNDS = 12  # largest number of rounds of such a search in a path
+_FEW_ROUNDS = 8  # largest number of rounds of the search next to the seed
 _GROUPS = 3
-# Lever [m] at which an angular lag of the tip counts as a distance: that of a tool, independent of the reach. With a
-# reach of 4 m as the lever, 5 mm would count no more than 1 mrad.
+# Lever [m] that converts an angular lag of the tip to a distance. It is the length of a tool, not the reach: with a
+# reach of 4 m as the lever, a lag of 5 mm would count little more than a lag of 1 mrad.
 _LEVER = 0.1
 UNKNOWN = -1.0
 """Last entry of a candidate that was not computed."""
@@ -137,7 +138,7 @@ def angle_cost(K: Array, n: int, i: int, angle: float, seed: Array, limits: Arra
 
 @inner
 def branch_cost(q: Array, seed: Array, limits: Array) -> float:
-    """Cost of a branch with free steps: largest move, inside limits before outside."""
+    """Cost of a branch with free steps: the largest move; branches outside the limits come last."""
     n = seed.shape[0]
     turn(q, seed, limits, 0, n)
     return cost_of(q, seed, limits, 0, n, True) + (0.0 if q[n] > 0.5 else INEXACT)
@@ -145,7 +146,7 @@ def branch_cost(q: Array, seed: Array, limits: Array) -> float:
 
 @inner
 def _is_better(q: Array, best: Array, K: Array, seed: Array, limits: Array, do_limits_count: bool) -> bool:
-    """Whether a branch is better than another in a path; the first group of joints whose costs differ decides."""
+    """Whether branch ``q`` is better than ``best`` in a path; the first group of joints whose costs differ decides."""
     for group in range(1, _GROUPS + 1):
         ours = _group_cost(q, K, seed, limits, group, do_limits_count and group > 1)
         theirs = _group_cost(best, K, seed, limits, group, do_limits_count and group > 1)
@@ -158,11 +159,11 @@ def _is_better(q: Array, best: Array, K: Array, seed: Array, limits: Array, do_l
 def choose(
     found: Array, count: int, seed: Array, limits: Array, K: Array, is_beside: bool, q: Array
 ) -> tuple[int, int]:
-    """Write the best of the candidates (count, n + 1), each by whole turns next to the seed.
+    """Write the best of the candidates (count, n + 1), each shifted by whole turns to the seed.
 
-    The best has the smallest largest move of a joint, inside limits before outside. In a path limits do not count.
-    There, groups are compared in order: joints that determine the branch come before joints that move far near a
-    singularity. If two branches are neighbours, limits count after the first group.
+    The best candidate is the one whose largest joint move is smallest; candidates outside the limits come last. In a
+    path limits do not count, and groups of joints are compared in order. Joints that determine the branch come before
+    joints that move far near a singularity. If two branches are neighbours, limits count after the first group.
 
     Returns:
         2 if the best candidate reaches the pose, 1 if only another candidate does, 0 if none does; and the index of
@@ -182,7 +183,7 @@ def choose(
         cost = branch_cost(trial, seed, limits)
         if cost < least:
             best, least = k, cost
-    if best < 0:  # numbers that overflow
+    if best < 0:  # the numbers have overflowed
         damped.assign(q, seed)
         return 0, best
     for i in range(n):
@@ -207,9 +208,9 @@ def is_nearly(geometry: Array) -> bool:
 
 @inner
 def is_beside(T: Array, seed: Array, limits: Array, geometry: Array, q: Array) -> bool:
-    """Whether an arm that fits its class approximately reaches the pose next to the seed; then write ``q``.
+    """Whether an arm that fits its class approximately reaches the pose next to the seed; if so, write ``q``.
 
-    Near a stretched elbow, or a limit, the seed's branch may not exist in the exact class.
+    Near a stretched elbow, or near a limit, the seed's branch may not exist for an arm that fits its class exactly.
     """
     if not is_nearly(geometry) or math.isfinite(limits[2, 0]):
         return False
@@ -238,7 +239,7 @@ def move_of(q: Array, seed: Array) -> float:
 def _best_of_rest(T: Array, seed: Array, limits: Array, geometry: Array, found: Array, count: int, q: Array) -> None:
     """Replace ``q`` by the joints within limits that come nearest to the pose.
 
-    It searches from the branch itself, from the seed and from all other branches, and keeps the smallest error.
+    The search starts from the branch itself, from the seed and from all other branches; the smallest error is taken.
     """
     n, box, trial, least = q.shape[0], np.empty((2, q.shape[0])), np.empty(q.shape[0]), math.inf
     box_around(seed, limits, box)
@@ -260,9 +261,9 @@ def _best_of_rest(T: Array, seed: Array, limits: Array, geometry: Array, found: 
 def _best_of_step(T: Array, seed: Array, limits: Array, geometry: Array, does_reach: bool, q: Array) -> None:
     """Replace ``q`` by the joints within limits and step that come nearest to the pose.
 
-    It searches from the branch. If the branch reaches the pose, joints that cannot get there in one step move at full
-    speed. The other joints either reduce the remaining error, or move proportionally slower on the straight path; the
-    smaller lag decides.
+    The search starts from the branch. If the branch reaches the pose, joints that cannot reach it in one step move at
+    full speed. The other joints either reduce the remaining error, or move proportionally slower on the straight path.
+    Of these two results the one with the smaller lag is taken.
     """
     n, box, trial = q.shape[0], np.empty((2, q.shape[0])), np.empty(q.shape[0])
     box_around(seed, limits, box)
@@ -299,10 +300,10 @@ def settled(
     q: Array,
     residual: Array,
 ) -> int:
-    """Bring a branch into limits and steps, write its residual (2,) and return its status.
+    """Clip a branch to limits and steps, write the residual (2,) and return the status.
 
     If the branch then misses the pose, damped least squares bring it as near as limits and steps allow. ``reach`` is
-    what :func:`choose` returned.
+    the first result of :func:`choose`.
     """
     reached, J = room(4, 4), room(6, 7)
     if is_allowed(q, seed, limits):

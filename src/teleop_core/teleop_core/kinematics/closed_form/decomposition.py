@@ -4,14 +4,14 @@ The classes, in the order of the search; each is tried from the base and, revers
 
 - *spherical wrist*: six turning joints, the last three axes meet in a point;
 - *three parallel axes*: six turning joints, axes 2, 3 and 4 are parallel;
-- *spherical shoulder and wrist*: seven turning joints, axes 1, 2, 3 meet, and 5, 6, 7 do;
-- *arm in a plane*: three parallel turning joints, with a slide along them, or with a first joint that turns their
-  plane, or a last joint that rolls the tool in it, or both of these.
+- *spherical shoulder and wrist*: seven turning joints; axes 1, 2, 3 meet in a point, and axes 5, 6, 7 meet in a point;
+- *arm in a plane*: three parallel turning joints, either with a slide along their axes, or with a first joint that
+  turns their plane, a last joint that rolls the tool in this plane, or both.
 
 Axes count as meeting or parallel within the tolerance :data:`NEARLY`, because some files contain 1.571 for a quarter
-turn. Newton steps on the true chain remove the error that results. Arms in a plane must be exact. All others are
-solved by search (:mod:`teleop_core.kinematics.dh_kernels`). For arms with six directions the solution states by how
-much their axes miss a class.
+turn. Newton steps on the true chain remove the resulting error. Arms in a plane must fit exactly. Arms without a class
+are solved by search (:mod:`teleop_core.kinematics.dh_kernels`). For arms with six directions the solution states the
+deviations of their axes from the classes.
 """
 
 import math
@@ -26,10 +26,10 @@ from teleop_core.kinematics import Kernels, dh_kernels
 from teleop_core.kinematics.closed_form import parallel_axes, plane_arm, spherical_wrist, swivel
 
 NEARLY = 1e-3
-"""Angle [rad] up to which axes are parallel, and share of the reach within which they meet."""
-_EXACT = 1e-5  # the same, up to which one Newton step after the closed form is enough
-_LEVEL = 1e-9  # the same, of arms in a plane
-_LEAST = 1e-3  # share of the reach, or sine, under which an arm of a class counts as degenerate
+"""Tolerance of parallel axes [rad], and of axes that meet in a point, divided by the reach."""
+_EXACT = 1e-5  # up to this deviation, one Newton step after the closed form is enough
+_LEVEL = 1e-9  # the tolerance for arms in a plane
+_LEAST = 1e-3  # an arm with a smaller length, divided by the reach, or a smaller sine counts as degenerate
 _PARALLEL, _MEETING, _SKEW = 0.0, 1.0, 2.0
 _NEAR = ", within 1e-3 of the class and finished by Newton steps"
 _Z = np.array([0.0, 0.0, 1.0])
@@ -61,7 +61,8 @@ class _Chain:
     """Turning joints about z with constant transforms around them, from base to tip or from tip to base.
 
     ``signs`` are the directions of the arm's own joints; ``order`` is -1 for a chain from the tip. ``off`` is the
-    largest angle or share of the reach that was neglected; ``misses`` tells why the chain does not fit a class.
+    largest deviation that was neglected, an angle or a share of the reach. ``misses`` contains the reasons why the
+    chain fits no class.
     """
 
     order: float
@@ -105,7 +106,7 @@ class _Chain:
         return (share, 1.0, large) if large == 0 else (1.0, share, large)
 
     def _counts(self, off: float, joints: Sequence[int], text: str) -> bool:
-        """Whether the deviation ``off`` is negligible; if not, ``text`` tells what prevents the class."""
+        """Whether the deviation ``off`` is negligible; if not, ``text`` is stored as the reason."""
         if off <= NEARLY:
             self.off = max(self.off, off)
             return True
@@ -122,15 +123,15 @@ class _Chain:
         return out
 
     def slide(self, joint: int, distance: float) -> None:
-        """Move a joint's frame along its axis."""
+        """Move a joint's frame along the joint's axis."""
         self._move(joint, transform(np.eye(3), distance * _Z))
 
     def spin(self, joint: int, angle: float) -> None:
-        """Turn a joint's frame about its axis."""
+        """Rotate a joint's frame about the joint's axis."""
         self._move(joint, transform(rotation("z", angle), np.zeros(3)))
 
     def flip(self, joint: int) -> None:
-        """Turn a joint's axis round."""
+        """Reverse a joint's axis."""
         self._move(joint, _FLIP)
         self.signs[joint] = -self.signs[joint]
 
@@ -139,7 +140,7 @@ class _Chain:
         self.fixed[joint + 1] = product(inverse_motion(by), self.fixed[joint + 1])
 
     def slide_next_to(self, joint: int, other: int) -> None:
-        """Move a joint's frame to the point of its axis that is nearest to another axis."""
+        """Move a joint's frame along its axis to the point that is nearest to the axis of ``other``."""
         frames = self.frames()
         w, v = frames[joint][:3, 2], frames[other][:3, 2]
         gap = frames[other][:3, 3] - frames[joint][:3, 3]
@@ -171,16 +172,16 @@ def _chains(kinds: Sequence[float], fixed: Sequence[Array], reach: float) -> tup
 
 
 def solution_of(kinds: Sequence[float], fixed: Sequence[Array], reach: float, task: Sequence[str]) -> Solution:
-    """Return how to solve the inverse kinematics of a chain.
+    """Return the solution of the inverse kinematics of a chain.
 
     Args:
         kinds: Kind of each joint: 1 for a turn, 2 for a slide; negative if it moves against its axis.
         fixed: Transforms (4, 4) before, between and after the joints, which move about z.
         reach: Length of the chain [m].
-        task: Directions that the arm is to control.
+        task: Directions that the arm must control.
 
     Returns:
-        The first class that fits, else :data:`SEARCH`, with what the axes lack for a class.
+        The first class that fits, else :data:`SEARCH` with the reasons why no class fits.
     """
     if reach > 0.0 and len(task) == len(kinds) < 6:
         return _arm_in_plane(kinds, fixed, reach, task) or SEARCH
@@ -207,7 +208,7 @@ def _spherical_wrist(chain: _Chain) -> Solution | None:
     F1, F2, t3 = chain.fixed[1], chain.fixed[2], chain.fixed[3][:3, 3]
     t1, t2, over = F1[:3, 3], F2[:3, 3], 1.0 / chain.reach
     k = product(F2[:3, :3].T, t2)
-    # Factors of joint 1 and of joint 3 in both equations, up to a rotation and a scale each.
+    # Factors of joint 1 and of joint 3 in the two equations; each is known up to a rotation and a scale.
     one = np.array([F1[:2, 2], -over * t1[:2]])
     three = np.array([F2[2, :2], over * k[:2]])
     if length(t3[:2]) * over < _LEAST or min(abs(one).max(), abs(three).max()) < _LEAST:
@@ -289,7 +290,7 @@ def _arm_in_plane(kinds: Sequence[float], fixed: Sequence[Array], reach: float, 
     wanted = {"x", "y", "z"} if shoulder else {"x", "y", "rz", *("z" for _ in slides)}
     if len(turns) < 3 or len(slides) > 1 - shoulder or not wanted <= set(task):
         return None
-    frames, merged = [fixed[0]], [fixed[0]]  # slides stand at zero
+    frames, merged = [fixed[0]], [fixed[0]]  # slides are at zero
     for i, after in enumerate(fixed[1:]):
         frames.append(product(frames[-1], after))
         merged[-1:] = [merged[-1], after] if i in turns else [product(merged[-1], after)]
@@ -322,7 +323,7 @@ def _arm_in_plane(kinds: Sequence[float], fixed: Sequence[Array], reach: float, 
 
 
 def _lay_in_plane(chain: _Chain, shoulder: int) -> Array | None:
-    """Lay the x axes of three parallel joints along their links, and the tool's axis along -y.
+    """Rotate the frames of three parallel joints: x axes along the links, and the tool's axis along -y.
 
     Returns:
         The tip in the frame of the third joint (3,); None if the joints do not form such an arm.

@@ -1,9 +1,10 @@
 """Arms of six turning joints whose axes 2, 3 and 4 are parallel: closed form, up to eight branches.
 
 The three parallel joints move everything after them in a plane. The height of axis 6 over that plane, and its slope to
-the plane, determine joints 1 and 5 by two equations, linear in their sines and cosines. If axes 5 and 6 meet, joint 5
-occurs in only one of them; otherwise an equation of degree four remains. Then joint 6 follows, and the planar arm of
-two links with its hand. An arm whose axes 3, 4 and 5 are parallel belongs to this class when treated from tip to base.
+the plane, determine joints 1 and 5 by two equations, linear in their sines and cosines. If axes 5 and 6 meet, only one
+of these equations contains joint 5; otherwise an equation of degree four remains. Then joint 6 follows, and finally
+joints 2, 3 and 4 as a planar arm of two links with a hand. An arm whose axes 3, 4 and 5 are parallel belongs to this
+class when it is described from tip to base.
 
 Source:
     Elias and Wen 2022, section on three parallel axes; Hawkins 2013 for the arms of Universal
@@ -20,11 +21,12 @@ from teleop_core.kinematics.closed_form import candidates, subproblems
 
 _F1, _F2, _F3, _F4, _F5 = (37, 49, 61, 73, 85)
 RULE = 97
-"""Index, in the constants, of the rule of the arm's pair of equations; then follow B and a length."""
+"""Index in the constants of the rule that solves the arm's two equations; B and a length follow the rule."""
 _LEVEL, _COST = 3, 4
-# Row of a pair: joints 1 and 5, whether it reaches, 1.0 if both are known, the least cost of its branches.
+# Row of a pair: joint 1, joint 5, whether the pair reaches the pose, 1.0 if both joints are known, and the least cost
+# of its branches.
 _LATER = 1e9  # added to the cost of pairs that always come after the others
-_ALIGNED = 1e-10  # sine under which axis 6 counts as parallel to 2, 3 and 4, and joint 6 is free
+_ALIGNED = 1e-10  # below this sine, axis 6 counts as parallel to axes 2, 3 and 4, and joint 6 is free
 
 
 @inner
@@ -42,7 +44,7 @@ def _equations(G: Array, K: Array, A: Array, B: Array, h: Array) -> None:
 
 @inner
 def _hand(K: Array, fifth: float, sixth: float, M: Array) -> None:
-    """Write the transform of the hand by joints 5 and 6, F4 Rz(q5) F5 Rz(q6), (3, 4)."""
+    """Write the transform (3, 4) of the hand that joints 5 and 6 give: F4 Rz(q5) F5 Rz(q6)."""
     c5, s5, c6, s6 = math.cos(fifth), math.sin(fifth), math.cos(sixth), math.sin(sixth)
     for i in range(3):
         f0, f1 = K[_F4 + 4 * i], K[_F4 + 4 * i + 1]
@@ -69,10 +71,10 @@ def _sixth(H: Array, K: Array, fifth: float, seed: float) -> float:
 
 @inner
 def _plane(H: Array, M: Array, K: Array, seed: float, angles: Array) -> float:
-    """Write joints 2, 3 and 4 of both elbows into ``angles`` (2, 3): they turn M into H.
+    """Write joints 2, 3 and 4, which move M to H, into ``angles`` (2, 3), for both elbow branches.
 
     Returns:
-        1.0 if the planar arm reaches that far, else 0.0.
+        1.0 if the planar arm reaches the position, else 0.0.
     """
     # Motion in the plane, D = H M⁻¹: its rotation, and the position of axis 4.
     c = H[0, 0] * M[0, 0] + H[0, 1] * M[0, 1] + H[0, 2] * M[0, 2]
@@ -105,7 +107,7 @@ def _behind_first(G: Array, K: Array, first: float, M: Array, N: Array) -> None:
 
 @inner
 def _elbows(G: Array, K: Array, pair: Array, seed: Array, q: Array) -> None:
-    """Write both branches of a pair of joints 1 and 5 into q (2, 7)."""
+    """Write the two branches of a pair of joints 1 and 5 into q (2, 7)."""
     M, N, angles = room(3, 4), room(3, 4), room(2, 3)
     _behind_first(G, K, pair[0], M, N)
     sixth = _sixth(N, K, pair[1], candidates.angle_of(K, 6, 5, seed))
@@ -133,10 +135,10 @@ def _least_sine(G: Array, K: Array, pairs: Array, count: int) -> float:
 
 @inner
 def _cost(pair: Array, K: Array, seed: Array, limits: Array, first: float, least: float) -> float:
-    """Lower bound of the cost of all branches of a pair, from the known ones of its joints 1 and 5.
+    """Lower bound of the cost of all branches of a pair, from the angles of joints 1 and 5 that are known.
 
-    In a path joint 1 comes first. Joint 5 is compared only for pairs in which joint 1 makes its least move ``first``;
-    all other pairs come later.
+    In a path joint 1 is compared first. Joint 5 is compared only for pairs in which joint 1 makes its least move
+    ``first``; all other pairs come later.
     """
     is_path, is_closed = math.isfinite(limits[2, 0]), pair[_LEVEL] > 0.5
     one = candidates.angle_cost(K, 6, 0, pair[0], seed, limits, not is_path)
@@ -153,7 +155,7 @@ def _cost(pair: Array, K: Array, seed: Array, limits: Array, first: float, least
 
 @inner
 def _known_cost(q: Array, K: Array, seed: Array, limits: Array, least: float) -> float:
-    """Cost of a branch (7,), above which other branches need not be computed; in a path that of joints 5 and 6."""
+    """Cost of a branch (7,), in a path of its joints 5 and 6; branches with a higher cost need not be computed."""
     is_path, cost = math.isfinite(limits[2, 0]), 0.0
     if q[6] < 0.5:
         return math.inf
@@ -222,9 +224,9 @@ def ik(T: Array, seed: Array, limits: Array, geometry: Array, q: Array, residual
 
 @kernel
 def ik_all(T: Array, geometry: Array, solutions: Array) -> int:
-    """Write the branches (k, 6), at most eight, ignoring limits; return how many reach T.
+    """Write the branches (k, 6), at most eight, ignoring limits; return the number of branches that reach T.
 
-    On a singularity a free joint is set to zero, and branches may coincide.
+    At a singularity a free joint is set to zero, and branches may be equal.
     """
     found, limits, seed = room(8, 7), room(3, 6), room(6)
     candidates.forget(seed, limits)

@@ -1,15 +1,15 @@
 """Arms of three parallel turning joints: closed form, two branches, or four with a first joint.
 
-Two links and a hand move in a plane. A slide may move along the normal of the plane, as in the SCARA. A first joint
-may turn the plane about an axis in it, and a last joint may roll the tool about an axis in it, as in five-axis arms.
-The arm controls fewer than six directions: the position of the tip, as far as the arm can reach it, and there the
-nearest possible attitude.
+Two links and a hand move in a plane. A slide may move along the normal of the plane, as in the SCARA. A first joint may
+turn the plane about an axis in it, and a last joint may roll the tool about an axis in it, as in five-axis arms. The
+arm controls fewer than six directions: the position of the tip, within reach, and the nearest attitude that is possible
+at this position.
 
 In the geometry row (:mod:`teleop_core.kinematics.dh_kernels`) the following numbers come after the chain: indices of
-the joints first, shoulder, elbow, hand, roll (-1 for none) and their signs; index of the slide and its factor on the
-height; both link lengths; the constant angles of elbow and attitude beyond the joints; the tip in the hand's frame and
-its height over the plane. Then come the transforms that undo what is before the first joint and after the last, and
-the one from the first joint to the shoulder.
+the joints first, shoulder, elbow, hand, roll (-1 for a missing joint) and their signs; index of the slide and its
+factor on the height; lengths of the two links; constant angles that are added to elbow and attitude; the tip in the
+hand's frame and the height of the tip over the plane. Then come three transforms: the inverses of the transforms before
+the first joint and after the last joint, and the transform from the first joint to the shoulder.
 
 Source:
     Craig 2005, section 4.4 (two links); the nearest attitude is derived.
@@ -25,27 +25,26 @@ from teleop_core.kinematics.closed_form import candidates, subproblems
 from teleop_core.kinematics.dh_kernels import fk
 
 FIRST, SHOULDER, ELBOW, HAND, ROLL = 0, 1, 2, 3, 4
-"""Joints of the closed form, by their indices in the constants; signs follow."""
+"""Indices in the constants of the numbers of the closed form's joints; their signs follow."""
 _SIGNS, _SLIDE, _PUSH, _UPPER, _FORE, _BEND, _TURN = 5, 10, 11, 12, 13, 14, 15
 _TIP_X, _TIP_Y, _HEIGHT, _BEFORE, _BEHIND, _TO_PLANE = 16, 17, 18, 19, 31, 40
-# Below this distance [m] a point counts as lying on its axis of rotation, and the joint does not move; below this sine
-# the tool counts as normal to the plane.
-_ON_AXIS, _ALIGNED = 1e-12, 1e-10
-_NEAR = 0.02  # sine of the elbow, and share of the reach, below which small tip moves need large joint moves
+_ON_AXIS = 1e-12  # a point at a smaller distance counts as lying on the axis, and the joint does not move [m]
+_ALIGNED = 1e-10  # with a smaller sine the tool counts as normal to the plane
+_NEAR = 0.02  # below this sine of the elbow, or share of the reach, small tip moves need large joint moves
 _FOLLOWED, _LIMITED = int(IkStatus.FOLLOWED), int(IkStatus.LIMITED)
 _NEAR_SINGULAR, _UNREACHABLE = int(IkStatus.NEAR_SINGULAR), int(IkStatus.UNREACHABLE)
 
 
 @inner
 def _get(K: Array, joint: int, q: Array) -> float:
-    """Angle [rad] of a joint of the closed form; 0 for one that the arm lacks."""
+    """Angle [rad] of a joint of the closed form; 0 for a joint that the arm does not have."""
     place = int(K[joint])
     return K[_SIGNS + joint] * q[place] if place >= 0 else 0.0
 
 
 @inner
 def _put(K: Array, joint: int, angle: float, q: Array) -> None:
-    """Write the angle [rad] of a joint of the closed form, unless the arm lacks it."""
+    """Write the angle [rad] of a joint of the closed form, if the arm has this joint."""
     place = int(K[joint])
     if place >= 0:
         q[place] = K[_SIGNS + joint] * angle
@@ -65,7 +64,7 @@ def _pointing(x: float, y: float, seed: float) -> float:
 
 @inner
 def _elbow(x: float, y: float, a: float, b: float) -> tuple[float, bool]:
-    """Elbow angle in [0, pi] with which links a and b reach as far as (x, y), and whether they reach that far."""
+    """Elbow angle in [0, pi] with which links a and b reach the distance of (x, y); whether they can reach it."""
     k = (x * x + y * y - a * a - b * b) / (2.0 * a * b)
     return math.atan2(math.sqrt(max(1.0 - k * k, 0.0)), k), abs(k) <= 1.0 + _ON_AXIS
 
@@ -98,7 +97,7 @@ def _wanted(T: Array, K: Array, G: Array) -> None:
 
 @inner
 def _sides(G: Array, K: Array, seed: Array) -> tuple[float, float, bool, float]:
-    """Both angles [rad] of the first joint, whether they bring the plane to the tip, and the root.
+    """Two angles [rad] of the first joint, whether they bring the plane to the tip, and the root.
 
     The root is the distance [m] of the tip from axis 1 within the plane.
     """
@@ -132,10 +131,10 @@ def _attitude(H: Array, K: Array, turned: float, roll: float) -> tuple[float, fl
 
     The angle in the plane gives the tool its direction in the plane. The sum of angle and roll, or their difference,
     whichever is better defined, gives the whole attitude. If the tool is normal to the plane, only that sum or
-    difference is defined: both angles then change by the same amount from the given ones.
+    difference is defined. Then both angles change by equal amounts from the given angles.
     """
     sign = -1.0 if K[ROLL] >= 0.0 and H[2, 2] < 0.0 else 1.0
-    both = math.atan2(H[1, 0] - sign * H[0, 1], H[0, 0] + sign * H[1, 1])  # turn + sign roll
+    both = math.atan2(H[1, 0] - sign * H[0, 1], H[0, 0] + sign * H[1, 1])  # angle in the plane plus ``sign`` times roll
     if K[ROLL] < 0.0:
         return both, 0.0
     if math.hypot(H[0, 2], H[1, 2]) > _ALIGNED:
@@ -171,7 +170,7 @@ def _bend(turned: float, x: float, y: float, K: Array, elbow: float, seed: Array
 
 @inner
 def _turn(q: Array, seed: Array, limits: Array, K: Array) -> None:
-    """Move all joints except the slide by whole turns next to the seed, or into their limits."""
+    """Add whole turns to all joints except the slide, so that they are nearest to the seed, or inside their limits."""
     for joint in range(5):
         if K[joint] >= 0.0:
             turn(q, seed, limits, int(K[joint]), int(K[joint]) + 1)
@@ -181,8 +180,8 @@ def _turn(q: Array, seed: Array, limits: Array, K: Array) -> None:
 def _choose(seed: Array, limits: Array, K: Array, G: Array, q: Array) -> tuple[bool, float]:
     """Write the branch of the smallest move; return whether any branch reaches the position, and the root.
 
-    Side and elbow of the seed come first; the others are solved only if they can still be better. In a path hand and
-    roll, which a stop may hold back, do not count: the elbow decides.
+    The branch with the side and elbow of the seed is solved first, the other branches only if they can still be better.
+    In a path the elbow decides; hand and roll do not count, because an end stop may limit them.
     """
     n, H, trial, best = q.shape[0], room(3, 4), room(6), math.inf
     is_path, any_reaches = math.isfinite(limits[2, 0]), False
@@ -216,7 +215,7 @@ def _choose(seed: Array, limits: Array, K: Array, G: Array, q: Array) -> tuple[b
 
 @inner
 def _hold(joint: int, seed: Array, limits: Array, K: Array, q: Array) -> None:
-    """Keep a joint, by whole turns next to the seed, inside its limits and its step."""
+    """Add whole turns to a joint so that it is next to the seed, and clip it to its limits and its step."""
     place = int(K[joint])
     if place >= 0:
         turn(q, seed, limits, place, place + 1)
@@ -225,7 +224,7 @@ def _hold(joint: int, seed: Array, limits: Array, K: Array, q: Array) -> None:
 
 @inner
 def _settle(G: Array, seed: Array, limits: Array, K: Array, q: Array) -> None:
-    """Keep a branch inside limits and steps; each joint reduces the error that earlier joints leave."""
+    """Clip a branch to limits and steps; each joint reduces the error that earlier joints leave."""
     H = room(3, 4)
     _hold(FIRST, seed, limits, K, q)
     turned, x, y = _wrist(G, K, _get(K, FIRST, q), seed, H, q)
@@ -234,7 +233,7 @@ def _settle(G: Array, seed: Array, limits: Array, K: Array, q: Array) -> None:
     _put(K, SHOULDER, _shoulder(x, y, K[_UPPER], K[_FORE], elbow, near), q)
     _hold(SHOULDER, seed, limits, K, q)
     upper = _get(K, SHOULDER, q)
-    # The elbow points link b at the wanted position, from the actual end of link a.
+    # The elbow points link b from the actual end of link a to the wanted position.
     x, y = x - K[_UPPER] * math.cos(upper), y - K[_UPPER] * math.sin(upper)
     bent = _pointing(x, y, upper + _get(K, ELBOW, seed) + K[_BEND]) - upper - K[_BEND]
     _put(K, ELBOW, bent, q)
@@ -248,7 +247,7 @@ def _settle(G: Array, seed: Array, limits: Array, K: Array, q: Array) -> None:
 
 @inner
 def _is_met(G: Array, reached: Array, K: Array, q: Array) -> bool:
-    """Whether position and attitude of the tip are as wanted, in the directions that the arm controls."""
+    """Whether position and attitude of the tip are reached in the directions that the arm controls."""
     now, M, H = room(3, 4), room(3, 4), room(3, 4)
     _wanted(reached, K, now)
     off = 0.0

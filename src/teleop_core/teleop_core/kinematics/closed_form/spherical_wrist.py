@@ -3,9 +3,9 @@
 The last three axes meet in the wrist centre, whose position determines the first three joints. In the frame of axis 2,
 the height of the wrist centre and its distance from the origin do not change when joint 2 turns. This gives two
 equations in joints 1 and 3, linear in their sines and cosines. If axes 1 and 2, or 2 and 3, are parallel or meet, one
-equation contains only one of the joints. If they are skew, an equation of degree four remains. The remaining attitude
-determines the wrist. An arm whose first three axes meet in a point belongs to this class when treated from tip to
-base.
+equation contains only one of the joints. If these axes are skew, an equation of degree four remains. The remaining
+attitude determines the wrist. An arm whose first three axes meet in a point belongs to this class when it is described
+from tip to base.
 
 Source:
     Pieper 1968 (three axes that meet decouple); Elias and Wen 2022, sections on spherical wrists.
@@ -22,20 +22,20 @@ from teleop_core.kinematics.closed_form import candidates, subproblems
 
 _F1, _F2, _F3, _F4, _F5 = (37, 49, 61, 73, 85)
 RULE = 97
-"""Index, in the constants, of the rule of the arm's pair of equations; then follow B and a length."""
+"""Index in the constants of the rule that solves the arm's two equations; B and a length follow the rule."""
 _LEVEL, _SECOND, _COST, _TRIG = 3, 4, 5, 6
-# An arm's row: joints 1 and 3, whether it reaches, how many of its joints are known (0: one,
-# 1: both, 2: joint 2 too), joint 2, the least cost of its branches, cosine and sine of 1 and 3.
-_ALIGNED = 1e-10  # sine below which axes 4 and 6 count as one line, and joint 4 keeps its value
-_BARE = 1e-12  # distance [m] of tip and wrist centre that counts as zero
-_EVEN = 1e-9  # constant term of joint 5's equation that counts as zero
+# Row of an arm: joint 1, joint 3, whether the arm reaches the pose, which joints are known (0: one of these two, 1:
+# both, 2: also joint 2), joint 2, the least cost of the arm's branches, cosine and sine of joints 1 and 3.
+_ALIGNED = 1e-10  # below this sine, axes 4 and 6 count as one line, and joint 4 keeps its value
+_BARE = 1e-12  # a smaller distance of tip and wrist centre counts as zero [m]
+_EVEN = 1e-9  # a smaller constant term of joint 5's equation counts as zero
 
 
 @inner
 def _equations(G: Array, K: Array, A: Array, B: Array, h: Array) -> None:
     """Write the equations in joints 1 and 3 of a wrist centre, G's last column."""
     x, y, z, over = G[0, 3], G[1, 3], G[2, 3], K[RULE + 8]
-    m0, m1, m2 = K[_F1 + 2], K[_F1 + 6], K[_F1 + 10]  # axis 2 in frame 1, then its origin there
+    m0, m1, m2 = K[_F1 + 2], K[_F1 + 6], K[_F1 + 10]  # axis 2 in frame 1; the origin of axis 2 follows
     u0, u1, u2 = K[_F1 + 3], K[_F1 + 7], K[_F1 + 11]
     A[0, 0], A[0, 1] = m0 * x + m1 * y, m0 * y - m1 * x
     A[1, 0], A[1, 1] = -over * (u0 * x + u1 * y), -over * (u0 * y - u1 * x)
@@ -49,7 +49,7 @@ def _equations(G: Array, K: Array, A: Array, B: Array, h: Array) -> None:
 
 @inner
 def _joint2(G: Array, K: Array, arm: Array, seed: float) -> float:
-    """Joint 2 that rotates the wrist centre as given by joint 3 onto the one given by joint 1; seed if on its axis.
+    """Joint 2 that rotates the wrist centre of joint 3 to that of joint 1; the seed if the centre is on axis 2.
 
     Cosine and sine of joints 1 and 3 are stored in the arm's row.
     """
@@ -70,7 +70,7 @@ def _joint2(G: Array, K: Array, arm: Array, seed: float) -> float:
 
 @inner
 def _arm_cost(arm: Array, K: Array, seed: Array, limits: Array) -> float:
-    """Lower bound of the cost of all branches of an arm, from the known ones of its joints 1 to 3."""
+    """Lower bound of the cost of all branches of an arm, from those of its joints 1 to 3 that are known."""
     do_count, level = not math.isfinite(limits[2, 0]), arm[_LEVEL]
     cost = candidates.INEXACT if do_count and arm[2] < 0.5 else 0.0
     worst = 0.0
@@ -87,22 +87,22 @@ def _arm_cost(arm: Array, K: Array, seed: Array, limits: Array) -> float:
 
 @inner
 def middle_angle(M: Array, K: Array, at: int) -> tuple[float, float, float]:
-    """Base and spread [rad] of y in Rz(x) F Rz(y) F' Rz(z) = M, and 1.0 if that has a solution.
+    """Base and spread [rad] of y in Rz(x) F Rz(y) F' Rz(z) = M, and 1.0 if the equation has a solution.
 
-    F is at index ``at`` in the constants, F' follows it; only their rotations count.
+    F is at index ``at`` in the constants, and F' follows F; only the rotations of F and F' are used.
     """
     r0, r1, r2 = K[at + 8], K[at + 9], K[at + 10]
     a0, a1, a2 = K[at + 14], K[at + 18], K[at + 22]
     a, b, d = r0 * a0 + r1 * a1, r1 * a0 - r0 * a1, M[2, 2] - r2 * a2
     base, spread, is_exact = subproblems.one_angle(a, b, d, 0.0)
-    if abs(r2 * a2) < _EVEN:  # digits that 1 - cos² loses where axes x and z are nearly in line
+    if abs(r2 * a2) < _EVEN:  # 1 - cos² loses digits if axes x and z are nearly in line
         spread = math.atan2(math.sqrt(M[0, 2] * M[0, 2] + M[1, 2] * M[1, 2]), d)
     return base, spread, is_exact
 
 
 @inner
 def wrist_at(M: Array, K: Array, at: int, y: float, seed: float, angles: Array) -> None:
-    """Write x, y and z, of which y is known, into ``angles`` (3,); x is the seed if y leaves it undetermined.
+    """Write x, y and z for a known y into ``angles`` (3,); x is the seed if y leaves x undetermined.
 
     M, F and F' are those of :func:`middle_angle`.
     """
@@ -120,7 +120,7 @@ def wrist_at(M: Array, K: Array, at: int, y: float, seed: float, angles: Array) 
 
 @inner
 def wrist_angles(M: Array, K: Array, at: int, seed: float, angles: Array) -> tuple[float, float]:
-    """Write both solutions of :func:`middle_angle` into ``angles`` (2, 3).
+    """Write the two solutions x, y, z of the equation of :func:`middle_angle` into ``angles`` (2, 3).
 
     Returns:
         Half the difference [rad] of the two angles y, and 1.0 if they solve the equation.
@@ -164,12 +164,12 @@ def _attitude(G: Array, K: Array, arm: Array, M: Array, N: Array) -> None:
 
 @inner
 def _wrist(G: Array, K: Array, arm: Array, seed: Array, limits: Array, do_both: bool, q: Array) -> tuple[float, float]:
-    """Write both branches of an arm into q (2, 7).
+    """Write the two branches of an arm into q (2, 7).
 
-    Unless both are wanted, the branch whose joint 5 moves more is left out if it cannot be the better one.
+    Unless ``do_both``, the branch whose joint 5 moves more is left out if it cannot be the better one.
 
     Returns:
-        The wrist's least spread, and with free steps the smaller cost of both.
+        The wrist's least spread, and with free steps the smaller cost of the two branches.
     """
     M, N, angles = room(4, 7), room(4, 7), room(3)
     is_path, lowest = math.isfinite(limits[2, 0]), math.inf
@@ -208,9 +208,9 @@ def _wrist(G: Array, K: Array, arm: Array, seed: Array, limits: Array, do_both: 
 def _branches(T: Array, geometry: Array, seed: Array, limits: Array, do_all: bool, found: Array) -> tuple[int, float]:
     """Write branches into ``found`` (8, 7), and whether each reaches the pose.
 
-    Unless all branches are wanted, arms with the least moves come first, and arms that cannot be the best are left
-    out. With free steps these are arms that move more than a complete branch inside the limits. In a path they are all
-    arms after the first that reaches. The known joints of an arm give a lower bound of its move.
+    Unless all branches are wanted, arms with the least moves come first, and arms that cannot be the best are left out.
+    With free steps, these are arms that move more than a complete branch inside the limits. In a path, these are all
+    arms after the first arm that reaches the pose. The known joints of an arm give a lower bound of its move.
 
     Returns:
         Number of branches, and the least half difference [rad] of a wrist's two angles y.
@@ -251,7 +251,7 @@ def _branches(T: Array, geometry: Array, seed: Array, limits: Array, do_all: boo
 
 @inner
 def _held(K: Array, i: int, angle: float, seed: Array, limits: Array, q: Array) -> float:
-    """Write joint i of the closed form within limits and step; return its resulting angle [rad]."""
+    """Write joint i of the closed form, clipped to limits and step; return the resulting angle [rad]."""
     candidates.set_angle(K, 6, i, angle, q)
     place = candidates.joint_of(K, 6, i)
     turn(q, seed, limits, place, place + 1)
@@ -267,7 +267,7 @@ def _has_no_tool(K: Array) -> bool:
 
 @kernel
 def _settle(T: Array, seed: Array, limits: Array, geometry: Array, q: Array) -> None:
-    """Keep a branch inside limits and steps; each joint reduces the error that earlier joints leave."""
+    """Clip a branch to limits and steps; each joint reduces the error that earlier joints leave."""
     K, arm = geometry[candidates.constants_at(6) :], room(10)
     G, M, N, A, B, h = room(4, 4), room(4, 4), room(4, 7), room(2, 2), room(2, 2), room(2)
     candidates.wanted_motion(T, K, 6, M, G)
@@ -312,9 +312,9 @@ def ik(T: Array, seed: Array, limits: Array, geometry: Array, q: Array, residual
 
 @kernel
 def ik_all(T: Array, geometry: Array, solutions: Array) -> int:
-    """Write the branches (k, 6), at most eight, ignoring limits; return how many reach T.
+    """Write the branches (k, 6), at most eight, ignoring limits; return the number of branches that reach T.
 
-    On a singularity a free joint is set to zero, and branches may coincide.
+    At a singularity a free joint is set to zero, and branches may be equal.
     """
     found, limits, seed = room(8, 7), room(3, 6), room(6)
     candidates.forget(seed, limits)

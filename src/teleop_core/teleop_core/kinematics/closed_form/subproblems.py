@@ -3,7 +3,7 @@
 Every arm that decomposes leads to two kinds of equations. *One angle*: a cos x + b sin x = d, with two solutions
 (subproblems 1, 3 and 4 of Paden and Kahan). *A pair of angles*: two equations that are linear in (cos x, sin x) and in
 (cos y, sin y), with two to four pairs (subproblems 5 and 6). If an equation has no solution, the result is the angle
-that comes nearest, marked as not exact.
+with the smallest error, marked as not exact.
 
 Source:
     Murray, Li and Sastry 1994, section 3.3; Elias and Wen 2022, Canonical subproblems for robot
@@ -15,9 +15,9 @@ import math
 from teleop_core.kernels import Array, inner, kernel
 from teleop_core.kernels.room import room
 
-# Relative to its squared amplitude, an equation with at most this error counts as solved.
+# An equation whose error, divided by its squared amplitude, is not larger counts as solved.
 _SLACK = 1e-9
-# Amplitude below which an equation does not determine its angle; the angle is then the seed.
+# An equation with a smaller amplitude does not determine its angle; the angle is then the seed.
 _FREE = 1e-12
 _STEPS = 60  # largest number of steps of a bracketed Newton search
 
@@ -28,7 +28,7 @@ def one_angle(a: float, b: float, d: float, seed: float) -> tuple[float, float, 
 
     Returns:
         Base [rad], spread [rad] in [0, pi], and 1.0 if the angles solve the equation. Otherwise the last value is 0.0,
-        and both angles are the one that comes nearest. If a and b are zero, the base is the seed.
+        and the two angles are equal to the angle with the smallest error. If a and b are zero, the base is the seed.
     """
     square = a * a + b * b
     if square <= _FREE * _FREE:
@@ -41,7 +41,7 @@ def one_angle(a: float, b: float, d: float, seed: float) -> tuple[float, float, 
 
 @inner
 def turn_between(x0: float, y0: float, x1: float, y1: float, seed: float) -> float:
-    """Angle [rad] that rotates the direction of (x0, y0) into that of (x1, y1); the seed if one is zero."""
+    """Angle [rad] that rotates the direction of (x0, y0) to that of (x1, y1); the seed if a vector is zero."""
     if min(x0 * x0 + y0 * y0, x1 * x1 + y1 * y1) <= _FREE * _FREE:
         return seed
     return math.atan2(x0 * y1 - y0 * x1, x0 * x1 + y0 * y1)
@@ -49,7 +49,7 @@ def turn_between(x0: float, y0: float, x1: float, y1: float, seed: float) -> flo
 
 @inner
 def _value(p: Array, degree: int, t: float) -> tuple[float, float]:
-    """Value and slope of a polynomial; p[i] belongs to t^i."""
+    """Value and slope of a polynomial; p[i] is the coefficient of t^i."""
     value, slope = p[degree], 0.0
     for i in range(degree - 1, -1, -1):
         slope = slope * t + value
@@ -121,11 +121,11 @@ def _append(found: Array, count: int, angle: float, is_exact: float) -> int:
 def circle_roots(f: Array, work: Array, found: Array) -> int:
     """Angles x where f0 + f1 cos x + f2 sin x + f3 cos 2x + f4 sin 2x is 0, or nearly so.
 
-    Column 0 of ``found`` (4, 3) gets the angle, column 2 whether it is a root (1.0) or only an
-    extremum that does not reach 0 (0.0). ``work`` is memory, (7, 7).
+    The angle is written into column 0 of ``found`` (4, 3). Column 2 is 1.0 for a root, and 0.0 for an extremum that
+    does not reach 0. ``work`` (7, 7) is scratch memory.
 
     Returns:
-        How many, 0 to 4.
+        Number of angles, 0 to 4.
     """
     count, p = 0, work[6]
     size = abs(f[0]) + abs(f[1]) + abs(f[2]) + abs(f[3]) + abs(f[4])
@@ -168,9 +168,9 @@ def _beside(A: Array, B: Array, h: Array, rule: Array, x: float, seed: float) ->
 def open_pairs(A: Array, B: Array, h: Array, rule: Array, seeds: Array, pairs: Array) -> int:
     """Begin pairs with A (cos x, sin x) + B (cos y, sin y) = h: rows of ``pairs`` (4, 4 or more).
 
-    A row is x, y, whether the pair solves the equations (1.0), and 1.0 if both angles are written. Otherwise only one
-    angle is written, with one value in rows 0 and 1 and one in rows 2 and 3. :func:`close_pair` then writes the other
-    angle. So callers that need only one pair save the work for the others.
+    A row contains x, y, 1.0 if the pair solves the equations, and 1.0 if both angles are written. Otherwise only one
+    angle is written, with one value in rows 0 and 1, and another value in rows 2 and 3. :func:`close_pair` then writes
+    the other angle. So callers that need only one pair save the work for the other pairs.
 
     Args:
         A: Factors of x, (2, 2).
@@ -179,10 +179,10 @@ def open_pairs(A: Array, B: Array, h: Array, rule: Array, seeds: Array, pairs: A
         rule: Method (4,): 0 if B has a null vector, 1 if A has one, 2 if neither; the null vector, two numbers;
             and the row that remains for the second angle.
         seeds: Values of x and y to use if the equations leave them free (2,).
-        pairs: Written.
+        pairs: Resulting pairs; written.
 
     Returns:
-        Number of pairs; if none solves the equations, all of them are only nearest.
+        Number of pairs; if no pair solves the equations, the pairs are those with the smallest error.
     """
     if rule[0] > 1.5:
         return _skew(A, B, h, pairs)
@@ -198,7 +198,7 @@ def open_pairs(A: Array, B: Array, h: Array, rule: Array, seeds: Array, pairs: A
 
 @inner
 def close_pair(A: Array, B: Array, h: Array, rule: Array, seeds: Array, k: int, pairs: Array) -> None:
-    """Write the other angle of rows k and k + 1 of what :func:`open_pairs` began."""
+    """Write the other angle of rows k and k + 1 of pairs from :func:`open_pairs`."""
     if rule[0] < 0.5:
         base, spread, is_exact = _beside(A, B, h, rule, pairs[k, 0], seeds[1])
     else:
@@ -220,7 +220,7 @@ def _skew(A: Array, B: Array, h: Array, pairs: Array) -> int:
     u1 = over * (B[1, 0] * A[0, 0] - B[0, 0] * A[1, 0])
     v0 = over * (B[0, 1] * A[1, 1] - B[1, 1] * A[0, 1])
     v1 = over * (B[1, 0] * A[0, 1] - B[0, 0] * A[1, 1])
-    # The other angle's vector is g + u cos x + v sin x, of length 1.
+    # The vector of the other angle is g + u cos x + v sin x; its length is 1.
     uu, vv = u0 * u0 + u1 * u1, v0 * v0 + v1 * v1
     f[0] = g0 * g0 + g1 * g1 + 0.5 * (uu + vv) - 1.0
     f[1], f[2] = 2.0 * (g0 * u0 + g1 * u1), 2.0 * (g0 * v0 + g1 * v1)

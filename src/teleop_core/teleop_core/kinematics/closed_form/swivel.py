@@ -6,10 +6,10 @@ wrist has a given angle follow from an equation linear in cos psi and sin psi. S
 circle of psi exactly into arcs. Each arc, however narrow, is either completely legal or completely illegal. psi = 0 is
 the seed's posture. The solution is the legal psi nearest to 0 that keeps a margin to the ends of its arc.
 
-In a path the arm makes the least move that follows. The swivel moves back to its margin when a joint is near a limit.
-When instead the axes of shoulder or wrist become coplanar, the swivel moves slowly to the side where the
-manipulability of both grows, with the speed that the path leaves. This manipulability is the volume that the unit axes
-span.
+In a path the arm makes the least joint move that reaches the next pose. Near a joint limit, the swivel moves back to
+its margin. Otherwise, when the axes of shoulder or wrist become coplanar, the swivel moves slowly to the side where the
+manipulabilities of shoulder and wrist increase, with the speed that the path does not need. The manipulability here is
+the volume that the unit axes span.
 
 Source:
     Shimizu, Kakuya, Yoon, Kitagaki and Kosuge 2008, IEEE T-RO 24(5), sections on joint limits;
@@ -26,12 +26,13 @@ from teleop_core.kinematics.branches import BESIDE, cost_of, is_allowed, turn
 from teleop_core.kinematics.closed_form import candidates, spherical_wrist, swivel_arcs, swivel_families
 
 _SPEED = 0.3  # share of a joint's largest step with which psi moves back to its margin in a path
-_ROUNDS, _MORE_ROUNDS = 8, 40  # largest numbers of rounds of the search: for the least move, and if it is close
-_CLOSE = 1e-4  # squared weighted error: a limit on the path slows a search that would still converge
-_FLAT = 0.3  # volume of three unit axes below which manipulability counts
-_ASIDE = 1e-3  # psi [rad] to either side at which manipulability is compared
+_ROUNDS = 8  # largest number of rounds of the search for the least move
+_MORE_ROUNDS = 40  # largest number of further rounds if the error is close to zero
+_CLOSE = 1e-4  # squared weighted error that is close to zero: a joint limit only slows the convergence
+_FLAT = 0.3  # with a larger volume of the three unit axes, the manipulability is ignored
+_ASIDE = 1e-3  # the manipulabilities at psi plus and minus this angle are compared [rad]
 _GAIN = 200.0  # gain from the relative difference to the share of full speed
-_NONE = 1e-9  # sum of two manipulabilities that counts as zero
+_NONE = 1e-9  # a smaller sum of two manipulabilities counts as zero
 
 
 @inner
@@ -44,7 +45,7 @@ def _elbow_cost(fourth: float, K: Array, seed: Array, limits: Array, q: Array) -
 
 @inner
 def _write(S: Array, W: Array, psi: float, K: Array, seed: Array, M: Array, angles: Array, q: Array, k: int) -> float:
-    """Write joints of shoulder and wrist of branch k at psi into q (8,); return the least spread."""
+    """Write the joints of shoulder and wrist of branch k at psi into q (8,); return the least spread."""
     swivel_arcs.blend(S, psi, M)
     spread, is_exact = spherical_wrist.wrist_angles(
         M, K, swivel_families.F1, candidates.angle_of(K, 7, 0, seed), angles
@@ -168,8 +169,9 @@ def _width(q: Array, K: Array, i: int) -> float:
 def _urge(q: Array, seed: Array, limits: Array, K: Array) -> float:
     """Weight of the manipulability, from 0 to 1, continuous at both ends.
 
-    The weight is 0 if the axes are far from coplanar or pass through a plane, within the margin of a limit, or if a
-    joint needs all of its speed. A part of that speed is always needed by a hand with noisy readings.
+    The weight is 0 in four cases: the axes are far from coplanar; the axes pass through a plane; a joint is within the
+    margin of a limit; or a joint needs all of its speed. Noise of the hand's readings always needs a part of that
+    speed.
     """
     left, apart = 1.0, _room(q, limits) / swivel_arcs.MARGIN - 1.0
     for i in range(7):
@@ -183,7 +185,7 @@ def _urge(q: Array, seed: Array, limits: Array, K: Array) -> float:
 def _step_to_width(T: Array, seed: Array, limits: Array, geometry: Array, urge: float, found: Array, q: Array) -> None:
     """Move the swivel of a path to the side where manipulability grows, with a speed given by ``urge``.
 
-    For this no joint moves by more than a share of its step, and none leaves its step from the seed.
+    This motion uses only a share of each joint's step, and every joint stays within its step from the seed.
     """
     work, trial, near, K = room(60, 4), found[8], found[9, :7], geometry[candidates.constants_at(7) :]
     _branches(T, geometry, q, limits, False, found, work)
@@ -231,7 +233,7 @@ def ik(T: Array, seed: Array, limits: Array, geometry: Array, q: Array, residual
     reach, best = candidates.choose(found, count, posture, limits, K, least < BESIDE, q)
     if not is_free and reach == 2:
         _step_to_margin(seed, limits, K, work, found, best, q)
-    if is_free and candidates.move_of(q, seed) > most + candidates.BESIDE_SEED:  # a margin is not worth this move
+    if is_free and candidates.move_of(q, seed) > most + candidates.BESIDE_SEED:  # too large a move for a margin
         reach = 2
         for i in range(7):
             q[i] = near[i]
@@ -242,7 +244,8 @@ def ik(T: Array, seed: Array, limits: Array, geometry: Array, q: Array, residual
 def ik_all(T: Array, geometry: Array, solutions: Array) -> int:
     """Write one joint vector (k, 7) of each branch, at most eight, at the swivel nearest to that of the zero posture.
 
-    Limits are ignored. There are infinitely many more, by rotating the elbow about the line from shoulder to wrist.
+    Limits are ignored. Rotating the elbow about the line from shoulder to wrist gives infinitely many other joint
+    vectors.
     """
     found, work, seed, limits = room(8, 8), room(60, 4), room(7), room(3, 7)
     candidates.forget(seed, limits)

@@ -1,4 +1,4 @@
-"""Arcs of the swivel: where the limits of shoulder and wrist cut the circle of psi.
+"""Arcs of the swivel: the pieces into which the limits of shoulder and wrist cut the circle of psi.
 
 The psi at which a joint of a spherical shoulder or wrist has a given angle follow from an equation linear in cos psi
 and sin psi (:mod:`teleop_core.kinematics.closed_form.swivel`). At the limits these psi are cuts of the circle. Between
@@ -18,8 +18,8 @@ from teleop_core.kinematics.closed_form import candidates, spherical_wrist, subp
 MARGIN = 0.1
 """Margin of psi [rad] to the ends of its arc; at most a quarter of the arc."""
 ARCS = (8, 36)
-"""Shape of the memory of a cut circle: starts of the pieces, and which branches are legal in them."""
-_ENOUGH = 4.0 * MARGIN  # length [rad] from which on an arc has the full margin
+"""Shape of the memory of a cut circle: starts of the pieces, and the branches that are legal in each piece."""
+_ENOUGH = 4.0 * MARGIN  # an arc of at least this length has the full margin [rad]
 _SLACK = 1e-10  # rounding of a joint on its limit [rad]
 _UNKNOWN = -1.0
 
@@ -35,7 +35,7 @@ def blend(S: Array, psi: float, M: Array) -> None:
 
 @inner
 def _cut(a: float, b: float, d: float, edges: Array, count: int) -> int:
-    """Append the psi where a cos psi + b sin psi = d, if any; return the new count."""
+    """Append the solutions psi of a cos psi + b sin psi = d, if there are any; return the new count."""
     base, spread, is_exact = subproblems.one_angle(a, b, d, 0.0)
     if is_exact > 0.5 and a * a + b * b > 1e-20:
         edges[count], edges[count + 1] = wrapped(base + spread), wrapped(base - spread)
@@ -45,7 +45,7 @@ def _cut(a: float, b: float, d: float, edges: Array, count: int) -> int:
 
 @inner
 def _cuts(S: Array, K: Array, at: int, i: int, limits: Array, edges: Array, count: int) -> int:
-    """Append the psi where joints i, i + 1 or i + 2 meet a limit, or lose a solution."""
+    """Append the psi at which joint i, i + 1 or i + 2 reaches a limit, or a solution disappears."""
     r0, r1, r2 = K[at + 8], K[at + 9], K[at + 10]
     e0, e1 = r0 * K[at + 14] + r1 * K[at + 18], r1 * K[at + 14] - r0 * K[at + 18]
     even, size = r2 * K[at + 22], math.hypot(e0, e1)
@@ -109,7 +109,7 @@ def cut_circle(S: Array, W: Array, K: Array, limits: Array, arcs: Array) -> None
 
 @inner
 def _edge(arcs: Array, j: int) -> float:
-    """Psi [rad] where piece j begins; j may run one full circle beyond either end."""
+    """Psi [rad] at which piece j begins; j may be outside 0 to count - 1 by up to one full circle."""
     count = int(arcs[2, 0])
     if j < 0:
         return arcs[0, j + count] - 2.0 * math.pi
@@ -144,10 +144,10 @@ def _nearest(low: float, high: float) -> float:
 
 @kernel
 def swivel_of(branch: int, S: Array, W: Array, K: Array, seed: Array, limits: Array, arcs: Array) -> float:
-    """Psi [rad] of a branch next to 0 in its legal arcs; infinity where no arc is legal.
+    """Psi [rad] of a branch nearest to 0 in its legal arcs; infinity if no arc is legal.
 
-    ``arcs`` is what :func:`cut_circle` wrote. Pieces are tested from psi = 0 outwards, until all remaining pieces are
-    farther away than the answer. An arc is followed until its margin is certain.
+    ``arcs`` is the result of :func:`cut_circle`. Pieces are tested from psi = 0 outwards, until all remaining pieces
+    are farther away than the answer. Neighbouring pieces of an arc are tested until its margin is certain.
     """
     count, psi = int(arcs[2, 0]), math.inf
     up = count - 1

@@ -1,8 +1,8 @@
-"""Families of rotations of a swivel: those of the shoulder, and of the wrist, over the angle psi.
+"""Families of rotations of a swivel: rotations of the shoulder, and of the wrist, as functions of psi.
 
-An arm of seven axes with a spherical shoulder and wrist holds its tip while its elbow turns about
-the line between the two (:mod:`teleop_core.kinematics.closed_form.swivel`). Then the rotation of the
-shoulder is P cos psi + Q sin psi + N, and that of the wrist another of this kind.
+An arm of seven axes with a spherical shoulder and wrist can turn its elbow about the line between shoulder and wrist
+while its tip does not move (:mod:`teleop_core.kinematics.closed_form.swivel`). Then the rotation of the shoulder is P
+cos psi + Q sin psi + N. The rotation of the wrist has the same form with other matrices.
 
 Source:
     Shimizu, Kakuya, Yoon, Kitagaki and Kosuge 2008, IEEE T-RO 24(5), section on the arm angle.
@@ -30,7 +30,7 @@ def turned_about_z(K: Array, at: int, q: float, M: Array, out: Array) -> None:
 
 @inner
 def elbow_of(G: Array, K: Array, seed: float) -> tuple[float, float, float]:
-    """Base and spread of joint 4 [rad], and 1.0 if the arm reaches that far."""
+    """Base and spread of joint 4 [rad], and 1.0 if the arm reaches the distance."""
     k0 = K[F3] * K[F3 + 3] + K[F3 + 4] * K[F3 + 7] + K[F3 + 8] * K[F3 + 11]
     k1 = K[F3 + 1] * K[F3 + 3] + K[F3 + 5] * K[F3 + 7] + K[F3 + 9] * K[F3 + 11]
     k2 = K[F3 + 2] * K[F3 + 3] + K[F3 + 6] * K[F3 + 7] + K[F3 + 10] * K[F3 + 11]
@@ -43,7 +43,7 @@ def elbow_of(G: Array, K: Array, seed: float) -> tuple[float, float, float]:
 
 @inner
 def _least_turn(v: Array, p: Array, A: Array, out: Array) -> None:
-    """Write the least rotation that turns the direction of A v into that of p, times A."""
+    """Write R A, where R is the smallest rotation of the direction of A v to the direction of p."""
     a, size, other = room(3), 0.0, 0.0
     for i in range(3):
         a[i] = A[i, 0] * v[0] + A[i, 1] * v[1] + A[i, 2] * v[2]
@@ -64,7 +64,7 @@ def _least_turn(v: Array, p: Array, A: Array, out: Array) -> None:
 
 @inner
 def families(G: Array, K: Array, fourth: float, A: Array, work: Array, S: Array, W: Array) -> None:
-    """Write P, Q, N of the shoulder's rotation into S (9, 3), those of the wrist's into W.
+    """Write P, Q, N of the shoulder's rotation into S (9, 3), and those of the wrist's rotation into W (9, 3).
 
     ``A`` is the shoulder's rotation at the seed; ``work`` (12, 3) is scratch memory.
     """

@@ -1,1 +1,1 @@
-"""Arms by name and by table: Denavit-Hartenberg tables, those of textbooks, the RCRT-1."""
+"""Arms by name and by table: Denavit-Hartenberg tables, textbook arms, and the RCRT-1."""

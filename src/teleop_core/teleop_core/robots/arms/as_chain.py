@@ -1,4 +1,4 @@
-"""Chains: serial arms of any origin as one chain of links, as drawn and as built."""
+"""Chains: serial arms from any source, converted to a chain of links, as drawn and as built."""
 
 import math
 from typing import Any
@@ -14,7 +14,7 @@ from teleop_core.robots.robot import Robot
 
 
 def chain_of(robot: Robot) -> Chain | None:
-    """The robot as a chain; None if it is not a chain: a parallel robot, or one with followers."""
+    """The robot as a chain; None for a parallel robot, and for a robot with followers."""
     if "motions" in robot.geometry:
         return None
     if robot.kernels.fk is rcrt1.fk:
@@ -37,7 +37,7 @@ def true_chain(robot: Robot, errors: LinkErrors) -> Array | None:
         errors: Errors of its n links.
 
     Returns:
-        The row, a new array, on which ``dh_kernels.fk`` takes the robot's own joint vectors; None for robots that are
+        The row, a new array. With it, ``dh_kernels.fk`` takes the robot's own joint vectors. None for a robot that is
         not a chain.
 
     Raises:

@@ -1,6 +1,6 @@
 """Denavit-Hartenberg chains from a table: standard, modified and Sheth-Uicker, as robots.
 
-A table is YAML, one row per link, written as in a textbook with ``q`` in the place of the joint variable::
+A table is YAML, one row per link, written as in a textbook, with ``q`` for the joint variable::
 
     name: scara
     convention: modified        # alpha, a: of the link before; standard: of the link itself
@@ -11,10 +11,10 @@ A table is YAML, one row per link, written as in a textbook with ``q`` in the pl
       - {a: 0.3, d: -q, lower: 0.0, upper: 0.2, name: d3}
       - {theta: q - 90}
 
-Entries that are left out are 0. A row without ``q`` is a fixed frame, such as a tool. Turning joints without limits
-have ±180 degrees; sliding ones must state theirs. ``home`` is the posture of the published or natural zero. ``start``
-is the posture at which sessions start; joints without ``start`` use ``home``. If no row has a ``start``, a posture
-with room in all directions is searched (:mod:`teleop_core.robots.freedom`).
+Entries that are left out are 0. A row without ``q`` is a fixed frame, such as a tool. Turning joints without limits get
+±180 degrees; sliding joints must state their limits. ``home`` is the posture of the published or natural zero.
+``start`` is the posture at which sessions start; joints without ``start`` use ``home``. If no row has a ``start``, a
+posture with room in all directions is searched (:mod:`teleop_core.robots.freedom`).
 
 Every chain can be a slave. Its drives are described, joint by joint, in a separate section::
 
@@ -22,14 +22,14 @@ Every chain can be a slave. Its drives are described, joint by joint, in a separ
       q1: {inertia: 0.6, speed_limit: 200, effort_limit: 60}
       d3: {inertia: 6.0, speed_limit: 1.0}
 
-The entries are those of :class:`~teleop_core.robots.drives.Drives`: ``speed_limit``, ``friction_speed`` (per second)
-and ``encoder_step`` of turning joints are in the table's unit of angles, all others in SI units (N·m·s/rad, rad/s).
-Missing entries are assumed (:mod:`teleop_core.robots.arms.dh_drives`), and ``Robot.drives.assumed`` names them. Axes
-are independent of each other, and gravity counts as balanced.
+The entries are those of :class:`~teleop_core.robots.drives.Drives`: For turning joints, ``speed_limit``,
+``friction_speed`` (per second) and ``encoder_step`` are in the table's unit of angles. All other entries are in SI
+units (N·m·s/rad, rad/s). Missing entries are assumed (:mod:`teleop_core.robots.arms.dh_drives`), and
+``Robot.drives.assumed`` names them. The axes have no dynamic coupling, and gravity counts as balanced.
 
 Source:
-    Denavit and Hartenberg 1955 (standard, also distal); Craig 2005 (modified, proximal); Sheth
-    and Uicker 1971, in the order that reproduces the other two.
+    Denavit and Hartenberg 1955 (standard, also distal); Craig 2005 (modified, proximal); Sheth and Uicker 1971, with
+    the order of motions that includes the other two conventions as special cases.
 """
 
 import math
@@ -151,7 +151,7 @@ def _joint(number: int, row: Mapping[str, Any], symbol: str, sign: float, scale:
 
 
 def _number(name: str, value: Any, kind: str) -> float:
-    """Length [m] or angle, whose range in radians holds for degrees as well."""
+    """Length [m] or angle; the bounds of angles in radians are used for degrees too."""
     if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
         raise ParameterError(name, value, "a finite number")
     return check(name, float(value), "rad" if kind == "turn" else "m", MOST_OF_ARM)

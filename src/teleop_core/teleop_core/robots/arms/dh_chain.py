@@ -1,4 +1,4 @@
-"""Denavit-Hartenberg chains as values: rows in one convention, and the robot they make."""
+"""Denavit-Hartenberg chains as values: rows in one convention, and the robot that is made from the rows."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ from teleop_core.robots.drives import Drives
 from teleop_core.robots.dynamics.followers import Followers
 from teleop_core.robots.robot import Robot
 
-# Elementary motions of one row, left to right: kind of motion, its axis, and its symbol.
+# Elementary motions of one row, from left to right. Each has a kind of motion, an axis and a symbol.
 CONVENTIONS = {
     "standard": (("turn", "z", "theta"), ("slide", "z", "d"), ("slide", "x", "a"), ("turn", "x", "alpha")),
     "modified": (("turn", "x", "alpha"), ("slide", "x", "a"), ("turn", "z", "theta"), ("slide", "z", "d")),
@@ -32,7 +32,7 @@ CONVENTIONS = {
 
 @dataclass(frozen=True, kw_only=True)
 class DhJoint:
-    """Joint of a row: its symbol is ``sign * q`` plus the row's constant; limits [rad or m]."""
+    """Joint of a row. The value of its symbol is ``sign * q`` plus the row's constant; limits in [rad or m]."""
 
     name: str
     symbol: str
@@ -45,7 +45,7 @@ class DhJoint:
 
 @dataclass(frozen=True, kw_only=True)
 class DhRow:
-    """One row: constants by symbol [rad, m], and the joint if it has one."""
+    """One row: constants by symbol [rad, m], and the joint if the row has a joint."""
 
     constants: Mapping[str, float]
     joint: DhJoint | None = None
@@ -56,8 +56,8 @@ class DhTable:
     """A chain: rows in one convention, from the base to the tip.
 
     ``task`` names the directions of :data:`DIRECTIONS` that the arm controls, in base axes; errors in the other
-    directions appear in the residual. ``drives`` contains, for each joint, the given entries of its drive [SI]; it is
-    empty if no joint has any.
+    directions appear in the residual. ``drives`` contains, for each joint, the given entries of its drive [SI];
+    ``drives`` is empty if no entry is given.
     """
 
     name: str
@@ -68,7 +68,7 @@ class DhTable:
 
     @property
     def joints(self) -> tuple[DhJoint, ...]:
-        """Joints from the base to the tip; their number is the chain's degrees of freedom."""
+        """Joints from the base to the tip; one per degree of freedom of the chain."""
         return tuple(row.joint for row in self.rows if row.joint)
 
     @property
@@ -86,8 +86,8 @@ class DhTable:
             (rows, 4, 4); their product from left to right is ``T_base_tip``.
 
         Raises:
-            ShapeError: Another shape.
-            ParameterError: NaN or infinity.
+            ShapeError: The shape of ``q`` is not (n,).
+            ParameterError: ``q`` contains NaN or infinity.
         """
         values = checked_array("q", q, (len(self.joints),))
         if values.ndim != 1:
@@ -104,11 +104,11 @@ class DhTable:
         return out
 
     def robot(self, geometry: Mapping[str, float] = MappingProxyType({}), drives: Drives | None = None) -> Robot:
-        """The chain as a robot, which can be a slave; in closed form if its axes allow it.
+        """The chain as a robot, which can be a slave; its inverse kinematics are in closed form if the axes allow it.
 
         Args:
-            geometry: Symbols and values that the robot shows; none for those of its row.
-            drives: Drive table in place of the table's own.
+            geometry: Symbols and values that the robot shows; None for the symbols of its row.
+            drives: Drive table that replaces the table's own.
         """
         kinds, fixed, reach = self._frames()
         stated = self.drives or ({},) * len(self.joints)
@@ -157,15 +157,15 @@ def chain_robot(
 
     Args:
         name: Name of the robot.
-        joints: From the base to the tip; names, limits, home and start count.
-        kinds: For each motion 1 for a turn, 2 for a slide; negative against its axis.
+        joints: Joints from the base to the tip; their names, limits, home and start are used.
+        kinds: Kind of each motion: 1 for a rotation, 2 for a translation; negative if it goes against its axis.
         fixed: Transforms (4, 4) before, between and after the motions, one more than motions.
-        reach: Length [m] that weighs distances against angles; 0 means 1 m.
+        reach: Length [m] that relates distances to angles in the inverse kinematics; 0 means 1 m.
         task: Directions that the arm controls, of :data:`DIRECTIONS`.
         drives: Drive table.
         solution: Text about the method of inverse kinematics.
         followers: How the motions follow the joints; None if each motion is a joint.
-        geometry: Symbols and values [m, rad] that the robot shows; none for those of its row.
+        geometry: Symbols and values [m, rad] that the robot shows; None for the symbols of its row.
     """
     weights = {
         "reach": reach if reach > 0.0 else 1.0,
@@ -209,5 +209,5 @@ def elementary(kind: str, axis: str, amount: float) -> Array:
 
 
 def kinds_of(convention: str) -> dict[str, str]:
-    """Symbols of a row, and whether each is a "turn" or a "slide"."""
+    """Symbols of a row in a convention, and the kind of motion of each: "turn" or "slide"."""
     return {symbol: kind for kind, _, symbol in CONVENTIONS[convention]}

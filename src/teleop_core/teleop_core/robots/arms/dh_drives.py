@@ -1,7 +1,7 @@
 """Drives of a table or file: the given values of each joint; missing values are assumed.
 
-Missing values of a joint are assumed as for a small laboratory arm, and in proportion to the joint's inertia. So
-friction stays within what the simulation can resolve.
+Missing values of a joint are those of a small laboratory arm, in proportion to the joint's inertia. So the simulation
+can resolve the assumed friction.
 """
 
 import math
@@ -16,7 +16,7 @@ from teleop_core.base import ParameterError, UnknownNameError, damage_told, plai
 from teleop_core.base.ranges import check
 from teleop_core.robots.drives import ENTRIES, MAY_BE_ZERO, Drives
 
-# All assumed, [rad, N·m, s] of turning joints, [m, N, s] of sliding ones.
+# All values are assumed, in [rad, N·m, s] for turning joints and in [m, N, s] for sliding joints.
 _INERTIA = {"turn": 0.1, "slide": 2.0}
 _SPEEDS = {
     "turn": {"friction_speed": 0.01, "speed_limit": 2.0, "encoder_step": 2e-5, "bandwidth": 60.0},
@@ -32,11 +32,11 @@ _UNITS = {
     "slide": {"inertia": "kg", "viscous": "N·s/m", "coulomb": "N", "friction_speed": "m/s",
               "effort_limit": "N", "speed_limit": "m/s", "encoder_step": "m"},
 }  # fmt: skip
-# Shares of the effort: dry friction, and viscous friction at the largest speed.
+# Largest assumed friction, divided by the effort limit; for viscous friction, at the largest speed.
 _MOST_ASSUMED = {"coulomb": 0.1, "viscous": 0.5}
 _OF_POSITION = ("friction_speed", "speed_limit", "encoder_step")  # entries in the table's unit of angles
 _FASTEST = {"bandwidth": 500.0}  # [rad/s], the largest that the 1 kHz control allows
-# Largest rate [1/s] at which friction may stop a joint: two integration steps a millisecond can follow it.
+# Largest rate [1/s] at which friction may slow a joint; the integration, with two steps per millisecond, resolves it.
 _STIFFEST = 2000.0
 
 
@@ -66,16 +66,16 @@ def drives_of(kinds: Sequence[str], stated: Sequence[Mapping[str, float]]) -> Dr
 
 
 def least_inertia(kind: str, viscous: float, coulomb: float) -> float:
-    """Inertia [kg·m² or kg] that a drive needs so that its friction is not too stiff.
+    """Smallest inertia [kg·m² or kg] of a drive with which its friction is not too stiff for the simulation.
 
     Args:
         kind: "turn" or "slide".
-        viscous: Viscous friction [N·m·s/rad or N·s/m]; 0 if it will be assumed.
-        coulomb: Dry friction [N·m or N], at the assumed ``friction_speed``; 0 if it will be assumed.
+        viscous: Viscous friction [N·m·s/rad or N·s/m]; 0 if this value will be assumed.
+        coulomb: Dry friction [N·m or N], at the assumed ``friction_speed``; 0 if this value will be assumed.
     """
     slow, assumed = _SPEEDS[kind]["friction_speed"], _PER_INERTIA[kind]
     rate = (0.0 if viscous else assumed["viscous"]) + (0.0 if coulomb else assumed["coulomb"]) / slow
-    # A little more, because the check of the rate divides by it again.
+    # The result is slightly larger than needed, because rounding in the check of the rate could refuse it.
     return 1.001 * (viscous + coulomb / slow) / (_STIFFEST - rate)
 
 
@@ -96,12 +96,12 @@ def parse_drives(content: Any, names: Sequence[str], kinds: Sequence[str], unit:
     Args:
         content: Mapping of joint names to mappings of entries; None when there is no section.
         names: Names of the joints, in order.
-        kinds: "turn" or "slide" for each.
-        unit: Radians in the table's unit of angles.
+        kinds: "turn" or "slide" for each joint.
+        unit: The table's unit of angles in radians.
 
     Raises:
-        UnknownNameError: A joint or an entry that does not exist.
-        ParameterError: A value that is not possible.
+        UnknownNameError: A joint or an entry does not exist.
+        ParameterError: A value is impossible.
     """
     stated = _entries(content, names, kinds, unit)
     for name, kind, own in zip(names, kinds, stated, strict=True):

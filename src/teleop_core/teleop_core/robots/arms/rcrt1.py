@@ -1,8 +1,8 @@
 """RCRT-1: the R-R-P-R-R-R slave with a spherical wrist, reach 458 mm.
 
-Standard Denavit-Hartenberg table (the source heads its columns as if modified): alpha = -90, 90,
-0, -90, 90, 0 degrees, d = 0, d2, d3, 0, 0, L6. With R2 = Rz(q1) Ry(q2) and
-R = R2 Rz(q4) Ry(q5) Rz(q6) the tip is at R2 (0, d2, d3) + L6 R z.
+Standard Denavit-Hartenberg table (the source labels its columns as if it were modified): alpha = -90, 90, 0, -90, 90, 0
+degrees, d = 0, d2, d3, 0, 0, L6. With R2 = Rz(q1) Ry(q2) and R = R2 Rz(q4) Ry(q5) Rz(q6) the tip is at R2 (0, d2, d3) +
+L6 R z.
 
 Source:
     Vongbunyong 2008, sections 3.3, 4.4, 4.5, 6.3 and tables 3.6, 6.2; misprints corrected.
@@ -31,13 +31,13 @@ HOME = np.array([0.0, 113.4 * _DEGREES, 0.421, 0.0, 0.0, 0.0])
 # Result of :func:`teleop_core.robots.freedom.start_posture` for the published lengths, rounded.
 START = np.array([-0.7622, 1.7058, 0.3445, 1.1233, 0.7795, -1.3396])
 
-# Below this sine the wrist axes 4 and 6 count as one line and joint 4 keeps its value: rounding
-# in T (1e-16) turned by 1/sine stays under 1e-6 rad.
+# Below this sine the wrist axes 4 and 6 count as one line, and joint 4 keeps its value. Rounding in T (1e-16), divided
+# by this sine, then changes joint 4 by less than 1e-6 rad.
 _COLLINEAR = 1e-10
-# Sine of joint 5, and wrist distance over full reach, under which small moves need large joint
-# moves (more than 50 rad of joint per rad of tool).
+# Below this sine of joint 5, or this wrist distance divided by the full reach, small moves of the tool need large moves
+# of the joints: more than 50 rad of joint per rad of tool.
 _NEAR = 0.02
-_REACH = 0.421
+_REACH = 0.421  # full reach of the wrist [m]
 _FOLLOWED, _LIMITED = int(IkStatus.FOLLOWED), int(IkStatus.LIMITED)
 _NEAR_SINGULAR, _UNREACHABLE = int(IkStatus.NEAR_SINGULAR), int(IkStatus.UNREACHABLE)
 
@@ -54,7 +54,7 @@ def fk(q: Array, geometry: Array, T: Array) -> None:
     c4, s4 = math.cos(q[3]), math.sin(q[3])
     c5, s5 = math.cos(q[4]), math.sin(q[4])
     c6, s6 = math.cos(q[5]), math.sin(q[5])
-    # Columns of Rz(q6), turned into the base one by one.
+    # The columns of Rz(q6) are rotated into the base one by one.
     u, v, w = c6, s6, 0.0
     for column in range(3):
         f, z = c5 * u + s5 * w, c5 * w - s5 * u
@@ -93,7 +93,7 @@ def jacobian(q: Array, geometry: Array, J: Array) -> None:
     axes[5] = (T[0, 2], T[1, 2], T[2, 2])
     for j in range(6):
         a = axes[j]
-        # Joints 1 and 2 turn the tip about the base origin, the wrist joints about its centre.
+        # Joints 1 and 2 rotate the tip about the origin of the base; the wrist joints rotate it about the wrist centre.
         x, y, z = T[0, 3], T[1, 3], T[2, 3]
         if j > 2:
             x, y, z = L6 * T[0, 2], L6 * T[1, 2], L6 * T[2, 2]
@@ -107,9 +107,9 @@ def jacobian(q: Array, geometry: Array, J: Array) -> None:
 
 @inner
 def _arm_branch(T: Array, geometry: Array, is_front: bool, seed: float, arm: Array) -> bool:
-    """Write q1, q2, d3 (3,) of one arm branch; return whether the wrist centre can be reached at all.
+    """Write q1, q2, d3 (3,) of one arm branch; return whether the arm can reach the wrist centre.
 
-    If the wrist centre is on the axis of joint 1, every q1 is a solution, and the seed's is kept.
+    If the wrist centre is on the axis of joint 1, every q1 is a solution, and the q1 of the seed is kept.
     """
     L6, d2 = geometry[0], geometry[1]
     x, y, z = T[0, 3] - L6 * T[0, 2], T[1, 3] - L6 * T[1, 2], T[2, 3] - L6 * T[2, 2]
@@ -154,7 +154,7 @@ def _joint6(M: Array, c4: float, s4: float, c5: float, s5: float) -> float:
 
 @inner
 def _wrist(M: Array, seed: float, q: Array) -> None:
-    """Write joints 4 to 6 of the branch with sin(q5) >= 0; joint 4 is the seed if it is zero."""
+    """Write joints 4 to 6 of the branch with sin(q5) >= 0; if sin(q5) is zero, joint 4 keeps the seed's value."""
     s5 = math.sqrt(M[0, 2] * M[0, 2] + M[1, 2] * M[1, 2])
     if s5 > _COLLINEAR:
         q[3], c4, s4 = math.atan2(M[1, 2], M[0, 2]), M[0, 2] / s5, M[1, 2] / s5
@@ -166,7 +166,7 @@ def _wrist(M: Array, seed: float, q: Array) -> None:
 
 @inner
 def _share_roll(M: Array, limits: Array, q: Array) -> None:
-    """With axes 4 and 6 in line, let joint 4 make the part of the roll that joint 6 cannot make."""
+    """With axes 4 and 6 in line, joint 4 makes the part of the roll that joint 6 cannot make because of its limits."""
     if M[0, 2] * M[0, 2] + M[1, 2] * M[1, 2] > _COLLINEAR * _COLLINEAR:
         return
     low, high = limits[0, 5], limits[1, 5]
@@ -181,16 +181,16 @@ def _share_roll(M: Array, limits: Array, q: Array) -> None:
 
 @inner
 def _flip(q: Array) -> None:
-    """Turn joints 4 to 6 to the other wrist branch, which reaches the same pose."""
+    """Change joints 4 to 6 to the other wrist branch, which reaches the same pose."""
     q[3], q[4], q[5] = wrapped(q[3] + math.pi), -q[4], wrapped(q[5] + math.pi)
 
 
 @inner
 def _choose(T: Array, seed: Array, limits: Array, geometry: Array, M: Array, q: Array) -> bool:
-    """Write the best of the four branches; return whether the wrist centre can be reached at all.
+    """Write the best of the four branches; return whether the arm can reach the wrist centre.
 
-    The wrist of the rear arm branch is solved only if that branch can still be the best. A path never changes to that
-    branch; there the wrist is solved from the position that the arm can reach.
+    The wrist of the rear arm branch is solved only if that branch can still be the best. A path never changes to the
+    rear branch. In a path, the wrist is solved from the position that the arm can reach.
     """
     best, is_reachable, trial = math.inf, True, room(6)
     is_path = math.isfinite(limits[2, 0])
@@ -219,10 +219,10 @@ def _choose(T: Array, seed: Array, limits: Array, geometry: Array, M: Array, q: 
 
 @inner
 def _settle(T: Array, seed: Array, limits: Array, M: Array, q: Array) -> None:
-    """Keep a branch inside limits and steps; each wrist joint reduces the error that earlier joints leave.
+    """Clamp a branch to limits and steps; each wrist joint reduces the error that earlier joints leave.
 
-    In a path joint 4 slows down towards the wrist singularity, because noise of the pose would turn it at full speed
-    there. When its axis is in line with that of joint 6, joint 4 rests.
+    In a path, joint 4 slows down towards the wrist singularity, because noise of the pose would rotate it at full speed
+    there. When the axes of joints 4 and 6 are in line, joint 4 does not move.
     """
     for i in range(3):
         hold(q, i, seed, limits)
@@ -243,17 +243,17 @@ def _settle(T: Array, seed: Array, limits: Array, M: Array, q: Array) -> None:
 def ik(T: Array, seed: Array, limits: Array, geometry: Array, q: Array, residual: Array) -> int:
     """Write joints (6,) for ``T_base_tip``; see :class:`teleop_core.robots.robot.Kernels`.
 
-    If a limit or step holds a joint back, the joints after it reduce the error that results. The wrist turns the tool
-    as wanted from the position that the arm has reached; joints 5 and then 6 use the angle that joint 4 has reached.
-    At the wrist singularity joint 4 lags, joint 5 passes through zero and changes its sign, and motion goes on at the
-    other side.
+    If a limit or the largest step stops a joint, the later joints reduce the resulting error. The wrist rotates the
+    tool to the wanted attitude, from the position that the arm has reached. Joint 5, and then joint 6, are computed
+    from the angle that joint 4 has reached. At the wrist singularity joint 4 lags, joint 5 passes through zero and
+    changes its sign, and the motion continues.
 
     Source:
         Vongbunyong 2008, eqs. 4.5.1-4.5.9, atan2 throughout, and its rule for q5 = 0.
     """
     if not is_askable(T, seed):
         return -1
-    reached = room(4, 4)  # until the end, its rotation part is the rotation left to the wrist
+    reached = room(4, 4)  # until the end, its rotation part is the rotation that remains for the wrist
     is_reachable = _choose(T, seed, limits, geometry, reached, q)
     is_slowed = abs(q[4]) < _NEAR and math.isfinite(limits[2, 3])
     if is_slowed or not is_allowed(q, seed, limits):
@@ -269,7 +269,7 @@ def ik(T: Array, seed: Array, limits: Array, geometry: Array, q: Array, residual
 def ik_all(T: Array, geometry: Array, solutions: Array) -> int:
     """Write the four branches (4, 6), front arm first, wrist not flipped first; return their number.
 
-    On a singularity a free joint is set to zero, and branches may coincide.
+    At a singularity a free joint is set to zero, and branches may be equal.
     """
     M = room(3, 3)
     for arm in range(2):

@@ -1,7 +1,7 @@
 """Dynamics of the RCRT-1: closed form for the first three axes, drive table for all six.
 
-The wrist is dominated by its motors: its axes are independent inertias, and link 3 carries it.
-Numbers that the source does not print (friction, motor inertia of the wrist) are marked *assumed*.
+The wrist is dominated by its motors. Its axes are independent inertias, and its mass is part of link 3. Numbers that
+the source does not print (friction, motor inertia of the wrist) are marked *assumed*.
 
 Table A.1 states no sign convention for the products of inertia, and no single convention is possible for all links.
 The numbers of link 1 are possible only as -∫yz dm (the other sign needs a principal moment of -0.018 kg·m²). Those of
@@ -24,13 +24,13 @@ from teleop_core.kernels.room import room
 from teleop_core.robots import drives, inertias
 
 # Symbols as in the source: moments about the link-frame origins [kg·m²], centres of mass G [m].
-# Published (table A.1); products as +∫xy dm, signs derived as said above.
+# Published (table A.1); products as +∫xy dm, signs derived as described at the top.
 LINKS = {
     "I1yy": 0.012, "I2xx": 0.011, "I2yy": 0.013, "I2zz": 0.004,
     "I2xy": 6.778e-4, "I2xz": 3.0e-3, "I2yz": 2.24e-4,
     "I3xx": 0.061, "I3yy": 0.061, "I3zz": 5.378e-4, "I3xz": -3.0e-3,
     "m2": 1.704, "m3": 0.789, "G2x": 0.031842, "G2z": 0.03594, "G3x": 0.014664, "G3z": -0.264245,
-    "m2b_L0b": 0.0,  # static moment of the four-bar's link 2b [kg·m], not given
+    "m2b_L0b": 0.0,  # static moment of the four-bar's link 2b [kg·m], not published
     # Reflected motor inertias: the source prints 81.6 without a unit; the unit of the catalogue is 1e-3 kg·m².
     "J1": 0.0816, "J2": 0.0816,
     "J3": 6.627e-7 * (2.0 * math.pi / 1e-3) ** 2,  # motor and screw through a 1 mm lead [kg]
@@ -48,7 +48,7 @@ _M2B, _J1, _G = _ORDER["m2b_L0b"], _ORDER["J1"], _ORDER["g"]
 
 
 def link_row(**symbols: float) -> Array:
-    """Parameter row of the kernels: :data:`LINKS` with the given symbols in their place."""
+    """Parameter row of the kernels: :data:`LINKS`, with the values of the given symbols replaced."""
     return np.array(list({**LINKS, **symbols}.values()), dtype=np.float64)
 
 
@@ -100,8 +100,8 @@ def inertia_matrix(q: Array, p: Array, D: Array) -> None:
     """Write the inertia (3, 3) of axes 1-3, reflected motors included.
 
     Source:
-        Vongbunyong 2008, eqs. 4.6.1-4.6.3, derived again with Ixy and Iyz of link 2, which alone
-        make D12; D13 = 0 for this geometry.
+        Vongbunyong 2008, eqs. 4.6.1-4.6.3, derived again with Ixy and Iyz of link 2. D12 depends on these two products
+        alone; D13 = 0 for this geometry.
     """
     s2, c2, d3 = math.sin(q[1]), math.cos(q[1]), q[2]
     reach = p[_M3] * d3 * (d3 + 2.0 * p[_G3Z])
@@ -155,7 +155,7 @@ def gravity_effort(q: Array, p: Array, c: Array) -> None:
 def acceleration(q: Array, dq: Array, effort: Array, p: Array, ddq: Array) -> None:
     """Write joint accelerations (6,) under the net joint effort (drive less friction).
 
-    Axes 1 and 3 act on each other through axis 2 alone, which is solved first.
+    Axes 1 and 3 are coupled only through axis 2, so axis 2 is solved first.
     """
     D, h, c = room(3, 3), room(3), room(6)
     inertia_matrix(q, p, D)
@@ -183,19 +183,19 @@ DYNAMICS = drives.Dynamics(
 
 _RPM = 2.0 * math.pi / 60.0
 DRIVES = drives.Drives(
-    # Derived of axes 1-3: motors plus, at home, the links. Assumed of the wrist: its rotors.
+    # Axes 1-3: derived from the motors plus the links at home. Wrist: inertia of the rotors, assumed.
     inertia=np.array([0.1213, 0.1199, 26.95, LINKS["J4"], LINKS["J5"], LINKS["J6"]]),
     viscous=np.array([0.4, 0.4, 30.0, 0.004, 0.002, 0.002]),  # assumed
     coulomb=np.array([0.15, 0.15, 1.0, 0.010, 0.005, 0.005]),  # assumed
     friction_speed=np.array([2e-3, 2e-3, 2e-4, 2e-2, 2e-2, 2e-2]),  # assumed
-    # Published (table 3.6); of axis 3 derived: 0.0056 N·m at the screw over the lifting factor
-    # 2.184e-4 N·m/N of its ball screw.
+    # Published (table 3.6). Axis 3 is derived: the torque 0.0056 N·m at its ball screw, divided by the lifting factor
+    # of the screw, 2.184e-4 N·m/N.
     effort_limit=np.array([5.9, 5.9, 0.0056 / 2.184e-4, 0.3525, 0.19, 0.19]),
-    # Published (table 3.6); of axis 3 derived from its 1 mm lead.
+    # Published (table 3.6). Axis 3 is derived from the lead of 1 mm of its screw.
     speed_limit=np.array(
         [30.0 * _RPM, 30.0 * _RPM, 3719.677 / 60.0 * 1e-3, 70.213 * _RPM, 130.263 * _RPM, 130.263 * _RPM]
     ),
-    # Derived from pulses (four counts each) and gears of table 3.6, and the lead.
+    # Derived from the pulses (four counts each) and gears of table 3.6, and from the lead of the screw.
     encoder_step=np.array(
         [
             2 * math.pi / (90 * 4000),
@@ -206,6 +206,6 @@ DRIVES = drives.Drives(
             2 * math.pi / (76 * 2048),
         ]
     ),
-    bandwidth=np.array([60.0, 60.0, 60.0, 80.0, 80.0, 80.0]),  # assumed: prints no gains
-    assumed=("inertia", "viscous", "coulomb", "friction_speed"),  # inertia: of the wrist
+    bandwidth=np.array([60.0, 60.0, 60.0, 80.0, 80.0, 80.0]),  # assumed: the source prints no gains
+    assumed=("inertia", "viscous", "coulomb", "friction_speed"),  # the inertia is assumed only for the wrist
 )

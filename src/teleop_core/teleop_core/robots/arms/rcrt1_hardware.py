@@ -1,7 +1,7 @@
 """Hardware of the RCRT-1: how the built arm differs from its model, and the angles of its motors.
 
-Encoders sit on the motors, so the published errors of chapters 7 and 8 do not contain what lies behind the motors.
-Only the accuracy test, with a ruler at the tip, measured it.
+Encoders sit on the motors, so the published errors of chapters 7 and 8 do not contain errors of the gears, tendons and
+links behind the motors. Only the accuracy test, with a ruler at the tip, measured these errors.
 
 Source:
     Vongbunyong 2008, sections 3.4, 7.3 and appendix E; what is fitted or assumed is marked.
@@ -29,7 +29,7 @@ _LENGTH = np.array([20e-6, 20e-6, 20e-6, 100e-6, 100e-6, 100e-6])
 _DRAWN = np.random.default_rng(2008).uniform(-1.0, 1.0, (4, 6)) * np.stack(
     [_LENGTH, _LENGTH / 0.05, _LENGTH, np.zeros(6)]
 )
-_DRAWN[2, 2] = 5.5e-3  # d3
+_DRAWN[2, 2] = 5.5e-3  # error of d3 [m]; it replaces the random value
 
 HARDWARE = hardware.Hardware(
     coulomb=np.array([0.0880, 0.251, 1.0, 6.08e-3, 5.62e-4, 5.10e-4]),
@@ -56,15 +56,15 @@ HARDWARE = hardware.Hardware(
 def tendon_motor_angles(joints: Array, *, ratio5: float = 1.0, ratio6: float = 1.0, coupling: float = 0.0) -> Array:
     """Motor-side angles of tendon joints 5 and 6: q5* = ratio5 q5, q6* = ratio6 q6 + coupling q5.
 
-    The joint-6 tendon runs over an idler on axis 5, so a move of joint 5 pulls it. The defaults
-    are what the published numbers were computed with: no coupling. With the printed radii
-    ratio5 = r5/r5* = 0.7143, ratio6 = r6/r6* = 1.3889 and coupling = r5/r6* = 1.3889.
+    The tendon of joint 6 runs over an idler on axis 5, so a move of joint 5 pulls this tendon. The published numbers
+    were computed with the defaults: no coupling. The printed radii give ratio5 = r5/r5* = 0.7143, ratio6 = r6/r6* =
+    1.3889 and coupling = r5/r6* = 1.3889.
 
     Args:
         joints: Joint angles 5 and 6, (..., 2) [rad].
         ratio5: Pulley ratio of joint 5, not 0.
         ratio6: Pulley ratio of joint 6, not 0.
-        coupling: Motor-6 turn per joint-5 turn; its sign depends on the routing.
+        coupling: Rotation of motor 6 per rotation of joint 5; the sign depends on how the tendon is routed.
 
     Returns:
         Motor-side angles (..., 2) [rad].

@@ -1,11 +1,11 @@
 """Textbook arms: PUMA 560, SCARA, planar 3R and a five-axis arm, each a table.
 
 Sources:
-    Ghosal 2020, lecture 6 (PUMA 560, SCARA, planar 3R; misprints corrected). Lengths of the PUMA:
-    Corke and Armstrong-Hélouvry 1994; its joint ranges: Wang and Chen 1991; both as
-    roboticstoolbox quotes them, brought to this table's zeros. Five-axis arm: table 3.4 of the MMA
-    thesis (its Microbot Alpha II and Rhino XR-3), joint 4 home corrected. All else is assumed, of
-    the size of these arms; the lecture and the thesis print no lengths.
+    Ghosal 2020, lecture 6 (PUMA 560, SCARA, planar 3R; misprints corrected). Lengths of the PUMA: Corke and
+    Armstrong-Hélouvry 1994; its joint ranges: Wang and Chen 1991; both as quoted in roboticstoolbox, converted to this
+    table's zeros. Five-axis arm: table 3.4 of the MMA thesis (its Microbot Alpha II and Rhino XR-3), with the home of
+    joint 4 corrected. All other numbers are assumed for arms of this size, because the lecture and the thesis print no
+    lengths.
 """
 
 import math
@@ -21,9 +21,9 @@ from teleop_core.robots.arms.dh import parse_table
 from teleop_core.robots.drives import ENTRIES, Drives
 from teleop_core.robots.robot import Robot, geometry_of
 
-_MOST = 10.0  # [m], of a length
+_MOST = 10.0  # largest absolute value of a length that is accepted [m]
 _DEGREES = math.pi / 180.0
-# Answer of :func:`teleop_core.robots.freedom.start_posture` for the published lengths, rounded.
+# Result of :func:`teleop_core.robots.freedom.start_posture` for the published lengths, rounded.
 _PUMA_START = (-0.4783, -1.6627, -0.035, 0.3949, 1.0084, -0.57)
 
 

@@ -2,7 +2,7 @@
 
 ``bodies_of(robot)`` returns the links of any robot as capsules, cylinders and spheres, each in the frame of a body;
 ``bodies_of(robot).poses(q)`` returns their poses. The first body is the base, the last is the tip. ``urdf_of(robot)``
-returns the same as a URDF.
+returns the bodies as a URDF.
 """
 
 from teleop_core.robots.bodies.describe import bodies_of

@@ -1,4 +1,4 @@
-"""Chains: joint axes from a Jacobian, the points between which links run, and their bodies."""
+"""Chains: joint axes from a Jacobian, the start and end points of links, and the bodies of links."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,9 +11,9 @@ from teleop_core.robots.bodies.frames import inverse, moved, product, seen_from
 from teleop_core.robots.body import HERE, Body, Joint
 from teleop_core.robots.solids import Role, Solid, along, ball, capsule, cylinder
 
-# Sine between two axes under which they count as parallel.
+# Two axes with a smaller sine of the angle between them count as parallel.
 _PARALLEL = 1e-4
-_UNIT = 1e-6  # tolerances: of an axis from unit length, and of a motion from a pure rotation
+_UNIT = 1e-6  # tolerance of the length of an axis, and of the pitch of a pure rotation
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,13 +27,13 @@ class Axis:
 
 @dataclass(frozen=True, eq=False)
 class Place:
-    """Points of a joint and of the link after it, in the base at the posture of reference [m].
+    """Points of a joint and of the link after the joint, in the base at the reference posture [m].
 
     Attributes:
         axis: The joint's axis.
         seat: Point on the axis at which the previous link ends.
-        arrive: Point at which its own link begins: the seat, or the end of the extended rod.
-        leave: Point at which its own link leaves the axis.
+        arrive: Point at which the link after the joint begins: the seat, or the end of the extended rod.
+        leave: Point at which the link after the joint leaves the axis.
     """
 
     axis: Axis
@@ -49,7 +49,7 @@ def axes_of(jacobian: Array, tip: Array) -> list[Axis] | None:
     origin.
 
     Returns:
-        The axes; None if some joint is neither a pure rotation nor a slide.
+        The axes; None if the motion of a joint is neither a pure rotation nor a pure translation.
 
     Source:
         Lynch and Park 2017, section 3.3.2.
@@ -71,11 +71,11 @@ def axes_of(jacobian: Array, tip: Array) -> list[Axis] | None:
 
 
 def places(axes: list[Axis], out: Array, tip: Array) -> list[Place]:
-    """Points between which links run: the feet of the common normals of neighbouring axes.
+    """Start and end points of links: the feet of the common normals of neighbouring axes.
 
     Args:
         axes: Axes of a chain in their order.
-        out: Extension of each rod from its seat (m,) [m].
+        out: Extension of the rod of each joint from its seat (m,) [m].
         tip: The tip (3,) [m].
     """
     found: list[Place] = []
@@ -94,7 +94,7 @@ def places(axes: list[Axis], out: Array, tip: Array) -> list[Place]:
 
 
 def _laid(axes: list[Axis], tip: Array) -> list[Axis]:
-    """The axes, pushes laid through what comes after them: a parallel turn, or the tip."""
+    """The axes; a sliding axis passes through the tip if it is last, through the next if parallel, else nowhere."""
     laid: list[Axis] = []
     beyond: Array | None = tip
     for axis, after in zip(reversed(axes), [None, *reversed(axes[1:])], strict=True):
@@ -115,16 +115,16 @@ def _are_parallel(a: Axis, b: Axis) -> bool:
 
 
 def _foot(axis: Axis, point: Array) -> Array:
-    """Point of an axis nearest to a point (3,); the point itself if the axis is laid nowhere."""
+    """Point of an axis nearest to ``point`` (3,); ``point`` itself if the axis has no position."""
     if np.isnan(axis.point).any():
         return point
     return np.asarray(axis.point + dot(point - axis.point, axis.direction) * axis.direction)
 
 
 def _normal(before: Axis | None, end: Array, axis: Axis) -> tuple[Array, Array]:
-    """Ends (3,) of the common normal, on the previous axis and on this axis.
+    """Two end points (3,) of the common normal, on the previous axis and on this axis.
 
-    Parallel axes have many common normals: the one through ``end``, where the link arrived, is taken.
+    Parallel axes have many common normals; the normal through ``end``, the point where the link arrives, is taken.
     """
     if before is None or np.isnan(axis.point).any() or _are_parallel(before, axis):
         return end, _foot(axis, end)
@@ -137,8 +137,8 @@ def _normal(before: Axis | None, end: Array, axis: Axis) -> tuple[Array, Array]:
     return leave, _foot(axis, leave)
 
 
-# Radius of links, divided by the reach of the robot, at the base and at the tip.
-_THICK, _THIN = 0.03, 0.014
+_THICK = 0.03  # radius of links at the base, divided by the reach of the robot
+_THIN = 0.014  # radius of links at the tip, divided by the reach of the robot
 
 
 def chain(
@@ -149,15 +149,15 @@ def chain(
     strokes: Array,
     tip: Array,
 ) -> tuple[list[Body], float]:
-    """Bodies of a chain, the base first, without the tip; and the length of its skeleton [m].
+    """Bodies of a chain, the base first, without the tip; and the length of the chain's skeleton [m].
 
     Args:
-        chained: Its joints at the reference posture.
+        chained: Joints of the chain at the reference posture.
         names: Names of the links after these joints.
-        coordinates: Index of the coordinate that moves each.
-        reference: Values of these coordinates at the posture of reference [rad, m].
-        strokes: Length of the rod of each joint that pushes [m].
-        tip: Pose of the tip (7,) at the posture of reference.
+        coordinates: Index of the coordinate that moves each joint.
+        reference: Values of these coordinates at the reference posture [rad, m].
+        strokes: Length of the rod of each sliding joint [m].
+        tip: Pose of the tip (7,) at the reference posture.
     """
     ends = [*(place.seat for place in chained[1:]), tip[:3]]
     reach = length_of(chained, tip)
@@ -183,11 +183,11 @@ def length_of(chained: Sequence[Place], tip: Array) -> float:
 
 
 def tip_of(bodies: Sequence[Body], frame: Array, tip: Array, reach: float) -> Body:
-    """Body of the tip (7,), fixed to the last link, whose frame (7,) is known.
+    """Body of the tip, fixed to the last link; ``tip`` and ``frame`` (7,) are the poses of tip and last link.
 
-    Both are those at the posture of reference.
+    These poses are those at the reference posture.
     """
-    # A tip in the middle of the last joint, as of a wrist without a tool, shows around it.
+    # A tip in the middle of the last joint, as in a wrist without a tool, is drawn larger, so that it is visible.
     is_hidden = float(length(tip[:3] - frame[:3])) < 3.0 * _THIN * reach
     solids = (ball(np.zeros(3), (2.2 if is_hidden else 1.3) * _THIN * reach, "tool"),)
     return Body("tip", solids, len(bodies) - 1, Joint.FIXED, product(inverse(frame), tip))
@@ -201,7 +201,7 @@ def _base(chained: Sequence[Place], reach: float, radius: float) -> tuple[Solid,
 
 
 def _link(place: Place, end: Array, stroke: float, radius: float, frame: Array) -> tuple[Solid, ...]:
-    """Solids of the link after a joint, in its frame: the joint, the connection to the next joint, and the rod."""
+    """Solids of the link after a joint, in the link's frame: joint, connection to the next joint, and rod."""
     up = np.array([0.0, 0.0, 1.0])
     points = [seen_from(frame, point) for point in (place.arrive, place.leave, end)]
     run = _run(points, radius, "link")

@@ -1,9 +1,9 @@
-"""Describing robots: which description of its bodies a robot has, and that of serial robots.
+"""Describing robots: the choice of the description of a robot's bodies, and the description of serial robots.
 
-Serial robots are described from kinematics alone, by the product of exponentials: the Jacobian at home gives every
-joint's screw axis; the placement of link i is the product of the motions of joints 1 to i, exact for every robot whose
-joints are a chain. A robot that is neither serial nor described is drawn as a base, a dotted line to the tip, and the
-tip.
+Serial robots are described from kinematics alone, by the product of exponentials. The Jacobian at home gives the screw
+axis of every joint. The pose of link i is the product of the motions of joints 1 to i; this is exact for every robot
+whose joints are a chain. A robot that is neither serial nor described is drawn as a base, a dotted line to the tip, and
+the tip.
 
 Source:
     Lynch and Park 2017, chapter 4.
@@ -42,7 +42,7 @@ def _described(robot: Robot) -> Bodies:
 
 
 _TRIALS = 5
-# Largest error of the tip, divided by the size of the robot, at which its joints count as a chain.
+# The joints count as a chain if the error of the tip, divided by the size of the robot, is not larger.
 _EXACT = 1e-6
 
 
@@ -89,7 +89,7 @@ _DOTS = 12
 
 
 def unknown_bodies(robot: Robot) -> Bodies:
-    """Bodies of a robot of which only its tip is known; no joint has a body of its own."""
+    """Bodies of a robot whose only known body is the tip; no joint has a body of its own."""
     home = robot.solve_fk(robot.home).T[:3, 3]
     size = max(float(length(home)), 1e-3)
     up = np.array([0.0, 0.0, 1.0])

@@ -1,4 +1,4 @@
-"""Frames: poses (7,) put together in plain NumPy, and tips of robots whose loops may be open."""
+"""Frames: products of poses (7,) in plain NumPy, and tips of robots whose loops may be open."""
 
 import math
 
@@ -19,8 +19,9 @@ def poses_from_transforms(transforms: geometry.Array, poses: geometry.Array) -> 
 def tips(robot: Robot, q: geometry.Array) -> tuple[geometry.Array, geometry.Array]:
     """Tips of joint vectors (N, n): transforms (N, 4, 4) and poses (N, 7).
 
-    The tip is that of the assembly next to home's. If this does not close, it is that of the nearest assembly that a
-    search finds. If none closes, it is the pose of least error. Joints that are not finite give NaN.
+    The tip is computed in the assembly of home. If the loops do not close there, the tip of the nearest assembly that a
+    search finds is taken. If the loops close in no assembly, the pose of least error is taken. Joints that are not
+    finite give NaN.
     """
     is_finite = np.isfinite(q).all(axis=1)
     transforms, poses = np.full((len(q), 4, 4), np.nan), np.empty((len(q), 7))
@@ -51,7 +52,7 @@ def inverse(pose: geometry.Array) -> geometry.Array:
 
 
 def moved(pose: geometry.Array, kind: int, value: float) -> geometry.Array:
-    """Pose (7,) turned about its z (kind 1, [rad]) or pushed along it (kind 2, [m])."""
+    """Pose (7,), rotated about its z axis (kind 1, [rad]) or shifted along that axis (kind 2, [m])."""
     half = 0.5 * value
     step = np.array([0.0, 0.0, 0.0, math.cos(half), 0.0, 0.0, math.sin(half)])
     if kind == 2:
@@ -60,7 +61,7 @@ def moved(pose: geometry.Array, kind: int, value: float) -> geometry.Array:
 
 
 def seen_from(pose: geometry.Array, point: geometry.Array) -> geometry.Array:
-    """Point (3,) of the base in the frame of a pose (7,)."""
+    """Point (3,), given in the base, in the frame of a pose (7,)."""
     return portable.product(geometry.rotations_from_quaternions(pose[3:]).T, point - pose[:3])
 
 
@@ -72,7 +73,7 @@ def pose_of(transform: geometry.Array) -> geometry.Array:
 
 
 def pose(x: float = 0.0, y: float = 0.0, z: float = 0.0, axis: str = "z", angle: float = 0.0) -> geometry.Array:
-    """Pose (7,) at a point [m], turned by an angle [rad] about one of its axes."""
+    """Pose (7,) at a point [m], rotated by an angle [rad] about a coordinate axis."""
     out = np.array([x, y, z, math.cos(0.5 * angle), 0.0, 0.0, 0.0])
     out[4 + "xyz".index(axis)] = math.sin(0.5 * angle)
     return out

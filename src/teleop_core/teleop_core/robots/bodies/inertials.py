@@ -1,6 +1,6 @@
-"""Inertias of bodies: those of the robot's own links if its model has them, else assumed ones.
+"""Inertias of bodies: the inertias of the robot's links if its model contains them, else assumed inertias.
 
-All are pseudo-inertias (4, 4). They add up when bodies are joined, and transform between frames as T P Tᵀ
+All inertias are pseudo-inertias (4, 4). Those of joined bodies add up. They transform between frames as T P Tᵀ
 (:mod:`teleop_core.robots.inertias`).
 """
 
@@ -16,8 +16,8 @@ from teleop_core.robots.robot import Robot
 from teleop_core.robots.solids import Solid
 
 DENSITY = 1000.0
-"""Density [kg/m³] of bodies whose robot has no masses of links, assumed: that of water, which
-physics engines assume too; motors and hollow links together are of this order."""
+"""Assumed density [kg/m³] of the bodies of a robot without masses of links. It is the density of water, which physics
+engines assume too; the mean density of motors and hollow links is of this order."""
 
 
 def has_own_links(robot: Robot) -> bool:
@@ -28,16 +28,16 @@ def has_own_links(robot: Robot) -> bool:
 
 
 def inertials_of(robot: Robot, bodies: Bodies) -> dict[int, Array]:
-    """Pseudo-inertias (4, 4) of bodies in their own frames, by their index; never of the base.
+    """Pseudo-inertias (4, 4) of bodies in their own frames, by the index of the body; the base is left out.
 
     Args:
         robot: The robot.
         bodies: Its bodies.
 
     Returns:
-        For a robot with links of its own (:func:`has_own_links`), the inertias of the links with mass; a link that the
-        source lumps into another link has none. For every other robot, those of all bodies with solids, uniform and of
-        :data:`DENSITY`; overlapping solids both count.
+        For a robot with links of its own (:func:`has_own_links`), the inertias of the links with mass. A link that the
+        source lumps into another link has no entry. For every other robot, the inertias of all bodies with solids, as
+        uniform bodies of :data:`DENSITY`. Where solids overlap, the mass of each solid counts.
     """
     if not has_own_links(robot):
         assumed = {i: sum(map(_uniform, body.solids)) for i, body in enumerate(bodies.bodies)}
@@ -51,12 +51,12 @@ def inertials_of(robot: Robot, bodies: Bodies) -> dict[int, Array]:
 
 
 def moved(T: Array, P: Array) -> Array:
-    """Pseudo-inertia (4, 4) in frame A of a body given in frame B, by ``T_A_B`` (4, 4)."""
+    """Pseudo-inertia (4, 4) in frame A, from the pseudo-inertia ``P`` in frame B; ``T`` is ``T_A_B`` (4, 4)."""
     return product(product(T, P), np.ascontiguousarray(T.T))
 
 
 def _own(robot: Robot, bodies: Bodies) -> tuple[Sequence[int], Sequence[Array]]:
-    """Bodies by index, and pseudo-inertias in the base at home of the first of these."""
+    """Bodies by index, and the pseudo-inertias of the first of these bodies, in the base, at home."""
     model, followers = robot.dynamics, followers_of(robot)
     assert model is not None
     if model.frames:
@@ -69,14 +69,15 @@ def _own(robot: Robot, bodies: Bodies) -> tuple[Sequence[int], Sequence[Array]]:
 
 
 def _uniform(solid: Solid) -> Array:
-    """Pseudo-inertia in the body's frame of a solid of :data:`DENSITY`."""
+    """Pseudo-inertia of a uniform solid of :data:`DENSITY`, in the body's frame."""
     sizes, P = solid.size, np.zeros((4, 4))
     if solid.kind == "box":
         parts = [(sizes[0] * sizes[1] * sizes[2], [side**2 / 12.0 for side in sizes])]
     else:
         r, span = sizes[0], sizes[1] if len(sizes) > 1 else 0.0
         rod = (np.pi * r**2 * span, [r**2 / 4.0, r**2 / 4.0, span**2 / 12.0])
-        # Both halves of a ball, each at an end: their centres are 3/8 of the radius beyond it.
+        # Each end of the capsule is half a ball; its centre of mass is 3/8 of the radius beyond the end of the
+        # cylinder.
         along = r**2 / 5.0 + 0.375 * r * span + 0.25 * span**2
         ball = (4.0 / 3.0 * np.pi * r * r * r, [r**2 / 5.0, r**2 / 5.0, along])
         parts = {"cylinder": [rod], "sphere": [ball], "capsule": [rod, ball]}[solid.kind]

@@ -16,7 +16,7 @@ from teleop_core.robots.visual import Visual
 
 
 def looks_of(robot: Robot) -> dict[int, Mesh]:
-    """Meshes of the bodies of a robot, by their index in :func:`bodies_of`.
+    """Meshes of the bodies of a robot, by the index of the body in :func:`bodies_of`.
 
     For a mesh that cannot be read, a warning names its link. A body without any readable mesh is not among the keys.
     Files are read again at each call.
@@ -41,7 +41,7 @@ def _triangles(visual: Visual) -> Mesh:
     """Triangles of a shape in its own frame.
 
     Raises:
-        ParameterError: Its file is not there, or cannot be read.
+        ParameterError: The file of the mesh does not exist, or cannot be read.
         TeleopError: The library that reads meshes is not installed.
     """
     if visual.kind != "mesh":

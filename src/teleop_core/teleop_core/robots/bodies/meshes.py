@@ -1,4 +1,4 @@
-"""Meshes: the triangles of solids, with sharp edges where a solid has them."""
+"""Meshes: the triangles of solids; sharp edges of a solid stay sharp."""
 
 import math
 
@@ -10,7 +10,8 @@ from teleop_core.robots.solids import Solid
 
 Faces = NDArray[np.int64]
 Mesh = tuple[Array, Faces]
-"""Vertices (V, 3) [m] and the three of each triangle (F, 3), seen from outside anticlockwise."""
+"""Vertices (V, 3) [m], and the indices of the three vertices of each triangle (F, 3), anticlockwise seen from
+outside."""
 AROUND = 20
 """Default number of sides of round solids; a multiple of four."""
 
@@ -45,11 +46,11 @@ def _box(x: float, y: float, z: float) -> Mesh:
 
 
 def _profiles(solid: Solid, arc: int) -> list[Array]:
-    """Radii and heights (N, 2) [m] from below upwards; a sharp edge is where a profile ends.
+    """Profiles of a solid: radii and heights (N, 2) [m], from bottom to top; each profile ends at a sharp edge.
 
     Args:
         solid: Capsule, cylinder or sphere.
-        arc: Steps of a quarter of a circle.
+        arc: Number of steps in a quarter of a circle.
     """
     radius, top = solid.size[0], 0.5 * sum(solid.size[1:])
     if solid.kind == "cylinder":
@@ -62,7 +63,7 @@ def _profiles(solid: Solid, arc: int) -> list[Array]:
 
 
 def _revolved(profiles: list[Array], around: int) -> Mesh:
-    """Surface that profiles of radius and height (N, 2), from below upwards, sweep about z."""
+    """Surface of revolution about z of profiles of radius and height (N, 2), from bottom to top."""
     angle = 2.0 * math.pi * np.arange(around) / around
     meshes = []
     for profile in profiles:

@@ -1,9 +1,9 @@
 """URDF: bodies of a robot as the XML that RViz, Foxglove and physics engines read.
 
 Joints that move one body appear with axis and limits. A body that follows one joint by a factor and an offset has a
-joint with ``mimic``. The format has no joints for legs and platforms of robots with loops, and for links that several
-joints move. These bodies have floating joints, and ``/tf`` gives their poses. The format has no capsules: a capsule
-becomes a cylinder with two spheres. Each shape is both visual and collision geometry.
+joint with ``mimic``. URDF has no joints for legs and platforms of robots with loops, nor for links that several joints
+move. These bodies get floating joints, and ``/tf`` contains their poses. URDF has no capsules: a capsule becomes a
+cylinder with two spheres. Each shape is both visual and collision geometry.
 """
 
 import math
@@ -27,8 +27,8 @@ COLOURS: dict[Role, tuple[float, float, float]] = {
     "platform": (0.93, 0.68, 0.20),
     "tool": (0.80, 0.25, 0.22),
 }
-"""Red, green, blue, 0 to 1, of solids by their role."""
-_EXACT = 1e-9  # [rad, m], largest error of a body that counts as following a joint
+"""Red, green and blue, from 0 to 1, of solids by their role."""
+_EXACT = 1e-9  # a body follows a joint if its largest error is smaller [rad, m]
 _TYPES = {Joint.FIXED: "fixed", Joint.REVOLUTE: "revolute", Joint.PRISMATIC: "prismatic"}
 
 
@@ -41,11 +41,11 @@ def urdf_of(robot: Robot, name: str = "", prefix: str = "") -> str:
         prefix: Prefix of the names of links and joints, such as ``slave_``, so that the root is ``slave_base``.
 
     Returns:
-        The XML. Limits are those of the robot, speeds and efforts those of its drives; 0 where it has none. Inertias
-        are those of the robot's own links if its model has them, else assumed
-        (:mod:`~teleop_core.robots.bodies.inertials`). A comment at the top states which, and which bodies have no
-        inertia. The base has none, because readers warn if the root has an inertia. The format cannot contain the
-        inertia of a motor.
+        The XML. Limits are those of the robot. Speeds and efforts are those of its drives, or 0 without drives.
+        Inertias are those of the robot's own links if its model contains them, else assumed
+        (:mod:`~teleop_core.robots.bodies.inertials`). A comment at the top states whether they are assumed, and which
+        bodies have no inertia. The base has no inertia, because programs that read a URDF warn if the root has one. A
+        URDF cannot contain the inertia of a motor.
     """
     bodies = bodies_of(robot)
     inertials = inertials_of(robot, bodies)
@@ -70,7 +70,7 @@ def urdf_of(robot: Robot, name: str = "", prefix: str = "") -> str:
 
 
 def joints_of(bodies: Bodies) -> dict[int, int]:
-    """Bodies that joints of the robot itself move, by index, with the joint of each."""
+    """Indices of the bodies that a joint of the robot moves, with the index of that joint."""
     found: dict[int, int] = {}
     for index, body in enumerate(bodies.bodies):
         is_joint = body.joint in {Joint.REVOLUTE, Joint.PRISMATIC} and body.coordinate < bodies.n
@@ -83,7 +83,7 @@ def _joint(root: Xml.Element, robot: Robot, bodies: Bodies, body: Body, joint: i
     is_fixed = body.joint is Joint.FIXED
     follows = None if is_fixed or joint is not None else _follows(robot, bodies, body)
     name = f"{body.name}_joint" if joint is None else robot.joint_names[joint]
-    if follows is not None:  # its name sorts after its leader's, because pinocchio reads joints in the order of names
+    if follows is not None:  # sorts after its leader's name: pinocchio reads joints in the order of names
         name = f"{robot.joint_names[follows[0]]}_{body.name}"
     is_floating = joint is None and follows is None and not is_fixed
     kind = "floating" if is_floating else _TYPES[body.joint]
@@ -105,7 +105,7 @@ def _joint(root: Xml.Element, robot: Robot, bodies: Bodies, body: Body, joint: i
 
 
 def _limit(element: Xml.Element, robot: Robot, joint: int, factor: float, offset: float) -> None:
-    """Write the limits of a joint that moves by ``factor`` and ``offset`` of one of the robot."""
+    """Write the limits of a joint whose value is ``factor`` times a joint of the robot, plus ``offset``."""
     ends = sorted(factor * end + offset for end in (robot.lower[joint], robot.upper[joint]))
     speed = effort = 0.0
     if robot.drives is not None:
@@ -116,7 +116,7 @@ def _limit(element: Xml.Element, robot: Robot, joint: int, factor: float, offset
 
 
 def _follows(robot: Robot, bodies: Bodies, body: Body) -> tuple[int, float, float] | None:
-    """The one joint of the file that a body follows, with factor and offset; None if there is no such joint."""
+    """The joint of the URDF that a body follows, with factor and offset; None if the body follows no single joint."""
     if body.joint not in _TYPES:
         return None
     draws = np.random.default_rng(0).uniform(robot.lower, robot.upper, (5, robot.n))
@@ -135,7 +135,7 @@ def _follows(robot: Robot, bodies: Bodies, body: Body) -> tuple[int, float, floa
 
 
 def _remark(robot: Robot, without: list[str]) -> str:
-    """Comment for readers of the file about its inertias."""
+    """Comment on the inertias of the URDF, for people who read it."""
     if not has_own_links(robot):
         return (
             f" Inertias are assumed: bodies as drawn, of {DENSITY:g} kg/m3 throughout, for no"
@@ -168,7 +168,7 @@ def _geometry(link: Xml.Element, what: str, solid: Solid) -> None:
 
 
 def _shapes(solid: Solid) -> Iterator[tuple[Array, str, dict[str, str]]]:
-    """Poses (7,), names and sizes of the shapes of the format that make up a solid."""
+    """Poses (7,), names and sizes of the URDF shapes that make up a solid."""
     if solid.kind == "box":
         yield solid.pose, "box", {"size": _row(solid.size)}
         return

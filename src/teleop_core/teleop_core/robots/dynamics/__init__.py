@@ -1,1 +1,1 @@
-"""Chains of links: their kernels, their dynamics, and joints that follow others."""
+"""Chains of links: their kernels, their dynamics, and joints that follow other joints."""

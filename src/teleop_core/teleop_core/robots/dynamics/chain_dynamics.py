@@ -40,9 +40,9 @@ def chain_row(kinds: Sequence[float], fixed: Sequence[Array], bodies: Array, mot
     """Parameter row of the kernels below.
 
     Args:
-        kinds: For each joint 1 for a turn, 2 for a slide; negative against its axis.
-        fixed: Transforms (4, 4) before, between and after the joints, one more than joints.
-        bodies: Body that each joint moves, in the frame after the joint, (n, 13), see :func:`body_row`.
+        kinds: Kind of each joint: 1 for a turning, 2 for a sliding joint; negative if it moves against its axis.
+        fixed: Transforms (4, 4) before, between and after the joints, n + 1 of them.
+        bodies: For each joint, the body that it moves, in the frame after the joint, (n, 13); see :func:`body_row`.
         motors: Inertia of each motor at its joint (n,) [kg·m² or kg].
 
     Returns:
@@ -54,7 +54,7 @@ def chain_row(kinds: Sequence[float], fixed: Sequence[Array], bodies: Array, mot
 
 
 def chain_dynamics(row: Array) -> Dynamics:
-    """Model of a chain over a row of :func:`chain_row`; all of its gravity is fed forward."""
+    """Model of a chain with a row of :func:`chain_row`; the controller feeds all gravity forward."""
     n = (row.shape[0] - 22) // 27  # see chain_row
     return Dynamics(
         acceleration=chain_acceleration, gravity=chain_gravity, parameters=row, compensated=np.ones(n, np.bool_)
@@ -63,7 +63,7 @@ def chain_dynamics(row: Array) -> Dynamics:
 
 @inner
 def _place(q: Array, row: Array, axes: Array, bodies: Array) -> None:
-    """Write the unit motion (n, 6) of each joint, turning first, and each body (n, 13), in base."""
+    """Write the unit motion of each joint (n, 6), angular part first, and each body (n, 13), in the base."""
     n = q.shape[0]
     at = n + 7 + 12 * (n + 1) + 3
     T, R = np.empty((4, 4)), np.empty((3, 3))
@@ -178,7 +178,7 @@ def inverse_dynamics(q: Array, dq: Array, ddq: Array, row: Array, effort: Array)
         dq: Joint speeds (n,) [rad/s or m/s].
         ddq: Joint accelerations (n,) [rad/s² or m/s²].
         row: See :func:`chain_row`.
-        effort: Written.
+        effort: Resulting efforts; written.
     """
     n = q.shape[0]
     axes, bodies = np.empty((n, 6)), np.empty((n, _BODY))
@@ -192,13 +192,13 @@ def inverse_dynamics(q: Array, dq: Array, ddq: Array, row: Array, effort: Array)
 def tip_efforts(q: Array, wrench: Array, row: Array, effort: Array) -> None:
     """Write the joint efforts (n,) [N·m or N] that an external wrench on the tip causes.
 
-    The sum of these and the drives' efforts is the effort of :func:`inverse_dynamics`.
+    Added to the efforts of the drives, they give the effort of :func:`inverse_dynamics`.
 
     Args:
         q: Joint positions (n,) [rad or m].
         wrench: Force [N], then torque [N·m], at the origin of the tip in the axes of the base (6,).
         row: See :func:`chain_row`.
-        effort: Written.
+        effort: Resulting efforts; written.
 
     Source:
         Craig 2005, section 5.10 (the transposed Jacobian maps forces to efforts).
@@ -222,7 +222,7 @@ def inertia_matrix(q: Array, row: Array, M: Array) -> None:
 
 
 def pseudo_inertias(q: Array, row: Array) -> Array:
-    """Pseudo-inertias (n, 4, 4) in the base of what each joint moves up to the next.
+    """Pseudo-inertias (n, 4, 4) of bodies in the base; body i is all links between joint i and the next joint.
 
     Args:
         q: Joint positions (n,) [rad or m].
@@ -262,7 +262,7 @@ def chain_acceleration(q: Array, dq: Array, effort: Array, row: Array, ddq: Arra
         dq: Joint speeds (n,) [rad/s or m/s].
         effort: Efforts of the drives, minus friction.
         row: See :func:`chain_row`.
-        ddq: Written.
+        ddq: Resulting accelerations; written.
     """
     n = q.shape[0]
     axes, bodies, M = np.empty((n, 6)), np.empty((n, _BODY)), np.empty((n, n))

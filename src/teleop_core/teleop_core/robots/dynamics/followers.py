@@ -1,12 +1,13 @@
 """Followers: chains in which one joint moves several motions, each by a factor and an offset.
 
-This is the ``mimic`` of a URDF. With joints q (n,) and motions p (m,) of the chain, p = A q + b, where each row of A
-has one factor. Then the Jacobian of the joints is J A; by the principle of virtual work their efforts are Aᵀ times
-those of the motions, and their inertia is Aᵀ M A. A is constant, so that there is no term with its derivative.
+This is the ``mimic`` of a URDF. The motions p (m,) of the chain follow the joints q (n,): p = A q + b, where each row
+of A contains one factor. With the Jacobian J and the inertia M of the motions, the Jacobian of the joints is J A and
+their inertia is Aᵀ M A. By the principle of virtual work, the efforts of the joints are Aᵀ times those of the motions.
+A is constant, so there is no term with its derivative.
 
-The parameter row of the dynamics contains m, then leader, factor and offset of each motion (m,), and the inertias (n,)
-of the motors at the joints. Then comes the row of :mod:`~teleop_core.robots.dynamics.chain_dynamics` of the m motions,
-with motor inertias of zero.
+The parameter row of the dynamics contains in this order: m; the leaders (m,), factors (m,) and offsets (m,) of the
+motions; the inertias (n,) of the motors at the joints; the row of :mod:`~teleop_core.robots.dynamics.chain_dynamics` of
+the m motions, with motor inertias of zero.
 
 Source:
     Featherstone 2008, section 3.2 (implicit and explicit constraints) and equation 3.21.
@@ -34,7 +35,7 @@ class Follower:
 
 @dataclass(frozen=True, kw_only=True)
 class Followers:
-    """How the motions of a chain follow its joints; and for each joint 1 if it turns, 2 if it slides."""
+    """How the motions of a chain follow its joints, and the kind of each joint: 1 turns, 2 slides."""
 
     motions: tuple[Follower, ...]
     kinds: tuple[float, ...]
@@ -47,18 +48,18 @@ class Followers:
 
     @property
     def is_plain(self) -> bool:
-        """Whether every motion is a joint itself, in order: a chain without followers."""
+        """Whether motion i is joint i for all i, as in a chain without followers."""
         return self.motions == tuple(Follower(leader=i) for i in range(len(self.kinds)))
 
     @property
     def first(self) -> list[int]:
-        """For each joint the first motion that it moves."""
+        """For each joint, the index of the first motion that it moves."""
         leaders = [f.leader for f in self.motions]
         return [leaders.index(joint) for joint in range(len(self.kinds))]
 
     @property
     def coordinates(self) -> list[int]:
-        """Indices (m,) of the motions in the list of joints, then motions; the joint's index if a motion is a joint."""
+        """Index of each motion (m,) in the list of joints, then motions; a motion that is a joint gets its index."""
         n, same = len(self.kinds), [f == Follower(leader=f.leader) for f in self.motions]
         return [f.leader if same[i] else n + i for i, f in enumerate(self.motions)]
 
@@ -67,14 +68,14 @@ class Followers:
         return np.stack([f.factor * q[..., f.leader] + f.offset for f in self.motions], axis=-1)
 
     def chain_jacobian(self, geometry: Array, motions: Array) -> Array:
-        """Geometric Jacobian (6, m) of the motions, from the row of their robot."""
+        """Geometric Jacobian (6, m) of the motions, from the geometry row of the robot."""
         out = np.empty((6, len(self.motions)))
         dh_kernels.jacobian(motions, geometry[len(self.kinds) + 8 + 3 * len(self.motions) :].copy(), out)
         return out
 
 
 def followers_of(robot: Robot) -> Followers | None:
-    """How the motions of a robot follow its joints; None for a robot whose joints are its motions."""
+    """How the motions of a robot follow its joints; None for a robot without followers."""
     if "motions" not in robot.geometry:
         return None
     n, m, row = robot.n, int(robot.geometry["motions"]) - 1, robot.geometry_row
@@ -95,12 +96,12 @@ def dynamics_row(followers: Followers, chain: Array, motors: Array) -> Array:
 
 
 def chain_part(row: Array, followers: Followers) -> Array:
-    """Row of the motions within a row of :func:`dynamics_row`: a copy that the caller may change."""
+    """Copy of the row of the motions within a row of :func:`dynamics_row`; the caller may change it."""
     return row[1 + 3 * len(followers.motions) + len(followers.kinds) :].copy()
 
 
 def follower_dynamics(row: Array, joints: int) -> Dynamics:
-    """Model of ``joints`` joints over a row of :func:`dynamics_row`; all gravity is fed forward."""
+    """Model of ``joints`` joints with a row of :func:`dynamics_row`; the controller feeds all gravity forward."""
     return Dynamics(
         acceleration=follower_acceleration,
         gravity=follower_gravity,

@@ -11,7 +11,7 @@ from teleop_core.kernels import Array, kernel
 def invert_positive(A: Array) -> None:
     """Invert a symmetric positive definite matrix (n, n) in place.
 
-    Gauss-Jordan elimination; such matrices need no pivoting (Golub and Van Loan 2013, section 4.2).
+    Gauss-Jordan elimination; positive definite matrices need no pivoting (Golub and Van Loan 2013, section 4.2).
     """
     n = A.shape[0]
     for k in range(n):
@@ -39,8 +39,8 @@ def write_model(acceleration: Any, model: Array, q: Array, dq: Array, out: Array
         model: Its parameter row.
         q: Joint positions (n,) [rad or m].
         dq: Joint speeds (n,) [rad/s or m/s].
-        out: (n + n²,): the bias, Coriolis, centrifugal and gravity effort [N·m or N], and the
-            inertia, row by row [kg·m², kg·m or kg]; written.
+        out: Written, (n + n²,): first the bias (Coriolis, centrifugal and gravity effort) [N·m or N], then the inertia
+            row by row [kg·m², kg·m or kg].
 
     Source:
         Walker and Orin 1982, method 1, with forward instead of inverse dynamics.

@@ -1,7 +1,7 @@
 """Robot descriptions: files of the package ``robot_descriptions``, if the user has downloaded them.
 
-A module of that package clones a repository with git when it is imported. Here the clone is replaced by a look into
-the package's cache, so that nothing is downloaded.
+A module of that package clones a repository with git when it is imported. Here the module is imported with the clone
+replaced by a search in the package's cache, so nothing is downloaded.
 """
 
 import os
@@ -20,7 +20,7 @@ def description_file(name: str) -> tuple[Path, dict[str, str]]:
         name: Name of a module of ``robot_descriptions``, such as ``ur5e_description``.
 
     Raises:
-        UnknownNameError: There is no description of a URDF of this name.
+        UnknownNameError: The package has no module of this name that describes a URDF.
         ParameterError: The description is not in the cache; the message contains the command to download it.
         TeleopError: The package is not installed, or cannot be used without git.
     """

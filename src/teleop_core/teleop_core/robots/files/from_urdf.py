@@ -1,13 +1,13 @@
-"""Robots from URDF: the chain from the root link to a tip, with the file's data on its drives.
+"""Robots from URDF: the chain from the root link to a tip, with the drive data of the file.
 
 The joints between root and tip move the tip. All other joints stay at zero, but their links have mass. A joint between
 root and tip that mimics another joint moves with it (:mod:`teleop_core.robots.dynamics.followers`). The kinematics are
 those of Denavit-Hartenberg chains (:mod:`teleop_core.kinematics.dh_kernels`), the dynamics those of rigid bodies
 (:mod:`teleop_core.robots.dynamics.chain_dynamics`). Effort and velocity limits, damping and friction of the file are
 used for the drives if they are above zero. The inertia of a drive is that of the links at home; a URDF never contains
-the inertia of its motor. A file of drives may state it, and other missing values. Values that are missing there too
-are assumed as for tables (:mod:`teleop_core.robots.arms.dh_drives`), and ``Robot.drives.assumed`` names them. Meshes
-are read when they are drawn (:mod:`teleop_core.robots.bodies.looks`).
+the inertia of its motor. A file of drives may state the inertia of the motor and other missing values. Values that are
+missing there too are assumed, as for tables (:mod:`teleop_core.robots.arms.dh_drives`), and ``Robot.drives.assumed``
+names them. Meshes are read when they are drawn (:mod:`teleop_core.robots.bodies.looks`).
 
 Source:
     The XML specification of URDF, pages joint and link.
@@ -37,11 +37,11 @@ from teleop_core.robots.rank import directions_of
 from teleop_core.robots.robot import Robot
 
 MODELS = ("independent", "links")
-"""How the arm of a file may move: see :func:`load_urdf`."""
+"""Choices for the dynamics of a URDF's arm; see :func:`load_urdf`."""
 _ROUNDING = 1e-6  # tolerance of an inertia, divided by its trace, because files have few digits
-_NO_MASS = 1e-6  # [kg, kg·m²]; simulators require some mass and inertia of every link
-_NO_INERTIA = 1e-9  # [kg·m² or kg]; below it is rounding of bodies on the axis, and unknown
-_POWERS = {"viscous": 2, "coulomb": 1}  # least factor at which the friction of a follower counts
+_NO_MASS = 1e-6  # less mass or inertia counts as none; files contain it because simulators need some [kg, kg·m²]
+_NO_INERTIA = 1e-9  # a smaller inertia is rounding of bodies on the axis and counts as unknown [kg·m² or kg]
+_POWERS = {"viscous": 2, "coulomb": 1}  # a follower adds its friction times its factor to this power
 
 
 def load_urdf(
@@ -53,33 +53,33 @@ def load_urdf(
     dynamics: str = "independent",
     drives: str = "",
 ) -> Robot:
-    """Robot whose joints are those between the root of a URDF and a tip.
+    """Robot with the joints between the root of a URDF and a tip.
 
     Args:
-        path: The file; one that ends in ``.xacro`` is expanded by the package ``xacro``.
+        path: The file; a file whose name ends in ``.xacro`` is expanded by the package ``xacro``.
         arguments: Texts for the ``<xacro:arg>`` of a xacro, by their names.
         tip: Link whose frame is the tip; empty for the only link without a child.
-        task: Directions that the arm controls, of :data:`DIRECTIONS`, separated by blanks or commas. Empty means all;
-            for an arm that cannot move in all of them at once, those of
-            :func:`~teleop_core.robots.rank.directions_of`.
-        dynamics: One of :data:`MODELS`. independent: independent axes with balanced gravity. links: the bodies of the
-            file, with mass and dynamic coupling; the controller feeds their gravity forward.
+        task: Directions that the arm controls, of :data:`DIRECTIONS`, separated by blanks or commas. Empty means all
+            six, or the directions of :func:`~teleop_core.robots.rank.directions_of` for an arm that cannot move in all
+            six at once.
+        dynamics: One of :data:`MODELS`. "independent" means independent axes with balanced gravity. "links" means the
+            bodies of the file, with mass and dynamic coupling; the controller feeds their gravity forward.
         drives: YAML file with the drives of the joints, by joint names, with the entries of
-            :class:`~teleop_core.robots.drives.Drives`; its values override those of the URDF. Inertia is that of the
-            motor; that of the links is added.
+            :class:`~teleop_core.robots.drives.Drives`; its values override those of the URDF. Its entry ``inertia`` is
+            that of the motor alone; the inertia of the links is added.
 
     Returns:
-        The robot, its base the root link, with inverse kinematics in closed form if it is of a
-        class of :mod:`~teleop_core.kinematics.closed_form.decomposition`, else by search. Home is zero,
-        or the middle of limits without zero; continuous joints turn two rounds (assumed: ±2π).
+        The robot; its base is the root link. Its inverse kinematics are in closed form if it belongs to a class of
+        :mod:`~teleop_core.kinematics.closed_form.decomposition`, else by search. Home is zero, or the middle of the
+        limits if zero is outside them. Continuous joints get the assumed limits ±2π.
 
     Raises:
         RecordingError: The file cannot be read, or is not XML.
-        ParameterError: An element is missing or not possible; the message names it. With dynamics of links also: a
-            joint outside of the path to the tip moves with a joint on the path.
-        UnknownNameError: A tip, direction, dynamics, link, type of joint, argument of a xacro, or
-            joint or entry of the drives that does not exist.
-        TeleopError: The package ``xacro`` is needed and not installed.
+        ParameterError: An element is missing or impossible; the message names it. With the dynamics "links", also if a
+            joint outside the path to the tip follows a joint on the path.
+        UnknownNameError: There is no tip, direction, dynamics, link, type of joint, argument of the xacro, joint of the
+            drives or entry of the drives with a given name.
+        TeleopError: The package ``xacro`` is needed but not installed.
     """
     if dynamics not in MODELS:
         raise UnknownNameError("dynamics", dynamics, MODELS)
@@ -121,7 +121,8 @@ def load_urdf(
     robot = make(task=controlled, solution=solution)
     coordinates = dict(zip((j.name for j in moving), followers.of(home).tolist(), strict=True))
     visuals = tuple(visuals_of(coordinates, links, by_child, Path(path)))
-    # The start posture is not computed here, because its search takes a second; callers that need it compute it.
+    # The start posture is not computed here, because its search takes about one second. It is computed at its first
+    # use.
     notes = tuple(urdf_notes.notes_on(chain, links))
     robot = replace(robot, visuals=visuals, notes=notes, home_is_assumed=True, start=None)
     if dynamics == "independent":
@@ -148,7 +149,7 @@ class _Geared:
 def _trains(
     moving: list[urdf_tree.UrdfJoint], named: Mapping[str, urdf_tree.UrdfJoint]
 ) -> tuple[list[list[_Geared]], Followers]:
-    """For each joint of the robot, the joint and its followers on the path to the tip; and the motions."""
+    """For each joint of the robot, the joint and its followers on the path to the tip; also all motions."""
     trains: dict[str, list[_Geared]] = {}
     motions = []
     for joint in moving:
@@ -165,7 +166,7 @@ def _trains(
 def _leader(
     joint: urdf_tree.UrdfJoint, named: Mapping[str, urdf_tree.UrdfJoint]
 ) -> tuple[urdf_tree.UrdfJoint, float, float]:
-    """Last leader that a joint follows, or the joint itself, with factor and offset."""
+    """Leader at the end of the mimic chain of a joint, or the joint itself, with factor and offset."""
     factor, offset, passed = 1.0, 0.0, [joint.name]
     while (mimic := joint.element.find("mimic")) is not None:
         where = f"mimic of joint {joint.name}"
@@ -190,7 +191,7 @@ def _leader(
 def _refuse_beside(
     leaders: list[urdf_tree.UrdfJoint], moving: list[urdf_tree.UrdfJoint], joints: list[urdf_tree.UrdfJoint]
 ) -> None:
-    """Refuse joints outside the chain from root to tip that follow a joint of the robot: their links have mass."""
+    """Refuse joints outside the chain that follow a joint of the robot, because their moving links have mass."""
     named = {joint.name: joint for joint in joints}
     for joint in joints:
         if joint.axis is not None and joint not in moving and _leader(joint, named)[0] in leaders:
@@ -233,7 +234,7 @@ def _narrowed(train: list[_Geared]) -> dh_chain.DhJoint:
 
 
 def _frames(chain: list[urdf_tree.UrdfJoint]) -> tuple[list[Array], list[float]]:
-    """Constant transforms between the joints, whose axes become z, and the kind of each joint."""
+    """Constant transforms between the joints, with the joint axes along z, and the kind of each joint."""
     fixed, kinds, last = [], [], np.eye(4)
     for joint in chain:
         last = product(last, joint.origin)
@@ -298,9 +299,10 @@ def _bodies(
     joints: list[urdf_tree.UrdfJoint],
     may_be_any: bool,
 ) -> Array:
-    """Bodies that each joint moves, up to the next joint, (n, 13), see :func:`body_row`; other joints at zero.
+    """Body of each joint: all links up to the next joint, (n, 13), see :func:`body_row`; other joints are at zero.
 
-    Many files contain inertias that no body can have. They do no harm if no joint moves them, or if ``may_be_any``.
+    Many files contain inertias that no body can have. Such inertias are accepted if no joint moves the link, or if
+    ``may_be_any``.
     """
     carried: dict[str, list[urdf_tree.UrdfJoint]] = {}
     for joint in joints:
@@ -324,7 +326,7 @@ def _bodies(
 
 
 def _mass(name: str, link: Xml.Element, may_be_any: bool) -> tuple[float, Array, Array]:
-    """Mass [kg], inertia (3, 3) [kg·m²] at its centre, and where that is in the link (4, 4)."""
+    """Mass [kg], inertia (3, 3) [kg·m²] about the centre of mass, and pose of that centre in the link (4, 4)."""
     element, where = link.find("inertial"), f"link {name}"
     if element is None:
         return 0.0, np.zeros((3, 3)), np.eye(4)
@@ -335,7 +337,7 @@ def _mass(name: str, link: Xml.Element, may_be_any: bool) -> tuple[float, Array,
         for key in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
     )
     inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-    if 0.0 <= mass < _NO_MASS and abs(inertia).max() < _NO_MASS:  # a frame to which the file gives mass
+    if 0.0 <= mass < _NO_MASS and abs(inertia).max() < _NO_MASS:  # a frame to which the file gives a tiny mass
         return 0.0, np.zeros((3, 3)), np.eye(4)
     if mass < 0.0 or not (may_be_any or _is_possible(inertia)):
         needed = "that of a rigid body; dynamics=independent accepts any"

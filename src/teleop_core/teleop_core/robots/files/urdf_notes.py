@@ -11,7 +11,7 @@ def notes_on(chain: Sequence[urdf_tree.UrdfJoint], links: urdf_tree.Links) -> It
     """Lines on the joints between root and tip, and on all links.
 
     Args:
-        chain: These joints.
+        chain: Joints between root and tip.
         links: Elements of the links by their names.
     """
     moving = [joint for joint in chain if joint.axis is not None]

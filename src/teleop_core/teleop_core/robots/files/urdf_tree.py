@@ -1,4 +1,4 @@
-"""URDF trees: links and joints of a file; errors name the wrong element.
+"""URDF trees: links and joints of a file; error messages name the wrong element.
 
 Source:
     The XML specification of URDF, pages joint and link.
@@ -24,7 +24,7 @@ _READ = ("link", "joint", "inertial")  # elements in which an unexpanded macro m
 _XACRO = "{http://www.ros.org/wiki/xacro}"
 Links = Mapping[str, Xml.Element]
 ASSUMED = {"turn": 2.0 * math.pi, "slide": RANGES["m"].usual}
-"""Limit [rad, m] to either side of a joint that has none."""
+"""Assumed limit [rad, m] in both directions for a joint without limits."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,7 +41,7 @@ class UrdfJoint:
 
 
 class _NoDoctype(Xml.TreeBuilder):
-    """Tree of an XML file without a document type, so that no entity can expand."""
+    """Builder of XML trees that refuses a document type, so that no entity can expand."""
 
     def doctype(self, name: str, pubid: str | None, system: str | None) -> None:
         """Refuse the declaration before anything it declares is used."""
@@ -74,8 +74,8 @@ def tree_of(data: bytes) -> Xml.Element:
     """Root of an XML file.
 
     Raises:
-        ParseError: It is not XML.
-        ParameterError: It declares a type of document.
+        ParseError: ``data`` is not XML.
+        ParameterError: ``data`` declares a document type.
     """
     builder = Xml.XMLParser(target=_NoDoctype())
     builder.feed(data)
@@ -100,8 +100,8 @@ def joint_of(name: str, element: Xml.Element, links: Links) -> UrdfJoint:
     """Joint of an element.
 
     Raises:
-        UnknownNameError: Its type, or one of its links, does not exist.
-        ParameterError: Its axis has length zero, or a value is not a number.
+        UnknownNameError: The type of the joint, or a link that it names, does not exist.
+        ParameterError: The axis has length zero, or a value is not a number.
     """
     kind, axis = element.get("type", ""), None
     if kind not in (*KINDS, "fixed"):
@@ -124,7 +124,7 @@ def joint_of(name: str, element: Xml.Element, links: Links) -> UrdfJoint:
 
 
 def joints_by_child(joints: list[UrdfJoint]) -> dict[str, UrdfJoint]:
-    """The joint that carries each link, for all links except the root."""
+    """For each link except the root, the joint whose child it is."""
     found: dict[str, UrdfJoint] = {}
     for joint in joints:
         if joint.child in found:
@@ -135,7 +135,7 @@ def joints_by_child(joints: list[UrdfJoint]) -> dict[str, UrdfJoint]:
 
 
 def root_link(links: Links, by_child: Mapping[str, UrdfJoint]) -> str:
-    """The only link that no joint carries; refuses cycles and several roots."""
+    """The only link that is not the child of a joint; cycles and several roots are refused."""
     for link in links:
         chain_to(link, by_child)
     roots = [name for name in links if name not in by_child]
@@ -170,10 +170,11 @@ def chain_to(tip: str, by_child: Mapping[str, UrdfJoint]) -> list[UrdfJoint]:
 
 
 def limits_of(joint: UrdfJoint) -> tuple[float, float]:
-    """Lower and upper limit of a joint [rad, m], narrowed to the soft limits of its controller.
+    """Lower and upper limit of a joint [rad, m], narrowed to the soft limits of the joint's controller.
 
     Raises:
-        ParameterError: The joint has no limits and is not continuous, or its limits cross or are not physical.
+        ParameterError: The joint has no limits and is not continuous, or its lower limit is above the upper limit, or a
+            limit is not physical.
     """
     most = ASSUMED[KINDS[joint.kind]]
     if is_endless(joint):
@@ -200,13 +201,13 @@ def is_endless(joint: UrdfJoint) -> bool:
 
 
 def soft_limits_of(joint: UrdfJoint) -> tuple[float, float] | None:
-    """Limits that the joint's controller keeps [rad, m]; None where the file gives none."""
+    """Soft limits [rad, m] of the joint's controller; None where the file contains none."""
     lower, upper = ends_of(joint, "safety_controller", "soft_lower_limit", "soft_upper_limit")
     return (lower, upper) if lower < upper else None
 
 
 def ends_of(joint: UrdfJoint, tag: str, lower: str, upper: str) -> tuple[float, float]:
-    """Two coordinates [rad, m] of an element of a joint; 0 where they are missing."""
+    """Two coordinates [rad, m] from the attributes of a joint's element; 0 for a missing attribute."""
     where, unit = f"joint {joint.name}", UNITS[KINDS[joint.kind]]
     element = joint.element.find(tag)
     first, second = (float(numbers_of(where, element, k, (0.0,), unit)[0]) for k in (lower, upper))
@@ -214,7 +215,7 @@ def ends_of(joint: UrdfJoint, tag: str, lower: str, upper: str) -> tuple[float, 
 
 
 def turn_of_z(axis: Array) -> tuple[float, Array]:
-    """Sign of an axis along z, and the turn (4, 4) of z into the axis of that sign."""
+    """Sign of the z component of an axis, and the rotation (4, 4) that turns z into the axis times that sign."""
     sign = -1.0 if axis[2] < 0.0 else 1.0
     return sign, transform(_turned_z(sign * axis), np.zeros(3))
 
@@ -227,7 +228,7 @@ def _turned_z(axis: Array) -> Array:
 
 
 def origin_of(where: str, element: Xml.Element) -> Array:
-    """Transform (4, 4) of the origin of an element; ``where`` names it if it is no origin."""
+    """Transform (4, 4) of the origin of an element; ``where`` is the name of the element in an error message."""
     found = element.find("origin")
     roll, pitch, yaw = numbers_of(where, found, "rpy", (0.0, 0.0, 0.0), "rad").tolist()
     turn = product(product(rotation("z", yaw), rotation("y", pitch)), rotation("x", roll))
@@ -246,7 +247,7 @@ def numbers_of(where: str, element: Xml.Element | None, key: str, default: tuple
         element: The element.
         key: Name of the attribute.
         default: Default values; their number is the required number.
-        unit: Unit of the numbers, of :data:`~teleop_core.base.ranges.RANGES`, which gives their bounds.
+        unit: Unit of the numbers, a key of :data:`~teleop_core.base.ranges.RANGES`, which contains their bounds.
 
     Raises:
         ParameterError: The number of words is wrong, a word is not a number, or a value is not physical.

@@ -1,4 +1,4 @@
-"""Visuals: shapes of the links in an arm's file, and the paths of their meshes."""
+"""Visuals: shapes of the links in a URDF, and the paths of the mesh files."""
 
 import hashlib
 import os
@@ -15,7 +15,7 @@ from teleop_core.robots.files.urdf_tree import Links, UrdfJoint, chain_to, numbe
 from teleop_core.robots.visual import Visual, VisualKind
 
 _ENDINGS = (".stl", ".dae", ".obj", ".ply", ".glb", ".gltf", ".off")
-_UP = 4  # folders above that of a URDF in which its meshes may be
+_UP = 4  # meshes may be in this many folders above the folder of the URDF
 _PACKAGE = "package://"
 _SHAPES: dict[VisualKind, tuple[tuple[str, tuple[float, ...]], ...]] = {
     "mesh": (("scale", (1.0, 1.0, 1.0)),),
@@ -23,19 +23,19 @@ _SHAPES: dict[VisualKind, tuple[tuple[str, tuple[float, ...]], ...]] = {
     "cylinder": (("radius", (0.0,)), ("length", (0.0,))),
     "sphere": (("radius", (0.0,)),),
 }
-"""Attributes of each shape of a visual [m], which are those of :class:`Visual` in this order."""
+"""Attributes in the URDF of each kind of shape [m], in the order of the sizes of :class:`Visual`."""
 
 
 def mesh_file(name: str, urdf: Path) -> Path:
-    """File of a mesh that a URDF names; :func:`kept_mesh` comes first.
+    """File of a mesh that a URDF names; a copy at the path of :func:`kept_mesh` is preferred.
 
     ``package://NAME/REST`` is searched in folders called NAME next to and above the URDF's folder, in the packages of
     ``AMENT_PREFIX_PATH`` and ``ROS_PACKAGE_PATH``, and without NAME in the folders above. Any other name is relative
     to the folder of the URDF.
 
     Raises:
-        ParameterError: The file is not found, is not a mesh, or is outside the package, or outside the fourth folder
-            above the URDF.
+        ParameterError: The file is not found or is not a mesh, or it is outside the package, or outside the fourth
+            folder above the URDF.
     """
     if not name.lower().endswith(_ENDINGS):
         raise ParameterError("mesh", name, f"a file with one of the endings {', '.join(_ENDINGS)}")
@@ -49,13 +49,13 @@ def mesh_file(name: str, urdf: Path) -> Path:
 
 
 def kept_mesh(name: str, urdf: Path) -> Path:
-    """Path of a mesh that belongs to the copy of a URDF in a recording, for any mesh name."""
+    """Path of the stored copy of a mesh, next to the copy of a URDF in a recording, for any mesh name."""
     file = hashlib.sha256(name.encode()).hexdigest()[:16] + Path(name).suffix
     return urdf.parent / "kept_meshes" / file
 
 
 def meshes_of(text: str, urdf: Path) -> dict[str, Path]:
-    """Files of the meshes that the visuals of a URDF name, by these names.
+    """Files of the meshes of a URDF's visuals, by the mesh names in the URDF.
 
     Args:
         text: XML of the URDF; text that is not XML names no meshes.
@@ -74,10 +74,10 @@ def meshes_of(text: str, urdf: Path) -> dict[str, Path]:
 
 
 def package_folder(name: str, urdf: Path) -> Path:
-    """Folder of a package, looked for as :func:`mesh_file` does.
+    """Folder of a package; searched in the same folders as by :func:`mesh_file`.
 
     Raises:
-        ParameterError: It is nowhere there, or is no plain name.
+        ParameterError: The package is in none of these folders, or ``name`` is not a plain folder name.
     """
     if name not in {"", ".", ".."} and name == Path(name).name:
         for _, place in _packages(name, urdf.resolve().parent):
@@ -118,11 +118,11 @@ def visuals_of(
     """Shapes of all links, in the order of the file.
 
     Args:
-        home: Coordinate at home of each moving joint on the path to the tip [rad, m], by its name; all other joints
+        home: Coordinate at home of each moving joint on the path to the tip [rad, m], by joint name; all other joints
             stay at 0.
         links: Elements of the links by their names.
         by_child: The joint that carries each link.
-        urdf: The file.
+        urdf: Path of the URDF.
 
     Raises:
         ParameterError: A position or a size is not a number.

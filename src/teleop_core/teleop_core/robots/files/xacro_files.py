@@ -12,7 +12,8 @@ from teleop_core.base import ParameterError, TeleopError, UnknownNameError, dama
 from teleop_core.robots.files import urdf_tree, visuals
 
 EXPANDED = ".expanded.urdf"
-"""Suffix of the expanded URDF that a recording stores for a xacro; arguments for it are allowed and ignored."""
+"""Suffix of the expanded URDF that a recording stores for a xacro. Arguments for such a file are allowed and
+ignored."""
 _DECLARED = re.compile(r"<xacro:arg\s[^>]*?name=[\"']([^\"']+)")
 _MOST_CHARACTERS = 300  # characters kept of the package's message, which may be pages long
 
@@ -22,12 +23,12 @@ def xml_of(path: Path, arguments: Mapping[str, str]) -> bytes:
 
     Args:
         path: The file.
-        arguments: Texts for its ``<xacro:arg>``, by their names.
+        arguments: Texts for the ``<xacro:arg>`` of the file, by their names.
 
     Raises:
         RecordingError: The file cannot be read.
         ParameterError: The file cannot be expanded, or arguments are given for a file that is not a xacro.
-        UnknownNameError: Neither the file nor what it includes declares such an argument.
+        UnknownNameError: Neither the file nor a file that it includes declares such an argument.
         TeleopError: The package ``xacro`` is not installed.
     """
     with damage_told(path):
@@ -62,7 +63,7 @@ def _expanded(path: Path, arguments: dict[str, str]) -> bytes:
 
 
 def _wrapped(error: BaseException | None) -> TeleopError | None:
-    """TeleopError, such as that of ``$(find NAME)``, that the package's exception wraps; None if there is none."""
+    """TeleopError inside an exception of the package, such as an error of ``$(find NAME)``; None if there is none."""
     while error is not None and not isinstance(error, TeleopError):
         error = getattr(error, "exc", None) or error.__cause__ or error.__context__
     return error
@@ -80,9 +81,9 @@ def _refuse_unknown(arguments: Mapping[str, str], files: list[Path]) -> None:
 
 @contextmanager
 def _our_files(path: Path) -> Iterator[None]:
-    """Let ``$(find NAME)`` find the same as ``package://NAME``, and refuse document types.
+    """Make ``$(find NAME)`` find the same folder as ``package://NAME``, and refuse document types.
 
-    The package has no setting for either, so its functions are replaced during the expansion.
+    The package has no settings for these two changes, so its functions are replaced during the expansion.
     """
     import xacro
     from xacro import substitution_args

@@ -1,4 +1,4 @@
-"""Combined: shapes made of several others, each of them a text such as ``sphere radius=0.01``."""
+"""Combined: shapes made of several other shapes; each part is given by a text such as ``sphere radius=0.01``."""
 
 import ast
 import math
@@ -14,10 +14,11 @@ from teleop_core.shapes import SHAPES, Shape
 from teleop_core.shapes.basis.drawing import with_lifts
 
 PARTS = tuple(name for name in SHAPES.builtin if name not in {"intersection", "union"})
-"""Shapes that can be parts; their indices here are their numbers in :func:`part_distance`."""
+"""Shapes that can be parts. The index of a shape in this tuple is its number in :func:`part_distance`."""
 MOST = 8
 """Largest number of parts."""
-_HEAD = 6  # numbers before those of a part: its index in PARTS, its count of numbers, its side, its middle [m]
+# Each part has these numbers before its own: index in PARTS, count of own numbers, side, and middle (3,) [m].
+_HEAD = 6
 _SETTING = re.compile(r"(\w+)\s*=\s*(.*?)\s*(?=\s\w+\s*=|$)")
 _NOT = "not "
 
@@ -34,8 +35,8 @@ class Part(NamedTuple):
     Attributes:
         kind: Shape of the part.
         parameters: Parameters of that shape.
-        side: 1 for the shape itself, -1 for everything outside it.
-        at: Middle of the part, relative to that of the whole (3,) [m].
+        side: 1 for the inside of the shape, -1 for everything outside it.
+        at: Middle of the part, relative to the middle of the whole shape (3,) [m].
     """
 
     kind: Shape
@@ -53,7 +54,7 @@ def parts_of(texts: tuple[str, ...], name: str) -> list[Part]:
 
     Raises:
         ParameterError: There is no part or more than :data:`MOST`, or a text does not describe a part.
-        UnknownNameError: A part has no such parameter.
+        UnknownNameError: A text names a parameter that the part does not have.
     """
     if not 1 <= len(texts) <= MOST:
         raise ParameterError(name, texts, f"1 to {MOST} parts, such as 'sphere radius=0.01'")
@@ -94,7 +95,7 @@ class Combined(Protocol):
 
 
 def numbers_of_parts(parameters: Combined) -> Array:
-    """Numbers that :func:`part_distance` reads: how many parts there are, then each part's."""
+    """Numbers that :func:`part_distance` reads: the number of parts, then the numbers of each part."""
     rows: list[Array] = [np.array([len(parameters.parts)], np.float64)]
     for part in parts_of(parameters.parts, "parts"):
         numbers = part.kind.numbers(part.parameters)
@@ -103,7 +104,7 @@ def numbers_of_parts(parameters: Combined) -> Array:
 
 
 def outline_of_parts(parameters: Combined) -> Array:
-    """Lines of all parts, each whole, (N, 3) [m] around the middle."""
+    """Complete outlines of all parts, (N, 3) [m] relative to the middle; hidden lines are included."""
     parts = parts_of(parameters.parts, "parts")
     return with_lifts([part.kind.outline(part.parameters) + part.at for part in parts])
 
@@ -123,7 +124,7 @@ _distance_of = kernel_from_source(
 
 @inner
 def next_part(numbers: Array, first: int) -> int:
-    """Index at which the numbers of the part after the one at ``first`` begin; the first part begins at 1."""
+    """Index of the first number of the part after the part that begins at ``first``; the first part begins at 1."""
     return first + _HEAD + int(numbers[first + 1])
 
 
@@ -132,10 +133,10 @@ def part_distance(place: Array, numbers: Array, first: int, out: Array) -> float
     """Write the outward direction of a part (3,); return the distance [m] of a point (3,) outside it.
 
     Args:
-        place: The point, relative to the middle of the whole, (3,) [m].
+        place: The point (3,) [m], relative to the middle of the whole shape.
         numbers: Numbers of all parts.
-        first: Index at which the numbers of this part begin.
-        out: Written; a vector of any length.
+        first: Index of the first number of this part.
+        out: Outward direction, written; a vector of any length.
     """
     offset, side = np.empty(3), numbers[first + 2]
     for i in range(3):
@@ -151,13 +152,13 @@ def part_distance(place: Array, numbers: Array, first: int, out: Array) -> float
 def extreme_part(place: Array, numbers: Array, sign: float, out: Array) -> float:
     """Write the outward direction of the part with the largest (sign 1) or smallest (-1) distance.
 
-    Of several parts with equal distance the first counts.
+    Of parts with equal distances the first is taken.
 
     Args:
-        place: The point, relative to the middle of the whole, (3,) [m].
+        place: The point (3,) [m], relative to the middle of the whole shape.
         numbers: Numbers of all parts.
         sign: 1 or -1.
-        out: Written; a vector of any length.
+        out: Outward direction, written; a vector of any length.
 
     Returns:
         Distance of the point outside that part [m].

@@ -6,17 +6,17 @@ from teleop_core.base import ParameterError
 from teleop_core.kernels import Array, inner
 
 NEAR = 5e-3
-"""A tip farther outside a shape than this [m] does not reach the shape within a tick."""
+"""Distance from a shape [m] that a tip cannot travel within one tick."""
 MIDDLE = 1e-150
 """Vectors shorter than this [m] have no direction, because their squares underflow."""
 ON_AXIS = 1e-12
 """Within this distance of an axis [m], rounding hides the direction of a point from the axis."""
-_SHORTEST = 1e-6  # vector that counts as a direction
+_SHORTEST = 1e-6  # a shorter vector has no direction
 Direction = tuple[float, float, float]
 
 
 def require_direction(name: str, vector: tuple[float, ...]) -> None:
-    """Make sure that a vector (3,) has a direction.
+    """Raise an error if a vector (3,) is too short to have a direction.
 
     Raises:
         ParameterError: The vector is zero or nearly zero.
@@ -35,7 +35,7 @@ def unit(x: float, y: float, z: float) -> Direction:
 @inner
 def length_of(vector: Array) -> float:
     """Length of a vector (3,)."""
-    # Products, because powers are rounded differently in plain Python.
+    # Written as products, because plain Python rounds powers differently from compiled code.
     x, y, z = vector[0], vector[1], vector[2]
     return math.sqrt(x * x + y * y + z * z)
 
@@ -87,14 +87,14 @@ def look_across(direction: Direction, vector: Array) -> float:
 
 @inner
 def between_ends(along: float, whole: float) -> float:
-    """Point nearest to ``along`` on a line of length ``whole``; both are measured from its middle."""
+    """Point of a line of length ``whole`` nearest to ``along``; positions are measured from the middle of the line."""
     half = 0.5 * whole
     return min(max(along, -half), half)
 
 
 @inner
 def nearest_share(offset: Array, start: Array, end: Array) -> float:
-    """Point of a segment nearest to a given point, as a share of the segment, 0 to 1; 0 without length.
+    """Point of a segment nearest to ``offset``, as a share of the segment from 0 to 1; 0 for a segment of length 0.
 
     Args:
         offset: The given point (3,).

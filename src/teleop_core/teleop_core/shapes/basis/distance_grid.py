@@ -1,7 +1,7 @@
-"""Distance grid: distances of points from a mesh or height field, computed once and cached for the user.
+"""Distance grid: distances of points from a mesh or height field, computed once and stored in the user's cache.
 
-The key of the cache is the digest of the file and of everything else that the grid depends on. So a grid serves every
-session, and a changed file gets a new grid.
+The key in the cache is the digest of the file and of everything else that the grid depends on. So all sessions share a
+grid, and a changed file gets a new grid.
 """
 
 import hashlib
@@ -31,13 +31,13 @@ from teleop_core.shapes.basis.triangles import (
 )
 
 HEADER = 7
-"""Numbers before the spline's: nodes along x, y and z, step [m], position of the first node [m]."""
+"""Number of values before the coefficients of the spline: nodes along x, y, z; step [m]; first node (3,) [m]."""
 EDGE = 2
-"""Nodes at each end of the grid where the spline is not used, because it is straight there."""
-_MADE = "1"  # must change when a file is converted differently
-_MOST = 4_000_000  # nodes of a grid, 32 MB
-_SIDES = (1e-3, 2.0)  # allowed length of a mesh's longest side [m]
-_THINNEST = 4.0  # steps across the shortest side of a mesh
+"""Number of nodes at each end of the grid that are not used, because the spline is straight there."""
+_MADE = "1"  # version of the conversion; change it when the code converts a file differently
+_MOST = 4_000_000  # largest number of nodes of a grid: 32 MB
+_SIDES = (1e-3, 2.0)  # least and largest length of a mesh's longest side [m]
+_THINNEST = 4.0  # least number of steps across the shortest side of a mesh
 _SHARP = math.cos(math.radians(30.0))
 
 
@@ -46,7 +46,7 @@ class GridRequest(NamedTuple):
 
     Attributes:
         file: Path of the mesh or the heights.
-        scale: Length of a mesh's unit, or distance between heights of a field [m].
+        scale: Length of the unit of a mesh, or distance between neighbouring heights of a field [m].
         angles: Rotation angles of a mesh [rad]; empty for a field of heights.
         step: Distance between nodes of the grid [m].
         kind: Name of the shape.
@@ -59,7 +59,7 @@ class GridRequest(NamedTuple):
     kind: str = "mesh"
 
     def error(self, name: str, value: object, text: str) -> ParameterError:
-        """Error about the file, ``scale`` or ``step``, with the name of the shape's parameter."""
+        """Error about ``file``, ``scale`` or ``step`` that contains the name of the shape's parameter."""
         is_spacing = name == "scale" and self.kind != "mesh"
         full = f"{self.kind}.{'spacing' if is_spacing else name}"
         return ParameterError(full, value, text)
@@ -69,8 +69,9 @@ class DistanceGrid(NamedTuple):
     """Distances from a mesh, and its outline.
 
     Attributes:
-        numbers: Header, then the coefficients of the cubic spline through the distances [m], along z fastest.
-        outline: Lines (N, 3) [m], a row of NaN between them.
+        numbers: Header, then the coefficients of the cubic spline through the distances [m]; the index along z changes
+            fastest.
+        outline: Lines (N, 3) [m] with a row of NaN between two lines.
     """
 
     numbers: Array
@@ -78,11 +79,11 @@ class DistanceGrid(NamedTuple):
 
 
 def distance_grid(request: GridRequest) -> DistanceGrid:
-    """Grid of a mesh, from the user's cache if it is there; making it takes seconds.
+    """Grid of a mesh, from the user's cache if the cache contains it; computing a grid takes seconds.
 
     Raises:
-        ParameterError: There is no such file, it is neither a closed mesh with a volume nor a field of heights, or it
-            does not fit the scale or the step; see :func:`read_triangles` and :func:`read_heights`.
+        ParameterError: The file does not exist, is neither a closed mesh with a volume nor a field of heights, or does
+            not fit the scale or the step; see :func:`read_triangles` and :func:`read_heights`.
     """
     path = Path(request.file).expanduser()
     try:
@@ -97,7 +98,7 @@ def distance_grid(request: GridRequest) -> DistanceGrid:
 
 @lru_cache(maxsize=4)
 def _found(digest: str, request: GridRequest) -> DistanceGrid:
-    """Grid of a digest: in memory, in the user's cache, or made."""
+    """Grid of a digest: from memory, from the user's cache, or newly computed."""
     folder = user_cache("grids")
     if folder is None:
         return _make(request)
@@ -114,7 +115,7 @@ def _loaded(kept: Path) -> DistanceGrid | None:
     try:
         with np.load(io.BytesIO(kept.read_bytes())) as file:
             grid = DistanceGrid(file["numbers"], file["outline"])
-        os.utime(kept)  # note that the grid was used, see teleop_core.kernels.store.prune
+        os.utime(kept)  # records that the grid was used; see teleop_core.kernels.store.prune
     except Exception:  # a damaged archive may raise anything
         return None
     is_whole = len(grid.numbers) == HEADER + grid.numbers[:3].prod()
@@ -122,7 +123,7 @@ def _loaded(kept: Path) -> DistanceGrid | None:
 
 
 def _keep(kept: Path, grid: DistanceGrid) -> None:
-    """Write a grid to the cache, if the user has one; readers never see an incomplete file."""
+    """Write a grid to the user's cache, if there is a cache; readers never see an incomplete file."""
     with suppress(OSError):
         kept.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.NamedTemporaryFile(dir=kept.parent, delete=False) as file:
@@ -158,13 +159,13 @@ def _read(request: GridRequest, path: Path) -> Triangles:
 
 
 def _nodes(size: Array, step: float) -> list[int]:
-    """Nodes of a grid for a mesh of a size (3,) [m]; a tip at its end is not near."""
+    """Numbers of nodes of a grid for a mesh of a size (3,) [m]; a tip at the end of the grid is not near the mesh."""
     around = np.ceil((size + 2.0 * directions.NEAR) / step).astype(np.int64)
     return (around + 3 + 2 * EDGE).tolist()
 
 
 def _check_size(request: GridRequest, size: Array) -> None:
-    """Make sure that a mesh of a size (3,) [m] fits its scale and its step.
+    """Raise an error if a mesh of a size (3,) [m] does not fit its scale or its step.
 
     Raises:
         ParameterError: The mesh is too small, too large or too thin, or its grid would be too large.
@@ -188,13 +189,13 @@ def _check_size(request: GridRequest, size: Array) -> None:
 
 
 def _outline(triangles: Triangles) -> Array:
-    """Sharp edges of a mesh and three sections through its middle, (N, 3) [m], NaN between."""
+    """Sharp edges of a mesh and three sections through its middle, (N, 3) [m], with rows of NaN between the lines."""
     from trimesh import Trimesh
     from trimesh.intersections import mesh_plane
 
     points, faces = triangles
     edges = np.sort(edges_of(faces), axis=1)
-    order = np.lexsort(edges.T)  # puts both occurrences of each edge next to each other
+    order = np.lexsort(edges.T)  # places the two occurrences of each edge next to each other
     normals = np.tile(unit_normals(triangles), (3, 1))[order]
     is_sharp = dot(normals[::2], normals[1::2]) < _SHARP
     lines = [points[edges[order][::2][is_sharp]]]

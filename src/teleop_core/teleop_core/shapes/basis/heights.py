@@ -1,7 +1,7 @@
 """Heights: the surface of a block, read from a table, as triangles.
 
-Between the heights of the table the surface is a cubic spline. It is cut into triangles that are
-half a step of the distance grid wide, so that their edges are not felt.
+Between the heights of the table the surface is a cubic spline. The surface is cut into triangles half a step of the
+distance grid wide, so that the hand does not feel their edges.
 """
 
 import io
@@ -19,16 +19,16 @@ FIELD = "height_field"
 THICKNESS = 0.02
 """Thickness of the block below the lowest height [m]."""
 _LEAST = 4  # least number of heights along x and along y
-_MOST = 400_000  # places of the surface
+_MOST = 400_000  # largest number of points of the surface
 
 
 def read_heights(path: Path, data: bytes, spacing: float, step: float) -> triangles.Triangles:
-    """Read a table of heights and close it to a block, whose middle is at height 0.
+    """Read a table of heights and make a closed block from it; the middle of the block is at height 0.
 
     Args:
-        path: Path of the file, for messages and for the format: ``.npy``, or else CSV.
+        path: Path of the file, for messages; its ending gives the format: ``.npy``, or else CSV.
         data: Content of the file: heights [m], a row for each x, a column for each y.
-        spacing: Distance between heights [m].
+        spacing: Distance between neighbouring heights [m].
         step: Step of the distance grid [m].
 
     Raises:
@@ -73,7 +73,7 @@ def _table(path: Path, data: bytes) -> Array:
 
 
 def _block(heights: Array, width: float) -> triangles.Triangles:
-    """Block below heights (N, M) [m] that are ``width`` [m] apart, with a flat bottom."""
+    """Block with a flat bottom below heights (N, M) [m]; neighbouring heights are ``width`` [m] apart."""
     rows, columns = heights.shape
     x = width * (np.arange(rows) - 0.5 * (rows - 1))
     y = width * (np.arange(columns) - 0.5 * (columns - 1))

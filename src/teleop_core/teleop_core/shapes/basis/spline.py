@@ -9,8 +9,8 @@ from teleop_core.kernels import Array, inner, kernel
 def write_spline(lines: Array) -> None:
     """Write the coefficients of cubic B-splines through values (N, n, M) along the second axis.
 
-    The splines are straight beyond their ends. Through nodes with the coefficients c a spline has the
-    values (c[i - 1] + 4 c[i] + c[i + 1]) / 6, a tridiagonal system.
+    The splines are straight beyond their ends. At node i a spline with the coefficients c has the value (c[i - 1] + 4
+    c[i] + c[i + 1]) / 6. These equations are a tridiagonal system.
     """
     last = lines.shape[1] - 1
     share = np.zeros(last)
@@ -26,7 +26,7 @@ def write_spline(lines: Array) -> None:
 
 @inner
 def weights(t: float) -> tuple[float, float, float, float]:
-    """Weights of the four nodes around a point that is a share t of a step after the second node."""
+    """Weights of the four nodes around a point; the point is t steps after the second node, 0 <= t <= 1."""
     u = 1.0 - t
     return (
         u * u * u / 6.0,
@@ -49,7 +49,7 @@ def write_between(coefficients: Array, between: Array) -> None:
 
     Args:
         coefficients: Coefficients of splines along the second axis (N, n, M), from :func:`write_spline`.
-        between: Written (N, k (n - 1) + 1, M), k points per step.
+        between: Values (N, k (n - 1) + 1, M), written; k points per step.
     """
     steps = coefficients.shape[1] - 1
     parts = (between.shape[1] - 1) // steps

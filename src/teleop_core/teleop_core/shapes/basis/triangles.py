@@ -12,12 +12,12 @@ from teleop_core.base import ParameterError, TeleopError
 from teleop_core.base.ranges import check
 from teleop_core.kernels import Array, arctangent, dot, inner, kernel, length, product
 
-_FLAT = 1e-6  # share of the cube around it that a mesh must fill
-_LEAF = 4  # triangles in a leaf of the tree, at least
+_FLAT = 1e-6  # a mesh must fill this share of the cube around it
+_LEAF = 4  # least number of triangles in a leaf of the tree
 
 
 class Triangles(NamedTuple):
-    """Corners of a closed mesh, whose triangles run counterclockwise seen from outside.
+    """Triangles of a closed mesh; their corners are sorted counterclockwise as seen from outside.
 
     Attributes:
         points: Corners (P, 3) [m].
@@ -29,19 +29,19 @@ class Triangles(NamedTuple):
 
 
 def read_triangles(path: Path, data: bytes, placed: Array) -> Triangles:
-    """Read a mesh and make sure that it encloses a volume.
+    """Read a mesh, and check that it encloses a volume.
 
-    The triangles of a mesh that is inside out are reversed.
+    If the triangles of the mesh point inwards, they are reversed.
 
     Args:
-        path: Path of the file, for messages and for the format.
+        path: Path of the file, for messages; its ending gives the format.
         data: Content of the file.
-        placed: Matrix (3, 3) from the file's axes to those of the shape, scale included [m].
+        placed: Matrix (3, 3) from the file's axes to the shape's axes, scale included [m].
 
     Raises:
         ParameterError: The file is not a mesh, or the mesh has a hole or no volume. For a hole, the message contains
-            the middle of an edge along it, in the units of the file.
-        TeleopError: The library that reads it is not installed.
+            the middle of an edge of the hole, in the units of the file.
+        TeleopError: The library that reads meshes is not installed.
     """
     name = "mesh.file"
     try:
@@ -49,7 +49,7 @@ def read_triangles(path: Path, data: bytes, placed: Array) -> Triangles:
     except ImportError as error:
         raise TeleopError("a mesh needs trimesh: pip install 'teleop_core[mesh]'") from error
     try:
-        with np.errstate(all="ignore"):  # warnings about numbers that are refused below
+        with np.errstate(all="ignore"):  # no warnings about numbers that are refused below
             mesh = trimesh.load_mesh(io.BytesIO(data), file_type=path.suffix.lower().lstrip("."))
             mesh.merge_vertices(merge_tex=True, merge_norm=True)
         points, faces = np.array(mesh.vertices, np.float64), np.array(mesh.faces, np.int64)
@@ -71,10 +71,10 @@ def read_triangles(path: Path, data: bytes, placed: Array) -> Triangles:
 
 
 def _check_closed(name: str, path: Path, points: Array, faces: NDArray[np.int64]) -> None:
-    """Make sure that every edge is used once in each direction.
+    """Raise an error unless the triangles use every edge exactly once in each direction.
 
     Raises:
-        ParameterError: An edge is not; the message contains its position.
+        ParameterError: An edge is missing or repeated in one direction; the message contains its position.
     """
     edges = edges_of(faces)
     forth = np.sort(edges[:, 0] * len(points) + edges[:, 1])
@@ -98,7 +98,7 @@ def _check_closed(name: str, path: Path, points: Array, faces: NDArray[np.int64]
 
 
 def edges_of(faces: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Edges (3 F, 2) of triangles: from corner 0 to 1 of each, then from 1 to 2, and 2 to 0."""
+    """Edges (3 F, 2) of triangles: first the edges from corner 0 to 1 of all triangles, then 1 to 2, then 2 to 0."""
     return np.concatenate([faces[:, [i, (i + 1) % 3]] for i in range(3)])
 
 
@@ -111,7 +111,7 @@ def unit_normals(triangles: Triangles) -> Array:
 
 
 def _pseudonormals(triangles: Triangles) -> Array:
-    """Normals (F, 7, 3) that determine the side of a point: of a triangle, its corners, its edges 01, 12, 20.
+    """Normals (F, 7, 3) that show the side of a point. Per triangle: face, corners 0, 1, 2, edges 01, 12, 20.
 
     Source:
         Baerentzen and Aanaes 2005: the normal of a corner is the sum over its triangles, weighted by their angles.
@@ -138,8 +138,8 @@ class Tree(NamedTuple):
     """Triangles in a binary tree of boxes: node ``i`` has the children ``2 i`` and ``2 i + 1``.
 
     Attributes:
-        boxes: Lower and upper corner of each node's box (2 L, 2, 3) [m]; the first is not used.
-        begin: First triangle of each of the L leaves, and the number of triangles (L + 1,).
+        boxes: Lower and upper corner of each node's box (2 L, 2, 3) [m]; ``boxes[0]`` is not used.
+        begin: (L + 1,): index of the first triangle of each of the L leaves, then the number of triangles.
         corners: Corners of the triangles (F, 3, 3) [m].
         normals: Normals from :func:`_pseudonormals` (F, 7, 3).
         stack: Scratch memory for nodes.
@@ -153,7 +153,7 @@ class Tree(NamedTuple):
 
 
 def tree_of(triangles: Triangles) -> Tree:
-    """Sort the triangles of a mesh into a tree; triangles without area are left out, their neighbours cover them."""
+    """Sort the triangles of a mesh into a tree, without triangles of area zero, which their neighbours cover."""
     has_area = unit_normals(triangles).any(axis=1)
     corners = triangles.points[triangles.faces][has_area]
     parts: list[Any] = [np.arange(len(corners))]
@@ -173,7 +173,7 @@ def tree_of(triangles: Triangles) -> Tree:
 
 
 def _halves(part: Any, centers: Array) -> tuple[Any, Any]:
-    """The triangles of a part below and above the median along its longest side."""
+    """Two halves of a part: the triangles below and above the median along its longest side."""
     axis = int(np.ptp(centers, axis=0).argmax())
     ordered = part[np.argsort(centers[:, axis], kind="stable")]
     return ordered[: len(part) // 2], ordered[len(part) // 2 :]
@@ -190,7 +190,7 @@ def _to_box(box: Array, x: float, y: float, z: float) -> float:
 
 @inner
 def _share(over: float, of: float) -> float:
-    """Share of an edge at which the edge is nearest."""
+    """Position of the nearest point on an edge, as a share of the edge, 0 to 1."""
     return over / of if of > 0.0 else 0.0
 
 
@@ -201,8 +201,9 @@ def _nearest_on(  # noqa: PLR0911 - seven regions
     """Point of a triangle (3, 3) that is nearest to x, y, z.
 
     Returns:
-        The feature on which the point lies, as an index into the rows of :func:`_pseudonormals`; and the shares of the
-        edges from corner 0 to 1 and from 0 to 2.
+        The feature on which the nearest point lies, as an index of a row of :func:`_pseudonormals`. Then the
+        coordinates of this point: its share of the edge from corner 0 to 1, and its share of the edge from corner 0 to
+        2.
 
     Source:
         Ericson 2005, Real-Time Collision Detection, section 5.1.5: regions of corners and edges.
@@ -219,7 +220,7 @@ def _nearest_on(  # noqa: PLR0911 - seven regions
         return 2, 1.0, 0.0
     if c >= cc and b - bc <= c - cc:
         return 3, 0.0, 1.0
-    u, v = cc * b - bc * c, bb * c - bc * b  # shares times the square of twice the area
+    u, v = cc * b - bc * c, bb * c - bc * b  # coordinates of the point, times the square of twice the area
     if v <= 0.0 <= b <= bb:
         return 4, _share(b, bb), 0.0
     if u <= 0.0 <= c <= cc:
@@ -270,7 +271,7 @@ def write_distances(tree: Tree, first: Array, step: float, distances: Array) -> 
         tree: Tree of the mesh.
         first: Point of ``distances[0, 0]`` (3,) [m].
         step: Distance between points [m].
-        distances: Written.
+        distances: Signed distances (N, M) [m]; written.
     """
     for j in range(distances.shape[0]):
         most = 1e9

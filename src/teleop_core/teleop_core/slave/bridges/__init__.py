@@ -1,7 +1,8 @@
 """Bridges: the ROS messages that controllers of real arms take as commands, one file per kind of controller.
 
 Each kind fills one ROS message from the commanded joints, in the arm's own names, order and signs. All kinds share the
-mapping of names, the checks, the start and the holds (:mod:`teleop_core.slave.bridges.arm_bridge`).
+mapping of names, the checks, the start, and the rules when the arm must stop
+(:mod:`teleop_core.slave.bridges.arm_bridge`).
 """
 
 from collections.abc import Callable
@@ -21,9 +22,9 @@ class Command:
     Attributes:
         names: The arm's joints, in the order of the command.
         position: Commanded joint positions, shape (n,) [rad or m].
-        velocity: Velocities of this motion, shape (n,) [rad/s or m/s].
+        velocity: Joint velocities of the commanded motion, shape (n,) [rad/s or m/s].
         period: Time until the next command [s].
-        stamp_ns: Time [ns].
+        stamp_ns: Time of the command [ns].
     """
 
     names: tuple[str, ...]
@@ -38,9 +39,9 @@ class Bridge:
     """A kind of controller.
 
     Attributes:
-        name: Its name in ``--set arm_bridge.kind=``.
-        parameters: Its parameter group.
-        message: ROS type of its commands, such as ``std_msgs/msg/Float64MultiArray``.
+        name: Name of the kind in ``--set arm_bridge.kind=``.
+        parameters: Parameter group of the kind.
+        message: ROS type of the commands, such as ``std_msgs/msg/Float64MultiArray``.
         command_topic: Default topic of the commands.
         state_topic: Default topic of the arm's measured joints, a JointState.
         write: ``write(message, command, parameters, make)`` fills an empty message with a :class:`Command`.

@@ -1,7 +1,7 @@
 """Arm bridge: the stage between the slave stage, which is the arm's server, and the controller of a real arm.
 
-It replaces ``slave_sim``: it reads the same setpoints and writes the measured joints of the real arm. It does not pass
-on invalid samples. The server then holds the arm and reports ``feedback``.
+The bridge replaces ``slave_sim``: it reads the same setpoints and writes the measured joints of the real arm. Invalid
+samples are dropped. If they continue, the server stops the arm and reports the fault ``feedback``.
 """
 
 from dataclasses import dataclass
@@ -137,8 +137,8 @@ class ControllerBridge(RunningStage):
     def hear(self, sample: Sample, now_ns: int) -> bool:
         """Take a sample of the arm that came at ``now_ns`` [ns]; return whether ``slave/measured_js`` is new.
 
-        After a jump, or when the server went on without the arm, ``slave/measured_js`` is not updated until the server
-        has left ENABLED. Then the arm restarts as after its first sample.
+        After a jump, or after the server's setpoint moved without the arm, ``slave/measured_js`` is not updated until
+        the server has left ENABLED. Then the arm restarts as after its first sample.
         """
         hearing, row = self.hearing, self.signals
         if row["slave_operation"][_STATE] != State.ENABLED:
@@ -153,7 +153,7 @@ class ControllerBridge(RunningStage):
         return True
 
     def _is_left(self, now_ns: int) -> bool:
-        """Whether the server has gone on without the arm for longer than setpoints may be missing."""
+        """Whether the server's setpoint has moved without the arm for longer than the timeout of setpoints."""
         return 0 < self._left_ns < now_ns - round(1e9 * self.parameters.setpoint_timeout)
 
     def is_due(self, now_ns: int) -> bool:
@@ -213,13 +213,13 @@ class ControllerBridge(RunningStage):
         return goes
 
     def trouble(self) -> str:
-        """Why the arm holds, or why its samples are rejected, in one line; empty without a problem."""
+        """Reason in one line why the arm gets no commands, or why its samples are rejected; empty without a problem."""
         if self.hearing.wrong:
             return f"the arm's messages are refused: {self.hearing.wrong}: holds"
         return self.lead_arm.waits
 
     def concerns(self) -> list[str]:
-        """Why the arm holds."""
+        """Reasons why the arm gets no commands."""
         return [text] if (text := self.trouble()) else []
 
 

@@ -11,7 +11,7 @@ from teleop_core.kernels.geometry import Array
 from teleop_core.slave.bridges.names import JointMap
 
 _OVERSPEED = 2.0
-"""Largest plausible joint speed, in rated speeds; assumed, larger than the server's 1.5."""
+"""Largest plausible joint speed, divided by the rated speed; assumed, larger than the server's bound 1.5."""
 _LAG = 0.02
 """Time constant [s], assumed, of speeds differentiated from positions, for arms that send no speeds."""
 
@@ -53,7 +53,7 @@ class Hearing:
         joints: Map between our joints and those of the arm.
         speed_limit: Rated speeds (n,) [rad/s or m/s].
         tolerance: Allowed change of a position beyond what the joint's speed explains [rad or m].
-        oldest: Largest difference between a stamp and our clock [s]; 0: stamps only have to rise.
+        oldest: Largest difference between a stamp and our clock [s]; 0: stamps only have to increase.
 
     Attributes:
         position: Joint positions of the arm, shape (n,) [rad or m].
@@ -62,7 +62,7 @@ class Hearing:
         stamp_ns: Stamp of the newest valid sample [ns]; 0 before the first.
         heard_ns: Arrival time of that sample [ns]; 0 before the first.
         wrong: Text about the fault of the newest sample; empty if the sample is valid.
-        strange: Names in a message that has none of our joints, such as a gripper's, since the newest valid sample.
+        strange: Names in a message without our joints, such as a message of a gripper, since the newest valid sample.
         has_jumped: Whether a joint jumped.
         refused: Number of rejected samples, by reason.
     """
@@ -76,7 +76,7 @@ class Hearing:
         self.begin_anew()
 
     def begin_anew(self) -> None:
-        """Forget the last position: the next valid sample may be anywhere."""
+        """Forget the last position: the next valid sample may have any position."""
         self.stamp_ns = self.heard_ns = 0
         self.wrong, self.strange, self.has_jumped = "", "", False
         self.velocity[:] = 0.0
@@ -151,13 +151,13 @@ def _numbers(values: Sequence[float], names: Sequence[str], places: list[int]) -
 
 
 def wrong_stamp(stamp_ns: int, newest_ns: int, now_ns: int, oldest: float, option: str) -> str:
-    """Why the stamp of a sample is rejected, in words; empty if the stamp is valid.
+    """Text with the reason why the stamp of a sample is rejected; empty if the stamp is valid.
 
     Args:
         stamp_ns: The stamp [ns].
         newest_ns: Stamp of the newest valid sample [ns].
         now_ns: Time [ns].
-        oldest: Largest difference between a stamp and our clock [s]; 0: stamps only have to rise.
+        oldest: Largest difference between a stamp and our clock [s]; 0: stamps only have to increase.
         option: Name of the parameter that makes the bridge use sending times in place of stamps.
     """
     if stamp_ns == 0:

@@ -1,7 +1,7 @@
 """Jaw bridge: the stage between the jaw's server and a real gripper.
 
-It does for the jaw what ``arm_bridge`` does for the arm, with two differences. Brakes of the arm do not open the jaw.
-Fingers that press on an object stop before their setpoint.
+It works for the jaw as ``arm_bridge`` works for the arm, with two differences. When the arm brakes, the jaw keeps its
+grip. Fingers that press on an object may stop before their setpoint.
 """
 
 from dataclasses import dataclass
@@ -39,7 +39,7 @@ class JawBridgeParameters(arm_bridge.BridgeParameters):
     )
 
     def __post_init__(self) -> None:
-        """Refuse a scale of zero as well."""
+        """Refuse a scale of zero, which is within the bounds of the parameter."""
         super().__post_init__()
         if self.scale == 0.0:
             raise ParameterError("jaw_bridge.scale", self.scale, "another number than 0")
@@ -49,8 +49,8 @@ class JawBridge(arm_bridge.ControllerBridge):
     """Stage that commands a real gripper and publishes the measured angle of its fingers.
 
     The gripper gets no command until the server follows the first command of the hand. After a pause without commands,
-    the gripper continues from the last command if the setpoint has not moved. So it keeps its grip. If the setpoint
-    has moved, the gripper continues from the measured angle, no faster than the rated speed.
+    the gripper continues from the last command if the setpoint has not moved, so it keeps its grip. If the setpoint has
+    moved, the gripper continues from the measured angle, no faster than the rated speed.
     """
 
     def __init__(self, parameters: JawBridgeParameters, dt: float = DT) -> None:
@@ -61,7 +61,7 @@ class JawBridge(arm_bridge.ControllerBridge):
         super().__init__(JAW_BRIDGE, p, joints, lead, speed, dt)
 
     def command(self, now_ns: int, setpoint_age: float, is_led: bool) -> Command | None:
-        """Return the command as every bridge does; None also before the first command of the hand is followed."""
+        """Return the command, as all bridges do; also None until the server follows the first command of the hand."""
         if self.signals["slave_jaw_setpoint_js_ns"] <= NO_COMMAND_NS:
             self.lead_arm.let_go("waits for the hand: no command is in force")
             return None

@@ -1,4 +1,4 @@
-"""Joint states out and in, as simulator bridges and topic-based hardware interfaces use them.
+"""Joint states as commands and as measurements, for simulator bridges and topic-based hardware interfaces.
 
 ``joint_state_topic_hardware_interface`` of ros2_control does not pass on steps smaller than its
 ``trigger_joint_command_threshold``, 1e-5 by default: set it to -1. Our default topics are those of that interface.

@@ -1,7 +1,7 @@
 """Joint trajectories of one point, the commands of ``joint_trajectory_controller`` of ros2_control.
 
-Each message replaces the trajectory before it. Its point lies at least two periods ahead. So the arm does not reach
-the end of its trajectory and stop when one message is late.
+Each message replaces the previous trajectory. Its point is at least two periods ahead. So if one message is late, the
+arm does not reach the end of its trajectory and stop.
 """
 
 from collections.abc import Callable

@@ -5,13 +5,14 @@ import numpy as np
 from teleop_core.kernels.geometry import Array
 
 _CATCHING_UP = 1.2
-"""Largest speed of commands, in rated speeds. Setpoints need at most 1; the rest makes up for late setpoints."""
+"""Largest speed of commands, divided by the rated speed. Setpoints need at most 1; the excess compensates late
+setpoints."""
 _SLOWLY = 0.1  # speed of an arm that catches up with a setpoint that has moved away, divided by the rated speed
 _LONGEST = 2.0  # largest number of missed periods that one command may catch up
 
 
 class Lead:
-    """Turns setpoints (n,) into commands: none until the arm is at its setpoint, and none with a jump.
+    """Turns setpoints (n,) into commands without jumps; there is no command until the arm is at its setpoint.
 
     Args:
         lower: Lower limits of the joints (n,) [rad or m].
@@ -19,8 +20,8 @@ class Lead:
         speed_limit: Rated speeds (n,) [rad/s or m/s].
         tolerance: Largest distance of a joint from its setpoint when commands begin [rad or m].
         period: Time from command to command [s].
-        presses: Whether joints may stop before their setpoints, as fingers on an object do. Such joints begin
-            anywhere, and continue from the last command if the setpoint has not moved.
+        presses: Whether joints may stop before their setpoints, as fingers on an object do. The commands of such joints
+            may begin at any position, and continue from the last command if the setpoint has not moved.
 
     Attributes:
         position: The last command (n,) [rad or m].
@@ -53,7 +54,7 @@ class Lead:
         return self.is_leading and not self._presses and not bool((off <= self.tolerance).all())
 
     def step(self, setpoint: Array, measured: Array, names: tuple[str, ...], elapsed: float) -> bool:
-        """Go on towards a setpoint (n,); return whether there is a command to send.
+        """Move the command towards a setpoint (n,); return whether there is a command to send.
 
         Args:
             setpoint: Joint setpoint of the server (n,) [rad or m].

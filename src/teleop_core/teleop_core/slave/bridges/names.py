@@ -56,7 +56,7 @@ class JointMap:
         self._known: tuple[tuple[str, ...], list[int]] = ((), [])
 
     def places(self, names: Sequence[str]) -> list[int] | str:
-        """Index of each of our joints in a message with these names, or what is wrong.
+        """Index of each of our joints in a message with these names, or a text that says what is wrong.
 
         Further joints in the message, such as a gripper's, are ignored.
         """
@@ -85,7 +85,7 @@ class JointMap:
         return self._signs * theirs
 
     def effort(self, theirs: Array) -> Array:
-        """Our efforts (n,) from the arm's efforts in our order; both do the same work."""
+        """Our efforts (n,) from the arm's efforts in our order, so that the mechanical power is equal."""
         return theirs / self._signs
 
     def command(self, ours: Array) -> Array:

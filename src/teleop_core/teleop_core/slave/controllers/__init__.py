@@ -1,8 +1,8 @@
 """Controllers: from setpoint and measurement to drive effort, one file per law.
 
 A controller works on all joints of an arm at once, tick by tick. Its gains are a table with a row per joint, computed
-from the parameters and the robot's drives. Its memory is another table. Gravity that the source compensates, drive
-limits and encoders belong to the slave, not to the control law.
+from the parameters and the robot's drives. Its memory is another table. The slave, not the control law, computes the
+compensated gravity, the drive limits and the encoders.
 """
 
 from collections.abc import Callable
@@ -38,22 +38,23 @@ class Controller:
     """A control law.
 
     Attributes:
-        name: Its name in ``--set controller=``.
-        parameters: Its parameter group.
-        gains: ``gains(parameters, robot, viscous)`` gives the table (n, k) that ``control`` takes;
-            ``viscous`` (n,) is the friction in force [N·m·s/rad or N·s/m].
-        memory: Number of values that it remembers for each joint; they are zero at the start.
+        name: Name of the law in ``--set controller=``.
+        parameters: Parameter group of the law.
+        gains: ``gains(parameters, robot, viscous)`` returns the table (n, k) that ``control`` takes; ``viscous`` (n,)
+            is the present viscous friction [N·m·s/rad or N·s/m].
+        memory: Number of values that the law remembers for each joint; they are zero at the start.
         control: ``control(gains, memory, setpoint, measured, feedforward, limit, dt, effort)``, a kernel or a plain
             function over all joints. Setpoint and measured position [rad or m], feedforward and limit [N·m or N] are
-            (n,), ``memory`` (n, m) is its own to write, and ``effort`` (n,) gets the drive efforts; they are cut at
-            ±limit afterwards. The feedforward is the gravity that is compensated.
+            (n,). The law may write ``memory`` (n, m). It writes the drive efforts into ``effort`` (n,); the slave then
+            clips them to ±limit. The feedforward is the compensated gravity.
         begin: ``begin(memory, measured, effort)`` prepares the memory for an arm at rest at
             ``measured`` that needs ``effort`` to stay there.
-        shift: ``shift(memory, effort)`` makes the law give more by ``effort`` from now on, because the feedforward, or
-            a law with new gains, gives less by that amount.
-        uses_model: Whether the feedforward is (2 n + n²,): behind the gravity that is compensated the model's bias,
-            Coriolis, centrifugal and all gravity effort (n,) at measured positions and speeds, and its inertia matrix
-            (n, n), row by row. These come from the known model, not from the plant; they contain no friction.
+        shift: ``shift(memory, effort)`` increases the effort of the law by ``effort`` from now on, because the
+            feedforward or new gains decrease it by that amount.
+        uses_model: Whether the feedforward is (2 n + n²,). Then the compensated gravity is followed by the model's bias
+            (n,) at the measured positions and speeds, and by its inertia matrix (n, n), row by row. The bias contains
+            the Coriolis, centrifugal and all gravity efforts. All come from the known model, not from the plant; they
+            contain no friction.
     """
 
     name: str

@@ -1,8 +1,8 @@
 """Adaptive control: each joint learns its inertia, friction and load while it follows.
 
-The effort has two parts. The first is what a joint with the parameters learned so far needs for a reference motion
-back to the setpoint. The second pulls the joint to that motion. The remaining error from that motion changes the
-parameters, each within bounds around its value in the drive table.
+The effort has two parts. The first part is the effort that a joint with the parameters learned so far needs for a
+reference motion back to the setpoint. The second part is a feedback that pulls the joint to the reference motion. The
+error from the reference motion changes the parameters, each within bounds around its value in the drive table.
 
 Source:
     Slotine and Li 1987, eqs. 5-9, on each joint by itself; bounds and dead zone as in Slotine and Li 1991, section 8.7.
@@ -49,7 +49,7 @@ class AdaptiveParameters:
 
 @kernel
 def learn(value: float, change: float, bound: float) -> float:
-    """Changed value, held within ±bound."""
+    """The value plus ``change``, clipped to ±bound."""
     return min(max(value + change, -bound), bound)
 
 
@@ -102,7 +102,7 @@ def adaptive_gains(parameters: AdaptiveParameters, robot: Robot, viscous: Array)
     """Table (n, 12) of the known parameters of each joint, and of its learning rates and bounds.
 
     Raises:
-        ParameterError: The list has another length than the robot has joints.
+        ParameterError: The length of the list is not the robot's number of joints.
     """
     p = parameters
     drives, pole = drives_and_poles(robot, "adaptive", p.bandwidth)

@@ -2,8 +2,8 @@
 
 The wanted acceleration is that of the setpoint plus a feedback of the error with three equal poles. The model gives
 inertia and coupling at the arm's position, Coriolis and centrifugal effort, and the whole gravity, whatever the value
-of ``gravity_compensation``. It contains neither dry friction nor weights that the drawing lacks; the integral must
-hold those.
+of ``gravity_compensation``. The model contains neither dry friction nor weights that are missing in the drawing; the
+integral must balance these.
 
 Source:
     Luh, Walker and Paul 1980; Craig 2005, eqs. 10.15-10.19, with integral action.
@@ -69,7 +69,7 @@ def computed_torque_control(
         effort[i] = min(max(asked, -limit[i]), limit[i])
         if share == 1.0 and (effort[i] == asked or asked * error < 0.0):
             row[_INTEGRAL] += pole * pole * pole * motion_estimates.beyond(error, gains[i, _DEAD_BAND]) * dt
-        # A saturated joint accelerates by less than was wanted of it.
+        # A saturated joint accelerates less than the law demands.
         row[motion_estimates.EXPECTED] += (effort[i] - asked) / feedforward[2 * n + n * i + i]
 
 
@@ -77,7 +77,7 @@ def computed_torque_gains(parameters: ComputedTorqueParameters, robot: Robot, vi
     """Table (n, 5): pole, friction, dead band and linear range of each joint.
 
     Raises:
-        ParameterError: The list has another length than the robot has joints.
+        ParameterError: The length of the list is not the robot's number of joints.
     """
     p = parameters
     drives, pole = drives_and_poles(robot, "computed_torque", p.bandwidth)

@@ -1,4 +1,4 @@
-"""Disturbance observer: estimates and cancels everything that moves a joint beside its drive effort.
+"""Disturbance observer: estimates and cancels all forces on a joint except its drive effort.
 
 The nominal joint is a pure inertia with viscous friction. Everything else that acts on the joint is one disturbance:
 dry friction, unknown weights, coupling, gravity that is not compensated. The disturbance passes a third-order filter Q
@@ -20,7 +20,7 @@ from teleop_core.slave.controllers import Controller, drives_and_poles, fields, 
 
 # Columns of the table of gains.
 _INERTIA, _POLE, _VISCOUS, _FADING, _FRICTION, _TRAVEL, _DEAD_BAND, _RANGE = range(8)
-_HELD = motion_estimates.MEMORY  # gravity effort at the start that is not compensated
+_HELD = motion_estimates.MEMORY  # column of the memory: uncompensated gravity effort at the start
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -73,7 +73,7 @@ def disturbance_observer_gains(parameters: DisturbanceObserverParameters, robot:
     """Table (n, 8): inertia, pole, friction, dead band and linear range of each joint.
 
     Raises:
-        ParameterError: The list has another length than the robot has joints.
+        ParameterError: The length of the list is not the robot's number of joints.
     """
     p = parameters
     drives, pole = drives_and_poles(robot, "disturbance_observer", p.bandwidth)

@@ -21,7 +21,7 @@ def ratio(what: str) -> Any:
 
 
 def friction_share(use: str) -> Any:
-    """Share of known dry friction that a law uses; ``use`` completes the text with its purpose."""
+    """Share of known dry friction that a law uses; ``use`` ends the parameter's text with the purpose."""
     return parameter(
         0.8,
         Within(0.0, 1.5),
@@ -41,7 +41,7 @@ def friction_counts() -> Any:
 
 
 def dead_band(use: str) -> Any:
-    """Error [encoder counts] within which a joint counts as at rest; ``use`` ends the text with the effect."""
+    """Error [encoder counts] within which a joint counts as at rest; ``use`` ends the text with the effect of this."""
     return parameter(
         0.5,
         Within(0.0, 100.0),

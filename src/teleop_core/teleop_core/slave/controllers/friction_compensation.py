@@ -66,7 +66,7 @@ def friction_compensation_control(
         if share == 1.0 and is_inside:
             row[_INTEGRAL] = integral
         effort[i] = min(max(free + row[_INTEGRAL], -limit[i]), limit[i])
-        # The load held by the integral does not accelerate the joint.
+        # The effort of the integral balances a load, so it does not accelerate the joint.
         known = friction + feedforward[i] + row[_INTEGRAL]
         row[motion_estimates.EXPECTED] = (effort[i] - known - viscous * row[motion_estimates.SPEED]) / inertia
 
@@ -75,7 +75,7 @@ def friction_compensation_gains(parameters: FrictionCompensationParameters, robo
     """Table (n, 10): PID gains, inertia, friction, dead band and linear range of each joint.
 
     Raises:
-        ParameterError: The list has another length than the robot has joints.
+        ParameterError: The length of the list is not the robot's number of joints.
     """
     p = parameters
     drives, pole = drives_and_poles(robot, "friction_compensation", p.bandwidth)

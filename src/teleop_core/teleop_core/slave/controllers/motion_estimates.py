@@ -2,10 +2,10 @@
 
 A control law gets positions alone. Setpoint and joint position each pass a fading-memory filter of the second degree,
 which follows a constant acceleration without lag. The filter of the joint also gets the acceleration that the law
-expects from its own effort, and so estimates the unexplained acceleration. Both filters have the same memory, so that
-their difference compares motions of the same age.
+expects from its own effort, and so estimates the unexplained acceleration. Both filters have the same time constant, so
+their outputs have the same delay and can be compared.
 
-Every law reserves the first :data:`MEMORY` numbers of each joint's memory for this, under the names below.
+Every law reserves the first :data:`MEMORY` numbers of each joint's memory for these estimates, under the names below.
 
 Source:
     Morrison 1969, Introduction to Sequential Smoothing and Prediction, chapter 13; Brookner 1998,
@@ -23,21 +23,22 @@ from teleop_core.robots.robot import Robot
 from teleop_core.slave.controllers import Begin, Shift
 
 MEMORY = 9
-"""Numbers of each joint that :func:`follow_motion` and :func:`friction_of_setpoint` keep."""
+"""Number of values per joint that :func:`follow_motion` and :func:`friction_of_setpoint` store."""
 PLACE, SPEED, UNEXPLAINED = 0, 1, 2
-"""Estimates of the joint: position, speed, and acceleration beyond the expected one."""
+"""Columns of estimates of the joint: position, speed, and unexpected acceleration."""
 SET_PLACE, SET_SPEED, SET_ACCELERATION = 3, 4, 5
-"""Estimates of the joint's setpoint: position, speed, acceleration."""
+"""Columns of estimates of the joint's setpoint: position, speed, acceleration."""
 EXPECTED = 6
-"""Expected acceleration of the joint, which the law writes."""
+"""Column of the expected acceleration of the joint; the law writes it."""
 _LAST_SETPOINT, _BENT = 7, 8
 EFFORT_SHARE = 0.02
+"""Largest change of effort by one encoder count, divided by the drive's limit."""
 FRICTION_SHARE = 0.5
-"""Largest change of effort by one encoder count, as shares of the drive's limit and of dry friction."""
+"""Largest change of effort by one encoder count, divided by the dry friction."""
 APPROACH_SHARE = 0.5
 """Share of a drive's limit that an error may use before the error is reduced; see approach()."""
 SLOWEST_RATIO = 2.0
-"""Smallest pole of the filters, in poles of the loop."""
+"""Smallest pole of the filters, divided by the pole of the loop."""
 _HALVINGS = 50
 
 
@@ -46,11 +47,11 @@ def follow(memory: Array, at: int, value: float, expected: float, fading: float,
     """Update the estimates of a position, ``memory[at:at + 3]``, with its next value.
 
     Args:
-        memory: Numbers of one joint; position, speed and acceleration (beside the expected one) are written.
+        memory: Numbers of one joint; position, speed and unexpected acceleration are written.
         at: Index of the first of these three numbers.
         value: Position [rad or m].
-        expected: Acceleration since the last value, as far as it is known [rad/s² or m/s²].
-        fading: Share of the memory that remains after a tick, 0 to 1: all three poles of the error.
+        expected: Known part of the acceleration since the last value [rad/s² or m/s²].
+        fading: Share of the memory that remains after a tick, 0 to 1; it is the triple pole of the estimation error.
         dt: Tick [s], > 0.
     """
     acceleration = memory[at + 2] + expected
@@ -78,7 +79,7 @@ def friction_of_setpoint(memory: Array, setpoint: float, most: float, travel: fl
     travel``. It never chatters, because measurements do not affect it.
 
     Args:
-        memory: Numbers of one joint, as :func:`follow_motion` has them; written.
+        memory: Numbers of one joint, as in :func:`follow_motion`; written.
         setpoint: Wanted position [rad or m].
         most: Dry friction [N·m or N], >= 0.
         travel: Travel over which the friction builds up [rad or m], > 0.
@@ -96,7 +97,7 @@ def friction_of_setpoint(memory: Array, setpoint: float, most: float, travel: fl
 
 @kernel
 def approach(error: float, linear: float) -> float:
-    """Reduced error to act on: a setpoint too far for the drive counts as nearer, so that the drive can brake.
+    """Reduced error for the control law: a setpoint too far away counts as nearer, so that the drive can brake.
 
     Beyond ``linear`` [rad or m] the error D counts as ``√(linear (2 D - linear))``. The speed of approach then falls
     with the root of the remaining distance, as under a constant deceleration.
@@ -123,15 +124,15 @@ def beyond(value: float, room: float) -> float:
 
 
 def begin_motion(memory: Array, measured: Array, _effort: Array) -> None:
-    """Let the estimates of all joints (n, m) begin at rest at ``measured`` (n,)."""
+    """Initialise the estimates of all joints (n, m): at rest at ``measured`` (n,)."""
     memory[:, PLACE] = memory[:, SET_PLACE] = memory[:, _LAST_SETPOINT] = measured
 
 
 def holding(column: int) -> tuple[Begin, Shift]:
-    """``begin`` and ``shift`` of a law in which one column of the memory is the effort that holds the arm.
+    """Functions ``begin`` and ``shift`` of a law whose memory contains the effort that holds the arm in one column.
 
-    ``begin`` sets that column to all the effort that the arm needs at rest. ``shift`` adds what the feedforward no
-    longer gives.
+    ``begin`` sets that column to the whole effort that the arm needs at rest. ``shift`` adds the effort that the
+    feedforward no longer contains.
     """
 
     def begin(memory: Array, measured: Array, effort: Array) -> None:
@@ -163,11 +164,11 @@ def fading_of(
 ) -> Array:
     """Fading (n,) of the filters of a law, as fast as encoder noise allows.
 
-    The filters are ``ratio`` times as fast as the loop, with two upper bounds on their speed. One encoder count
-    changes the effort by at most :data:`EFFORT_SHARE` of the drive's limit. It also changes the effort by at most
+    The filters are ``ratio`` times as fast as the loop, with two upper bounds on their speed. One encoder count changes
+    the effort by at most :data:`EFFORT_SHARE` of the drive's limit. It also changes the effort by at most
     :data:`FRICTION_SHARE` of known dry friction, so that encoder noise never makes a stuck joint slip. In any case the
-    filters are at least :data:`SLOWEST_RATIO` times as fast as the loop, because a slower filter would leave it
-    undamped.
+    filters are at least :data:`SLOWEST_RATIO` times as fast as the loop, because with slower filters the loop would
+    have too little damping.
 
     Args:
         robot: Robot with drives.

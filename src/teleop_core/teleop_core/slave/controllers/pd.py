@@ -16,8 +16,9 @@ class PdParameters:
     bandwidth: tuple[float, ...] = fields.bandwidth("double")
 
 
-# Columns of the table of gains, and of the memory.
+# Columns of the table of gains.
 _KP, _KD = range(2)
+# Columns of the memory.
 _LAST, _SPEED = range(2)
 
 
@@ -34,8 +35,8 @@ def pd_control(
 ) -> None:
     """Write ``Kp (setpoint - measured) - Kd speed + feedforward`` of each joint.
 
-    The speed is that of the measured position, through a first-order filter of two ticks; memory
-    holds the last position and the filtered speed.
+    The speed is that of the measured position, through a first-order filter of two ticks; the memory contains the last
+    position and the filtered speed.
     """
     for i in range(effort.shape[0]):
         row = memory[i]
@@ -49,7 +50,7 @@ def pd_gains(parameters: PdParameters, robot: Robot, viscous: Array) -> Array:
     """Kp, Kd of each joint, (n, 2), for the characteristic polynomial ``inertia (s + bandwidth)²``.
 
     Raises:
-        ParameterError: The list has another length than the robot has joints.
+        ParameterError: The length of the list is not the robot's number of joints.
     """
     drives, bandwidth = drives_and_poles(robot, "pd", parameters.bandwidth)
     kd = (2.0 * bandwidth * drives.inertia - viscous).clip(min=0.0)
@@ -57,7 +58,7 @@ def pd_gains(parameters: PdParameters, robot: Robot, viscous: Array) -> Array:
 
 
 def begin(memory: Array, measured: Array, effort: Array) -> None:
-    """Start at rest; without an integrator nothing holds gravity that is not compensated."""
+    """Start at rest; without an integrator nothing balances uncompensated gravity."""
     memory[:, _LAST] = measured
 
 

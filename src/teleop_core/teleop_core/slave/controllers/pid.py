@@ -10,7 +10,7 @@ from teleop_core.robots.robot import Robot
 from teleop_core.slave.controllers import Controller, drives_and_poles, fields, motion_estimates, per_joint
 
 THIRD = 1.0 / 3.0
-"""Setpoint weight whose zero cancels one of three equal poles."""
+"""Setpoint weight with which the zero cancels one of three equal poles."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,7 +45,7 @@ def critically_damped_gains(inertia: Array, viscous: Array, bandwidth: Array) ->
         bandwidth: Triple pole (n,) [rad/s], > 0.
 
     Returns:
-        Kp, Ki, Kd, each (n,). Kd is 0 where friction alone damps more than wanted.
+        Kp, Ki, Kd, each (n,). Kd is 0 where friction alone gives more damping than wanted.
 
     Source:
         Åström and Hägglund 1995, PID Controllers, section 3.4 (setpoint weighting).
@@ -56,8 +56,9 @@ def critically_damped_gains(inertia: Array, viscous: Array, bandwidth: Array) ->
     return kp, ki, kd
 
 
-# Columns of the table of gains, and of the memory.
+# Columns of the table of gains.
 _KP, _KI, _KD, _WEIGHT = range(4)
+# Columns of the memory.
 _INTEGRAL, _LAST, _SPEED, _LAGGED = range(4)
 
 
@@ -98,11 +99,11 @@ def pid_step(
 
 @kernel
 def weighted_setpoint(setpoint: float, measured: float, gains: Array, memory: Array, room: float, dt: float) -> float:
-    """Modified setpoint that gives a PID on the error the setpoint weight b; unchanged at b = 1.
+    """Modified setpoint with which a PID on the error has the setpoint weight b; unchanged for b = 1.
 
-    It is ``b r + (1 - b) x``, where x is the setpoint r after a first-order lag of rate Ki / Kp. It gives the same
-    effort at every tick as ``Kp (b r - y) + Ki ∫(r - y)``. The difference is in the integral: here it holds the load
-    alone, there it holds ``Kp (1 - b) r`` as well.
+    The modified setpoint is ``b r + (1 - b) x``, where x is the setpoint r after a first-order lag of rate Ki / Kp. At
+    every tick the effort equals that of the form ``Kp (b r - y) + Ki ∫(r - y)``. Only the integrals differ: the
+    integral here balances the load alone; the integral of that form also contains ``Kp (1 - b) r``.
 
     A setpoint farther away than ``room / (b Kp)`` counts as nearer, so that the drive can brake: see
     :func:`teleop_core.slave.controllers.motion_estimates.approach`.
@@ -145,10 +146,10 @@ def pid_control(
 
 
 def pid_gains(parameters: PidParameters, robot: Robot, viscous: Array) -> Array:
-    """Kp, Ki, Kd, setpoint weight of each joint, (n, 4): given, or from the robot's drives.
+    """Kp, Ki, Kd and setpoint weight of each joint, (n, 4), from the parameters or from the robot's drives.
 
     Raises:
-        ParameterError: A list has another length than the robot has joints.
+        ParameterError: The length of a list is not the robot's number of joints.
     """
     drives, bandwidth = drives_and_poles(robot, "pid", parameters.bandwidth)
     designed = critically_damped_gains(drives.inertia, viscous, bandwidth)
@@ -161,13 +162,13 @@ def pid_gains(parameters: PidParameters, robot: Robot, viscous: Array) -> Array:
 
 
 def begin(memory: Array, measured: Array, effort: Array) -> None:
-    """Let the integrators hold the arm where it is."""
+    """Initialise the integrators so that they hold the arm at its position."""
     memory[:, _INTEGRAL] = effort
     memory[:, _LAST] = memory[:, _LAGGED] = measured
 
 
 def shift(memory: Array, effort: Array) -> None:
-    """Let the integrators take over what the feedforward no longer gives."""
+    """Add the effort that the feedforward no longer contains to the integrators."""
     memory[:, _INTEGRAL] += effort
 
 

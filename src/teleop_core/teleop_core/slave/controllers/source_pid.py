@@ -1,4 +1,4 @@
-"""Source PID: the published controller, as printed, with gains by a stated rule.
+"""Source PID: the published controller, as printed; its gains follow from a rule stated here.
 
 Proportional, integral and differential action on the error alone: the derivative is not filtered, so it reacts to
 every encoder count. Only axes whose gravity is not fed forward have integral action, as the published rest positions
@@ -37,8 +37,9 @@ class SourcePidParameters:
     kd: tuple[float, ...] = parameter((), Within(0.0), "derivative gain of each joint [N·m·s/rad or N·s/m]")
 
 
-# Columns of the table of gains, and of the memory.
+# Columns of the table of gains.
 _KP, _KI, _KD = range(3)
+# Columns of the memory.
 _INTEGRAL, _LAST = range(2)
 
 
@@ -59,7 +60,7 @@ def source_pid_control(
     """
     for i in range(effort.shape[0]):
         error = setpoint[i] - measured[i]
-        # Without integral action nothing holds the arm's weight at the start either.
+        # Without integral action no effort holds the arm's weight at the start, as later.
         integral = memory[i, _INTEGRAL] + gains[i, _KI] * dt * error if gains[i, _KI] > 0.0 else 0.0
         memory[i, _INTEGRAL] = min(max(integral, -limit[i]), limit[i])
         change = (error - memory[i, _LAST]) / dt
@@ -76,13 +77,13 @@ def loaded_axes(robot: Robot) -> NDArray[np.bool_]:
 
 
 def source_pid_gains(parameters: SourcePidParameters, robot: Robot, viscous: Array) -> Array:
-    """Kp, Ki, Kd of each joint, (n, 3): given, or by the rule.
+    """Kp, Ki, Kd of each joint, (n, 3), from the parameters or by the rule.
 
     The rule gives the characteristic polynomial: ``inertia (s + bandwidth)²`` for axes without integral action, and
     ``inertia (s + bandwidth)³`` for :func:`loaded_axes`, which have integral action.
 
     Raises:
-        ParameterError: A list has another length than the robot has joints.
+        ParameterError: The length of a list is not the robot's number of joints.
     """
     drives, pole = drives_and_poles(robot, "source_pid", parameters.bandwidth)
     double = pole**2 * drives.inertia, np.zeros(robot.n), 2.0 * pole * drives.inertia - viscous
@@ -103,7 +104,7 @@ def begin(memory: Array, measured: Array, effort: Array) -> None:
 
 
 def shift(memory: Array, effort: Array) -> None:
-    """Leave the integrals unchanged: axes without integral action could not take over missing feedforward."""
+    """Do nothing: axes without integral action cannot replace the missing feedforward."""
 
 
 SOURCE_PID = Controller("source_pid", SourcePidParameters, source_pid_gains, source_pid_control, 2, begin, shift)

@@ -1,7 +1,7 @@
 """Drive of the simulated jaw: its control law, and two fingers that close on an object.
 
-Both fingers turn by the same angle, so one angle between them gives the opening of the jaw: their pads are ``2 L
-sin(angle / 2)`` apart.
+Both fingers turn by the same angle, so the angle between them determines the opening of the jaw. The distance between
+their pads is ``2 L sin(angle / 2)``.
 """
 
 import math
@@ -17,7 +17,7 @@ class DriveNumbers(Fields):
     stiffness: float  # stiffness of the control law [N·m/rad]
     damping: float  # damping of the control law [N·m·s/rad]
     inertia: float  # [kg·m²]
-    friction: float  # viscous [N·m·s/rad]
+    friction: float  # viscous friction [N·m·s/rad]
     length: float  # length of a finger [m]
     size: float  # size of the object [m]
     pad_stiffness: float  # stiffness of both pads and the object [N/m]
@@ -43,10 +43,10 @@ def width(p: DriveNumbers, angle: float) -> float:
 
 @inner
 def drive(p: DriveNumbers, s: DriveState, setpoint_speed: float, dt: float) -> None:
-    """Move the jaw on by a tick: a PD law within the drive's limit, against the object if one is there.
+    """Advance the jaw by a tick: by a PD law within the drive's limit, and by the push of an object between the pads.
 
     The law's effort is constant during the tick. The object's push is evaluated at the end of the tick (backward
-    Euler), so that a stiff object gives no energy to the jaw, whatever ``dt`` is.
+    Euler). So a stiff object gives no energy to the jaw for any ``dt``.
     """
     asked = p.stiffness * (s.setpoint - s.angle) + p.damping * (setpoint_speed - s.velocity)
     s.effort = min(max(asked, -p.effort), p.effort)

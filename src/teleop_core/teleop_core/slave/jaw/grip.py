@@ -1,11 +1,11 @@
 """Grip: objects that the fingers hold by dry friction, above a table with pegs.
 
-An object is one mass. Friction of both pads brings the object towards the speed of the tip, as far as friction can;
-the remaining difference is sliding (Coulomb). Time-stepping in speeds makes both one rule, after Moreau 1988. The
-speed changes by what sticking needs, or by the largest change that friction gives in the tick.
+An object is a point mass. Friction of both pads changes the speed of the object towards the speed of the tip. If
+friction is too small for this, the object slides (Coulomb). Sticking and sliding follow from one rule on speeds (Moreau
+1988). The speed changes by the amount that sticking needs, but at most by the change that friction gives in the tick.
 
-Two arms share the objects. The first arm's simulator moves them, and receives tip pose and grip force of the second
-jaw. The second arm's simulator receives the positions of the objects.
+Two arms share the objects. The first arm's simulator moves the objects, and receives tip pose and grip force of the
+second jaw. The second arm's simulator receives the positions of the objects.
 """
 
 import math
@@ -19,14 +19,15 @@ from teleop_core.slave.jaw import drive, sharing
 WEIGHT = 9.81
 """Standard weight per mass [m/s²], along -z of the slave's base."""
 SLIP = 1e-3
-"""An object that slides by more than this in one grip has slipped [m]; less is settling of the fingers."""
+"""An object that slides by more than this in one grip has slipped [m]; a smaller distance is settling of the
+fingers."""
 PEGS = 12
 """Largest number of pegs on a board."""
 _NONE = -1  # peg number of an object that is on no peg
 _LOST = 1e-3  # an object lost higher than this above the table has dropped [m]
 _ROUNDS = 20  # iterations for the remaining speed of an object that a peg stops
-_OPEN = 1e-3  # fingers wider than the object by more than this have let go; smaller gaps are bounces [m]
-_LETS_GO = 0.01  # a setpoint wider than the grip's tightest one by more than this opens the jaw [rad], assumed
+_OPEN = 1e-3  # fingers wider than the object by more than this have released it; a smaller gap is a bounce [m]
+_LETS_GO = 0.01  # a setpoint above the smallest of the grip by more than this releases the object [rad]; assumed
 
 
 class GripNumbers(drive.DriveNumbers):
@@ -51,7 +52,7 @@ class GripState(drive.DriveState):
     held: Vector3  # middle of the second arm's object in the tip's frame when the grip began [m]
     forces: Annotated[geometry.Array, 2]  # force of each hand's fingers on its object [N]
     numbers: Annotated[Integers, 2]  # number of the object that each hand moves, or moved last
-    objects: Annotated[geometry.Array, 7 * topics.JAW_OBJECTS]  # poses
+    objects: Annotated[geometry.Array, 7 * topics.JAW_OBJECTS]  # poses (7,) of all objects
     motions: Annotated[geometry.Array, 3 * topics.JAW_OBJECTS]  # [m/s]
     pegs: Annotated[Integers, topics.JAW_OBJECTS]  # peg that each object is on; _NONE without a peg
     homes: Annotated[Integers, topics.JAW_OBJECTS]  # peg where each object rested last; _NONE: it dropped
@@ -89,7 +90,7 @@ def _tip_motion(
 
 @inner
 def _most(p: GripNumbers, force: float, dt: float) -> float:
-    """Largest change of an object's speed that friction of both pads gives in a tick [m/s]."""
+    """Largest change of an object's speed by the friction of both pads in a tick [m/s]."""
     return 2.0 * p.pad_friction * force * dt / p.mass
 
 
@@ -97,11 +98,11 @@ def _most(p: GripNumbers, force: float, dt: float) -> float:
 def _rub(
     p: GripNumbers, s: GripState, motion: geometry.Array, tip: geometry.Array, force: float, cut: float, dt: float
 ) -> float:
-    """Bring an object's speed (3,) towards that of the fingers, as far as friction of both pads can.
+    """Change an object's speed (3,) towards the speed of the fingers, within the friction of both pads.
 
-    Where a peg stops the object, the fingers slide on by ``cut`` [m/s] across the peg. Friction then has its largest
-    value, against the whole direction of sliding, so a smaller part of it acts in the free direction. The remaining
-    sliding speed ``left`` solves ``left² = cut² + (apart left / (left + most))²``.
+    Where a peg stops the object, the fingers continue to slide over it at the speed ``cut`` [m/s] across the peg.
+    Friction then has its largest value, opposite to the total sliding speed. So only a part of the friction acts in the
+    free direction. The remaining sliding speed ``left`` solves ``left² = cut² + (apart left / (left + most))²``.
 
     Returns:
         The remaining speed between fingers and object [m/s]; 0 where the object sticks.
@@ -122,13 +123,13 @@ def _rub(
 
 @inner
 def _is_opened(s: GripState) -> bool:
-    """Whether the hand opens the jaw: an object that slides or falls then is released, not lost."""
+    """Whether the hand opens the jaw; if so, an object that slides or falls counts as released, not as lost."""
     return s.setpoint > s.tightest + _LETS_GO
 
 
 @inner
 def _count(p: GripNumbers, s: GripState, table: float, is_lost: bool) -> None:
-    """Begin or end a grip, and count; a grip ends when the fingers are wider than the object, or lose it."""
+    """Begin or end a grip, and count it; a grip ends when the fingers are wider than the object, or lose the object."""
     if s.force > 0.0 and s.is_gripped == 0:
         s.is_gripped, s.slid, s.tightest = 1, 0.0, s.setpoint
         s.grips += 1
@@ -160,9 +161,10 @@ def _is_near(p: GripNumbers, s: GripState, number: int, tip: geometry.Array) -> 
 
 @inner
 def _find(p: GripNumbers, s: GripState, tip: geometry.Array) -> bool:
-    """Return whether the object has just left the fingers; write whether it is between them.
+    """Return whether the object has just left the fingers; write whether the object is between the fingers.
 
-    It comes between the fingers while they are wider than it, and stays there as long as it is near.
+    The object comes between the fingers only while their opening is wider than the object. It stays between them as
+    long as it is near the tip.
     """
     is_near = _is_near(p, s, s.numbers[0], tip)
     is_lost = bool(s.is_between > 0 and not is_near)
@@ -177,13 +179,13 @@ def _find(p: GripNumbers, s: GripState, tip: geometry.Array) -> bool:
 def _meet_peg(
     p: GripNumbers, peg: int, pose: geometry.Array, motion: geometry.Array, wanted: geometry.Array, dt: float
 ) -> float:
-    """Stop a wanted motion (3,) and its object at the peg that the object is on.
+    """Limit the motion (3,) of an object by the peg that the object is on.
 
-    The peg is rigid, without friction, and its impacts are inelastic. It constrains the object only across the peg's
-    axis: the object's middle is no farther from the axis than the clearance.
+    The peg is rigid and without friction, and its impacts are inelastic. It constrains the object only across the peg's
+    axis: the distance of the object's middle from the axis is at most the clearance.
 
     Returns:
-        The speed that the peg takes from the motion [m/s]; 0 without a peg or a touch.
+        The speed by which the peg slows the motion [m/s]; 0 without a peg or without contact.
     """
     if peg == _NONE:
         return 0.0
@@ -212,16 +214,16 @@ def _peg_at(p: GripNumbers, x: float, y: float) -> int:
 
 @inner
 def _thread(p: GripNumbers, s: GripState, number: int, before: float, is_held: bool) -> None:
-    """Put an object onto a peg or off it when the object passes the peg's top, and count where it rests.
+    """Put an object onto a peg or off a peg when it passes the top of the peg, and count where the object rests.
 
-    A straight step along the peg's tangent leaves the clearance; the object is then moved back into it.
+    A straight step along the tangent may exceed the clearance; the object is then moved back to the clearance.
 
     Args:
         p: Parameters.
         s: State; written.
         number: Number of the object.
         before: Height of the object before this tick [m].
-        is_held: Whether fingers press on it.
+        is_held: Whether fingers press on the object.
     """
     pose, top, peg = s.objects[7 * number : 7 * number + 7], p.place[2] + p.peg_height, _NONE
     if pose[2] < top:
@@ -278,14 +280,14 @@ def put_objects(p: GripNumbers, s: GripState, places: geometry.Array) -> None:
 
 @inner
 def _hold(p: GripNumbers, s: GripState, tips: geometry.Array, number: int, hands: int, dt: float) -> None:
-    """Change an object's speed by the friction of the fingers; it rotates with fingers that it sticks to.
+    """Change an object's speed by the friction of the fingers; an object that sticks to the fingers rotates with them.
 
     Args:
         p: Parameters.
         s: State; written.
         tips: Present poses of both tips (2, 7).
         number: Number of the object.
-        hands: Jaws that hold the object: 1 this jaw, 2 the second arm's, 3 both.
+        hands: Jaws that hold the object: 1 this jaw, 2 the second arm's jaw, 3 both jaws.
         dt: Tick [s].
     """
     pose, motion = s.objects[7 * number : 7 * number + 7], s.motions[3 * number : 3 * number + 3]
@@ -314,7 +316,7 @@ def _hold(p: GripNumbers, s: GripState, tips: geometry.Array, number: int, hands
 
 @inner
 def _move(p: GripNumbers, s: GripState, tips: geometry.Array, number: int, dt: float) -> None:
-    """Move an object on by a tick, under fingers, weight, table and peg."""
+    """Advance an object by a tick under the forces of fingers, weight, table and peg."""
     pose, motion = s.objects[7 * number : 7 * number + 7], s.motions[3 * number : 3 * number + 3]
     hands = 0
     for hand in range(2):
@@ -342,7 +344,7 @@ def _move(p: GripNumbers, s: GripState, tips: geometry.Array, number: int, dt: f
 
 @inner
 def _take_hands(p: GripNumbers, s: GripState, tips: geometry.Array, row: Row) -> None:
-    """Read both tip poses (2, 7), the forces of both jaws, and which objects they press on."""
+    """Read both tip poses (2, 7), the forces of both jaws, and the numbers of the objects that they press on."""
     copy(row.slave_true_cp, tips[0])
     copy(row.second_slave_true_cp, tips[1])
     for i in range(3):
@@ -360,7 +362,7 @@ def _take_hands(p: GripNumbers, s: GripState, tips: geometry.Array, row: Row) ->
 
 @inner
 def move_objects(p: GripNumbers, s: GripState, row: Row) -> None:
-    """Move the objects on to the stamp of the newest slave_true_cp.
+    """Advance the objects to the stamp of the newest slave_true_cp.
 
     Args:
         p: Parameters.
@@ -383,7 +385,7 @@ def move_objects(p: GripNumbers, s: GripState, row: Row) -> None:
 
 @inner
 def see_objects(p: GripNumbers, s: GripState, row: Row) -> None:
-    """Read the object positions from the first arm's simulator, and count this jaw's grips of them.
+    """Read the object positions from the first arm's simulator, and count the grips of this jaw.
 
     Args:
         p: Parameters.
@@ -395,7 +397,7 @@ def see_objects(p: GripNumbers, s: GripState, row: Row) -> None:
     for i in range(p.objects):
         for k in range(3):
             s.objects[7 * i + k] = board[3 + 3 * i + k] - p.second_base[k]
-    # The board is a tick old, and its objects follow the tip of the tick before that.
+    # The board is one tick old, and its objects follow the tip pose of the tick before.
     R, way = room(3, 3), room(3)
     geometry.rotation_from_quaternion(s.tips[10:14], R)
     for i in range(3):

@@ -1,6 +1,6 @@
 """Stage ``jaw``: the jaw's server. It writes the setpoint that simulated drives or a real gripper follow.
 
-It moves the jaw's setpoint as ``slave`` moves the arm's. It receives the jaw's measured angle.
+The stage moves the jaw's setpoint as ``slave`` moves the arm's setpoint. It receives the jaw's measured angle.
 """
 
 import math
@@ -13,8 +13,8 @@ from teleop_core.slave.operation.states import State
 
 _STATE, _ENABLED = topics.OPERATION.index("state"), int(State.ENABLED)
 _NEAR = 1e-3  # a command this near to the held angle has reached it [rad]
-_MOVED = 0.05  # a jaw farther from its setpoint by more than this was moved by something else [rad]
-_CLOSING = 0.02  # a command that falls by this much closes the jaw; a resting hand varies less
+_MOVED = 0.05  # if its distance from the setpoint grew by more, something else moved the jaw [rad]
+_CLOSING = 0.02  # a command that decreases by this much closes the jaw; the angle of a resting hand varies less [rad]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,8 +49,8 @@ class JawState(Fields):
     seen_ns: int  # time of arrival of the newest measured angle [ns]
     off: float  # distance of the jaw from its setpoint at that time [rad]
     setpoint: float  # [rad]
-    is_led: int  # whether the jaw has followed commands since its last hold
-    lowest: float  # command since then [rad]
+    is_led: int  # whether the jaw has followed commands since it was last held
+    lowest: float  # smallest command since the jaw was last held [rad]
     highest: float  # [rad]
 
 
@@ -58,8 +58,9 @@ class JawState(Fields):
 def _see(p: JawNumbers, s: JawState, row: Row) -> None:
     """Take the jaw's measured angle.
 
-    The setpoint is set to this angle until the first command is followed. It is also set to this angle if the jaw was
-    silent and is now farther from its setpoint than before, because then something else moved the jaw.
+    Until the first command is followed, the setpoint equals this angle. The setpoint is also set to this angle if no
+    angle was measured for a while and the jaw is now farther from its setpoint than before: then something else moved
+    the jaw.
     """
     angle = row.slave_jaw_measured_js[0]
     if row.slave_jaw_measured_js_ns == s.sampled_ns or not math.isfinite(angle):
@@ -74,7 +75,7 @@ def _see(p: JawNumbers, s: JawState, row: Row) -> None:
 
 @inner
 def _may_move(p: JawNumbers, s: JawState, row: Row) -> bool:
-    """Whether the arm may move, and commands and measured angles arrive."""
+    """Whether the arm may move and both commands and measured angles arrive."""
     if row.slave_jaw_servo_jp_ns != s.told_ns:
         s.told_ns, s.heard_ns = row.slave_jaw_servo_jp_ns, row.now_ns
     is_heard = s.told_ns != 0 and row.now_ns - s.heard_ns <= p.timeout_ns
@@ -134,7 +135,7 @@ class Jaw(RunningStage):
         self.reset()
 
     def reset(self) -> None:
-        """Go back to the state before the first tick: no command is in force."""
+        """Return to the state before the first tick, without any command."""
         s, row = self.state, self.signals
         assign(s, 0)
         assign(row, self._begin)

@@ -16,7 +16,7 @@ _OTHERS = (topics.FIRST_JAW_BOARD, topics.SECOND_TRUE_CP, topics.SECOND_JAW_GRIP
 
 @dataclass(frozen=True, kw_only=True)
 class GripObjectParameters:
-    """Objects that the jaw can grip, equally thick from every side; they stand on a flat table."""
+    """Objects that the jaw can grip, with equal thickness in all directions; they stand on a flat table."""
 
     place: tuple[float, ...] = fixed(
         (),
@@ -112,7 +112,7 @@ class JawSimParameters:
 
 @kernel
 def jaw_sim_step(p: GripNumbers, s: GripState, row: Row, dt: float) -> None:
-    """One tick: take the setpoint, write the measured jaw angle, and move jaw and object on.
+    """One tick: take the setpoint, write the measured jaw angle, and advance jaw and object.
 
     Args:
         p: Parameter record.

@@ -1,8 +1,8 @@
 """Sharing: the speed of an object that two jaws hold by dry friction.
 
 The speed v minimises ``(v - v0)² / 2 + Σ most |v - tip|``. Here v0 is the speed without friction, ``tip`` the speed of
-each jaw, and ``most`` the largest change by that jaw's friction. This is the rule of
-:mod:`~teleop_core.slave.jaw.grip`, for two frictions at once.
+each jaw, and ``most`` the largest change by that jaw's friction. This is the rule of :mod:`~teleop_core.slave.jaw.grip`
+for the friction of two jaws.
 """
 
 import math
@@ -10,8 +10,8 @@ import math
 from teleop_core.graph.signals import copy
 from teleop_core.kernels import geometry, inner
 
-_ROUNDS = 2000  # most iterations if the object sticks to neither jaw
-_ENOUGH = 1e-9  # the iteration ends at this change of the speed [m/s]
+_ROUNDS = 2000  # largest number of iterations, needed if the object sticks to neither jaw
+_ENOUGH = 1e-9  # the iteration stops when the speed changes by less [m/s]
 
 
 @inner
@@ -39,7 +39,7 @@ def _sticks(motion: geometry.Array, tip: geometry.Array, most: float, other: geo
 def share_speed(
     motion: geometry.Array, tip: geometry.Array, most: float, other: geometry.Array, against: float
 ) -> None:
-    """Change the speed of an object between two pairs of fingers by the friction of both.
+    """Change the speed of an object between two pairs of fingers by the friction of both pairs.
 
     Args:
         motion: Speed of the object (3,) without friction [m/s]; written.

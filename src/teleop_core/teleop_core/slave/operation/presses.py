@@ -8,9 +8,9 @@ class Presses:
     messages of other buttons do not release it. :meth:`release` overrides all buttons.
 
     Every button numbers its messages, 1 for the first. A missing number means a lost message: lost by a full queue, by
-    a process that stood still, or by the network. A lost message may have been a press, so it counts as a press.
-    Messages before the first received one count as lost too, unless the listener is idle, because they may have been
-    sent to this listener. A message that arrives twice, through two readers, counts once.
+    a blocked process, or by the network. A lost message may have been a press, so it counts as a press. Messages before
+    the first received one count as lost too, unless the listener is idle, because they may have been sent to this
+    listener. A message that arrives twice, through two readers, counts once.
 
     The state of a button that sends nothing is unknown, so such a button holds the stop (:meth:`doubt`).
 
@@ -94,12 +94,13 @@ class Presses:
         return () if sender in self._last else self._note(sender, now_ns, is_pressed=is_pressed)
 
     def doubt(self, sender: bytes) -> tuple[bool, ...]:
-        """Let a button that was discovered but has sent no message hold the stop.
+        """Count a button that was discovered but has sent no message as pressed.
 
         The button counts as pressed until it reports its release, or is overridden.
 
         Args:
-            sender: As in :meth:`take`; a button that is known, or was doubted before, is ignored.
+            sender: As in :meth:`take`. The call is ignored if the button is known, or for a second call for this
+                button.
         """
         if self.knows(sender) or sender in self._doubted:
             return ()

@@ -1,4 +1,4 @@
-"""Report of an arm's operation, as ``slave/operation`` carries it."""
+"""Report of an arm's operation, from the numbers of ``slave/operation``."""
 
 from collections.abc import Mapping
 
@@ -11,7 +11,7 @@ def operation_text(values: Mapping[str, float], joint_names: tuple[str, ...] = (
 
     Args:
         values: Numbers of :data:`~teleop_core.graph.topics.OPERATION` by name.
-        joint_names: Names of the joints; without them they are counted from 1.
+        joint_names: Names of the joints; without names, joints are numbered from 1.
     """
     state = State(int(values["state"]))
     is_waiting = state is State.ENABLED and not values["is_homed"]

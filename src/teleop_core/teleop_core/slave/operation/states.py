@@ -1,7 +1,7 @@
 """States of an arm and the transitions between them, in one table that all run modes use.
 
 The states and commands are those of CRTK (Collaborative Robotics Toolkit, robot operating states), with two more
-commands. ``stop`` is the emergency stop, which every state accepts. Only ``reset`` ends the emergency stop.
+commands. ``stop`` is the emergency stop, which is accepted in every state. Only ``reset`` ends it.
 """
 
 from enum import IntEnum
@@ -47,7 +47,7 @@ class Answer(IntEnum):
     """Answer to an event."""
 
     DONE = 0
-    ALREADY = 1  # nothing had to change
+    ALREADY = 1  # the event is accepted, but the arm is already in the state
     REFUSED = 2  # the event is refused in this state
     STOPPED = 3  # the emergency stop is still pressed, or must be reset first
     BRAKING = 4  # the arm is not at rest yet
@@ -86,7 +86,7 @@ class OperatingState(Fields):
     is_homed: int
     is_busy: int
     is_homing: int
-    must_plan: int  # a move is to be planned; during homing, to the start position
+    must_plan: int  # a move must be planned; during homing it is the move to the start position
     is_stopped: int  # an emergency stop is latched
     is_pressed: int  # the cause of the stop still exists
     is_moving: int  # the arm is not at rest
@@ -162,7 +162,7 @@ def command_event(name: str) -> Event:
 
 
 AT_REST_ONLY = "the arm is not at rest yet; try again"
-"""End of the answer to a command that an arm accepts only at rest."""
+"""Last part of the answer to a command that an arm accepts only at rest."""
 
 
 STILL_PRESSED = "the emergency stop is still pressed"

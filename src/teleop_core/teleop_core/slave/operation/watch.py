@@ -37,7 +37,7 @@ class ServerParameters(Fields):
 class ServerState(OperatingState):
     """Fields of the server's state record that are used to find faults."""
 
-    setpoint: PerJoint  # [rad or m]; the next two as well
+    setpoint: PerJoint  # [rad or m]; the next two fields have the same unit
     target: PerJoint
     measured: PerJoint
     speed: PerJoint  # [rad/s or m/s]
@@ -70,11 +70,11 @@ _TRACKING, _TIP, _EFFORT = int(Fault.TRACKING), int(Fault.TIP), int(Fault.EFFORT
 _OVERSPEED, _LIMIT = int(Fault.OVERSPEED), int(Fault.JOINT_LIMIT)
 _FEEDBACK = int(Fault.FEEDBACK)
 REST_NS = 50_000_000
-"""An arm rests once no joint has moved for so long [ns]: twice as long as a turn of a swinging
-joint, at the bandwidths of 60 to 80 rad/s that drives have, takes."""
+"""An arm counts as at rest after this time without motion of any joint [ns]. An oscillating joint is slow at each
+turning point. At the usual bandwidths of drives, 60 to 80 rad/s, a turning point takes half of :data:`REST_NS`."""
 # A joint this close to its limit [rad or m] counts as at the limit.
 _AT = 1e-9
-# A drive that gives this share of its effort limit counts as saturated.
+# A drive whose effort is at least this share of its limit counts as saturated.
 _FULL = 0.999
 
 
@@ -102,7 +102,7 @@ def fail(p: ServerParameters, s: ServerState, fault: int, joint: int, value: flo
 
 @inner
 def begin_tick(p: ServerParameters, s: ServerState, now_ns: int) -> None:
-    """Play the commands whose time has come; a stop button that fell silent counts as pressed."""
+    """Execute the scripted commands that are due; a stop button that sends no more messages counts as pressed."""
     if s.first_ns == 0:
         s.first_ns = now_ns
         s.heard_ns = max(s.heard_ns, now_ns)
@@ -141,7 +141,7 @@ def watch_joints(p: ServerParameters, s: ServerState, effort: Array, passed_ns: 
     """
     for i in range(effort.shape[0]):
         off = abs(s.setpoint[i] - s.measured[i])
-        if not off <= p.lag[i]:  # NaN is too far as well
+        if not off <= p.lag[i]:  # also for NaN
             fail(p, s, _TRACKING, i, off, p.lag[i])
         fast = p.overspeed * p.speed_limit[i]
         if not abs(s.speed[i]) <= fast:
@@ -178,7 +178,7 @@ def watch_limits(p: ServerParameters, s: ServerState, now_ns: int) -> None:
 
 @inner
 def measure_rest(s: ServerState, place: Array, now_ns: int) -> None:
-    """Measure for how long and how far the tip, at ``place`` (7,), still moves after the arm had to stop."""
+    """Measure the time and the distance for which the tip, at ``place`` (7,), still moves after the arm had to stop."""
     if s.state == _ENABLED:
         s.left_ns, s.is_resting = 0, 0
         return
@@ -200,7 +200,7 @@ def measure_rest(s: ServerState, place: Array, now_ns: int) -> None:
 def find_rest(s: ServerState, moves: bool, now_ns: int) -> None:
     """Record whether the arm moves; it is at rest after :data:`REST_NS` without motion.
 
-    The waiting time is needed because an oscillating joint stands still for a moment at each of its turns.
+    The waiting time is needed because an oscillating joint has a speed of zero at each turning point.
     """
     if moves:
         s.still_ns, s.is_moving = 0, 1

@@ -25,7 +25,7 @@ PER_JOINT = (
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Physics:
-    """Numbers of a plant, (n,) each unless said otherwise.
+    """Numbers of a plant; each has shape (n,) unless another shape is given.
 
     Args:
         viscous: Viscous friction [N·m·s/rad or N·s/m].
@@ -44,7 +44,7 @@ class Physics:
         dynamics: Parameter row of the true dynamics; empty for the dynamics that the control law knows.
         effort_delay: Delay from commanded effort to motor effort, beyond the tick [s]; whole ticks.
         drive_gain: Effort that the drives give, divided by the commanded effort; None: 1.
-        gear_stiffness: Stiffness of gears that bend [N·m/rad or N/m]; 0, or None, for those that do not.
+        gear_stiffness: Stiffness of gears that bend [N·m/rad or N/m]; 0 for rigid gears; None if all gears are rigid.
         motor_inertia: Inertia of the motors, seen through their gears [kg·m² or kg]. The dynamics contain it already;
             it is used only for gears that bend.
     """
@@ -86,9 +86,9 @@ class Plant:
     """A plant.
 
     Attributes:
-        name: Its name in ``--set plant=``.
-        parameters: Its parameter group.
-        physics: ``physics(parameters, robot)`` gives its numbers for a robot with drives.
+        name: Name of the plant in ``--set plant=``.
+        parameters: Parameter group of the plant.
+        physics: ``physics(parameters, robot)`` returns the numbers of the plant for a robot with drives.
     """
 
     name: str

@@ -36,7 +36,7 @@ FAULTS = {
 
 @dataclass(frozen=True, kw_only=True)
 class HardwareParameters:
-    """Simulated effects, values that replace the robot's, and values that no robot file states."""
+    """Simulated effects, values that replace those of the robot, and values that no robot file contains."""
 
     without: tuple[str, ...] = fixed(
         (), choices=tuple(FAULTS), doc="effects that the plant leaves out, to see what each contributes"
@@ -120,19 +120,19 @@ def _steps(drives: Drives, bits: int) -> Array:
     """Resolution of the converters over their range [N·m or N].
 
     The range ends at the drive's effort limit, or at the effort that brings the axis to full speed within a tick. The
-    second bound is needed because some robot files give drives of 100 N·m to links of a few grams. One step of such a
-    drive would throw the link.
+    second bound is needed because some robot files contain drives of 100 N·m for links of a few grams. One step of such
+    a drive would accelerate the link too much.
     """
     quick = drives.inertia * drives.speed_limit / DT
     return 2.0 * np.minimum(drives.effort_limit, quick) / 2.0**bits
 
 
 def hardware_physics(parameters: HardwareParameters, robot: Robot) -> Physics:
-    """Numbers of a robot's drive table and of its faults, without the faults that are left out.
+    """Physics from a robot's drive table and its faults, except the faults that the parameters leave out.
 
     Raises:
         ParameterError: The length of a list is not the robot's number of joints, or a weight has no value.
-        UnknownNameError: A weight is not one that the robot's dynamics leave open.
+        UnknownNameError: A weight is not among the unknown parameters of the robot's dynamics.
     """
     drives, faults, out = robot.drives, faults_of(robot), set(parameters.without)
     assert drives is not None
@@ -199,7 +199,7 @@ def _gears(robot: Robot, parameters: HardwareParameters) -> Array:
 
 
 def _dynamics(robot: Robot, faults: Hardware, weights: tuple[str, ...]) -> Array:
-    """Parameter row of the true dynamics; empty if it equals the one that the control law knows."""
+    """Parameter row of the true dynamics; empty if it equals the row that the control law uses."""
     model = robot.dynamics
     assert model is not None
     row = (faults.dynamics if len(faults.dynamics) else model.parameters).copy()
@@ -215,7 +215,7 @@ def _dynamics(robot: Robot, faults: Hardware, weights: tuple[str, ...]) -> Array
 
 
 def _tip_geometry(robot: Robot, faults: Hardware) -> Array:
-    """Geometry row of the arm as built; empty if nothing differs, or if the robot is not a chain."""
+    """Geometry row of the arm as built; empty if it equals the drawing, or if the robot is not a chain."""
     built = None if faults.links is None else true_chain(robot, faults.links)
     return np.zeros(0) if built is None else built
 

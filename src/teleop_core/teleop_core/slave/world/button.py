@@ -1,9 +1,8 @@
 """Button: an upright post whose surface yields with a click, above a stiff stop.
 
 Its spring force grows up to the click force, and then falls until the button is on its stop. The stop has the material
-of the world. On release the button pushes less than on the press because of dry friction, which is a share of its
-force. This
-friction is a second spring that yields at that bound.
+of the world. The button pushes less on release than on the press, because of dry friction. The dry friction is modelled
+as a second spring, which yields at a bound: a share of the force of the first spring.
 """
 
 from dataclasses import dataclass
@@ -17,7 +16,7 @@ from teleop_core.shapes.basis import drawing
 from teleop_core.shapes.cylinder import CylinderParameters, cylinder_distance, cylinder_outline
 
 _STIFFER = 10.0  # stiffness of the friction's spring, divided by the steepest slope of the click spring
-_LARGEST = 100.0  # click force [N]
+_LARGEST = 100.0  # largest click force [N]
 
 
 class ButtonNumbers(Fields):
@@ -90,7 +89,7 @@ def _spring(p: ButtonNumbers, depth: float) -> float:
 def _stiffness(p: ButtonNumbers) -> float:
     """Stiffness of the friction's spring [N/m].
 
-    The stiffness is larger than the slope of the bound. Otherwise the moving bound would drive the spring and add
+    The stiffness is larger than the slope of the bound. Otherwise the moving bound would move the spring and add
     energy.
     """
     return _STIFFER * p.click_force / min(p.click_travel, p.stroke - p.click_travel)
@@ -141,7 +140,7 @@ def count_presses(depths: Array, parameters: ButtonParameters, *, is_pressed: bo
         Number of new presses, and whether the button is pressed at the end.
     """
     is_down = depths >= parameters.stroke
-    is_known = is_down | (depths <= parameters.click_travel)  # between both depths the state does not change
+    is_known = is_down | (depths <= parameters.click_travel)  # between these two depths the state does not change
     states = np.append(is_pressed, is_down[is_known])
     return int(np.sum(states[1:] & ~states[:-1])), bool(states[-1])
 

@@ -3,9 +3,9 @@
 The tool touches with one point, its tip, or with several points along its axis. Each point has its own record with its
 surface, its bristle, and the Jacobian at the point of contact.
 
-The position of the points relative to the object is computed once in a tick. Within the tick the surface counts as
-flat there and the Jacobians as constant. So every Runge-Kutta stage of the arm's motion gets the push at its own
-position and speed: a contact too stiff for one step of a tick is still smooth for the integrator.
+The position of the points relative to the object is computed once per tick. Within the tick, the surface at each point
+counts as flat, and the Jacobians count as constant. So the push is computed anew for the position and speed of every
+Runge-Kutta stage. A contact too stiff for one step of a tick is therefore still smooth for the integrator.
 """
 
 import math
@@ -22,7 +22,7 @@ from teleop_core.slave.world.puncture import PunctureNumbers, PunctureState, fol
 
 
 class WorldNumbers(PunctureNumbers, ButtonNumbers):
-    """Fields of a parameter record with the object's material and place, and with the tool."""
+    """Fields of a parameter record with the object's material and position, and with the tool."""
 
     has_world: int
     world_stiffness: float
@@ -55,13 +55,13 @@ def _bend(p: WorldNumbers, s: ContactState, moved: Array, out: float, force: Arr
 def _push(p: WorldNumbers, s: ContactState, moved: Array, speed: Array, force: Array) -> float:
     """Write the force (3,) [N] on a tip that moved (3,) [m] since the tick began, at a speed (3,).
 
-    Along the normal acts a spring with the damper of Hunt and Crossley. It never pulls, and pushes with the puncture
-    force at most; in a button it begins at the stop. Across the normal acts a bristle of the same stiffness. It holds
-    until it carries the dry friction, and then slips. In a channel the needle's push acts along the channel. Across
-    the channel acts the bristle, which does not slip there.
+    Along the normal acts a spring with the damper of Hunt and Crossley. The spring never pulls, and its push is at most
+    the puncture force; for a button the spring begins at the stop. Across the normal acts a bristle of the same
+    stiffness. The bristle bends until its force equals the dry friction, and then slips. In a channel, the needle's
+    push acts along the channel. Across the channel acts the bristle, without slip.
 
     Returns:
-        The part along the normal [N].
+        The component of the force along the normal [N].
 
     Source:
         Hunt and Crossley 1975, with exponent 1: F = K x (1 + a dx/dt). Dry friction as that of the
@@ -116,8 +116,8 @@ def add_push(p: WorldNumbers, contacts: Any, q: Array, dq: Array, effort: Array)
         p: Parameters.
         contacts: :class:`ContactState` of each point of the tool (N,).
         q: Joints of the links (n,) [rad or m].
-        dq: Their speeds (n,).
-        effort: Written (n,) [N·m or N].
+        dq: Speeds of the joints (n,) [rad/s or m/s].
+        effort: Joint efforts (n,) [N·m or N]; the push is added.
     """
     for point in range(contacts.shape[0]):
         if contacts[point].is_near:
@@ -160,9 +160,9 @@ def _begin_at(s: ContactState, arm: Arm, lever: Array, q: Array, dq: Array, spee
 
 @inner
 def _keep_bend(p: WorldNumbers, s: ContactState, force: Array) -> None:
-    """Limit the bend of the bristle to what friction carries of the push (3,) [N]; the rest has slipped.
+    """Limit the bend of the bristle to the dry friction for a push (3,) [N]; the rest of the motion is slip.
 
-    Without contact there is no push, and the bend becomes zero.
+    Without contact the push is zero, and so the bend becomes zero.
     """
     push = 0.0
     for k in range(3):
@@ -185,7 +185,7 @@ def _touch_at(
         lever: Point relative to the tip (3,) [m]; overwritten with the point of contact.
         q: Joints of the links (n,).
         dq: Their speeds (n,).
-        force: Written.
+        force: Resulting force; written.
 
     Returns:
         Whether ``arm.J`` now belongs to this tick.

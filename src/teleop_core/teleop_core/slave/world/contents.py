@@ -16,7 +16,7 @@ class Material(NamedTuple):
 
     Attributes:
         stiffness: Stiffness of its surface [N/m].
-        damping: Damping of Hunt and Crossley's law [s/m]: share of the force per speed.
+        damping: Damping of Hunt and Crossley's law [s/m]: relative increase of the force per speed.
         friction: Dry friction, divided by the normal force.
     """
 
@@ -39,7 +39,7 @@ _USUAL: dict[str, Value] = {
     "cylinder.direction": (0.0, 0.0, 1.0),
 }
 """Parameters of objects whose defaults differ from those of a fixture."""
-_FARTHEST = 3.0  # distance below a tip within which an object is looked for [m]
+_FARTHEST = 3.0  # largest distance below the tip at which an object is placed [m]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -164,7 +164,7 @@ class WorldParameters:
         return np.array(self.place) - np.array(self.base) if self.place else self.below(T_base_tip)
 
     def below(self, T_base_tip: Array) -> Array:
-        """Middle (3,) [m] of an object that lies straight below a tip pose (4, 4), with a gap between them.
+        """Middle (3,) [m] of an object straight below a tip pose (4, 4), with the gap of the parameters to the tip.
 
         Raises:
             ParameterError: There is no such position.

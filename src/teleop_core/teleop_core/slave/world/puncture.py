@@ -3,7 +3,8 @@
 Once the push along the normal reaches the puncture force, the surface opens under the tip, and the spring of the
 surface vanishes there. The tip then moves in a straight channel along the normal at that point. Two forces act in the
 channel: the cutting force when the tip goes deeper than before, and the dry friction of the shaft, which grows with
-depth. Both are springs that yield at a bound: they hold at rest, and release no more energy than was stored in them.
+depth. Each force is modelled by a spring that yields at a bound. Such a spring holds a load at rest, and never releases
+more energy than was stored in it.
 
 Source:
     Okamura, Simone and O'Leary 2004: stiffness before the puncture, then friction along the shaft
@@ -28,11 +29,11 @@ class PunctureState(Fields):
     gap: float  # gap of the tip along the present normal [m]
     normal: Vector3
     stuck: Vector3  # bend of the bristle across the normal [m]
-    is_open: int  # the tip is in the channel, or above its hole
+    is_open: int  # whether the tip is in the channel, or above its hole
     punctures: int  # number of punctures so far
     hole: Vector3  # position of the hole, from the middle of the object [m]
     channel: Vector3  # direction of the channel, a unit vector out of the object
-    cut: float  # depth from which tissue ahead of the tip resists [m]
+    cut: float  # depth below which the tissue ahead of the tip is uncut and resists [m]
     drawn: float  # distance that the shaft has dragged the tissue, positive inwards [m]
 
 
@@ -40,7 +41,7 @@ class PunctureState(Fields):
 def puncture(p: PunctureNumbers, s: PunctureState, stiffness: float, push: float, offset: Array) -> None:
     """Open the surface under the tip, if the push on it reaches the puncture force.
 
-    Immediately after the puncture the force is the cutting force, if the surface has stored that much.
+    Immediately after the puncture the force equals the cutting force, if the surface was bent far enough for it.
 
     Args:
         p: Parameters.
@@ -62,21 +63,21 @@ def puncture(p: PunctureNumbers, s: PunctureState, stiffness: float, push: float
 
 @inner
 def _is_open(p: PunctureNumbers, s: PunctureState, before: float, along: float, beside: float) -> bool:
-    """Whether a tip stays in the channel, or is where it can enter the channel.
+    """Whether a tip stays in the channel, or is at a position from which it can enter the channel.
 
     Args:
         p: Parameters.
-        s: State; ``is_open`` is of a tick ago, the gap to the surface is of now [m].
-        before: Gap a tick ago [m].
+        s: State with ``is_open`` of the previous tick, and with the present gap to the surface [m].
+        before: Gap one tick ago [m].
         along: Position of the tip relative to the hole, along the channel [m]; negative inside.
         beside: Distance of the tip from the channel's axis [m].
     """
-    # A tip that was above the hole has entered it, whatever its position now: no spring was bent under the tip.
+    # A tip that was above the hole has entered it at any position, because no spring was bent under the tip.
     if s.is_open and (s.gap < 0.0 or (along < 0.0 and before < 0.0)):
         return True
     if p.puncture_force <= 0.0 or beside > p.hole_radius:
         return False
-    # Not from behind the object: a tip there is outside, although its depth along the channel is large.
+    # A tip behind the object cannot enter: it is outside, although its depth along the channel is large.
     return along >= 0.0 if s.gap >= 0.0 else abs(along - s.gap) <= p.hole_radius
 
 
@@ -84,9 +85,9 @@ def _is_open(p: PunctureNumbers, s: PunctureState, before: float, along: float, 
 def follow_channel(
     p: PunctureNumbers, s: PunctureState, stiffness: float, before: float, offset: Array, normal: Array
 ) -> None:
-    """Measure a tip at the last hole along its channel, and update the yielding springs by its motion.
+    """Measure the gap of a tip at the last hole along the channel, and update the yielding springs by the tip's motion.
 
-    Away from the hole nothing changes, because the surface is intact there.
+    Away from the hole the surface is intact, so nothing changes.
 
     Args:
         p: Parameters.
@@ -115,7 +116,7 @@ def follow_channel(
     s.cut = max(s.cut, depth - p.cutting_force / stiffness)
     for k in range(3):
         normal[k] = s.channel[k]
-        if not was_inside:  # the channel begins to hold sideways where the tip enters
+        if not was_inside:  # the sideways force of the channel is zero where the tip enters
             s.stuck[k] = 0.0
 
 
