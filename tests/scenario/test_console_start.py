@@ -110,7 +110,7 @@ def test_session_is_chosen_begun_and_repeated(tab: Any, size: tuple[int, int]) -
         pick(tab, "Network", "delay_300")
         tab.shows("--scenario wall --set 'teleop.stages=[network]' network.preset=delay_300")
         observer = "document.querySelector('option[value=observer]')"
-        tab.until(f"{observer}.disabled && {observer}.textContent.includes('with a task')")
+        tab.until(f"{observer}.disabled && {observer}.textContent.includes('stage task')")
         tab.click("Start")
         until(lambda: wishes, "it is begun")
         told = {"scenario": "wall", "operator": "remote", "network": "delay_300"}

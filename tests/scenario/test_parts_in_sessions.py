@@ -121,6 +121,6 @@ def test_command_notes_an_answer_that_nobody_reads_and_scores_without_its_file(
     done = teleop("sim", "--parts", forgetful, "--duration", 0.5, "--out", out, "--set", "stages=[own]")
     notes = [line for line in done.stderr.splitlines() if not line.startswith("compiling kernels")]
     (note,) = notes
-    assert note.startswith("note: stage 'own' writes test/answer, which no stage reads; replaces")
+    assert note.startswith("note: stage 'own' writes test/answer, which no stage reads; with replaces=")
     teleop("evaluate", out, "--json", scores)
     assert "own" not in json.loads(scores.read_text())[0]["latency_ms"]
