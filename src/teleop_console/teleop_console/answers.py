@@ -1,8 +1,8 @@
 """Answers: the server's responses that do not come from viser: signs of life, the stop, style and script.
 
-The emergency stop does not go through viser. Its button is our own and visible as soon as the page begins to load. Its
-press is a separate request, which is answered when the stop has been sent. So the stop works while the page's
-connection is lost, flooded or being opened again, and the page knows whether the press was received.
+The emergency stop does not use viser. The stop button is our own and visible as soon as the page begins to load. A
+press of the button is a separate request, which is answered when the stop has been sent. So the stop works while the
+page's connection is lost, flooded or being opened again, and the page knows whether the press was received.
 """
 
 import gzip
@@ -27,7 +27,7 @@ from teleop_console.timeline import StripPage
 OWN_PAGE = "Teleop-Page"
 """Header of our page's requests; browsers do not allow a page of another origin to send it."""
 PRESS = "Teleop-Press"
-"""Header with the name of a press: a press that the page repeats because no answer came keeps its name."""
+"""Header with the name of a press. If no answer came, the page repeats the press with the same name."""
 _SCRIPTS = tuple(Path(__file__).with_name(name) for name in ("page.js", "strip.js"))
 _FIELDS = 100  # largest number of query parameters in an address
 _FURNITURE = b'<head><link rel="stylesheet" href="teleop.css"><script src="teleop.js"></script>'
@@ -42,11 +42,11 @@ class Situation:
         is_stopped: Whether an emergency stop is in force.
         text: Text about the last event and the next action; empty if there was no event.
         doing: Text about the progress before a session can be shown; empty while a session is shown.
-        chooses: Whether a session is being chosen: the form is shown.
+        chooses: Whether the page shows the form on which a session is chosen.
         can_end: Whether the page can end the session or replay, which returns to the form.
         state: State of all arms in words, for screen readers.
-        can_press: Whether a person at the page moves a hand that can press or close: in a task with pressing, or with
-            a jaw.
+        can_press: Whether a person at the page moves a hand that can press or close. This is so in a task with
+            pressing, or if the arm has a jaw.
     """
 
     can_stop: bool = True
@@ -60,18 +60,18 @@ class Situation:
 
 
 class Answers:
-    """Answers to our own requests, and what is added to viser's page.
+    """Answers to our own requests, and our additions to viser's page.
 
     Args:
         drivers: Receives the signs of life of pages.
         form: Form that is shown while no session runs; None for the form that chooses a session.
 
     Attributes:
-        situation: Data that pages show; the shown session or replay writes it.
-        stop: Presses the emergency stop; it must not block.
-        jaw: Closes the hand by a share, 0 to 1; it must not block.
+        situation: Data that pages show; the shown session or replay writes these data.
+        stop: Function that presses the emergency stop; it must not block.
+        jaw: Function that closes the hand by a share, 0 to 1; it must not block.
         start: The form on which sessions are chosen.
-        strip: The strip of time.
+        strip: The timeline below the scene.
         form: Form that is shown while no session runs.
     """
 
@@ -80,8 +80,8 @@ class Answers:
         self.stop: Callable[[], None] | None = None
         self.jaw: Callable[[float], None] | None = None
         self._drivers = drivers
-        self._pages: dict[str, int] = {}  # pages by random names that no other page can guess
-        self._heard: deque[str | None] = deque(maxlen=100)  # presses, by their names
+        self._pages: dict[str, int] = {}  # numbers of pages by random names, which no other page can guess
+        self._heard: deque[str | None] = deque(maxlen=100)  # names of the last presses
         self.start, self.strip = StartPage(drivers), StripPage(drivers)
         self.form: Form = form or self.start
         self._paths: dict[str, Callable[[Request], Response]] = {
@@ -97,13 +97,13 @@ class Answers:
         }
 
     def name(self, page: int) -> str:
-        """Name by which a page gives signs of life; a new one each time."""
+        """Return a new name with which a page sends its signs of life."""
         name = secrets.token_urlsafe(12)
         self._pages[name] = page
         return name
 
     def forget(self, page: int) -> None:
-        """A page has gone."""
+        """Delete the name of a page that was closed."""
         self._pages = {name: known for name, known in self._pages.items() if known != page}
 
     @property

@@ -1,4 +1,4 @@
-"""Console: the page of one session, from its opening to its end."""
+"""Console: the page of one session, from the begin of the session to its end."""
 
 import gc
 import logging
@@ -25,7 +25,7 @@ from teleop_console.timeline import Timeline
 from teleop_console.view_tab import Insets, ViewTab, Visitors, theme
 
 RATE = 30.0
-"""How often the page is drawn [1/s]."""
+"""Rate at which the page is drawn [1/s]."""
 _NICE = 10
 _ASK_AGAIN = 2.0  # [s]
 
@@ -36,12 +36,12 @@ class Console:
     Args:
         server: Server of the page.
         link: The session.
-        renew: Begins a new session with other settings; returns the reason if it cannot, else an empty text. None if
-            the session is not ours.
+        renew: Function that begins a new session with other settings. It returns the reason of a refusal, else an empty
+            text. None if the console did not start the session.
         of_session: Parameters of the whole session, which belong to no node.
-        can_end: Whether the page can end what it shows.
-        if_stopped: Text of the pages during an emergency stop, for pages without a panel; empty for the usual text,
-            the operator's next step.
+        can_end: Whether the page can end the shown session or replay.
+        if_stopped: Text that pages without a panel show during an emergency stop. If it is empty, they show the
+            operator's next step.
     """
 
     def __init__(
@@ -92,7 +92,7 @@ class Console:
         self._link.let_go(arm)
 
     def draw(self) -> None:
-        """Show what is known now."""
+        """Show the newest data of the session."""
         view = seen = self._link.view()
         if self._link.is_live:
             can_press = self.panel.is_led_here and any(map(closes, view.arms.values()))
@@ -115,7 +115,7 @@ class Console:
             time.sleep(_ASK_AGAIN)
 
     def try_to_draw(self) -> None:
-        """Draw; an error is reported once and skips this drawing, but does not end the session."""
+        """Draw. An error is reported once; it cancels this drawing, but does not end the session."""
         try:
             self.draw()
         except Exception as error:
@@ -129,8 +129,8 @@ class Console:
             give_way()
         threading.Thread(target=self._ask, args=(is_over,), daemon=True).start()
         thresholds = gc.get_threshold()
-        # A stop waits during a garbage collection. A collection of all objects of the page takes 0.2 s, so only new
-        # objects are collected, and so often that each collection is short.
+        # A garbage collection delays a stop. A collection of all objects of the page takes 0.2 s. So only new objects
+        # are collected, and so often that each collection is short.
         gc.freeze()
         gc.set_threshold(*thresholds[:2], 1)
         try:
@@ -154,7 +154,7 @@ class Console:
 
 
 def give_way() -> None:
-    """Lower the priority of the page below that of the session: the page may be late, arm and stop must not."""
+    """Lower the priority of the page below that of the session, because arm and stop must never be late."""
     stop = {thread.native_id for thread in threading.enumerate() if thread.name == STOPPER}
     with suppress(OSError):  # only on Linux does each thread have its own priority
         for thread in {int(name) for name in os.listdir("/proc/self/task")} - stop:
@@ -180,7 +180,7 @@ def _empty(server: ConsoleServer) -> None:
 
 @contextmanager
 def splash(server: ConsoleServer) -> Iterator[Callable[[str], None]]:
-    """Show on an empty page what is going on until there is something to show."""
+    """Show the progress on an empty page until the session can be shown."""
     _empty(server)
     answers = server.answers
 
@@ -199,7 +199,7 @@ def splash(server: ConsoleServer) -> Iterator[Callable[[str], None]]:
 
 
 def replay(server: ConsoleServer, path: Path) -> None:
-    """Show a recording until the page ends it, or Ctrl-C.
+    """Show a recording until the page ends the replay, or until Ctrl-C.
 
     Raises:
         RecordingError: The recording cannot be read, or comes from another system.

@@ -40,16 +40,18 @@ from teleop_core.robots.robot import Robot
 Path = Callable[[Topic, str, float], tuple[Array, Array]]
 """Function of a topic, an arm and a length [s] that returns times (N,) [s] and rows (N, width) up to now."""
 _AT = 1e-3
-"""Share of a joint's range next to its end that counts as at its limit."""
-_WORK, _GRIP = 0.05, 0.1  # free space on all sides of a tip and of a stylus with its handles [m]
+"""A joint is at its limit if its distance from the limit is below this share of its range."""
+_WORK = 0.05  # free space on all sides of a tip [m]
+_GRIP = 0.1  # free space on all sides of a stylus with its handles [m]
 _GOAL = TASK_STATE.columns.index("goal_x")
 _LEAST_GOAL = 1e-3  # smallest drawn width of a goal [m]
-_NEAR = 0.4  # part of the robot's length about the start of the tip in which an object is framed
+_NEAR = 0.4  # largest distance of a framed object from the start of the tip, divided by the robot's length
 _TOUCH = 0.05  # smallest wall force that counts as a contact [N]
 SHOWN = ("axes", "ghost", "reach", "paths")
-"""What may be shown or hidden: axes of bodies, the commanded posture, the positions that the tip can reach, the paths
-of the last seconds."""
-_REACHED, _POINT = 4000, 0.003  # points of the reach, and how wide each is, as a part of the robot's length
+"""Elements that may be shown or hidden: axes of bodies, the commanded posture, positions that the tip can reach, and
+paths of the last seconds."""
+_REACHED = 4000  # number of drawn positions that the tip can reach
+_POINT = 0.003  # width of such a point, divided by the robot's length
 
 
 class ArmNodes:
@@ -60,13 +62,13 @@ class ArmNodes:
         arm: The arm.
 
     Attributes:
-        bodies: Bodies of its robot.
-        world: Object that its tip can touch.
-        jaw: Its fingers, and what they grip.
-        low: Lowest corner (3,) [m] of the space that arm and master take, in slave_base.
-        high: Highest corner (3,) [m].
-        fixture: Kind and parameters of its fixture.
-        recorded_path: Returns the recorded path when time jumps; None without a recording.
+        bodies: Bodies of the robot.
+        world: Object that the tip can touch.
+        jaw: Fingers of the arm, and the objects that they grip.
+        low: Lowest corner (3,) [m] of the box around arm and master, in slave_base.
+        high: Highest corner (3,) [m] of this box.
+        fixture: Kind and parameters of the arm's fixture.
+        recorded_path: Function that returns the recorded path when time jumps; None without a recording.
     """
 
     def __init__(self, server: viser.ViserServer, arm: Arm) -> None:
@@ -104,7 +106,7 @@ class ArmNodes:
     # -- places ----------------------------------------------------------------------------------
 
     def place(self, side: float) -> None:
-        """Place arm and master at a position along the page's y [m]."""
+        """Move arm and master to a position along the page's y axis [m]."""
         self._side = side
         self._root.position = (0.0, side, 0.0)
 
@@ -120,9 +122,9 @@ class ArmNodes:
         return points.min(axis=0), points.max(axis=0)
 
     def work(self) -> Array:
-        """Corners (16, 3) [m] of where stylus and tip work, in the axes of the page.
+        """Corners (16, 3) [m] of the boxes in which stylus and tip work, in the axes of the page.
 
-        The corners of the tip's space contain its positions so far, the fixture, the object and the goals.
+        The tip's box contains all positions of the tip so far, the fixture, the object and the goals.
         """
         hand = self._stand.axes @ REST[:3] + self._stand.origin
         tip, room = self._start(), max(_WORK, 0.08 * self.bodies.size)
@@ -131,7 +133,7 @@ class ArmNodes:
         return np.concatenate((corners(hand - _GRIP, hand + _GRIP), corners(low, high))) + shift
 
     def _meet(self, view: ArmView) -> None:
-        """Extend the space that :meth:`work` returns by what is known now."""
+        """Extend the boxes that :meth:`work` returns by the newest data."""
         tip, room, reach = self._start(), max(_WORK, 0.08 * self.bodies.size), _NEAR * self.bodies.size
         points = [self._poses[-1, :3]]
         if (box := box_of(view.state)) is not None:
@@ -174,7 +176,7 @@ class ArmNodes:
     # -- drawing ---------------------------------------------------------------------------------
 
     def draw(self, time: float, view: ArmView) -> None:
-        """Draw what is known at a time of the session [s]."""
+        """Draw the data of a time of the session [s]."""
         state = view.get(SLAVE_MEASURED_JS)
         if state is not None:
             joints = state[: self._robot.n]
@@ -193,7 +195,7 @@ class ArmNodes:
             self._meet(view)
 
     def _draw_ghost(self, view: ArmView) -> None:
-        """Draw the commanded posture, at a third of the rate, which is enough to see the command."""
+        """Draw the commanded posture at a third of the page's rate, which is sufficient for people."""
         reference = view.get(SLAVE_SETPOINT_JS)
         self._count = (self._count + 1) % 3
         if self._ghost is not None and reference is not None and self._is_ghost_shown and not self._count:
@@ -216,7 +218,7 @@ class ArmNodes:
         self.reference.draw(time, None if reference is None else reference[:3])
 
     def _draw_goal(self, view: ArmView) -> None:
-        """Draw the goal of a task as a ball, as wide as it is."""
+        """Draw the goal of a task as a ball with the goal's width."""
         told = view.get(TASK_STATE)
         is_there = told is not None and told[0] > 0.0
         if self._goal is None and is_there:
@@ -232,7 +234,7 @@ class ArmNodes:
             self._goal.scale = max(float(told[_GOAL + 3]), _LEAST_GOAL)
 
     def _draw_fixture(self, view: ArmView, *, is_touched: bool) -> None:
-        """Draw the fixture around the slave, as the session reports it, and its image around the hand."""
+        """Draw the reported fixture around the slave, and its image around the hand."""
         box = box_of(view.state)
         hand, command = view.get(MASTER_MEASURED_CP), view.get(SLAVE_SERVO_CP)
         gain = view.state.get("gain", 0.0)
@@ -250,9 +252,9 @@ class ArmNodes:
             self.master.outline.draw(look, around, scale / gain, is_touched=is_touched)
 
     def _at_limit(self, joints: Array, state: dict[str, float]) -> frozenset[int]:
-        """Joints that are at the ends of their ranges, or that the session reports as limiting.
+        """Joints that are at their limits, or that the session reports as the limit.
 
-        A joint whose home is at its end counts only if the session reports it as the limit.
+        A joint whose home position is at its limit is included only if the session reports it as the limit.
         """
         robot = self._robot
         room = _AT * (robot.upper - robot.lower)
@@ -288,7 +290,7 @@ class ArmNodes:
             node.visible = is_shown
 
     def set_background(self, color: Color) -> None:
-        """Colour into which its paths fade."""
+        """Set the colour into which the paths fade."""
         for tail in self._tails:
             tail.set_background(color)
 

@@ -1,4 +1,4 @@
-"""Body nodes: the bodies of an arm on the page, of which only the frames move."""
+"""Body nodes: the bodies of an arm on the page; after the first drawing only their frames are sent."""
 
 from collections.abc import Mapping
 
@@ -12,7 +12,7 @@ from teleop_core.robots.bodies import Bodies, Role, Solid
 from teleop_core.robots.bodies.meshes import Mesh, merged, mesh_of
 
 _HALO = 0.05
-"""Radius of a halo, as a share of the length to which a robot reaches."""
+"""Radius of a halo, divided by the reach of the robot."""
 
 
 class BodyNodes:
@@ -22,7 +22,7 @@ class BodyNodes:
         server: The page.
         path: Path of the node above the bodies.
         bodies: The robot's bodies.
-        looks: Meshes in place of the solids of some bodies, by their index.
+        looks: Meshes that replace the solids of some bodies, by the index of the body.
         is_ghost: Whether the bodies are drawn transparent in one colour, without axes.
     """
 
@@ -52,7 +52,7 @@ class BodyNodes:
     def move(self, joints: Array) -> Array:
         """Draw the bodies at joint positions (n,) [rad, m]; returns the drawn poses (B, 7).
 
-        Bodies whose position is not finite keep their drawn pose.
+        A body whose position is not finite stays at its drawn pose.
         """
         poses = self._bodies.poses(joints)
         for body in moved(poses, self._drawn):
@@ -61,7 +61,7 @@ class BodyNodes:
         return self._drawn.copy()
 
     def mark(self, joints: frozenset[int]) -> None:
-        """Show a halo around these joints, and around no others; the bodies keep their colour."""
+        """Show a halo around the given joints only; the colours of the bodies do not change."""
         bodies = frozenset(self._bodies.joint_body[joint] for joint in joints)
         for body in bodies ^ self._marked:
             if body not in self._halos:
@@ -90,7 +90,7 @@ def add_solids(
     is_ghost: bool = False,
     opacity: float | None = None,
 ) -> dict[Role, viser.MeshHandle]:
-    """Add solids below a node: one mesh for each role among them; an opacity of None is opaque."""
+    """Add solids below a node, as one mesh for each role of the solids; an opacity of None is opaque."""
     meshes = {}
     for role in dict.fromkeys(solid.role for solid in solids):
         mesh = merged([mesh_of(solid) for solid in solids if solid.role == role])
@@ -122,7 +122,7 @@ def _add_mesh(
 
 
 def extent(bodies: Bodies, joints: Array) -> tuple[Array, Array]:
-    """Lowest and highest corner (3,) [m] of the space that the bodies take, in slave_base."""
+    """Lowest and highest corner (3,) [m] of the box around the bodies, in slave_base."""
     points = [np.zeros((1, 3))]
     for body, pose in zip(bodies.bodies, bodies.poses(joints), strict=True):
         if np.isfinite(pose).all():

@@ -1,4 +1,4 @@
-"""Cameras: places from which a session is seen, for the browser of one person."""
+"""Cameras: views of a session for the browser of one person."""
 
 from dataclasses import dataclass
 from itertools import product
@@ -11,13 +11,15 @@ from teleop_core.kernels.geometry import Array, quaternion_from_rotation, rotati
 FIELD = np.radians(45.0)
 """Vertical field of view of all cameras [rad]."""
 _FROM = np.array([-0.80, -0.42, 0.48])
-"""Direction from the scene to the first camera: behind the arm, over its right shoulder."""
-_WIDE, _HIGH = 0.875, 0.8  # parts of a picture that may be filled across and upwards
+"""Direction from the scene to the first camera, which is behind the arm and above its right shoulder."""
+_WIDE = 0.875  # largest share of the picture's width that the scene fills
+_HIGH = 0.8  # largest share of the picture's height that the scene fills
 ASPECT = 1.2
-"""Width over height of a wide window with the panel beside it."""
-_PHONE = 0.85  # width over height below which a panel may cover the lower part, as on phones
-_CLEAR = (0.4, 0.55)  # middle and half height of the free part of the picture then, upwards, in units of half the
-# picture
+"""Width divided by height of the scene in a wide window with the panel beside the scene."""
+_PHONE = 0.85  # width divided by height below which the panel may cover the lower part of the scene, as on phones
+# Free part of such a picture: height of its middle above the picture's middle, and half of its own height. The unit is
+# half the height of the picture.
+_CLEAR = (0.4, 0.55)
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,13 +48,13 @@ class Camera:
         return out
 
     def is_elsewhere(self, other: "Camera", part: float) -> bool:
-        """Whether position or view point differ from another camera's by more than a part of its viewing distance."""
+        """Whether the distance from another camera exceeds a part of that camera's viewing distance."""
         far = part * float(np.linalg.norm(other.position - other.look_at))
         away = max(np.linalg.norm(self.position - other.position), np.linalg.norm(self.look_at - other.look_at))
         return bool(away > far)
 
     def give(self, client: viser.ClientHandle) -> None:
-        """Set the camera of one person's browser to this one."""
+        """Move the camera of a browser to this pose."""
         with client.atomic():
             client.camera.up_direction = self.up
             client.camera.position = self.position
@@ -60,16 +62,16 @@ class Camera:
 
 
 def corners(low: Array, high: Array) -> Array:
-    """Corners (8, 3) [m] of the box between its lowest and its highest one (3,)."""
+    """Corners (8, 3) [m] of the box that is given by its lowest and its highest corner (3,)."""
     return np.array(list(product(*zip(low, high, strict=True))))
 
 
 def around(points: Array, aspect: float = ASPECT) -> Camera:
-    """Camera that sees all of some points, beside the panel or, on a phone, above it.
+    """Camera whose picture contains all given points, beside the panel or, on a phone, above the panel.
 
     Args:
         points: Points (N, 3) [m] that the camera must see, in the axes of the page.
-        aspect: Width over height of the picture.
+        aspect: Width of the picture divided by its height.
     """
     up, direction = np.array([0.0, 0.0, 1.0]), _FROM / np.linalg.norm(_FROM)
     turn = rotations_from_quaternions(Camera(direction, np.zeros(3), up).quaternion[None])[0]

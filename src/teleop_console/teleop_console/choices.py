@@ -1,7 +1,8 @@
-"""Choices: the options of a new session, which of them contradict each other, and the command line of a choice.
+"""Choices: the options of a new session, contradictions between options, and the command line of a choice.
 
-A choice is a word for each of :data:`FIELDS`; an empty word means the value of the scenario. The configuration itself
-decides whether words contradict each other, so a part of your own is offered, and refused, like any other.
+A choice is a word for each of :data:`FIELDS`; an empty word stands for the value of the scenario. The configuration
+itself decides whether words contradict each other. So the form offers and refuses parts of your own like all other
+parts.
 """
 
 import math
@@ -34,13 +35,13 @@ from teleop_core.slave.controllers import CONTROLLERS
 from teleop_core.slave.plants import PLANTS
 
 Chosen = Mapping[str, str]
-"""Words by the names of their fields; a field that is missing is empty."""
+"""Words by the names of their fields; the word of a missing field is empty."""
 PERSON = "remote"
 """Operator that is a person at the page."""
 _PERSON = f"operator={PERSON}"
 _FOR_EVER = f"{SESSION}.duration=86400.0"
 OWN = (_PERSON, _FOR_EVER)
-"""Settings of a session of the page in addition to its scenario: a person is the hand, and the session has no end."""
+"""Settings of the page's sessions in addition to the scenario: a person is the hand, and the session may last a day."""
 
 
 @dataclass(frozen=True)
@@ -48,12 +49,12 @@ class Field:
     """One option of a new session.
 
     Attributes:
-        name: Its name.
-        label: Its label on the page.
-        unsaid: Text for an empty word.
+        name: Name of the field.
+        label: Label of the field on the page.
+        unsaid: Text that is shown for an empty word.
         key: Parameter that a word sets; empty for the scenario, which is a file.
-        options: Words that may be chosen, each with its meaning; any other text may be a file.
-        stage: Stage that a word needs; empty for none.
+        options: Words that may be chosen, each with its meaning; any other word may be the name of a file.
+        stage: Stage that a word needs; empty if it needs none.
     """
 
     name: str
@@ -102,21 +103,23 @@ FIELDS = (
     Field("plant", "Plant", _OF_SCENARIO, "plant.kind", _named(PLANTS)),
 )
 """All fields, in the order of the page."""
-FOLLOWED, TIP = "followed", "tip"
-"""Further words: the file that an operator ``bag`` or ``file`` follows; the tip of a URDF."""
-_PATHS = {"bag": "operator.bag", "file": "operator.file.path"}  # parameter of the file, by the kind of operator
+FOLLOWED = "followed"
+"""Name of a further word: the file that an operator ``bag`` or ``file`` follows."""
+TIP = "tip"
+"""Name of a further word: the link of a URDF that is the tip."""
+_PATHS = {"bag": "operator.bag", "file": "operator.file.path"}  # parameter with the path
 START: Chosen = {"operator": PERSON}
 """Choice when the form is opened."""
-_LONGEST = 500  # characters of a word
+_LONGEST = 500  # largest number of characters of a word
 _TASK_TIME = 60.0  # shortest time for which a simulated operator works at a task [s]
-_NOTHING = "none"  # word of a field with a stage that does not need the stage
+_NOTHING = "none"  # word with which a field does not need its stage
 
 
 def checked(words: Chosen) -> dict[str, str]:
-    """Words of known fields that are not empty.
+    """Return the words that are not empty, after a check of all words.
 
     Raises:
-        ParameterError: A field is unknown, or a word too long.
+        ParameterError: A field is unknown, or a word is too long.
     """
     known = {field.name for field in FIELDS} | {FOLLOWED, TIP}
     for name, word in words.items():
@@ -128,7 +131,7 @@ def checked(words: Chosen) -> dict[str, str]:
 
 
 def texts(chosen: Chosen) -> tuple[str, ...]:
-    """Settings ``key=value`` that express the choice, to be applied after the scenario and :data:`OWN`.
+    """Settings ``key=value`` of a choice; they must be applied after the scenario and :data:`OWN`.
 
     Raises:
         TeleopError: The scenario is unknown.
@@ -148,7 +151,7 @@ def texts(chosen: Chosen) -> tuple[str, ...]:
 
 
 def _said(chosen: Chosen) -> tuple[str, ...]:
-    """Settings that are applied after the scenario, without :data:`OWN`."""
+    """Settings of a choice without :data:`OWN`; they are applied after the scenario."""
     said = [f"{f.key}={word}" for f in FIELDS if f.key and (word := chosen.get(f.name))]
     stages = before = _stages(chosen.get("scenario", ""))
     for field in FIELDS:
@@ -165,7 +168,7 @@ def _said(chosen: Chosen) -> tuple[str, ...]:
 
 
 def command_line(chosen: Chosen) -> str:
-    """Command that starts the same."""
+    """Command line that starts the session of a choice."""
     scenario, said = chosen.get("scenario"), texts(chosen)
     words = ["teleop", "console", *(("--scenario", scenario) if scenario else ())]
     words += ["--set", *said] if said else [] if scenario else ["--set", _PERSON]
@@ -173,7 +176,7 @@ def command_line(chosen: Chosen) -> str:
 
 
 def refusal(chosen: Chosen) -> str:
-    """Reason why this choice cannot be started; empty if it can."""
+    """Reason why the session of a choice cannot start; empty if it can."""
     key = tuple(sorted((name, word) for name, word in chosen.items() if word))
     if key not in _REFUSALS:
         try:
@@ -188,7 +191,7 @@ def refusal(chosen: Chosen) -> str:
 
 
 def tips(chosen: Chosen) -> tuple[str, ...]:
-    """Links of a URDF without a child, one of which is the tip; empty if the robot is no valid URDF."""
+    """Links of a URDF without a child link; one of them must be the tip. Empty if the robot is not a valid URDF."""
     file = Path(chosen.get("robot", ""))
     with suppress(TeleopError, OSError):
         if file.suffix == ".urdf":
@@ -200,7 +203,7 @@ def tips(chosen: Chosen) -> tuple[str, ...]:
 
 @lru_cache(64)
 def _no_robot(name: str, geometry: tuple[str, ...]) -> str:
-    """Reason why a robot cannot be loaded; empty if it can. A configuration alone does not load the robot."""
+    """Reason why a robot cannot be loaded; empty if it can. The configuration does not check this."""
     try:
         load_robot_set(name, geometry)
     except TeleopError as error:
@@ -219,7 +222,8 @@ class Option:
     Attributes:
         word: The word.
         text: Its meaning; empty if the word alone is clear.
-        reason: Why the word may not be chosen now; empty if it may, None before this is known.
+        reason: Reason why the word may not be chosen now. It is empty if the word may be chosen, and None if this is
+            unknown.
     """
 
     word: str
@@ -230,13 +234,12 @@ class Option:
 def options(field: Field, chosen: Chosen, until: float = math.inf) -> tuple[Option, ...]:
     """All words of a field, each with the reason why it contradicts the other chosen words.
 
-    If the present choice is refused as a whole, no single word is refused for that.
+    A reason for which the present choice itself is refused does not count.
 
     Args:
         field: The field.
         chosen: Words of all fields.
-        until: Monotonic time [s] after which no further word is tested; the words not tested by then have an unknown
-            reason.
+        until: Monotonic time [s] after which no further word is tested; the reasons of the remaining words are unknown.
     """
     now = refusal(chosen)
     known = {"": field.unsaid, **field.options()}
@@ -274,7 +277,7 @@ def _scenario(name: str) -> Layer:
 
 
 def _stages(scenario: str) -> tuple[str, ...]:
-    """Further stages of a scenario."""
+    """Additional stages that a scenario sets."""
     layers = [_base(), *([_scenario(scenario)] if scenario else [])]
     found: object = ()
     for layer in layers:

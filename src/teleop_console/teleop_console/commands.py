@@ -1,4 +1,4 @@
-"""``teleop console``: a page in the browser that shows a session, drives it, replays recordings."""
+"""``teleop console``: a page in the browser that shows and drives a session, and replays recordings."""
 
 import argparse
 import time
@@ -129,7 +129,7 @@ def _attach(arguments: argparse.Namespace, server: "ConsoleServer") -> None:
 
 
 def _drive(arguments: argparse.Namespace, server: "ConsoleServer", settings: Sequence[str]) -> bool:
-    """Run sessions one after the other, each with the page; returns whether the page ended the last one."""
+    """Show sessions on the page, one after the other; returns whether the page ended the last session."""
     from teleop_console.choices import OWN
 
     ros_module("guest")

@@ -1,4 +1,4 @@
-"""Connection: a browser's connection, with bounds on what the browser may send and on what it leaves unread."""
+"""Connection: a browser's connection, with limits for the data that it sends and the data that it does not read."""
 
 from typing import Any, Protocol
 
@@ -10,31 +10,31 @@ from teleop_console.filter import Budget
 STUCK = 10.0
 """Longest time for which a page may read none of its waiting data [s]."""
 OPENING = 32
-"""Connections that may be opening or fetching files at the same time; if there are more, the oldest is closed."""
+"""Largest number of connections that open or fetch files at the same time; if there are more, the oldest is closed."""
 ALL = 3.0
-"""What all pages of a server may send together, as a multiple of the budget of one page."""
-_PART = 4096  # bytes that are read before the budget is checked again
+"""Common budget of all pages of a server, as a multiple of the budget of one page."""
+_PART = 4096  # bytes that are read between two checks of the budget
 
 
 class Gate(Protocol):
-    """Decides about the messages of connections."""
+    """Decides which messages of connections are passed on."""
 
     def passed(self, connection: "Connection", data: Data) -> bytes:
         """Part of a message that is passed on to viser; empty if nothing is passed on."""
 
     def cut(self, connection: "Connection") -> None:
-        """Note that a connection was closed because of a flood."""
+        """Record that a connection was closed because it sent too much."""
 
     def come(self, connection: "Connection") -> None:
-        """Note that a connection has become a page."""
+        """Record that a connection now belongs to an open page."""
 
 
 class Crowd:
-    """All connections of one server, and what all its pages may send together.
+    """All connections of one server, and the common budget of its pages.
 
     Attributes:
-        opening: Connections that are not pages yet, the oldest first.
-        pages: Connections that are pages.
+        opening: Connections that do not belong to an open page yet, the oldest first.
+        pages: Connections of open pages.
     """
 
     def __init__(self) -> None:
@@ -50,19 +50,19 @@ class Crowd:
 
 
 class Connection(ws.ServerConnection):
-    """A connection whose messages are filtered, and that ends when it floods or stops reading.
+    """A connection whose messages are filtered; it is closed if the browser sends too much or stops reading.
 
-    The connection ends when the browser reads nothing for :data:`STUCK` seconds, or sends more than its
-    :class:`~teleop_console.filter.Budget`. It also ends if all pages together exceed the budget of the :class:`Crowd`
-    and this page sends most. It ends too if it has not become a page before :data:`OPENING` newer connections have
-    come. One message of each of viser's two queues can wait here, and the newest of each kind wait in the queues. So
-    the cost of a slow page is bounded, and the cost of a dead page ends.
+    The connection is closed in four cases: the browser reads nothing for :data:`STUCK` seconds; the browser exceeds its
+    :class:`~teleop_console.filter.Budget`; all pages together exceed the budget of the :class:`Crowd` and this page
+    sends most; or :data:`OPENING` newer connections have come before this connection has become a page. At most one
+    message of each of viser's two queues waits in the connection, and the newest messages of each kind wait in the
+    queues. So the memory of a slow page is bounded, and the memory of a dead page is released.
 
     Args:
-        gate: Decides about its messages.
+        gate: Object that decides about the messages.
         crowd: Connections of the same server.
-        arguments: Arguments from the library.
-        options: Options from the library.
+        arguments: Arguments from the websockets library.
+        options: Options from the websockets library.
 
     Attributes:
         budget: Frames and bytes that the browser may still send.
@@ -92,7 +92,7 @@ class Connection(ws.ServerConnection):
         super().connection_lost(exc)
 
     def start_keepalive(self) -> None:
-        """The handshake is done: the connection is a page now."""
+        """Register the connection as a page, because the handshake is complete."""
         self._crowd.opening.pop(self, None)
         self._crowd.pages.add(self)
         self._gate.come(self)
@@ -107,7 +107,7 @@ class Connection(ws.ServerConnection):
             super().data_received(part)
 
     def process_event(self, event: Any) -> None:
-        """Process one frame of any kind; every frame counts, because each takes time."""
+        """Process one frame and subtract it from the budget; frames of all kinds count, because each takes time."""
         if self._spend(1, 0):
             super().process_event(event)
 
@@ -134,7 +134,7 @@ class Connection(ws.ServerConnection):
         return not self._is_cut
 
     def cut(self) -> None:
-        """End it at once, for a flood."""
+        """Close the connection immediately, because the browser sends too much."""
         self._is_cut = True
         self._crowd.pages.discard(self)
         self._gate.cut(self)

@@ -1,8 +1,8 @@
-"""Console link: a live session as the page sees it, only through topics and services.
+"""Console link: access of the page to a live session through topics and services.
 
-It reads the slow copies of streams that the recorder publishes (:mod:`teleop_core.nodes.display`). Without a recorder
-it reads the streams themselves, best effort and with a queue of one. In a session with a display the slave is shown
-with the delay of that display, as a simulated operator sees it.
+The link reads the slow copies of streams that the recorder publishes (:mod:`teleop_core.nodes.display`). Without a
+recorder it subscribes to the streams themselves, best effort and with a queue of one. In a session with a display the
+page shows the slave with the delay of this display, as a simulated operator sees it.
 """
 
 import math
@@ -34,9 +34,9 @@ from teleop_core.robots.robot import Robot
 from teleop_core.slave.operation import operation_text
 
 PATIENCE = 5.0
-"""Time in which an arm must be found and must answer [s]."""
+"""Time limit for the discovery and the answer of an arm [s]."""
 _LIST, _SPLIT = "/list_parameters", "/split"
-_MARKS = 100  # marks that are kept
+_MARKS = 100  # largest number of marks in memory
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}")
 _HEARTBEAT = "operation.heartbeat"
 
@@ -52,7 +52,7 @@ class LiveLink(Observer):
         world: World of the session.
 
     Raises:
-        SessionError: There is no arm on this domain, or an arm does not report its robot.
+        SessionError: The domain has no arm, or an arm does not report its robot.
     """
 
     is_live = True
@@ -125,7 +125,7 @@ class LiveLink(Observer):
     def _robot(self, arm: str) -> Robot:
         slave = "/".join(filter(None, (arm, "slave")))
         values = self._client.values(slave, ["robot", "geometry"])  # a slave that does not answer counts as no RCRT-1
-        told = self._client.values(slave, [_HEARTBEAT])  # a foreign slave may lack this parameter
+        told = self._client.values(slave, [_HEARTBEAT])  # a slave of another program may lack this parameter
         self.has_heartbeat = self.has_heartbeat or bool(told.get(_HEARTBEAT))
         geometry = values.get("geometry")
         texts = tuple(map(str, geometry)) if isinstance(geometry, tuple) else ()
@@ -180,7 +180,7 @@ class LiveLink(Observer):
 
     def _hear_marks(self, view: View) -> None:
         while (taken := self._marks.take()) is not None:
-            with suppress(ValueError):  # bytes that are no report
+            with suppress(ValueError):  # the bytes may not be a report
                 for mark in read_reports(taken.data):
                     ago = 1e-9 * (self.world.time_ns() - mark.stamp_ns)
                     view.marks = (*view.marks, (now_of(self) - self._begun - ago, mark.message))[-_MARKS:]
@@ -227,7 +227,7 @@ class LiveLink(Observer):
             self._button.say(is_pressed=is_pressed)
 
     def _insist(self, view: View) -> None:
-        """Repeat a stop that some arm has not confirmed, unless it was released."""
+        """Repeat a stop that an arm has not confirmed, unless the stop was released."""
         with self._pressing:
             confirmed = all(arm.operation.get("is_stopped") for arm in view.arms.values())
             self._is_pressed = self._is_pressed and not confirmed
@@ -245,11 +245,11 @@ class LiveLink(Observer):
         return MappingProxyType(found)
 
     def changes(self) -> dict[tuple[str, str], Setting]:
-        """Parameters that have changed since the last call, by node and name, from any source."""
+        """Parameters that any source has changed since the last call, by node and name."""
         return self._events.take()
 
     def change(self, node: str, name: str, value: Setting) -> str:
-        """Set a parameter; returns the reason if it was refused, else an empty text."""
+        """Set a parameter; returns the reason of a refusal, else an empty text."""
         return self._client.change(node, name, value)
 
     def hold(self, arm: str, pose: Array) -> None:
@@ -257,14 +257,14 @@ class LiveLink(Observer):
         self._hands[arm].hold(pose)
 
     def let_go(self, arm: str) -> None:
-        """Release the stylus. Nothing is sent, because silence releases it."""
+        """Release the stylus. No message is sent, because silence releases the stylus."""
 
     def press_button(self, arm: str, name: str) -> None:
         """Press and release the ``fixture`` or ``mode`` button of the stylus."""
         self._hands[arm].press(name)
 
     def close_jaw(self, share: float) -> None:
-        """Close the jaw of all hands by a share: 0 open, 1 closed."""
+        """Set the closed share of the jaw for all hands: 0 is open, 1 is closed."""
         for hand in self._hands.values():
             hand.close_jaw(share)
 
@@ -276,7 +276,7 @@ class LiveLink(Observer):
         """Close the recording under a name and begin the next one; returns the path of the closed recording.
 
         Raises:
-            ParameterError: The name is not a plain file name, or exists already.
+            ParameterError: The name is not a plain file name, or a recording has this name.
             SessionError: The recorder refuses, or does not answer.
         """
         recording = self._view.recording

@@ -1,4 +1,4 @@
-"""Console session: the live session behind a page, which the page starts and ends."""
+"""Console session: a live session that the page starts and ends."""
 
 import threading
 from collections.abc import Callable, Collection
@@ -25,18 +25,18 @@ from teleop_core.nodes.live import live
 from teleop_core.nodes.operation import StopButton
 from teleop_core.session.configuration import Configuration
 
-_LOOK = 1.0  # wait for the arm between two checks whether the session has ended [s]
+_LOOK = 1.0  # time between two checks whether the session has ended, while the arm is not found [s]
 _END_PATIENCE = 60.0
 
 
 class _Lines:
-    """Text file that passes each line on as soon as it is complete."""
+    """Text file that passes each line to a function as soon as the line is complete."""
 
     def __init__(self, say: Callable[[str], None]) -> None:
         self._say, self._rest = say, ""
 
     def write(self, text: str) -> int:
-        """Accept text, and pass on the lines that it completes."""
+        """Accept text, and pass all complete lines to the function."""
         *lines, self._rest = (self._rest + text).split("\n")
         for line in lines:
             if line:
@@ -48,11 +48,10 @@ class _Lines:
 
 
 class ConsoleSession:
-    """A session in its own ROS domain, used as a context manager. All nodes run in one process if none is replaced.
+    """A session in its own ROS domain, used as a context manager. If no node is replaced, all nodes run in one process.
 
-    If ``ROS_DOMAIN_ID`` is set, the session uses that domain, and the process cannot run a second session.
-
-    Its processes end when this process ends, even if this process is killed.
+    If ``ROS_DOMAIN_ID`` is set, the session uses that domain, and this process cannot run a second session. The
+    processes of the session end when this process ends, even if this process is killed.
 
     Args:
         configuration: Configuration of the session.
@@ -61,8 +60,8 @@ class ConsoleSession:
         without: Nodes that are not started, because other programs replace them.
 
     Attributes:
-        domain: Its ROS domain.
-        button: Its stop button, which works before there is an arm.
+        domain: ROS domain of the session.
+        button: Stop button of the session; it works before the arm is found.
     """
 
     def __init__(
@@ -100,20 +99,20 @@ class ConsoleSession:
 
     @property
     def is_over(self) -> bool:
-        """Whether it has ended."""
+        """Whether the session has ended."""
         return not self._thread.is_alive()
 
     def check(self) -> None:
         """Check that the session runs, or has ended without an error.
 
         Raises:
-            SessionError: It ended with an error.
+            SessionError: The session ended with an error.
         """
         if self._error:
             raise SessionError(self._error)
 
     def link(self) -> LiveLink:
-        """Link to the session, as soon as its arm has been found.
+        """Wait until the arm of the session is found, and return the link to the session.
 
         Raises:
             SessionError: The session ended before its arm was found.
@@ -144,17 +143,17 @@ def show_session(
     without: Collection[str] = (),
     if_stopped: str = "",
 ) -> None:
-    """Run a session behind the page until it ends, or is over.
+    """Run a session and show it on the page until the session ends.
 
     Args:
-        server: The page.
+        server: Server of the page.
         configuration: Configuration of the session.
         out: Directory of the recording.
-        is_over: Returns whether the session must end; called at every drawing with the present view.
+        is_over: Function that returns whether the session must end; called at every drawing with the present view.
         renew: As in :class:`~teleop_console.app.Console`.
         without: As in :class:`ConsoleSession`.
-        if_stopped: As in :class:`~teleop_console.app.Console`. With this text, pages report only that the session
-            starts, and cannot end it.
+        if_stopped: As in :class:`~teleop_console.app.Console`. If the text is not empty, pages show only that the
+            session starts, and cannot end the session.
 
     Raises:
         SessionError: The session could not begin, or ended with an error.
@@ -175,7 +174,7 @@ def show_session(
 
 
 def _both(say: Callable[[str], None], *, is_on_page: bool) -> Callable[[str], None]:
-    """Print a line in the terminal and, while a session starts, also show it on the page if it matters."""
+    """Print a line in the terminal. While a session starts, the page also shows relevant lines."""
 
     def tell(line: str) -> None:
         if "s  " not in line:  # the line that the session prints each second is already on the page

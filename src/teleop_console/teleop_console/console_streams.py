@@ -1,4 +1,4 @@
-"""Console streams: the stream of an arm that a page reads, and the messages that it publishes as a person's hand."""
+"""Console streams: the streams of an arm that a page reads, and the messages of a hand that a page publishes."""
 
 import math
 from collections import deque
@@ -16,11 +16,11 @@ from teleop_core.nodes.display import displayed
 from teleop_core.nodes.streams import Subscription, message_type
 
 SILENCE = 1.0
-"""Time without a message after which a stream is not fresh any more, and another source of the stream is searched [s].
-"""
+"""Time without a message after which a stream is no longer fresh [s]. Then the page searches another source of the
+stream."""
 _PRESS = 0.12  # duration of a button press [s]
-_FRAMES = 512  # samples of a stream that may wait to be shown
-_SCREEN_NS = 33_000_000  # delay of the page itself, the default latency of a display [ns]
+_FRAMES = 512  # largest number of samples of a stream that wait to be shown
+_SCREEN_NS = 33_000_000  # delay of the page itself [ns]; equal to the default latency of a display
 _RHYTHM_NS = 3_000_000_000  # time over which the frames of a display are counted [ns]
 
 
@@ -30,7 +30,7 @@ def now_of(owner: Owner) -> float:
 
 
 class Seen:
-    """Newest sample of one stream of one arm."""
+    """Newest sample of a stream of an arm."""
 
     def __init__(self, owner: Owner, topic: Topic, arm: Arm) -> None:
         self.topic, self._joints = topic, arm.robot.joint_names
@@ -43,7 +43,7 @@ class Seen:
         self._frames: deque[tuple[int, int]] = deque(maxlen=_FRAMES)  # arrival times of new samples, and their stamps
 
     def take(self) -> bool:
-        """Take the newest sample, for :meth:`show`; returns whether a new sample came."""
+        """Store the newest sample for :meth:`show`; returns whether a new sample has arrived."""
         newest = None
         while (taken := self._subscription.take()) is not None:
             newest = taken.data
@@ -52,7 +52,7 @@ class Seen:
             return False
         found: Any = self._layout.decode_one(newest) or read_any(self.topic.kind, newest, self._joints)
         if not isinstance(found, tuple) or not np.isfinite(found[1]).all():
-            return False  # the nodes that need the topic refuse and count its messages
+            return False  # the nodes that use the topic refuse and count wrong messages
         now_ns = self._owner.world.time_ns()
         self._waiting.append((now_ns, found[0], found[1].copy()))
         if not self._frames or self._frames[-1][1] != found[0]:
@@ -60,7 +60,7 @@ class Seen:
         return True
 
     def rhythm(self) -> tuple[float, float]:
-        """New samples in a second, and the delay of the newest one [s]; NaN without recent samples."""
+        """Number of new samples per second, and the delay of the newest sample [s]; NaN without recent samples."""
         since_ns = self._owner.world.time_ns() - _RHYTHM_NS
         seen = [frame for frame in self._frames if frame[0] >= since_ns]
         if len(seen) < 2:
@@ -104,7 +104,7 @@ class Hand:
             self._publishers[0].publish(data)
 
     def press(self, name: str) -> None:
-        """Press a button and release it a moment later; presses follow one another."""
+        """Press a button and release it after a short time; several presses are sent one after the other."""
         self._world.thread("press", lambda: self._press(name)).start()
 
     def _press(self, name: str) -> None:
@@ -112,11 +112,11 @@ class Hand:
             self._say(np.array([0.0, name == "fixture", name == "mode"]))
             self._world.sleep(_PRESS)
             self._say(np.zeros(3))
-            # keep the button released for the same time, because otherwise two presses would be one
+            # keep the button released for the same time, so that two presses are not received as one
             self._world.sleep(_PRESS)
 
     def close_jaw(self, share: float) -> None:
-        """Close the jaw by a share."""
+        """Command the closed share of the jaw, 0 to 1."""
         with self._lock:
             self._publishers[2].publish(self._closed.encode_one(self._world.time_ns(), np.array([share])))
 

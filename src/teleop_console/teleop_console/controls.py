@@ -1,6 +1,6 @@
-"""Controls: buttons of the page with which the person who drives commands the session.
+"""Controls: buttons of the page with which the driving person commands the session.
 
-A control that is not a command of the arm, such as a set of gentle limits, is one file like any other part.
+A control of your own, such as one that sets gentle limits, is one file, like any other part.
 """
 
 import time
@@ -15,7 +15,7 @@ from teleop_core.base.registry import Registry
 from teleop_core.slave.operation.states import AT_REST_ONLY, STILL_PRESSED
 
 Answers = Sequence[tuple[bool, str]]
-"""Result of each requested action: whether it was done, and a line about it."""
+"""Result of each requested action: whether it was done, and a line with the details."""
 _PATIENCE = 3.0  # longest wait for an arm that must come to rest first [s]
 _PAUSE = 0.2  # pause before the command is sent again [s]
 
@@ -27,13 +27,14 @@ class Control:
     Attributes:
         name: Label of the button.
         hint: Effect of the button, shown when the pointer is over it.
-        act: ``act(link, arm)`` does the action for the arm with this name (empty for the default arm), and
-            returns the result as :data:`Answers`. It runs in a separate thread. The link sends commands
-            (``link.command``), sets parameters (``link.change``), and more. If the last answer is no, the page
-            shows it to the person who pressed.
+        act: Function ``act(link, arm)`` that does the action for the arm with this name (empty for the default arm) and
+            returns :data:`Answers`. It runs in a separate thread. ``link.command`` sends commands, and ``link.change``
+            sets parameters. If the last action was not done, the page shows its line to the person who pressed.
         folder: ``stylus`` for buttons of the hand's device; empty for the others.
-        text: ``text(arm)`` returns the present state, shown behind the name; None to show nothing.
-        is_alive: ``is_alive(view)`` returns whether the button has an effect now; None if it always has.
+        text: Function ``text(arm)`` that returns the present state, which is shown after the name; None to show
+            nothing.
+        is_alive: Function ``is_alive(view)`` that returns whether the button has an effect now; None if the button
+            always has an effect.
     """
 
     name: str
@@ -45,10 +46,11 @@ class Control:
 
 
 def commands(*words: str) -> Callable[[SessionLink, str], Answers]:
-    """Action of a control that sends the arm commands, one after the other.
+    """Return an action that sends commands to the arm, one after the other.
 
     Args:
-        words: Commands from :data:`~teleop_core.graph.topics.STATE_COMMANDS`; before a reset the stop is released.
+        words: Commands from :data:`~teleop_core.graph.topics.STATE_COMMANDS`. The action releases the stop before a
+            reset.
     """
 
     def act(link: SessionLink, arm: str) -> Answers:
@@ -60,11 +62,11 @@ def commands(*words: str) -> Callable[[SessionLink, str], Answers]:
 
 
 def _insist(link: SessionLink, word: str, arm: str) -> tuple[bool, str]:
-    """Send a command; while the arm is coming to rest, the command is repeated for a while."""
+    """Send a command. If the arm is still coming to rest, the command is repeated for some time."""
     until = time.monotonic() + _PATIENCE
     while True:
         is_taken, text = link.command(word, arm)
-        is_passing = AT_REST_ONLY in text or STILL_PRESSED in text  # a release may have been sent, but has not arrived
+        is_passing = AT_REST_ONLY in text or STILL_PRESSED in text  # a release may have been sent but not received
         # yet
         if is_taken or not is_passing or time.monotonic() > until:
             return is_taken, text
@@ -132,5 +134,5 @@ CONTROLS: Registry[Control] = Registry(
 
 
 def register_control(control: Control, *, replace: bool = False) -> Control:
-    """Add a control under its own name for the rest of the program; see :meth:`Registry.add`."""
+    """Add a control under its own name until the program ends; see :meth:`Registry.add`."""
     return CONTROLS.add(control.name, control, replace=replace)

@@ -1,4 +1,4 @@
-"""Curves: columns thinned to the pixels that show them, and the bands and ticks of a session's states and events."""
+"""Curves: columns that are thinned to the pixels of the strip, and bands and tick marks of states and events."""
 
 import math
 from collections.abc import Mapping
@@ -15,7 +15,8 @@ STRETCHES = 400
 """Largest number of stretches drawn in a band; the worst and the longest stretches are drawn."""
 TICKS = 200
 """Largest number of tick marks; faults have priority."""
-_GAP, _GAPS = 0.5, 10.0  # a pause is at least this long [s], and at least this many usual steps
+_GAP = 0.5  # shortest pause [s]
+_GAPS = 10.0  # shortest pause, as a multiple of the usual time between two samples
 _FAULTS = 100.0  # larger than the number of kinds of faults
 _STATES = {
     float(state): (state.name, meaning) for state, meaning in zip(State, ("idle", "good", "held", "wrong"), strict=True)
@@ -24,18 +25,18 @@ Told = dict[str, object]
 
 
 def thinned(samples: Rows, begin: float, end: float, pixels: int, *, is_held: bool = False) -> dict[str, list[object]]:
-    """Smallest and largest value of each pixel, with a sample on each side; no peak is left out.
+    """Smallest and largest value of the samples in each pixel, with one sample beyond each end; no peak is left out.
 
     Args:
         samples: Times (N,) [s], ascending, and values (N,); values that are not finite are unknown.
         begin: Left end of the strip [s].
         end: Right end [s], later.
         pixels: Number of pixels, at least one.
-        is_held: Whether a value holds until the next one, so that a pause is none.
+        is_held: Whether a value is valid until the next value; then the samples have no pauses.
 
     Returns:
-        ``times``, ``low`` and ``high``, of at most twice as many entries as there are pixels, and
-        None between values before and after a pause.
+        ``times``, ``low`` and ``high``, with at most two entries for each pixel, and None between the values before and
+        after a pause.
     """
     times, values = samples[0], np.asarray(samples[1], np.float64)
     first = max(0, int(np.searchsorted(times, begin, side="right")) - 1)
@@ -57,7 +58,7 @@ def thinned(samples: Rows, begin: float, end: float, pixels: int, *, is_held: bo
 
 
 def _short_numbers(values: Array) -> list[object]:
-    """Numbers as JSON has them, short."""
+    """Convert numbers to short JSON values."""
     return [float(f"{value:.7g}") if math.isfinite(value) else None for value in values.tolist()]
 
 
@@ -65,8 +66,8 @@ def bands(past: Past, begin: float, end: float) -> tuple[list[Told], list[Told]]
     """Bands and ticks of all arms between two times [s], without topics that are still being read.
 
     Returns:
-        Rows with their ``row`` and ``stretches`` of begin, end, text and meaning of a colour, and
-        ticks with ``time``, ``text`` and ``meaning``.
+        Rows, each with its name ``row`` and ``stretches`` (begin, end, text, meaning of the colour), and ticks with
+        ``time``, ``text`` and ``meaning``.
     """
     rows: list[Told] = []
     ticks = [(1, time, text, "wanted") for time, text in past.marks() if begin <= time <= end]
@@ -120,7 +121,7 @@ def _columns(found: Rows, names: tuple[str, ...]) -> Mapping[str, Array]:
 
 
 def _runs(times: Array, values: Array, begin: float, end: float) -> list[tuple[float, float, float, int]]:
-    """Begin, end, value and first row of each stretch of constant value that overlaps an interval."""
+    """Begin, end, value and index of the first row of each stretch of constant value that overlaps an interval."""
     is_new = np.ones(len(values), bool)
     is_new[1:] = ~((values[1:] == values[:-1]) | (np.isnan(values[1:]) & np.isnan(values[:-1])))
     starts = np.flatnonzero(is_new)
@@ -133,6 +134,6 @@ def _runs(times: Array, values: Array, begin: float, end: float) -> list[tuple[f
 
 
 def _most(runs: list[tuple[float, float, str, str]]) -> list[tuple[float, float, str, str]]:
-    """The stretches that are drawn, in their order."""
+    """Return the stretches that are drawn, in order of time."""
     kept = sorted(runs, key=lambda run: (run[3] != "wrong", run[0] - run[1]))[:STRETCHES]
     return [(round(a, 4), round(b, 4), text, meaning) for a, b, text, meaning in sorted(kept)]

@@ -1,8 +1,8 @@
 """Filter: which messages of a page the console accepts; all others are dropped at the socket.
 
-viser sets any attribute of any element that a page names, accepts positions of any shape, and keeps uploads. So only
-the messages declared here, within the bounds declared here, reach viser, and only from a page that may send them. An
-accepted message is encoded anew from its checked values.
+viser sets any attribute of any element that a page names, accepts positions of any shape, and stores uploads. So only
+messages that are declared here reach viser. Their values must be within the declared bounds, and the page must be
+allowed to send them. An accepted message is encoded anew from its checked values.
 """
 
 import struct
@@ -16,11 +16,15 @@ import msgspec
 from msgspec import Meta, Struct
 
 LARGEST = 256 * 1024
-"""Largest message of a page [bytes]: a picture of an inset, drawn by a browser."""
-RATE, BURST = 200.0, 400.0
-"""Frames that a page may send in a second, and in one burst; a busy page sends 90 a second."""
-BYTES_RATE, BYTES_BURST = 1e6, 2e6
-"""Bytes that a page may send in a second, and in one burst; visible insets need 520,000 a second."""
+"""Largest message of a page [bytes]; it is the picture of an inset that a browser has drawn."""
+RATE = 200.0
+"""Largest number of frames per second that a page may send; a busy page sends 90."""
+BURST = 400.0
+"""Largest number of frames that a page may send in one burst."""
+BYTES_RATE = 1e6
+"""Largest number of bytes per second that a page may send; visible insets need 520,000."""
+BYTES_BURST = 2e6
+"""Largest number of bytes that a page may send in one burst."""
 PICTURE = (180, 240)
 """Height and width of the picture that the console may request from a browser [px]."""
 
@@ -45,7 +49,7 @@ _OFF_UNIT = 1e-2  # tolerance of the squared length of a unit quaternion
 
 
 class _Message(Struct, tag_field="type", forbid_unknown_fields=True):
-    """A message of a page; a float is finite because it has bounds."""
+    """A message of a page; floats are always finite, because they have bounds."""
 
 
 class Looks(_Message, tag="ViewerCameraMessage"):
@@ -86,7 +90,7 @@ class LetsGo(_Message, tag="TransformControlsDragEndMessage"):
 
 
 class Value(Struct, forbid_unknown_fields=True):
-    """All that a page may set of an element."""
+    """The only attribute of an element that a page may set."""
 
     value: bool | _Count | _Number | Annotated[str, Meta(max_length=1000)]
 
@@ -105,7 +109,7 @@ class Triggers(_Message, tag="CommandTriggerMessage"):
 
 
 class Draws(_Message, tag="GetRenderResponseMessage"):
-    """The page answers with a picture."""
+    """The page sends a requested picture."""
 
     payload: bytes
     render_uuid: _Name
@@ -124,19 +128,19 @@ def decode(data: bytes | str) -> _Message | None:
 
 
 class Elements(Protocol):
-    """Elements that are on the page now."""
+    """Access to the elements that the page shows now."""
 
     def control(self, page: int, uuid: str) -> Any | None:
         """Handle of an input that the page shows; None if there is none."""
 
     def has_command(self, uuid: str) -> bool:
-        """Whether there is such a command."""
+        """Whether a command with this identifier exists."""
 
     def has_gizmo(self, name: str) -> bool:
-        """Whether there is such a gizmo."""
+        """Whether a gizmo with this name exists."""
 
     def is_public(self, uuid: str) -> bool:
-        """Whether pages that watch may use an element."""
+        """Whether pages that do not drive may use an element."""
 
     def is_asked(self, page: int) -> bool:
         """Whether the console has requested a picture from a page."""
@@ -160,7 +164,7 @@ class Filter:
         self.refused: Counter[str] = Counter()
 
     def judge(self, page: int, data: bytes | str) -> tuple[bytes, str]:
-        """Encoded message for viser and an empty reason, or no message and the reason of the refusal."""
+        """Check a message; returns the encoded message for viser and an empty reason, or no message and the reason."""
         message = decode(data)
         reason = UNKNOWN if message is None else self._reason(page, message)
         if reason:
@@ -207,7 +211,7 @@ class Filter:
 
 
 def takes(control: Any, value: object) -> bool:
-    """Whether an input of viser can have a value: of its type, its options, within its bounds."""
+    """Whether a value suits an input of viser: type, options and bounds must match."""
     if hasattr(control, "options"):  # dropdowns and groups of buttons
         return value in control.options
     if isinstance(control.value, bool):  # buttons and boxes
@@ -222,7 +226,7 @@ def takes(control: Any, value: object) -> bool:
 
 
 def is_picture(data: bytes) -> bool:
-    """Whether data begin with the header of a PNG of the requested size, so that it cannot decompress to more."""
+    """Whether data begin with the header of a PNG of the requested size, which limits the decompressed size."""
     return data[:8] == b"\x89PNG\r\n\x1a\n" and data[16:24] == struct.pack(">II", *PICTURE[::-1])
 
 
@@ -253,5 +257,5 @@ class Budget:
 
     @property
     def left(self) -> float:
-        """Remaining budget, the smaller share of frames and bytes: 1 if nothing is used, negative if it is exceeded."""
+        """Smaller remaining share of frames and bytes: 1 if nothing is used, negative if the budget is exceeded."""
         return min(self._frames / BURST, self._bytes / BYTES_BURST) / self._share

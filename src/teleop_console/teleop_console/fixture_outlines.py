@@ -27,8 +27,8 @@ class Look:
 
     Attributes:
         kind: Name of its kind.
-        values: Names and values of its shape's parameters, and its place; those that are missing
-            have their defaults.
+        values: Names and values of the parameters of the fixture's shape and place; missing parameters have their
+            defaults.
     """
 
     kind: str = BOX.name
@@ -39,11 +39,11 @@ class Look:
 def unit_outline(look: Look) -> Array:
     """Segments (N, 2, 3) of a fixture along the master's axes, scaled to length 1 along each axis.
 
-    Along an axis on which the fixture has no extent, they are in metres. A fixture of an unknown kind is drawn as its
-    bounding box.
+    Along an axis on which the fixture has no extent, the segments are in metres. A fixture of an unknown kind is drawn
+    as its bounding box.
     """
     fixture = Fixture(BOX, BOX.parameters())
-    with suppress(Exception):  # a foreign kind may raise any error, which must not stop the page
+    with suppress(Exception):  # a user's own kind may raise any error, which must not stop the page
         values: dict[str, Any] = dict(look.values)
         place, shape = values.pop("place", fixture.place), SHAPES.find(look.kind)
         found = Fixture(shape, build(shape.parameters, values), tuple(place))
@@ -54,7 +54,7 @@ def unit_outline(look: Look) -> Array:
 
 
 def scale_of(outline: Array, size: Array, gain: float) -> Array:
-    """Scale (3,) that gives a unit outline its size (3,) [m]; along flat axes the scale keeps metres."""
+    """Scale (3,) with which a unit outline has the size (3,) [m]; along flat axes the outline is already in metres."""
     is_flat = np.ptp(outline.reshape(-1, 3), axis=0) < 0.5
     scale: Array = np.where(is_flat, gain, size)
     return scale
@@ -65,8 +65,8 @@ class OutlineNode:
 
     Args:
         server: The page.
-        name: Path of its node.
-        turn: Quaternion (4,) from the master's axes to those of the node above.
+        name: Path of the outline's node.
+        turn: Quaternion (4,) from the master's axes to the axes of the parent node.
     """
 
     def __init__(self, server: viser.ViserServer, name: str, turn: Array) -> None:
@@ -76,13 +76,13 @@ class OutlineNode:
         self.line: viser.LineSegmentsHandle | None = None
 
     def turn(self, turn: Array) -> None:
-        """Set another rotation (4,) from the master's axes to those of the node above."""
+        """Set the rotation (4,) from the master's axes to the axes of the parent node."""
         self._turn = turn
         if self.line is not None:
             self.line.wxyz = turn
 
     def hide(self) -> None:
-        """Draw none."""
+        """Hide the outline."""
         if self.line is not None:
             self.line.visible = False
 
@@ -91,9 +91,9 @@ class OutlineNode:
 
         Args:
             look: Kind of fixture that is drawn.
-            center: Middle of the fixture (3,) [m] in the axes of the node above.
+            center: Centre of the fixture (3,) [m] in the axes of the parent node.
             scale: Scale factors of the unit outline (3,), along the master's axes.
-            is_touched: Whether the hand or the slave touches its wall.
+            is_touched: Whether the hand or the slave touches the fixture's wall.
         """
         color = WRONG if is_touched else GOOD
         if self.line is None or look != self._look:

@@ -1,8 +1,8 @@
-"""Front: accepts the connections of the page's server, and answers the emergency stop by itself.
+"""Front: accepts the connections of the page's server, and answers the emergency stop without the event loop.
 
-One event loop processes the messages of all pages, and a stop would wait behind all of them. So a separate thread
-accepts the connections. It answers requests for the stop and signs of life at once. Another thread answers slow
-requests, one after the other. Every other connection is passed on to the event loop unread.
+One event loop processes the messages of all pages, so a stop would wait for all of them. Therefore a separate thread
+accepts the connections. It answers requests for the stop and signs of life immediately. Another thread answers slow
+requests, one after the other. All other connections are passed on to the event loop unread.
 """
 
 import logging
@@ -25,21 +25,21 @@ from websockets.http11 import Response
 from websockets.streams import StreamReader
 
 WAITING = 64
-"""Connections that may be open without a complete request; if there are more, the oldest is closed."""
+"""Largest number of connections without a complete request; if there are more, the oldest is closed."""
 PATIENCE = 10.0
 """Time in which a connection must send its request [s]."""
 STOPPER = "console front"
 """Name of the thread that answers the stop."""
-_LARGEST = 16 * 1024  # bytes of a request's head
-_LOOK = 0.5  # s, between two checks of connections that have sent nothing
-_SOON = 0.02  # s, between two checks of a request that has begun
+_LARGEST = 16 * 1024  # largest number of bytes of a request's head
+_LOOK = 0.5  # time between two checks of connections that have sent nothing [s]
+_SOON = 0.02  # time between two checks of an incomplete request [s]
 _BACKLOG = 64
 _LINE = 32  # largest number of slow requests that wait; a further request is not answered
 _LENGTH = re.compile(rb"\r\nContent-Length: *([0-9]{1,9})(?=\r\n|$)", re.IGNORECASE)
 _MALFORMED = (EOFError, SecurityError, ValueError, NotImplementedError)
 
 Body = Callable[[int], bytes]
-"""Reads the body of a request when it is called; raises ValueError if the body has more bytes than the argument."""
+"""Function that reads the body of a request; it raises ValueError if the body has more bytes than the argument."""
 Answer = Callable[[Head, Body], Response]
 
 
@@ -47,13 +47,13 @@ class Front:
     """Listening socket whose connections are first examined by a thread.
 
     Args:
-        opened: Socket that listens; it is closed at the end.
-        paths: Paths of requests that are answered here.
-        answer: Answers one of these requests; called in a thread of this object.
-        slow: Paths whose answers may take a while; they do not delay other answers.
+        opened: Listening socket; it is closed at the end.
+        paths: Paths of requests that this object answers.
+        answer: Function that answers one of these requests; called in a thread of this object.
+        slow: Paths whose answers may take long; they do not delay other answers.
 
     Attributes:
-        passed_on: Socket for an event loop: it accepts the connections that are passed on.
+        passed_on: Socket for an event loop, which accepts from it the connections that are passed on.
     """
 
     def __init__(
@@ -62,8 +62,8 @@ class Front:
         self._opened, self._paths, self._answer, self._slow = opened, paths, answer, slow
         self._line: queue.Queue[tuple[socket.socket, bytes] | None] = queue.Queue(_LINE)
         threading.Thread(target=self._work, name="console start", daemon=True).start()
-        self._waiting: dict[socket.socket, float] = {}  # time limit of each waiting connection
-        self._partial: set[socket.socket] = set()  # number of these connections that have begun to send a request
+        self._waiting: dict[socket.socket, float] = {}  # time limit of each connection without a complete request
+        self._partial: set[socket.socket] = set()  # those connections that have begun to send a request
         inner, self._told = socket.socketpair()
         self.passed_on = PassedOn(inner, opened.getsockname())
         self._told.setblocking(False)
@@ -77,7 +77,7 @@ class Front:
         """Stop accepting connections."""
         self._is_closed = True
         self._thread.join()
-        with suppress(queue.Full):  # no harm if the thread is not woken to end
+        with suppress(queue.Full):  # if the queue is full, the thread need not be woken
             self._line.put_nowait(None)
         for one in (self._opened, self._told, *self._waiting):
             one.close()
@@ -101,7 +101,7 @@ class Front:
     def _accept(self) -> None:
         try:
             one, _ = self._opened.accept()
-        except OSError:  # the client has left already, or this process has too many files open
+        except OSError:  # the client has closed the connection, or this process has too many open files
             time.sleep(_SOON)
             return
         one.setblocking(False)
@@ -122,7 +122,7 @@ class Front:
         if not data:
             self._drop(one)
         elif not is_whole and len(data) < _LARGEST:
-            if one not in self._partial:  # the socket would count as readable all the time
+            if one not in self._partial:  # otherwise the socket would always be readable
                 self._selector.unregister(one)
                 self._partial.add(one)
         elif is_ours:
@@ -160,7 +160,7 @@ class Front:
 
     def _pass_on(self, one: socket.socket) -> None:
         self.passed_on.waiting.append(one)
-        with suppress(OSError):  # the event loop already has many connections to accept
+        with suppress(OSError):  # the event loop already has many connections to accept, so a wake-up is not needed
             self._told.send(b"\0")
 
     def _forget(self, one: socket.socket) -> None:
@@ -179,8 +179,8 @@ class PassedOn(socket.socket):
     """Socket that an event loop uses like a listening socket; it accepts the connections that a front passes on.
 
     Args:
-        inner: Becomes readable with every connection that is passed on; taken over.
-        address: Address of the socket that really listens.
+        inner: Socket that becomes readable with every connection that is passed on; this object closes it.
+        address: Address of the listening socket.
 
     Attributes:
         waiting: Connections that are passed on.
@@ -196,21 +196,21 @@ class PassedOn(socket.socket):
         """Do nothing, because another socket listens."""
 
     def getsockname(self) -> Any:
-        """Address of that other socket."""
+        """Address of the listening socket."""
         return self._address
 
     def accept(self) -> tuple[socket.socket, Any]:
-        """Next connection.
+        """Return the next connection.
 
         Raises:
-            BlockingIOError: None waits.
+            BlockingIOError: No connection waits.
         """
         if self.waiting:
             with suppress(BlockingIOError):
                 self.recv(1)
             one = self.waiting.popleft()
             return one, self._address
-        self.recv(_LARGEST)  # a byte for a connection that is taken already; raises if there is no byte
+        self.recv(_LARGEST)  # remove the byte of an accepted connection; raises an error if there is no byte
         raise BlockingIOError
 
     def close(self) -> None:
@@ -226,7 +226,7 @@ def _none(most: int) -> bytes:
 
 
 def _without_body(head: bytes) -> tuple[bytes, int]:
-    """Head of a request, changed to that of a request without a body, and the length of the body [bytes]."""
+    """Head of a request without the entries about its body, and the length of the body [bytes]."""
     if not head.startswith(b"POST "):
         return head, 0
     found = _LENGTH.findall(head)
@@ -236,7 +236,7 @@ def _without_body(head: bytes) -> tuple[bytes, int]:
 
 
 def _body(one: socket.socket, length: int, most: int) -> bytes:
-    """Body of a request, as long as the other side sends it without delay."""
+    """Read the body of a request; the client must send it within :data:`PATIENCE` seconds."""
     if length > most:
         raise ValueError
     end, found = time.monotonic() + PATIENCE, bytearray()
@@ -251,7 +251,7 @@ def _body(one: socket.socket, length: int, most: int) -> bytes:
 
 
 def _parsed(data: bytes) -> Head:
-    """Head of a request."""
+    """Parse the head of a request."""
     reader = StreamReader()
     reader.feed_data(data)
     reader.feed_eof()
@@ -265,7 +265,7 @@ def _parsed(data: bytes) -> Head:
 
 
 def _path(line: bytes) -> str:
-    """Path of a request's first line; empty if it has none."""
+    """Path in the first line of a request; empty if the line contains no path."""
     words = line.split(b" ")
     try:
         return urlsplit(words[1].decode("ascii")).path if len(words) == 3 else ""

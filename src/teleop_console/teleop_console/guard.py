@@ -1,9 +1,9 @@
-"""Guard: which requests the page's server answers; a page of another origin must not drive an arm.
+"""Guard: decides which requests the page's server answers; a page of another origin must not drive an arm.
 
-Three things protect it. *Host*: a name that resolves to this machine but is not ours is an attack (DNS rebinding).
-*Origin*: browsers state which page opens a WebSocket or fetches a file; only the console's page may do this. *Token*:
-where others can
-reach the port, a secret in the address which the browser then keeps as a cookie.
+Three checks protect the arm. *Host*: a host name that resolves to this machine but is not ours is an attack (DNS
+rebinding). *Origin*: browsers state which page opens a WebSocket or fetches a file, and only the console's page may do
+this. *Token*: if other machines can reach the port, the address must contain a secret, which the browser then stores as
+a cookie.
 """
 
 import ipaddress
@@ -29,7 +29,7 @@ HEADERS = {
 
 
 def is_loopback(host: str) -> bool:
-    """Whether only this machine reaches an address."""
+    """Whether only this machine can reach an address."""
     try:
         return ipaddress.ip_address(host).is_loopback
     except ValueError:
@@ -52,7 +52,7 @@ class Request:
         path: Path with its query.
         is_socket: Whether the request opens a WebSocket.
         header: Function that returns all values of a header by its name.
-        body: Function that reads its body, of at most the given number of bytes.
+        body: Function that reads the body of the request, with at most the given number of bytes.
     """
 
     path: str
@@ -64,13 +64,13 @@ class Request:
 class Guard:
     """Decides about requests.
 
-    Ports are compared between Host and Origin only, not with our own: the page may be seen through
-    a forwarded port, and a browser cannot be made to send a Host that it did not connect to.
+    The ports of Host and Origin are compared with each other, but not with our own port, because a browser may reach
+    the page through a forwarded port. A browser cannot be made to send a Host to which it did not connect.
 
     Args:
-        host: Address that the server is bound to.
-        port: Its port; names the cookie, since cookies are shared by all ports of a host.
-        token: Secret that requests must have; empty for none.
+        host: Address to which the server is bound.
+        port: Port of the server. It is part of the cookie's name, because all ports of a host share cookies.
+        token: Secret that requests must contain; empty for no secret.
     """
 
     def __init__(self, host: str, port: int, token: str = "") -> None:
@@ -78,7 +78,7 @@ class Guard:
         self._cookie = f"teleop_console_{port}"
 
     def refusal(self, request: Request) -> str:
-        """Why a request is refused; empty if it is answered."""
+        """Reason why a request is refused; empty if the request is answered."""
         hosts, origins = request.header("Host"), request.header("Origin")
         if len(hosts) != 1 or not self._is_ours(hosts[0]):
             return "the console does not have this host name"

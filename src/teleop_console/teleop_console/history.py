@@ -1,4 +1,4 @@
-"""History: figures that the page computes from the samples that it received."""
+"""History: scores that the page computes from the samples that it received."""
 
 from dataclasses import dataclass
 
@@ -11,9 +11,9 @@ from teleop_core.kernels.geometry import Array
 
 @dataclass
 class LiveScores:
-    """Figures of one arm since their last reset, from the samples that the page received.
+    """Scores of one arm since the last reset, computed from the samples that the page received.
 
-    The scores of a recording use every sample; these figures are a preview.
+    The scores of a recording use every sample; these scores are a preview.
 
     Attributes:
         time: Time for which the arm has followed the hand [s], without clutched time.
@@ -32,7 +32,7 @@ class LiveScores:
     _last: tuple[float, Array] | None = None
 
     def add(self, time: float, view: ArmView) -> None:
-        """Add the view of a time [s]; only samples in which the slave follows the hand count."""
+        """Add the view of a time [s]; only samples while the slave follows the hand count."""
         reference, place = view.get(topics.SLAVE_SERVO_CP), view.get(topics.SLAVE_MEASURED_CP)
         force = view.get(topics.MASTER_MEASURED_CF)
         is_led = view.state.get("is_following") and not view.state.get("is_clutched")
@@ -51,7 +51,7 @@ class LiveScores:
         self._last = (time, place[:3].copy())
 
     def text(self) -> str:
-        """The figures as a table in Markdown."""
+        """The scores as a table in Markdown."""
         rows = (
             ("followed", f"{self.time:.1f} s"),
             ("path of the tip", f"{1e3 * self.way:.1f} mm"),

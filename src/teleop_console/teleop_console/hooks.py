@@ -1,10 +1,10 @@
 """Hooks: all changes of viser's behaviour; the only module that uses viser's private names.
 
 viser 1.1 opens its port itself, answers every request, tries the next port if one is taken, prints a banner and offers
-a public tunnel to the page. It has no settings for these. So this module replaces the function with which viser opens
-its server. Our function passes an already listening socket to the same library, asks the guard before viser sees a
-request, and asks the filter before viser sees a message. The message buffers here wake their readers from the right
-thread. The bound on viser's version in ``setup.py`` is needed by this module.
+a public tunnel to the page. No settings change this behaviour. So this module replaces the function with which viser
+opens its server. Our function passes an already listening socket to the websockets library. It asks the guard before
+viser gets a request, and the filter before viser gets a message. The message buffers of this module wake their readers
+in the right thread. This module needs the bound on viser's version in ``setup.py``.
 """
 
 import asyncio
@@ -38,7 +38,7 @@ from teleop_console.guard import Request as Asked
 from teleop_core.base.errors import SessionError
 
 PAGES = 16
-"""Pages that may be open at the same time; if there are more, the newest page that does not drive is closed."""
+"""Largest number of open pages; if there are more, the newest page that does not drive is closed."""
 _NOTICE = 5.0  # time for which a page receives only its last message [s]
 _STARTING = threading.Lock()
 
@@ -46,15 +46,15 @@ Answer = Callable[[ws.ServerConnection, Request], Response | None]
 
 
 class Wake(asyncio.Event):
-    """Event that is set only on the thread of its event loop.
+    """Event that is set only in the thread of its event loop.
 
-    viser sets its event from the drawing thread, and then asks the loop to set it too. A reader that has checked the
-    event but does not wait yet misses the first call. The second call, and every later one, has no effect, because the
-    event is set already: the page then never shows anything new.
+    viser sets its event in the drawing thread, and then asks the loop to set it again. A reader that has checked the
+    event but does not wait yet misses the first call. The second call and all later calls have no effect, because the
+    event is already set. Then the page is never updated again.
     """
 
     def set(self) -> None:
-        """Wake the waiting task, on the loop's own thread only: viser asks the loop to do so too."""
+        """Wake the waiting task if this is the loop's own thread; calls in other threads are ignored."""
         with suppress(RuntimeError):  # viser calls this also in a thread without a loop
             asyncio.get_running_loop()
             super().set()
@@ -77,12 +77,12 @@ class Server(viser.ViserServer):
     Args:
         opened: Listening socket; it is closed with the server.
         guard: Decides about requests.
-        drivers: Gets the pages that are open and alive, and the pages that drag a gizmo.
-        answers: Answers to requests that are not for viser's page.
+        drivers: Object that is informed about open pages, their signs of life, and pages that drag a gizmo.
+        answers: Object that answers requests that are not for viser's page.
         label: Heading of the panel.
 
     Attributes:
-        filter: Decides about messages.
+        filter: Object that decides about messages.
     """
 
     def __init__(self, opened: socket, guard: Guard, drivers: Drivers, answers: Answers, label: str) -> None:
@@ -105,13 +105,13 @@ class Server(viser.ViserServer):
         super().stop()
 
     def request_share_url(self, verbose: bool = True) -> str | None:
-        """Refuse: a public address would bypass the guard."""
+        """Refuse the request, because a public address would bypass the guard."""
         raise SessionError(
             "the console does not listen on public addresses; use `ssh -L` to reach it from another machine"
         )
 
     def _tell(self, answers: Answers) -> None:
-        """Report pages to the drivers, in the order of events, and therefore on the server's loop."""
+        """Report opened and closed pages to the drivers in the order of events, in the server's loop."""
         drivers = self._drivers
 
         async def come(client: viser.ClientHandle) -> None:
@@ -133,7 +133,7 @@ class Server(viser.ViserServer):
             self._websock_server.register_handler(message, lambda page, _, tell=tell: tell(page))  # type: ignore[misc]
 
     def show_on(self, page: int, name: str, *, is_shown: bool) -> None:
-        """Show a visible node of the scene on one page, or hide it there until its visibility is sent to all."""
+        """Show or hide a visible node of the scene on one page, until its visibility is sent to all pages."""
         client, node = self._connected_clients.get(page), self.scene.get_handle_by_name(name)
         if client is not None and node is not None:
             message = _messages.SetSceneNodeVisibilityMessage(name, node.visible and is_shown)
@@ -142,20 +142,20 @@ class Server(viser.ViserServer):
     # -- what the filter asks ----------------------------------------------------------------------
 
     def make_public(self, handle: viser.GuiButtonHandle) -> None:
-        """Let pages that watch use an element too."""
+        """Allow pages that do not drive to use an element."""
         self._public.add(handle._impl.uuid)
 
     def is_public(self, uuid: str) -> bool:
-        """Whether pages that watch may use an element."""
+        """Whether pages that do not drive may use an element."""
         return uuid in self._public
 
     def control(self, page: int, uuid: str) -> Any | None:
-        """Handle of an input that is on a page; None if there is none."""
+        """Handle of an input that a page shows; None if there is none."""
         handle = self.gui._gui_input_handle_from_uuid.get(uuid)
         return None if handle is None or handle._impl.removed else handle
 
     def has_command(self, uuid: str) -> bool:
-        """Whether there is such a command."""
+        """Whether a command with this identifier exists."""
         return uuid in self.gui._command_handle_from_uuid
 
     def has_gizmo(self, name: str) -> bool:
@@ -181,7 +181,7 @@ class Server(viser.ViserServer):
         return passed
 
     def cut(self, connection: Connection) -> None:
-        """Take note of a connection that is cut for a flood."""
+        """Record that a connection was closed because it sent too much."""
         self.filter.refuse(self._page(connection), FLOOD)
 
     def come(self, connection: Connection) -> None:
@@ -210,12 +210,12 @@ class Server(viser.ViserServer):
             client._websock_connection.queue_message(message)
 
     def forget(self) -> None:
-        """Delete the messages of removed elements; viser does so only when a page opens."""
+        """Delete the messages of removed elements; viser itself deletes them only when a page opens."""
         self._run_garbage_collector()
 
 
 def _server_at(opened: socket, guard: Guard, answers: Answers, gate: Gate) -> Callable[..., ws.serve]:
-    """A function that opens a server at the given socket, and ignores the address argument."""
+    """Return a function that opens a server on the given socket and ignores its address argument."""
 
     def serve(handler: Any, host: str, port: int, *, process_request: Answer, **options: Any) -> ws.serve:
         return _Serving(
@@ -231,10 +231,10 @@ def _server_at(opened: socket, guard: Guard, answers: Answers, gate: Gate) -> Ca
 
 
 class _Serving(ws.serve):
-    """A server that stops accepting connections one turn of the loop before it ends.
+    """A server that stops to accept connections one turn of the event loop before it ends.
 
-    asyncio takes two turns to accept a connection, and the library waits for one of them. A
-    connection that began in the last turn would belong to nobody and stay open.
+    asyncio needs two turns to accept a connection, but the library waits for only one. A connection that began in the
+    last turn would never be closed.
     """
 
     async def __aexit__(self, *error: Any) -> None:
@@ -244,7 +244,7 @@ class _Serving(ws.serve):
 
 
 def _answered(guard: Guard, answers: Answers, request: Request, body: Body) -> Response:
-    """Our own answer to a request, or a refusal."""
+    """Return our own answer to a request, or a refusal."""
     asked = Asked(request.path, False, request.headers.get_all, body)
     if reason := guard.refusal(asked):
         return answer_of(http.HTTPStatus.FORBIDDEN, f"{reason}\n".encode())
@@ -254,7 +254,7 @@ def _answered(guard: Guard, answers: Answers, request: Request, body: Body) -> R
 
 
 def _guarded(answer: Answer, guard: Guard, answers: Answers) -> Answer:
-    """Answer of viser to a request, or a refusal."""
+    """Return viser's answer to a request, or a refusal."""
 
     def guarded(connection: ws.ServerConnection, request: Request) -> Response | None:
         headers = request.headers
@@ -271,7 +271,7 @@ def _guarded(answer: Answer, guard: Guard, answers: Answers) -> Answer:
 
 
 def _harden(headers: Headers, host: str, guard: Guard) -> None:
-    """Add what binds the page to this server."""
+    """Add the headers of every page, and the cookie of this server."""
     for name, value in HEADERS.items():
         headers[name] = value.format(socket=f"ws://{host}")
     if cookie := guard.cookie():
@@ -280,7 +280,7 @@ def _harden(headers: Headers, host: str, guard: Guard) -> None:
 
 @contextmanager
 def _opening(serve: Callable[..., ws.serve]) -> Iterator[None]:
-    """Let viser open servers by another function."""
+    """Let viser open servers with the given function."""
     real = websockets
     server = SimpleNamespace(**{**vars(real.asyncio.server), "serve": serve})
     library = SimpleNamespace(**{**vars(real.asyncio), "server": server})
@@ -293,7 +293,7 @@ def _opening(serve: Callable[..., ws.serve]) -> Iterator[None]:
 
 
 def _logger() -> logging.Logger:
-    """Logger of the server. Connections that speak another protocol are not logged."""
+    """Logger of the server; it ignores connections with another protocol."""
     logger = logging.getLogger("teleop_console")
     if not logger.filters:
         logger.addFilter(lambda record: record.getMessage() != "opening handshake failed")

@@ -1,4 +1,4 @@
-"""Inputs: the elements that show and change a parameter on the page, one type for each of seven kinds of values."""
+"""Inputs: elements that show and change a parameter on the page; each of seven kinds of values has its own element."""
 
 import ast
 import math
@@ -13,12 +13,13 @@ from teleop_core.base.parameters import specs
 from teleop_core.graph.layers import declared_groups
 
 KINDS = ("switch", "choice", "whole number", "slider", "number", "vector", "text")
-"""Kinds of inputs: for yes or no, names, counts, numbers with and without two bounds, short lists of numbers, texts."""
+"""Kinds of inputs: for yes or no, names, integers, numbers with two bounds, other numbers, short lists of numbers,
+texts."""
 FIELDS = 7
-"""Numbers of a vector that have a field each; a longer one is a text."""
+"""Largest length of a vector with a field for each number; a longer vector is shown as a text."""
 LATER = "↻"
-"""Mark of a parameter that only a new session takes."""
-_WIDE = 200.0  # largest range of a slider, as a multiple of its value: a larger range cannot be set by hand
+"""Mark of a parameter that takes effect only in a new session."""
+_WIDE = 200.0  # largest range of a slider, as a multiple of its value; a larger range is too coarse for a hand
 _DIGITS = 6  # digits after the decimal point of a slider's numbers
 
 
@@ -58,7 +59,7 @@ class Input:
 
     Attributes:
         kind: Kind of value, one of :data:`KINDS`.
-        parts: Its elements, one for each number of a vector.
+        parts: Elements of the input; a vector has one element for each number.
     """
 
     def __init__(self, gui: viser.GuiApi, label: str, info: ParameterInfo, names: Sequence[str] = ()) -> None:
@@ -91,7 +92,7 @@ class Input:
         return self._own.value if self.kind != "vector" else shown(self.value or ())
 
     def show(self, value: Setting) -> bool:
-        """Show a value; returns false if a value of this kind needs another input."""
+        """Show a value; returns false if this input cannot show values of this kind."""
         values = value if self.kind == "vector" and isinstance(value, tuple) else (shown(value),)
         if len(values) != len(self.parts) or any(not _takes(p, v) for p, v in zip(self.parts, values, strict=True)):
             return False
@@ -101,12 +102,12 @@ class Input:
         return True
 
     def on_change(self, act: Callable[[int | None], None]) -> None:
-        """Call a function with the number of the browser whenever a person changes the input there."""
+        """Call a function whenever a person changes the input; its argument is the number of the browser."""
         for part in self.parts:
             part.on_update(lambda event: act(event.client_id))
 
     def remove(self) -> None:
-        """Take it off the page."""
+        """Remove the input from the page."""
         self._own.remove()
 
 
@@ -141,12 +142,12 @@ def _number(gui: viser.GuiApi, label: str, value: Any, info: ParameterInfo) -> A
     step = 1 if isinstance(value, int) else _step(value)
     low, high = info.lower, info.upper
     if not (-math.inf if low is None else low) <= value <= (math.inf if high is None else high):
-        low = high = None  # the value `off` is allowed outside of the bounds
+        low = high = None  # the value `off` lies outside of the bounds but is allowed
     return gui.add_number(label, value, min=low, max=high, step=step, hint=hint_of(info))
 
 
 def hint_of(info: ParameterInfo) -> str:
-    """Meaning, bounds and default of a parameter, and when it takes effect."""
+    """Text with the meaning, the bounds and the default of a parameter, and the time at which a change takes effect."""
     bounds = ""
     if info.lower is not None or info.upper is not None:
         low = "−∞" if info.lower is None else f"{info.lower:g}"
@@ -162,12 +163,12 @@ def _defaults() -> Mapping[tuple[str, str], Any]:
 
 
 def default_of(node: str, name: str) -> Setting | None:
-    """Default of a parameter of a known stage; None of others, and where there is none."""
+    """Default of a parameter of a known stage; None for other parameters and for parameters without a default."""
     return _defaults().get((node.rpartition("/")[2], name))
 
 
 def shown(value: Setting) -> bool | int | float | str:
-    """Value as one element shows it: lists as text."""
+    """Value as a single element shows it; a list is converted to a text."""
     if not isinstance(value, tuple):
         return value
     words = [f"{one:g}" if isinstance(one, float) else str(one) for one in _words(value)]
@@ -175,14 +176,14 @@ def shown(value: Setting) -> bool | int | float | str:
 
 
 def text(value: Setting) -> str:
-    """Value as ``--set`` takes it."""
+    """Text of a value for ``--set``."""
     if not isinstance(value, tuple):
         return str(value)
     return f"[{','.join(map(str, _words(value)))}]"
 
 
 def _words(values: tuple[float | str, ...]) -> list[float | str]:
-    """Numbers unchanged; all texts in quotes if one of them could not be read from a list without quotes."""
+    """Return numbers unchanged. If one text could not be read from a list without quotes, all texts get quotes."""
     is_quoted = any(isinstance(one, str) and set(one) & set(",[]()'\"") for one in values)
     return [repr(one) if is_quoted and isinstance(one, str) else one for one in values]
 
@@ -207,7 +208,7 @@ def parsed(said: object, info: ParameterInfo) -> Setting | None:
 
 
 def _list(said: str, like: tuple[object, ...]) -> Setting | None:
-    """Tuple from a text ``[1, 2]`` or ``[a, b]``; its items are numbers if the present value has numbers."""
+    """Tuple from a text such as ``[1, 2]`` or ``[a, b]``; the items are numbers if the present value has numbers."""
     try:
         found = ast.literal_eval(said)
     except (ValueError, SyntaxError):
@@ -222,19 +223,19 @@ def _list(said: str, like: tuple[object, ...]) -> Setting | None:
 
 
 def unit(doc: str) -> str:
-    """Unit in brackets as it ends a meaning, with a space before it; empty without one."""
+    """Unit in brackets at the end of a meaning, with a space before it; empty if the meaning has no unit."""
     _, bracket, found = doc.rpartition(" [")
     return f"{bracket}{found}" if found.endswith("]") else ""
 
 
 def _step(value: float) -> float:
-    """A twentieth of a value, in a round number."""
+    """A twentieth of a value, rounded."""
     if value == 0.0:
         return 0.001
     return float(f"{abs(value) / 20.0:.0e}")
 
 
 def _fine_step(value: float, low: float, high: float) -> float:
-    """Step of a slider: a power of ten, at most a hundredth of its range, of which the value is a multiple."""
+    """Step of a slider: a power of ten of which the value is a multiple, at most a hundredth of the slider's range."""
     digits = next((d for d in range(_DIGITS) if round(value, d) == value), _DIGITS)
     return min(10.0 ** math.floor(math.log10((high - low) / 100.0)), 10.0**-digits)

@@ -12,16 +12,16 @@ from teleop_core.graph.topics import SLAVE_JAW_BOARD, SLAVE_JAW_MEASURED_JS, SLA
 from teleop_core.kernels.geometry import Array, quaternion_products, rotations_from_quaternions
 
 _THICK = 0.1  # thickness of a finger divided by its length
-_PEG = 0.2  # thickness of a peg, over that of an object
-_FIRST = SLAVE_JAW_BOARD.columns.index("x0")  # first column with the middles of objects
+_PEG = 0.2  # thickness of a peg divided by that of an object
+_FIRST = SLAVE_JAW_BOARD.columns.index("x0")  # first column of the positions of objects
 _DRAWN = ("finger_length", "object.size", "object.place", "pegs.place", "pegs.height")
 
 
 def finger_poses(tip: Array, angle: float, length: float) -> Array:
-    """Poses (2, 7) of the middles of both fingers, whose z axes lead from the pivot to the pads.
+    """Poses (2, 7) of the centres of both fingers; their z axes point from the pivot to the pads.
 
-    The pads are at the tip, the pivot lies behind it along the tip's z axis, and the fingers turn
-    about the tip's y axis.
+    The pads are at the tip. The pivot lies behind the tip along the tip's z axis, and the fingers rotate about the
+    tip's y axis.
 
     Args:
         tip: Pose (7,) of the tip.
@@ -40,11 +40,11 @@ def finger_poses(tip: Array, angle: float, length: float) -> Array:
 
 
 class JawNodes:
-    """Fingers, objects and pegs of one arm, below a node in slave_base; nothing without a jaw.
+    """Fingers, objects and pegs of one arm, below a node in slave_base; an arm without a jaw has none.
 
     Args:
         server: The page.
-        path: Path of that node.
+        path: Path of the node in slave_base.
     """
 
     def __init__(self, server: viser.ViserServer, path: str) -> None:
@@ -88,7 +88,7 @@ class JawNodes:
             poses = finger_poses(tip, state[0], self._length)
             for node, pose in zip(self.fingers, poses, strict=True):
                 move(node, pose)
-        if place is not None and self._size > 0.0 and place[:3].any():  # zero: there is no object
+        if place is not None and self._size > 0.0 and place[:3].any():  # a zero position means that there is no object
             poses = _block_poses(place, view.get(SLAVE_JAW_BOARD))
             while len(self.blocks) < len(poses):
                 self._add(self.blocks, "object", (self._size,) * 3)
@@ -102,14 +102,14 @@ class JawNodes:
 
 
 def _block_poses(place: Array, board: Array | None) -> Array:
-    """Poses (N, 7) of all blocks, those at rest upright.
+    """Poses (N, 7) of all blocks; blocks at rest are upright.
 
     Args:
         place: Pose (7,) of the block that moved last.
         board: Columns of ``slave/jaw/board``, if this topic exists.
     """
     middles = np.empty((0, 3)) if board is None else board[_FIRST:].reshape(-1, 3)
-    middles = middles[middles.any(axis=1)]  # zero: there is no such block
+    middles = middles[middles.any(axis=1)]  # a zero position means that there is no block
     if not len(middles):
         return place[None]
     poses = np.hstack((middles, np.tile([1.0, 0.0, 0.0, 0.0], (len(middles), 1))))
@@ -118,7 +118,7 @@ def _block_poses(place: Array, board: Array | None) -> Array:
 
 
 def _pegs(values: Mapping[str, Setting], size: float) -> tuple[Array, float]:
-    """Middles (N, 3) of the pegs, and how high they are [m]."""
+    """Centres (N, 3) of the pegs, and height of the pegs [m]."""
     objects, axes = (
         np.array(value if isinstance(value := values.get(name), tuple) else (), dtype=np.float64)
         for name in ("object.place", "pegs.place")

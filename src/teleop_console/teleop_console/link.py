@@ -22,7 +22,7 @@ REFUSED = "a recording accepts no commands"
 
 @dataclass(frozen=True)
 class Arm:
-    """An arm of the session: its namespace, empty for the default one, and its robot."""
+    """An arm of the session: its robot, and its namespace, which is empty for the default arm."""
 
     name: str
     robot: Robot
@@ -33,13 +33,12 @@ class ArmView:
     """Newest data of one arm.
 
     Attributes:
-        streams: Newest values of each stream by its name without the arm, such as
-            ``slave/measured_cp``; columns as of :class:`~teleop_core.graph.topics.Kind`. Topics without a message so
-            far are missing.
-        stamp_ns: Their stamps [ns].
-        state: Numbers of ``teleop/state`` by name; empty before the first.
-        operation: Numbers of ``slave/operation`` by name; empty before the first.
-        operation_text: The same in words.
+        streams: Newest values of each stream by its name without the arm, such as ``slave/measured_cp``. The columns
+            are those of :class:`~teleop_core.graph.topics.Kind`. Topics that have had no message are missing.
+        stamp_ns: Stamps of these values [ns].
+        state: Numbers of ``teleop/state`` by name; empty before the first message.
+        operation: Numbers of ``slave/operation`` by name; empty before the first message.
+        operation_text: Text that describes ``operation``.
     """
 
     streams: dict[str, Array] = field(default_factory=dict)
@@ -49,7 +48,7 @@ class ArmView:
     operation_text: str = ""
 
     def get(self, topic: Topic) -> Array | None:
-        """Newest values of a stream; None before the first."""
+        """Newest values of a stream; None before the first message."""
         return self.streams.get(topic.name)
 
 
@@ -60,14 +59,14 @@ class View:
     Attributes:
         time: Time since the beginning of the session [s].
         arms: Views of the arms, by namespace.
-        is_fresh: Whether streams arrive; false if the session is silent or has ended.
-        news: Warnings of the nodes, a line each.
-        delay: Median and 99th percentile from master sample to slave command [s]; NaN if unknown.
-        rate: Ticks of the slave in a second; NaN if unknown.
-        age: Time since the newest sample that is shown came [s]; NaN if unknown.
+        is_fresh: Whether messages of the streams arrive; false if the session is silent or has ended.
+        news: Warnings of the nodes, one line for each.
+        delay: Median and 99th percentile of the delay from master sample to slave command [s]; NaN if unknown.
+        rate: Ticks of the slave per second; NaN if unknown.
+        age: Time since the newest shown sample arrived [s]; NaN if unknown.
         marks: Times [s] and texts of the marks that were set since the page opened.
-        display: Frames a second of the operator's display, and how late they are [s]; NaN without one.
-        recording: Path of the present recording; None if nothing is recorded.
+        display: Frames per second and delay [s] of the operator's display; NaN without a display.
+        recording: Path of the present recording; None if no recording is made.
         run: Number of recordings that were saved in this session.
     """
 
@@ -86,7 +85,7 @@ class View:
 
 @dataclass(frozen=True)
 class ParameterInfo:
-    """A parameter of a node: what it is now, and what it may be.
+    """A parameter of a node: its present value and its allowed values.
 
     Attributes:
         node: Name of the node with its namespace, such as ``left/slave``.
@@ -95,7 +94,7 @@ class ParameterInfo:
         doc: Meaning, with its unit.
         lower: Smallest value; None without a bound.
         upper: Largest value; None without a bound.
-        choices: Values that a text may have; empty for any.
+        choices: Allowed values of a text; empty if all values are allowed.
         is_fixed: Whether only a new session can change it.
     """
 
@@ -114,14 +113,14 @@ Parameters = Mapping[tuple[str, str], ParameterInfo]
 
 
 class SessionLink(Protocol):
-    """A session as the page sees it. All methods may be called from any thread.
+    """Access of the page to a session. All methods may be called from any thread.
 
     A subclass that defines only ``view`` and ``parameters`` refuses all commands.
 
     Attributes:
-        arms: The arms, the default one first.
-        title: Name of the session: scenario or recording.
-        is_live: Whether it can be commanded; false for a recording.
+        arms: Arms of the session, the default arm first.
+        title: Name of the session: its scenario or its recording.
+        is_live: Whether the session accepts commands; false for a recording.
     """
 
     arms: tuple[Arm, ...]
@@ -129,7 +128,7 @@ class SessionLink(Protocol):
     is_live: bool
 
     def view(self) -> View:
-        """Newest data of the session; takes little time, because it is called at the frame rate of the page."""
+        """Newest data of the session. The method must be fast, because the page calls it in every frame."""
 
     def command(self, word: str, arm: str = "") -> tuple[bool, str]:
         """Send one of ``topics.STATE_COMMANDS``; returns whether it was accepted, and the reason."""
@@ -140,14 +139,14 @@ class SessionLink(Protocol):
         return
 
     def parameters(self) -> Parameters:
-        """All parameters of all nodes by node and name, as of the last read."""
+        """All parameters of all nodes by node and name, as they were at the last read."""
 
     def changes(self) -> Mapping[tuple[str, str], Setting]:
-        """Parameters that have changed since the last call, by node and name, from any source."""
+        """Parameters that any source has changed since the last call, by node and name."""
         return {}
 
     def change(self, node: str, name: str, value: Setting) -> str:
-        """Set a parameter; returns the reason if it was refused, else an empty text."""
+        """Set a parameter; returns the reason of a refusal, else an empty text."""
         return REFUSED
 
     def hold(self, arm: str, pose: Array) -> None:
@@ -163,7 +162,7 @@ class SessionLink(Protocol):
         return
 
     def close_jaw(self, share: float) -> None:
-        """Close the jaw of all hands by a share: 0 open, 1 closed; closing it also presses at a task's goal."""
+        """Set the closed share of the jaw for all hands, 0 to 1. Closing also presses at a task's goal."""
         return
 
     def mark(self) -> tuple[bool, str]:
@@ -180,7 +179,7 @@ class SessionLink(Protocol):
 
 
 def box_of(state: Mapping[str, float]) -> tuple[Array, Array] | None:
-    """Centre and size [m] of the fixture that is on, in slave_base; None if none is."""
+    """Centre and size [m] of the active fixture, in slave_base; None if no fixture is active."""
     if not state.get("is_fixture_on"):
         return None
     place = [[state[f"fixture_{what}_{axis}"] for axis in "xyz"] for what in ("center", "size")]

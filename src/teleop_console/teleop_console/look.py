@@ -1,8 +1,8 @@
 """Look: the colours and fonts of the page; each colour is defined once, with one meaning.
 
-Colours have a meaning; everything without a meaning is grey. Red is only for errors and the stop. Measured values are
-orange, wanted values and the next button blue, actions of the person violet, and forces magenta, both in the scene and
-in texts. The colours of curves in a plot have no meaning; they only distinguish the curves.
+Each colour has a meaning; everything without a meaning is grey. Red is only for errors and the stop. Measured values
+are orange, wanted values and the next button are blue, actions of the person are violet, and forces are magenta. This
+is true for the scene and for texts. The colours of curves in a plot have no meaning; they only distinguish the curves.
 """
 
 from collections.abc import Mapping
@@ -16,7 +16,7 @@ Color = tuple[int, int, int]
 
 
 class Meaning(NamedTuple):
-    """Colour of one meaning: in the scene, and of a text on light and on dark ground."""
+    """Colours of one meaning: in the scene, for texts on a light page, and for texts on a dark page."""
 
     scene: Color
     light: str
@@ -25,18 +25,18 @@ class Meaning(NamedTuple):
 
 MEANINGS: Mapping[str, Meaning] = MappingProxyType(
     {
-        "good": Meaning((43, 138, 62), "#127f48", "#7ee8a8"),  # goes, is free
-        "held": Meaning((157, 105, 0), "#9d6900", "#ffc14d"),  # holds, waits, warns, is at a limit
-        "wrong": Meaning((200, 0, 26), "#a80016", "#ff6060"),  # stopped, touches; the stop
-        "idle": Meaning((92, 102, 112), "#5c6670", "#9aa5b1"),  # there, and no more
-        "measured": Meaning((217, 95, 2), "#b34d00", "#ff9f4d"),  # paths that were measured
-        "wanted": Meaning((28, 109, 208), "#1c6dd0", "#74a9f2"),  # wanted values; what to press next
+        "good": Meaning((43, 138, 62), "#127f48", "#7ee8a8"),  # active or free
+        "held": Meaning((157, 105, 0), "#9d6900", "#ffc14d"),  # holding, waiting, a warning, or at a limit
+        "wrong": Meaning((200, 0, 26), "#a80016", "#ff6060"),  # stopped or in contact; also the stop button
+        "idle": Meaning((92, 102, 112), "#5c6670", "#9aa5b1"),  # present but not active
+        "measured": Meaning((217, 95, 2), "#b34d00", "#ff9f4d"),  # measured paths
+        "wanted": Meaning((28, 109, 208), "#1c6dd0", "#74a9f2"),  # wanted values; also the button to press next
         "hand": Meaning((112, 72, 190), "#7048be", "#b197fc"),  # path of the stylus
         "force": Meaning((190, 24, 132), "#a61e74", "#f06ec0"),  # forces on stylus and tip
         "target": Meaning((12, 133, 153), "#0b7285", "#3bc9db"),  # points and objects of a task
     }
 )
-"""All colours that mean something, texts with at least 4.5 to 1 on their ground."""
+"""All colours with a meaning; the contrast between text and background is at least 4.5 to 1."""
 GOOD, HELD, WRONG, MEASURED, WANTED, HAND, FORCE, TARGET = (
     MEANINGS[name].scene for name in ("good", "held", "wrong", "measured", "wanted", "hand", "force", "target")
 )
@@ -51,13 +51,13 @@ ROLES: Mapping[Role, Color] = MappingProxyType(
         "tool": (72, 82, 94),
     }
 )
-"""Greys of solids, readable on light and on dark ground."""
+"""Greys of solids, visible on a light and on a dark background."""
 LIGHT: Color = (255, 255, 255)
 DARK: Color = (20, 20, 20)
-"""Ground behind the scene: viser's, which the style sheet has too."""
+"""Background of the scene on a dark page: viser's colour, which is also in the style sheet."""
 GRID: Color = (196, 202, 208)
 GRID_DARK: Color = (52, 58, 64)
-"""Lines of the floor."""
+"""Colour of the floor's lines on a dark page."""
 CURVES = ("#0072b2", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#8c6d46")
 """Colours of curves, in their order; people with red-green colour blindness can distinguish them (Okabe and Ito 2008).
 """
@@ -146,7 +146,10 @@ _PARTS = tuple(Path(__file__).with_name(name) for name in ("start.css", "strip.c
 
 
 def style(form: Path | None = None) -> str:
-    """Style sheet that is added to the page, with those of the form and of the strip of time, and of another form."""
+    """Style sheet that is added to the page.
+
+    It contains the styles of the form, the timeline, and an optional other form.
+    """
     curves = {f"curve{i}": color for i, color in enumerate(CURVES)}
     light = _LIGHT | curves | {name: one.light for name, one in MEANINGS.items()}
     dark = _DARK | {name: one.dark for name, one in MEANINGS.items()}

@@ -1,4 +1,4 @@
-"""Master nodes: the device with its stylus on the page, the fixture around the hand, the force."""
+"""Master nodes: the device with its stylus, the fixture around the hand, and the force, as the page shows them."""
 
 import numpy as np
 import viser
@@ -12,18 +12,18 @@ from teleop_console.tails import Tail
 from teleop_core.kernels.geometry import Array
 
 METRES_PER_NEWTON = 0.05
-"""Scale of forces."""
+"""Length of a force's arrow [m/N]."""
 _LEAST = 0.03
-"""Force below which no arrow is drawn [N]; forces of the device have steps of some mN."""
+"""Smallest force that is drawn [N]; the device's forces have steps of some millinewtons."""
 _STEP = 0.02  # change below which the arrow is not redrawn [N]
 
 
 class ForceArrow:
-    """Force at a place, in the axes of the node above.
+    """Arrow of a force at a point, in the axes of the parent node.
 
     Args:
         server: The page.
-        name: Path of its node.
+        name: Path of the arrow's node.
     """
 
     def __init__(self, server: viser.ViserServer, name: str) -> None:
@@ -40,7 +40,7 @@ class ForceArrow:
         self._drawn = np.zeros(3)
 
     def draw(self, place: Array, force: Array) -> float:
-        """Draw a force (3,) [N] at a place (3,) [m]; returns its size [N]."""
+        """Draw a force (3,) [N] at a point (3,) [m]; returns the magnitude of the force [N]."""
         size = float(np.linalg.norm(force))
         if not size >= _LEAST:  # NaN too
             self._frame.visible = False
@@ -83,11 +83,11 @@ class MasterNodes:
         self._force = ForceArrow(server, f"{path}/force")
 
     def stand(self, stand: Stand) -> None:
-        """Stand elsewhere."""
+        """Move the device to another stand."""
         self.base.wxyz, self.base.position = stand.quaternion, stand.origin
 
     def draw(self, time: float, pose: Array | None, force: Array | None) -> float:
-        """Draw stylus, its path and the force on it; returns the size of the force [N].
+        """Draw the stylus, its path and the force on it; returns the magnitude of the force [N].
 
         Args:
             time: Time of the session [s].

@@ -26,15 +26,15 @@ _PERIOD = 0.2  # time between two updates of the texts [s]
 
 
 class Panel:
-    """Everything beside the scene.
+    """All controls beside the scene.
 
     Args:
         server: The page.
         link: The session.
         drivers: Object that knows which page drives.
-        renew: Begins a new session with other settings, and returns why it does not, empty if it
-            does; None where the session is not ours.
-        of_session: Parameters of the session as a whole, which no node has.
+        renew: Function that begins a new session with other settings. It returns the reason of a refusal, else an empty
+            text. None if the console did not start the session.
+        of_session: Parameters of the whole session, which belong to no node.
     """
 
     def __init__(
@@ -87,7 +87,7 @@ class Panel:
                 self._button(control.name, control.hint, partial(self._act, control))
 
     def _button(self, label: str, hint: str, action: Callable[[int], None]) -> viser.GuiButtonHandle:
-        """Button that acts for the browser that drives, one press after the other."""
+        """Add a button that acts only for the driving browser; a press during an action is ignored."""
         button = self._buttons[label] = self._gui.add_button(label, hint=hint, color="gray")
         acts = threading.Lock()
 
@@ -95,7 +95,7 @@ class Panel:
         def _(event: viser.GuiEvent[viser.GuiButtonHandle]) -> None:
             client = -1 if event.client_id is None else event.client_id
             if action != self._take and not self._may_drive(client):
-                return  # pages without control were refused by the filter already; control may have changed since
+                return  # the filter has refused pages without control, but control may have changed since then
             if acts.acquire(blocking=False):  # presses during the action are ignored
                 try:
                     action(client)
@@ -105,7 +105,7 @@ class Panel:
         return button
 
     def _tell(self, client: int, text: str) -> None:
-        """Tell the people at one page why something was not done."""
+        """Show on one page the reason why an action was not done."""
         handle = self._server.get_clients().get(client)
         if handle is not None:
             handle.add_notification("Not done", text, auto_close_seconds=5.0, color="yellow")
@@ -131,7 +131,7 @@ class Panel:
         for arm in self._link.arms:
             try:
                 answers = control.act(self._link, arm.name)
-            except Exception as error:  # a foreign control may raise any error, which must not stop the page
+            except Exception as error:  # a user's own control may raise any error, which must not stop the page
                 reason = " ".join(str(error).split())
                 answers = [(False, f"{control.name}: {type(error).__name__}: {reason}")]
             told += [f"- {'✓' if is_taken else '⚠'} {text}" for is_taken, text in answers]
@@ -187,7 +187,7 @@ class Panel:
             self._live.content = text
 
     def _draw_buttons(self, view: View) -> None:
-        """Show the state of each button, whether it can be used, and which button is the next step."""
+        """Show the state of each button, whether the button has an effect, and which button is the next step."""
         arm, soon, now = next(iter(view.arms.values())), next_button(view), alive(view)
         labels = {c.name: f"{c.name.capitalize()}: {c.text(arm)}" for c in self._controls if c.text}
         own = {c.name: c.is_alive(view) for c in self._controls if c.is_alive is not None}
@@ -201,13 +201,13 @@ class Panel:
         self.stylus_folder.visible = now["steps"]
 
     def _doing(self, view: View) -> str:
-        """Run, recording, and what moves the hand if no person at a page does."""
+        """Text with the run and the recording, and with the mover of the hand if no person at a page moves it."""
         where = view.recording.name if view.recording else "not recording"
         return " · ".join(filter(None, (f"run {view.run + 1}", where, leader(self._kind))))
 
     @property
     def _kind(self) -> str:
-        """Operator of the first arm; empty before it is known."""
+        """Kind of the first arm's operator; empty while it is unknown."""
         name = self._link.arms[0].name
         info = self.settings.known.get((f"{name}/operator" if name else "operator", "kind"))
         return "" if info is None else str(info.value)
@@ -224,6 +224,6 @@ class Panel:
 
 
 def _next_name(name: str) -> str:
-    """``run_2`` after ``run_1``."""
+    """Next name of a recording: ``run_2`` follows ``run_1``."""
     head, digits = name.rstrip("0123456789"), name[len(name.rstrip("0123456789")) :]
     return f"{head}{int(digits) + 1}" if digits else f"{name}_2"

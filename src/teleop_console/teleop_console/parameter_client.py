@@ -12,14 +12,14 @@ from teleop_core.middleware.ros_parameters import EVENTS, from_message, to_messa
 from teleop_core.middleware.world import Client, Owner, World
 
 PATIENCE = 3.0
-"""Time that a node has for an answer [s]."""
+"""Time limit for a node's answer [s]."""
 _LARGEST = 1e18
 _ONE_OF = "one of "
 _HIDDEN = ("use_sim_time", "qos_overrides", "start_type_description_service", "configuration")
 
 
 class ParameterEvents:
-    """Changes of parameters that nodes publish; the caller must spin an executor.
+    """Changes of parameters, as nodes publish them; the caller must spin an executor.
 
     Args:
         owner: Node that subscribes to the changes.
@@ -31,7 +31,7 @@ class ParameterEvents:
         self._own = owner.ros.create_subscription(ParameterEvent, "/parameter_events", self._hear, EVENTS)
 
     def take(self) -> dict[tuple[str, str], Setting]:
-        """Newest values of what has changed since the last call, by node and name."""
+        """Newest values of the parameters that have changed since the last call, by node and name."""
         with self._lock:
             taken, self._changed = self._changed, {}
         return taken
@@ -59,7 +59,7 @@ class ParameterClient:
         """All parameters of a node, by their names.
 
         Raises:
-            SessionError: It does not answer.
+            SessionError: The node does not answer.
         """
         listed = self._ask(ListParameters, name, "list_parameters", ListParameters.Request())
         names = sorted(n for n in listed.result.names if not n.startswith(_HIDDEN))
@@ -72,7 +72,7 @@ class ParameterClient:
         }
 
     def values(self, name: str, names: list[str]) -> dict[str, Setting]:
-        """Present values of some parameters; those that are not set are left out."""
+        """Present values of some parameters; parameters that are not set are left out."""
         request = GetParameters.Request(names=names)
         answer = self._ask(GetParameters, name, "get_parameters", request)
         found = zip(names, answer.values, strict=True)
@@ -83,7 +83,7 @@ class ParameterClient:
         }
 
     def change(self, name: str, parameter: str, value: Setting) -> str:
-        """Set a parameter of a node; returns the reason if it was refused, else an empty text."""
+        """Set a parameter of a node; returns the reason of a refusal, else an empty text."""
         request = SetParameters.Request(parameters=[to_message(parameter, value)])
         try:
             (result,) = self._ask(SetParameters, name, "set_parameters", request).results
@@ -102,7 +102,7 @@ def call(world: World, client: Client, request: object, patience: float) -> Any:
     """Call a service from a thread other than the executor's, and return the answer.
 
     Raises:
-        SessionError: There is no such service, or it did not answer in time.
+        SessionError: The service does not exist or did not answer in time.
     """
     if not client.wait_for_service(timeout_sec=patience):
         raise SessionError(f"the service {client.srv_name} does not exist")

@@ -1,4 +1,4 @@
-"""Past: the numbers of a session over time, by name: those that were recorded, or that the page saw."""
+"""Past: numbers of a session over time, by name; they were recorded, or received by the page."""
 
 import threading
 from abc import ABC, abstractmethod
@@ -15,11 +15,11 @@ from teleop_core.kernels.geometry import Array
 from teleop_core.robots.robot import Robot
 
 ERROR = "tracking error"
-"""Column of the distance between wanted and measured tip [m], which no topic has."""
+"""Name of the column with the distance between wanted and measured tip [m]; no topic contains this distance."""
 DELAY = "session command_delay"
-"""Column of the median delay from master sample to slave command [s], of live sessions."""
+"""Name of the column with the median delay from master sample to slave command [s]; only live sessions have it."""
 ROWS = 4000
-"""Number of times that are stored of a live session: two minutes at 30 Hz."""
+"""Number of views that are stored of a live session: two minutes at 30 Hz."""
 _UNITS = {
     topics.Kind.POSE: ("m",) * 3 + ("",) * 4,
     topics.Kind.TWIST: ("m/s",) * 3 + ("rad/s",) * 3,
@@ -40,7 +40,7 @@ _UNIT_OF = {
     }.items()
     for name in names.split()
 }
-"""Units of numbers that have names of their own in ``topics.py``."""
+"""Unit of each number that is named in ``topics.py``."""
 
 
 @dataclass(frozen=True)
@@ -48,10 +48,10 @@ class Column:
     """A number over time.
 
     Attributes:
-        topic: Its topic, with the namespace of its arm before it.
-        index: Its place in a row of the topic.
-        unit: Its unit; empty for a number without one.
-        is_held: Whether each value holds until the next one, as of reports.
+        topic: Topic of the number, after the namespace of the arm.
+        index: Index of the number in a row of the topic.
+        unit: Unit of the number; empty for a number without unit.
+        is_held: Whether each value is valid until the next value, as in reports.
     """
 
     topic: str
@@ -71,8 +71,8 @@ class Past(ABC):
     """Columns of a session; methods may be called from any thread.
 
     Attributes:
-        columns: Columns by name, such as ``left/slave/measured_cp x``; it grows while other threads read it, so they
-            must iterate over a copy.
+        columns: Columns by name, such as ``left/slave/measured_cp x``. The mapping grows while other threads read it,
+            so these threads must iterate over a copy.
         joints: Names of the joints of each arm, by namespace.
     """
 
@@ -81,7 +81,7 @@ class Past(ABC):
 
     def __init__(self) -> None:
         self.columns = {}
-        # errors by arm, with the rows from which they were computed
+        # tracking errors by arm, with the rows from which the errors were computed
         self._errors: dict[str, tuple[Rows, Rows, Rows]] = {}
 
     @abstractmethod
@@ -97,7 +97,7 @@ class Past(ABC):
         column = self.columns[name]
         if not name.endswith(ERROR):
             found = self.rows(column.topic)
-            if found is None or column.index >= found[1].shape[1]:  # an earlier version had fewer
+            if found is None or column.index >= found[1].shape[1]:  # an earlier version recorded fewer columns
                 return None if found is None else _NO_SAMPLES
             return found[0], found[1][:, column.index]
         arm = name.removesuffix(ERROR)
@@ -116,14 +116,14 @@ class Past(ABC):
         return errors
 
     def _add(self, arm: str, topic: str, names: Sequence[str], units: Sequence[str], *, is_held: bool = False) -> None:
-        """Take note of a topic's columns."""
+        """Add the columns of a topic."""
         for index, (name, unit) in enumerate(zip(names, units, strict=True)):
             self.columns[f"{below(arm, topic)} {name}"] = Column(below(arm, topic), index, unit, is_held)
         if topic == topics.SLAVE_MEASURED_CP.name:
             self.columns[below(arm, ERROR)] = Column(below(arm, topic), 0, "m")
 
     def _add_known(self, arm: str, topic: str, kind: topics.Kind, joints: tuple[str, ...], robot: Robot | None) -> None:
-        """Take note of the columns of a topic whose kind is known."""
+        """Add the columns of a topic of a known kind."""
         known = topics.BY_NAME.get(topic)
         names = known.columns if known is not None and known.columns else kind.columns(joints)
         units = _UNITS.get(kind) or [_UNIT_OF.get(name, "") for name in names]
@@ -133,7 +133,7 @@ class Past(ABC):
 
 
 class Seen(Past):
-    """Views of a live session in the last minutes, as the page received them: a row for each view.
+    """Views of a live session that the page received in the last minutes, with a row for each view.
 
     Args:
         arms: The arms.
@@ -149,7 +149,10 @@ class Seen(Past):
         self.columns = {below(arm.name, ERROR): Column("", 0, "m") for arm in arms} | {DELAY: Column(DELAY, 0, "s")}
 
     def add(self, view: View) -> None:
-        """Add a view. A time before the last one clears the rows; the same time, or a silent session, adds nothing."""
+        """Add a view. If its time is before the last view, all rows are cleared first.
+
+        A view of the same time, or of a silent session, is not added.
+        """
         with self._lock:
             last = self._times[(self._count - 1) % ROWS]
             if self._count and view.time < last:
@@ -171,7 +174,7 @@ class Seen(Past):
         return self._marks
 
     def _ring(self, arm: str, topic: str, width: int) -> Array:
-        """Rows of a topic, with its columns noted when it is new."""
+        """Ring of rows of a topic; the columns of a new topic are added."""
         found = self._rings.get((arm, topic))
         if found is None:
             found = self._rings[arm, topic] = np.full((ROWS, width), np.nan)
@@ -197,7 +200,7 @@ class Seen(Past):
             return (self._times[order], found[0][order]) if found else NOTHING
 
     def view(self, time: float) -> View:
-        """View at a time [s]; at the first stored time if the time is earlier."""
+        """View at a time [s]; the first stored view if the time is earlier."""
         with self._lock:
             order = self._order()
             at = max(0, int(np.searchsorted(self._times[order], time, side="right")) - 1)
@@ -218,12 +221,12 @@ class Seen(Past):
 
 
 def below(arm: str, topic: str) -> str:
-    """Name of a topic, or a column, of an arm."""
+    """Name of a topic or column with the namespace of an arm."""
     return f"{arm}/{topic}" if arm else topic
 
 
 def _values(view: ArmView) -> Iterator[tuple[str, Array]]:
-    """Known data of an arm, by topics."""
+    """Known data of an arm, by topic."""
     yield from view.streams.items()
     if view.state:
         yield topics.TELEOP_STATE.name, np.array([view.state[name] for name in topics.TELEOP_STATE.columns])
@@ -232,7 +235,7 @@ def _values(view: ArmView) -> Iterator[tuple[str, Array]]:
 
 
 def _of_joints(kind: topics.Kind, count: int, robot: Robot | None) -> list[str]:
-    """Units of joints: of position, and where there are, of velocity and effort."""
+    """Units of joint positions, followed by the units of velocities and efforts if the topic contains them."""
     joints = count // 3 if kind is topics.Kind.STATE else count
     slides = np.zeros(joints, bool)
     if robot is not None:

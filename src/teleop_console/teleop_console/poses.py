@@ -1,8 +1,8 @@
-"""Poses: moving nodes of the page, thirty times a second and many at once.
+"""Poses: move many nodes of the page thirty times a second.
 
-viser compares every new pose with the last one by ``np.allclose``, and then sends position and rotation. This
-comparison takes more time than everything else. Here all bodies of an arm are compared together beforehand, so viser's
-comparison is skipped. The messages and the attributes of the nodes are the same.
+viser compares every new pose with the last pose by ``np.allclose``, and then sends position and rotation. This
+comparison takes most of the time. This module compares all bodies of an arm at once and skips viser's comparison. The
+messages and the attributes of the nodes stay the same.
 """
 
 from typing import Any
@@ -14,11 +14,11 @@ from viser import _messages
 from teleop_core.kernels.geometry import Array
 
 _STILL = 2e-5
-"""Change of a pose [m, parts of a turn] below which nothing is sent."""
+"""Change of position [m] or quaternion [1] below which a pose is not sent."""
 
 
 def set_pose(node: viser.SceneNodeHandle, pose: Array) -> None:
-    """Move a node to a pose (7,): x, y, z [m], quaternion w, x, y, z, in the node above."""
+    """Move a node to a pose (7,) in its parent node: x, y, z [m], quaternion w, x, y, z."""
     held: Any = node._impl
     x, y, z, *turn = pose.tolist()
     held.position[:], held.wxyz[:] = pose[:3], pose[3:]
@@ -28,12 +28,12 @@ def set_pose(node: viser.SceneNodeHandle, pose: Array) -> None:
 
 
 def move(node: viser.SceneNodeHandle, pose: Array) -> None:
-    """The same, unless it is there already."""
+    """Move a node to a pose (7,) in its parent node, unless the node is already there."""
     place, turn = node.position, node.wxyz
     if max(np.abs(place - pose[:3]).max(), np.abs(turn - pose[3:]).max()) > _STILL:
         set_pose(node, pose)
 
 
 def moved(poses: Array, drawn: Array) -> list[int]:
-    """Indices of those of poses (N, 7) that differ from what is drawn (N, 7); NaN never does."""
+    """Indices of the poses (N, 7) that differ from the drawn poses (N, 7); a pose with NaN is never included."""
     return np.flatnonzero(np.abs(poses - drawn).max(axis=1) > _STILL).tolist()

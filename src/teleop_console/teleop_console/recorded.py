@@ -1,4 +1,4 @@
-"""Recorded link: gives the page access to a recording like to a session, at any time of the recording."""
+"""Recorded link: access of the page to a recording, like to a session, at any time of the recording."""
 
 import math
 import threading
@@ -15,14 +15,14 @@ from teleop_core.base.errors import ParameterError
 from teleop_core.graph.topics import Topic
 from teleop_core.kernels.geometry import Array
 
-_PATH = 200  # points of a path
+_PATH = 200  # largest number of points of a path
 
 
 class RecordedLink(SessionLink):
-    """A link to a recording, which refuses the commands of a session.
+    """A link to a recording; it refuses all commands of a session.
 
-    A view has, for each stream, the last sample that was recorded up to the present time of the replay.
-    :meth:`advance` advances this time; the caller has the clock.
+    A view contains, for each stream, the last sample that was recorded before the present time of the replay.
+    :meth:`advance` advances this time; the caller provides the clock.
 
     Args:
         recording: Path of the recording, or the recording itself.
@@ -30,13 +30,13 @@ class RecordedLink(SessionLink):
     Attributes:
         duration: Time from the first to the last message [s].
         loop: Whether the replay starts again at the end.
-        thinning: Every ``thinning``-th sample is kept; 1 for all.
+        thinning: Every ``thinning``-th sample is loaded; 1 means all samples.
         past: Columns of the recording, with all samples.
-        recording: Its path.
+        recording: Path of the recording.
 
     Raises:
-        RecordingError: The recording cannot be read, or lacks the robot's name or its joint positions; the text names
-            what is missing.
+        RecordingError: The recording cannot be read, or lacks the robot's name or the joint positions. The message
+            names the missing data.
     """
 
     is_live = False
@@ -59,7 +59,7 @@ class RecordedLink(SessionLink):
     # -- seeing ----------------------------------------------------------------------------------
 
     def view(self, time: float | None = None) -> View:
-        """Data at a time of the replay [s]; None for the present time."""
+        """Data at a time of the replay [s]; a time of None stands for the present time."""
         time = self._time if time is None else time
         view = View(
             time=time,
@@ -121,7 +121,7 @@ class RecordedLink(SessionLink):
         """Speed of the replay relative to real time; a new speed must be from 0.01 to 100.
 
         Raises:
-            ParameterError: Another one.
+            ParameterError: The speed is out of this range.
         """
         return self._speed
 
@@ -132,10 +132,10 @@ class RecordedLink(SessionLink):
         self._speed = float(speed)
 
     def seek(self, time: float) -> None:
-        """Go to a time [s], limited to the begin and the end of the recording.
+        """Set the time of the replay [s]; it is limited to the begin and the end of the recording.
 
         Raises:
-            ParameterError: NaN.
+            ParameterError: The time is NaN.
         """
         if math.isnan(time):
             raise ParameterError("time", time, f"0 to {self.duration:.3f} s")
@@ -143,18 +143,18 @@ class RecordedLink(SessionLink):
             self._time = min(max(float(time), 0.0), self.duration)
 
     def play(self) -> None:
-        """Let time go on; from the begin if it is at the end."""
+        """Start the replay; if it is at the end, it starts again at the begin."""
         with self._lock:
             if self._time >= self.duration:
                 self._time = 0.0
             self._is_playing = True
 
     def pause(self) -> None:
-        """Hold time."""
+        """Pause the replay."""
         self._is_playing = False
 
     def advance(self, dt: float) -> None:
-        """Let time go on by what passed [s]; nothing happens while it is held."""
+        """Advance the replay after ``dt`` [s] of real time; nothing happens while the replay is paused."""
         with self._lock:
             if not self._is_playing:
                 return

@@ -22,7 +22,8 @@ from teleop_core.session.runner import recorded_configuration
 from teleop_core.slave.operation.report import operation_text
 
 MOST = 200 << 20
-"""Largest size of the samples in memory [bytes]; of a longer recording only every second, third, … sample is loaded."""
+"""Largest size of the samples in memory [bytes]; for a longer recording only every second, third, … sample is loaded.
+"""
 _STAMP_BYTES = 16
 _KEPT = (
     *topics.STREAMS,
@@ -42,7 +43,7 @@ class RecordedArm:
 
     Attributes:
         arm: The arm.
-        tracks: Streams and reports by their plain names.
+        tracks: Streams and reports by their names without the arm.
     """
 
     arm: Arm
@@ -84,12 +85,12 @@ def recorded_arms(
 
 
 def namespaces(bag: Bag) -> dict[str, str]:
-    """Arms by their namespaces: empty for the default one, whose topics have plain names."""
+    """Namespaces of all arms; the default arm, whose topics have no prefix, has an empty namespace."""
     return {name if topic_prefix(bag, name).endswith(f"{name}/") else "": name for name in arm_names(bag)}
 
 
 def configuration_of(bag: Bag) -> Configuration | None:
-    """Configuration of the recorded session; None if the recording has none, or if it can no longer be built."""
+    """Configuration of the recorded session; None if there is none, or if this version cannot build it."""
     with suppress(TeleopError):
         layer, scenario = recorded_configuration(bag)
         return Configuration.from_layers([layer], scenario) if layer else None
@@ -120,14 +121,14 @@ def _robot(bag: Bag, configuration: Configuration | None, arm: str) -> Robot:
 
 
 def _size(bag: Bag, joints: int) -> int:
-    """Bytes of the samples of one arm."""
+    """Size of the samples of one arm [bytes]."""
     infos = [(topic, bag.topics.get(topic.name)) for topic in _KEPT]
     widths = {topic.name: topic.width(joints) for topic in _KEPT}
     return sum(info.count * (8 * widths[topic.name] + _STAMP_BYTES) for topic, info in infos if info is not None)
 
 
 def _tracks(bag: Bag, arm: Arm, thinning: int) -> dict[str, Series]:
-    """Streams and reports of one arm by their plain names."""
+    """Streams and reports of one arm by their names without the arm."""
     wanted = [
         topic
         for topic in _KEPT
@@ -154,7 +155,7 @@ def _tracks(bag: Bag, arm: Arm, thinning: int) -> dict[str, Series]:
 
 
 def _order(bag: Bag, names: tuple[str, ...], width: int, robot: Robot) -> list[int] | slice:
-    """Columns of joints in the robot's order; all columns of a topic without joints.
+    """Indices of the columns, with joints in the robot's order; a topic without joints keeps its order.
 
     Raises:
         RecordingError: Joints of the robot were not recorded.
@@ -169,13 +170,13 @@ def _order(bag: Bag, names: tuple[str, ...], width: int, robot: Robot) -> list[i
 
 
 def reports_of(bag: Bag, topic: topics.Topic) -> Series | None:
-    """Numbers of a report, with those columns that the recording has; None without any."""
+    """Numbers of a report, with the columns that the recording contains; None without any column."""
     info = bag.topics.get(topic.name)
     if info is None or not info.count or info.type != topic.kind.ros_type:
         return None
     logs, stamps, rows = [], [], []
     for _, _, log_ns, data in bag.raw([topic]):
-        with suppress(ValueError):  # bytes that are no report
+        with suppress(ValueError):  # the bytes may not be a report
             for report in read_reports(data):
                 rows.append([float(report.values.get(c, "nan")) for c in topic.columns])
                 logs.append(log_ns)
@@ -186,7 +187,7 @@ def reports_of(bag: Bag, topic: topics.Topic) -> Series | None:
 
 
 def in_words(operation: Mapping[str, float], joints: tuple[str, ...]) -> str:
-    """State of the arm in words; empty for numbers of another version."""
+    """Text with the state of the arm; empty for numbers of another version."""
     with suppress(ValueError, KeyError):
         return operation_text(operation, joints)
     return ""
@@ -195,10 +196,10 @@ def in_words(operation: Mapping[str, float], joints: tuple[str, ...]) -> str:
 def parameters_of(
     configuration: Configuration | None, only: tuple[str, ...] = ()
 ) -> dict[tuple[str, str], ParameterInfo]:
-    """Parameters of groups with their declarations, by node and name; all of them fixed.
+    """Parameters of groups with their declarations, by node and name; all of them are marked as fixed.
 
     Args:
-        configuration: The session; None for none.
+        configuration: Configuration of the session; None returns no parameters.
         only: Names of the groups to return; empty for all.
     """
     found = {}

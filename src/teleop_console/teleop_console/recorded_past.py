@@ -1,4 +1,4 @@
-"""Recorded past: every number of a recording over time; each topic is read at its first request."""
+"""Recorded past: all numbers of a recording over time; each topic is read at its first request."""
 
 import threading
 import time
@@ -24,7 +24,7 @@ _GATHER = 0.02  # time within which a page requests all topics that it needs tog
 
 
 class Recorded(Past):
-    """Every column of every recorded topic that contains numbers.
+    """All columns of all recorded topics that contain numbers.
 
     A topic is read at its first request, in a thread: reading ten minutes takes five seconds.
     For recordings longer than eleven minutes, only the smallest and largest value of short intervals are kept.
@@ -50,7 +50,7 @@ class Recorded(Past):
             self._note(arm, topic, robots.get(arm))
 
     def _note(self, arm: str, topic: str, robot: Robot | None) -> None:
-        """Take note of a topic's columns, where its messages are numbers."""
+        """Add the columns of a topic, if its messages contain numbers."""
         info = self._bags[arm].topics[topic]
         kind, known = kind_of(topic, info.type), topic in BY_NAME
         if not info.count or kind is None or (kind is Kind.REPORT and topic not in {one.name for one in REPORTS}):
@@ -61,7 +61,7 @@ class Recorded(Past):
         self._add_known(arm, topic, kind, joints, robot if known else None)
 
     def _names(self, arm: str, topic: str) -> tuple[str, ...]:
-        """Names of joints as the first messages of a topic have them."""
+        """Names of joints, read from the first messages of a topic."""
         try:
             blocks = (block[topic] for block in self._bags[arm].blocks([topic]) if topic in block)
             return next((series.names for series in blocks), ())
@@ -69,7 +69,7 @@ class Recorded(Past):
             return ()
 
     def rows(self, topic: str) -> Rows | None:
-        """All rows of a topic; None until they are read. Topics that are requested together are read together."""
+        """All rows of a topic; None until the topic is read. Topics that are requested together are read together."""
         with self._lock:
             if topic in self._read:
                 return self._read[topic]
@@ -91,7 +91,7 @@ class Recorded(Past):
             for arm in self._bags:
                 own = [self._topics[topic][1] for topic in wanted if self._topics[topic][0] == arm]
                 found |= {below(arm, topic): rows for topic, rows in self._rows_of(arm, own).items()}
-        except TeleopError:  # damaged there: nothing can be drawn
+        except TeleopError:  # a damaged topic cannot be drawn
             pass
         finally:
             with self._lock:
@@ -100,7 +100,7 @@ class Recorded(Past):
                 self._read = dict(kept) | found
 
     def _rows_of(self, arm: str, own: list[str]) -> dict[str, Rows]:
-        """Rows of topics of an arm: of streams in one pass."""
+        """Rows of topics of an arm; all streams are read in one pass."""
         bag, found = self._bags[arm], dict[str, Rows]()
         reports = {one.name for one in REPORTS} & set(own)
         for topic in reports:
@@ -120,7 +120,7 @@ class Recorded(Past):
 
     @staticmethod
     def _sorted(times: Any, values: Any) -> Rows:
-        """Rows sorted by their times; rows of several writers may be recorded in another order."""
+        """Sort rows by their times, because rows of several writers may be recorded out of order."""
         if len(times) and (np.diff(times) < 0.0).any():
             order = np.argsort(times, kind="stable")
             times, values = times[order], values[order]

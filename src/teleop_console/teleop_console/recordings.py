@@ -1,4 +1,4 @@
-"""Recordings: those of a folder, the newest first, with their verdicts as these become known."""
+"""Recordings: the recordings of a folder, the newest first; verdicts are added as soon as they are computed."""
 
 import json
 import os
@@ -14,7 +14,7 @@ from pathlib import Path
 from teleop_core.base.errors import ParameterError, TeleopError
 
 _MOST = 50
-"""Recordings that are listed."""
+"""Largest number of listed recordings."""
 _FILE = "metadata.yaml"
 _COLUMNS = 132  # width of a command's output in characters
 _KIND = {"score": "evaluate", "export": "export"}
@@ -25,11 +25,11 @@ class Entry:
     """A recording in the list.
 
     Attributes:
-        name: Its name in the folder.
-        made: Time at which it was closed [s since 1970].
-        about: Scenario, robot and length, a line; empty before they are known.
-        verdict: Line that names the worst first; empty before it is known.
-        is_good: Whether all figures are within their bounds; None before this is known.
+        name: Name of the recording in the folder.
+        made: Time at which the recording was closed [s since 1970].
+        about: Line with scenario, robot and duration; empty while they are unknown.
+        verdict: Line that names the worst score first; empty while it is unknown.
+        is_good: Whether all scores are within their bounds; None while this is unknown.
     """
 
     name: str
@@ -52,7 +52,7 @@ class Recordings:
         self._judging: tuple[Entry, subprocess.Popen[bytes], Path] | None = None
 
     def entries(self) -> list[Entry]:
-        """The newest recordings, the newest first; each with the data that are known so far."""
+        """The newest recordings with the data that are known so far; the newest recording is first."""
         found = []
         for file in self._folder.glob(f"*/{_FILE}"):
             name, made = file.parent.name, file.stat().st_mtime
@@ -60,24 +60,24 @@ class Recordings:
         return sorted(found, key=lambda entry: -entry.made)[:_MOST]
 
     def path(self, name: str) -> Path:
-        """Place of a recording.
+        """Path of a recording.
 
         Raises:
-            ParameterError: There is no such recording in the folder.
+            ParameterError: The folder contains no recording with this name.
         """
         if name not in {entry.name for entry in self.entries()}:
             raise ParameterError("recording", name, f"the name of a recording in {self._folder}")
         return self._folder / name
 
     def words(self, kind: str, names: Sequence[str]) -> list[str]:
-        """Command that scores, compares or exports recordings, without its program.
+        """Arguments of a ``teleop`` command that scores, compares or exports recordings.
 
         Args:
             kind: ``score`` or ``export``.
-            names: Names of the recordings, at least one; several are compared.
+            names: Names of the recordings, at least one; several recordings are compared.
 
         Raises:
-            ParameterError: A name is that of no recording, or the kind is another.
+            ParameterError: No recording has a given name, or the kind is unknown.
         """
         if kind not in _KIND or not names:
             raise ParameterError("action", kind, f"one of {', '.join(_KIND)}, for a recording that is named")
@@ -86,14 +86,14 @@ class Recordings:
         return [_KIND[kind], *(paths[:1] if kind == "export" else paths), *out]
 
     def run(self, kind: str, names: Sequence[str]) -> str:
-        """Run such a command at low priority; returns what it printed."""
+        """Run the command of :meth:`words` at low priority, and return its output."""
         wide = os.environ | {"COLUMNS": str(_COLUMNS)}  # the request names several recordings
         words = [*_program(), *self.words(kind, names)]
         done = subprocess.run(words, capture_output=True, text=True, check=False, env=wide)
         return done.stdout or done.stderr
 
     def judge(self) -> None:
-        """Continue to compute the verdict of the newest recording without one; never waits."""
+        """Begin or continue to compute the verdict of the newest recording without a verdict; never waits."""
         if self._judging is not None:
             self._take()
             return
@@ -130,7 +130,7 @@ def _program() -> list[str]:
 
 def _operator(path: Path) -> list[str]:
     """Kind of the first arm's operator; empty if the recording does not contain it."""
-    from teleop_console.recorded_arms import configuration_of  # costly for a command that only lists itself
+    from teleop_console.recorded_arms import configuration_of  # this import would slow commands that do not need it
     from teleop_core.bags.reader import Bag
 
     with suppress(TeleopError):
@@ -140,7 +140,7 @@ def _operator(path: Path) -> list[str]:
 
 
 def _judged(folder: Path, entry: Entry, out: Path) -> Entry:
-    """Entry with the verdict of its score, or with a note that it could not be scored."""
+    """Entry with the verdict of the recording's score, or with a note that the recording could not be scored."""
     if not out.is_file():
         return Entry(entry.name, entry.made, "", "could not be scored: teleop evaluate", False)
     score = json.loads(out.read_text(encoding="utf-8"))[0]

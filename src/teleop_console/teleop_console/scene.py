@@ -17,7 +17,7 @@ from teleop_core.kernels.axes import axis_map
 from teleop_core.kernels.geometry import Array
 
 _POINTS = {"tour": "tour.points", "points": "points"}
-"""Operators that move to points, and the parameter with these points."""
+"""Parameter with the points, by the kind of an operator that moves to points."""
 _PIECES = 6  # number of pieces of a floor line, each with a linear fade
 
 
@@ -38,9 +38,9 @@ def targets_of(parameters: Parameters, arm: str) -> Array:
 
 
 def floor_lines(radius: float, cell: float) -> tuple[Array, Array]:
-    """Grid lines of a floor that fade towards its rim; every fifth line is stronger.
+    """Grid lines of a floor that fade towards the rim; every fifth line is stronger.
 
-    With software rendering, a grid drawn by a shader takes a quarter of the time of a picture.
+    Lines replace a grid that a shader draws: with software rendering, such a grid takes a quarter of the drawing time.
 
     Args:
         radius: Radius at which the lines end [m].
@@ -74,7 +74,7 @@ class Scene:
         self._server = server
         self.arms: dict[str, ArmNodes] = {}
         side = 0.0
-        # Shadows and mirrored surroundings take half of the time of a picture drawn by software.
+        # With software rendering, shadows and reflections would take half of the drawing time.
         server.scene.configure_default_lights(cast_shadow=False)
         server.scene.configure_environment_map(None)
         server.scene.add_light_hemisphere("/light", intensity=1.5)
@@ -94,17 +94,17 @@ class Scene:
     # -- drawing ---------------------------------------------------------------------------------
 
     def draw(self, view: View) -> None:
-        """Draw what is known now; sends only what has changed."""
+        """Draw the newest data; only changes are sent."""
         with self._server.atomic():
             for name, nodes in self.arms.items():
                 if (seen := view.arms.get(name)) is not None:
                     nodes.draw(view.time, seen)
 
     def retune(self, parameters: Parameters) -> None:
-        """Apply the session's parameters that change the picture: axes, fixture, targets, object.
+        """Apply the session's parameters that change the picture: axes, fixture, targets and object.
 
         Args:
-            parameters: As :meth:`~teleop_console.link.SessionLink.parameters` returns them; missing ones change
+            parameters: Result of :meth:`~teleop_console.link.SessionLink.parameters`. Missing parameters change
                 nothing.
         """
         with self._server.atomic():
@@ -128,7 +128,7 @@ class Scene:
             )
 
     def remember(self, path: Path) -> None:
-        """When time jumps, take paths from a recording; without this, paths begin again there."""
+        """Take paths from a recording when time jumps; without a recording, paths then start anew."""
         for nodes in self.arms.values():
             nodes.recorded_path = path
 
@@ -141,7 +141,7 @@ class Scene:
                 nodes.show(what, is_shown=is_shown)
 
     def set_dark(self, *, is_dark: bool) -> None:
-        """Take the colours for a dark page, or a light one."""
+        """Set the colours for a dark or a light page."""
         ground, line = (DARK, GRID_DARK) if is_dark else (LIGHT, GRID)
         shade = np.array(ground) + self._strength[:, :, None] * (np.array(line) - np.array(ground))
         self._floor.colors = shade.astype(np.uint8)
@@ -151,21 +151,21 @@ class Scene:
     # -- cameras ---------------------------------------------------------------------------------
 
     def work(self, aspect: float = ASPECT) -> Camera:
-        """Camera that sees the work: all tips and styli with the space around them."""
+        """Camera whose picture contains all tips and styli with the space around them."""
         return around(np.concatenate([nodes.work() for nodes in self.arms.values()]), aspect)
 
     def whole(self, aspect: float = ASPECT) -> Camera:
-        """Camera that sees all arms and their masters; ``aspect``: width over height."""
+        """Camera whose picture contains all arms and masters; ``aspect`` is width divided by height."""
         rooms = [corners(*nodes.room()) for nodes in self.arms.values()]
         return around(np.concatenate(rooms), aspect)
 
     def tool(self, arm: str = "") -> Camera:
-        """Camera on the tool of an arm, as it is now; of the first arm if there is no such arm."""
+        """Camera on the tool of an arm at its present pose; the first arm is used if the given arm does not exist."""
         nodes = self._arm(arm)
         return from_tool(nodes.tip(), nodes.bodies.size)
 
     def microscope(self, arm: str = "") -> Camera:
-        """Fixed camera over where the tip of an arm starts; of the first if there is no such."""
+        """Fixed camera above the start of an arm's tip; the first arm is used if the given arm does not exist."""
         nodes = self._arm(arm)
         return microscope(nodes.begin(), nodes.bodies.size)
 
@@ -174,7 +174,7 @@ class Scene:
 
     @property
     def masters(self) -> dict[str, str]:
-        """Path of each arm's node in master_base, by namespace, as a Stylus takes them."""
+        """Path of the node in master_base of each arm, by namespace, for a Stylus."""
         return {name: nodes.master.path for name, nodes in self.arms.items()}
 
     # -- the begin -------------------------------------------------------------------------------
@@ -199,7 +199,7 @@ class Scene:
 
 
 def _look(parameters: Parameters, node: str, kind: str) -> Look:
-    """Kind of fixture of a node."""
+    """Kind and parameters of a node's fixture."""
     values = _values_below(parameters, node, f"fixture.{kind}.")
     if (place := parameters.get((node, "fixture.place"))) is not None:
         values["place"] = place.value
@@ -207,7 +207,7 @@ def _look(parameters: Parameters, node: str, kind: str) -> Look:
 
 
 def _values_below(parameters: Parameters, node: str, start: str) -> dict[str, Setting]:
-    """Values of a node's parameters whose names begin with ``start``, by the rest of their names."""
+    """Values of a node's parameters whose names begin with ``start``, by the rest of the name."""
     return {
         name.removeprefix(start): info.value
         for (owner, name), info in parameters.items()
@@ -216,7 +216,7 @@ def _values_below(parameters: Parameters, node: str, start: str) -> dict[str, Se
 
 
 def _map(axes: object) -> Array:
-    """Rotation (3, 3) for the value of an axes parameter; the published one if the value is not valid."""
+    """Rotation (3, 3) for the value of an axes parameter; the published rotation if the value is not valid."""
     try:
         return axis_map("axes", tuple(axes))  # type: ignore[arg-type]
     except (TeleopError, TypeError, ValueError):

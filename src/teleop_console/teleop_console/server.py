@@ -26,14 +26,14 @@ def listen(host: str, port: int) -> socket.socket:
 
     Args:
         host: Address of this machine.
-        port: Port; 0 for any free one.
+        port: Number of the port; 0 for any free port.
 
     Returns:
-        The socket, bound and listening.
+        The bound and listening socket.
 
     Raises:
         ParameterError: The port is not a port number, or the address does not belong to this machine.
-        SessionError: The port is taken; the text says by what, and names a free one.
+        SessionError: The port is in use. The message names the process that uses it, and a free port.
     """
     if not 0 <= port < 1 << 16:
         raise ParameterError("port", port, "0 to 65535, 0 for any free one")
@@ -66,7 +66,7 @@ def _refusal(host: str, port: int, error: OSError) -> Exception:
 
 
 def free_port(host: str = "127.0.0.1") -> int:
-    """A port that is free now."""
+    """Number of a port that is free now."""
     with listen(host, 0) as opened:
         return int(opened.getsockname()[1])
 
@@ -105,29 +105,29 @@ _FORGET = 20  # number of checks between two removals of closed pages
 
 
 class ConsoleServer:
-    """Server of the page, running from its making to :meth:`close`.
+    """Server of the page; it runs from its construction to :meth:`close`.
 
-    Without a token it serves this machine alone; other addresses always have one. Pages of other origins, foreign host
-    names that resolve to this machine, and requests without the token get 403. Messages of
-    pages go through a :class:`~teleop_console.filter.Filter`.
+    Without a token the server serves this machine only; on other addresses a token is always required. Requests of
+    pages of other origins, with foreign host names, or without the token are answered by status 403. A
+    :class:`~teleop_console.filter.Filter` checks the messages of pages.
 
     Attributes:
         viser: The server to which scene and panel are added.
         drivers: Object that knows which page drives.
-        answers: Data for pages in addition to viser's elements, and the receiver of their stops.
+        answers: Object with the data for pages in addition to viser's elements; it also receives the pages' stops.
         token: Secret that the address must contain; empty for none.
 
     Args:
-        port: Port; 0 for any free one.
-        host: Address of this machine to serve at; the loopback by default.
-        token: Secret; made if the address is not the loopback and none is given.
+        port: Number of the port; 0 for any free port.
+        host: Address of this machine that the server uses; the loopback address by default.
+        token: Secret. If it is empty and the address is not the loopback address, a secret is generated.
         label: Heading of the panel.
-        form: Makes the form that is shown while no session runs, from the drivers; None for the form that chooses a
-            session.
+        form: Function that makes, from the drivers, the form that is shown while no session runs. None for the form
+            that chooses a session.
         patience: Time without a sign of life after which a page loses a held stylus [s].
 
     Raises:
-        SessionError: The port is taken; the text says by what, and names a free one.
+        SessionError: The port is in use. The message names the process that uses it, and a free port.
         ParameterError: The address does not belong to this machine.
     """
 
@@ -155,13 +155,13 @@ class ConsoleServer:
 
     @property
     def url(self) -> str:
-        """Address of the page, token included, as people of this machine open it."""
+        """Address with which people at this machine open the page; it includes the token."""
         host = "localhost" if is_wildcard(self.host) else self.host
         host = f"[{host}]" if ":" in host else host
         return f"http://{host}:{self.port}/" + (f"?token={self.token}" if self.token else "")
 
     def close(self) -> None:
-        """End the server; pages that are open show that they have lost it."""
+        """Stop the server; open pages show that the connection is lost."""
         self._ends.set()
         self._watch.join()
         self.viser.stop()

@@ -1,4 +1,4 @@
-"""Settings: every parameter of the session as a control, with its unit, bounds and meaning."""
+"""Settings: a control for each parameter of the session, with its unit, bounds and meaning."""
 
 import threading
 from collections.abc import Callable, Mapping
@@ -18,13 +18,13 @@ QUICK = (
     ("slave_sim", "world.material"), ("network", "preset"), ("slave", "reference_filter.is_on"),
     ("slave_sim", "controller.kind"), ("slave_sim", "plant.kind"), ("teleop", "delays"),
 )  # fmt: skip
-"""Parameters that people change most, by stage and name."""
+"""Stage and name of the parameters that people change most often."""
 _USED = "most used"
-_MOST = 40  # parameters that are shown at once
+_MOST = 40  # largest number of parameters that are shown together
 Renew = Callable[[tuple[str, ...]], str]
-"""Begins a new session with other settings; returns the reason if it cannot, else an empty text."""
+"""Function that begins a new session with other settings; it returns the reason of a refusal, else an empty text."""
 Guard = Callable[[int | None], bool]
-"""Returns whether a browser may change something; if not, it shows the reason there."""
+"""Function that returns whether a browser may change parameters; if not, it shows the reason in the browser."""
 
 
 class SettingsPanel:
@@ -33,13 +33,14 @@ class SettingsPanel:
     Args:
         server: The page.
         link: The session.
-        may_drive: Returns whether the page may change parameters; called before each change.
-        renew: Begins a new session with other texts ``node.name=value``, for parameters that are fixed while a session
-            runs. Returns the reason of a refusal, or an empty text. None if the console did not start the session.
-        of_session: Parameters of the session as a whole, which no node has.
+        may_drive: Function that returns whether the page may change parameters; called before each change.
+        renew: Function that begins a new session with texts ``node.name=value``, for parameters that are fixed while a
+            session runs. It returns the reason of a refusal, else an empty text. None if the console did not start the
+            session.
+        of_session: Parameters of the whole session, which belong to no node.
 
     Attributes:
-        known: All parameters with the values that were last received or set here.
+        known: All parameters with the last received or last set values.
     """
 
     def __init__(
@@ -78,10 +79,10 @@ class SettingsPanel:
         self._listeners.append(listener)
 
     def refresh(self) -> bool:
-        """Read the parameters of all nodes again, and show them; takes a moment.
+        """Read the parameters of all nodes again, and show them; this takes some time.
 
         Returns:
-            Whether they returned as many parameters as before, which means that all nodes have started.
+            Whether the nodes returned as many parameters as before; then all nodes have started.
         """
         before = self.known.keys()
         try:
@@ -99,7 +100,7 @@ class SettingsPanel:
         return False
 
     def follow(self, changes: Mapping[tuple[str, str], Setting]) -> None:
-        """Show values that were changed elsewhere: by a button of the stylus, a program, another page."""
+        """Show values that another source has changed: a button of the stylus, a program, or another page."""
         known = {key: value for key, value in changes.items() if key in self.known}
         if not known:
             return
@@ -145,7 +146,7 @@ class SettingsPanel:
                 self._add(self.known[key], with_node=not is_group or self._choice.value == _USED)
 
     def _reset(self, client: int | None) -> None:
-        """Set what is shown to the defaults, as far as the nodes take them."""
+        """Set all shown parameters to their defaults; nodes may refuse some of them."""
         failed = [] if self._may(client) else ["you watch; take control first"]
         for key in () if failed else [key for key in self._by_key if self._is_changed(key)]:
             if refusal := self._set(self.known[key], default_of(*key)):  # type: ignore[arg-type]
@@ -154,7 +155,7 @@ class SettingsPanel:
         self._show()
 
     def _add(self, info: ParameterInfo, *, with_node: bool) -> None:
-        """Control of one parameter, and under it, when needed, why a value was refused."""
+        """Add the control of a parameter, with a line below it for the reason of a refused value."""
         label = info.name.rpartition(".")[2] if not with_node else info.name
         arm = info.node.rpartition("/")[0]
         wanted = self._wanted.get((info.node, info.name), info.value)
@@ -167,7 +168,7 @@ class SettingsPanel:
         control.on_change(lambda client: self._changed(client, control, why, info))
 
     def _changed(self, client: int | None, control: Input, why: viser.GuiMarkdownHandle, info: ParameterInfo) -> None:
-        """Set the parameter to the present value of an input; while a slider is dragged, its last value is set last."""
+        """Set the parameter to the present value of an input; the last value of a dragged slider is always set."""
         key = info.node, info.name
         with self._changing:
             before, value = self._wanted.get(key, self.known[key].value), control.value
@@ -183,7 +184,7 @@ class SettingsPanel:
                 control.show(before)
 
     def _joints(self, info: ParameterInfo) -> tuple[str, ...]:
-        """Names of the joints of the arm that a parameter is of."""
+        """Names of the joints of the arm to which a parameter belongs."""
         namespace = info.node.rpartition("/")[0]
         return next((arm.robot.joint_names for arm in self._link.arms if arm.name == namespace), ())
 
@@ -214,5 +215,5 @@ class SettingsPanel:
 
 
 def _group(node: str, name: str) -> str:
-    """Stage and group of a parameter, as the choice shows it."""
+    """Stage and group of a parameter, as text for the filter of the panel."""
     return " · ".join(filter(None, (node, name.rpartition(".")[0])))

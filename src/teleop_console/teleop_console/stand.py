@@ -29,21 +29,21 @@ DEVICE = (
     _solid("box", (0.045, 0.025, 0.06), (0.0, -0.185, -0.105), _LEVEL, "base"),
     _solid("cylinder", (0.012, 0.10), (0.0, -0.13, -0.105), _UPRIGHT, "base"),
 )
-"""Solids of the device in master_base: foot, body, shoulder, and the inkwell before it."""
+"""Solids of the device in master_base: foot, body, shoulder, and the inkwell in front."""
 STYLUS = (
     _solid("cylinder", (0.003, 0.03), (0.0, 0.0, 0.015), _LEVEL, "tool"),
     _solid("capsule", (0.008, 0.10), (0.0, 0.0, 0.085), _LEVEL, "link"),
 )
-"""Solids of the stylus in its frame: its tip is the origin, its back along z."""
+"""Solids of the stylus in the stylus's frame; the origin is the tip, and z points to the back end."""
 
 
 @dataclass(frozen=True, eq=False)
 class Stand:
-    """Place of master_base in slave_base.
+    """Pose of master_base in slave_base.
 
     Attributes:
         axes: Rotation (3, 3) from the master's base to the slave's axes.
-        origin: Place of its origin (3,) [m].
+        origin: Position of the origin of master_base (3,) [m].
     """
 
     axes: Array = field(default_factory=PUBLISHED_AXES.copy)
@@ -58,11 +58,11 @@ class Stand:
 
 
 def stand_beside(low: Array, high: Array, axes: Array) -> Stand:
-    """Stand to the right of a robot, on the same ground; the view is along the robot's x.
+    """Stand to the right of a robot, seen along the robot's x axis, on the same floor.
 
     Args:
-        low: Lowest corner (3,) [m] of what the robot takes, in slave_base.
-        high: Highest corner (3,) [m].
+        low: Lowest corner (3,) [m] of the box around the robot, in slave_base.
+        high: Highest corner (3,) [m] of this box.
         axes: Rotation (3, 3) from the master's base to the slave's axes.
     """
     vertices = np.concatenate([mesh_of(solid)[0] for solid in DEVICE]) @ axes.T

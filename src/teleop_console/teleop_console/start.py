@@ -1,7 +1,7 @@
 """Start page: a form to choose, begin and end a session, and to replay and score recordings.
 
-The form is our own. It can send only the few requests below, whose words are checked here. A separate thread answers
-them, beside the thread of the stop.
+The form is our own. It can send only the few requests of this module, whose words are checked here. A separate thread
+answers these requests, so they do not delay the stop.
 """
 
 import http
@@ -22,9 +22,9 @@ from teleop_core.base.errors import ParameterError, TeleopError
 BAGS = Path("bags")
 """Folder of the recordings that are listed, and of new ones."""
 ROBOTS = Path("robots")
-"""Folder of the robots that were dropped on the form."""
+"""Folder of the robot files that people drop on the form."""
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}\.urdf")
-_LARGEST = 4 * 1024 * 1024  # bytes of a robot's file
+_LARGEST = 4 * 1024 * 1024  # largest number of bytes of a robot's file
 _TRY = 0.25  # time for which options are checked before the page is answered [s]
 _LOOK = 0.2  # time between two checks for new verdicts [s]
 Query = Mapping[str, Sequence[str]]
@@ -39,7 +39,7 @@ class Wish:
 
     Attributes:
         chosen: Words of a session, see :mod:`~teleop_console.choices`.
-        recording: Recording to replay, in place of a session; None for a session.
+        recording: Recording to replay; None for a session.
     """
 
     chosen: Mapping[str, str] = field(default_factory=dict)
@@ -59,26 +59,26 @@ class Form(Protocol):
 
     @property
     def documents(self) -> Mapping[str, bytes]:
-        """Pages of their own by path."""
+        """Further pages of the form, by path."""
 
     @property
     def paths(self) -> frozenset[str]:
         """Paths of the form's requests."""
 
     def answer(self, path: str, query: Query, page: int, body: Body = bytes) -> Told:
-        """Answer to a request; ``page`` is the number of the page, -1 if the page is not open."""
+        """Answer to a request; ``page`` is the number of the page, or -1 if the page is not open."""
 
 
 class StartPage:
     """Content of the form, and the actions that people requested; methods may be called from any thread.
 
     Args:
-        drivers: Knows which page may begin and end a session.
+        drivers: Object that knows which page may begin and end a session.
         folder: Folder of the recordings.
 
     Attributes:
-        is_open: Whether the form is shown because no session runs.
-        told: Text for the person at the page: why the last session ended, or the output of a command.
+        is_open: Whether the form is shown, because no session runs.
+        told: Text for the person at the page: the reason why the last session ended, or the output of a command.
     """
 
     script, style = Path(__file__).with_name("start.js"), None
@@ -121,7 +121,7 @@ class StartPage:
 
     @property
     def is_ended(self) -> bool:
-        """Whether the session or replay must end and the form return."""
+        """Whether the session or replay must end, so that the form is shown again."""
         return self._ends.is_set()
 
     def answer(self, path: str, query: Query, page: int, body: Body = bytes) -> Told:
@@ -131,8 +131,8 @@ class StartPage:
             path: One of :attr:`paths`.
             query: Query parameters of the request.
             page: Number of the page that sent the request.
-            body: Returns the request's body of at most the given number of bytes; read only if the page may send a
-                body.
+            body: Function that reads the request's body, with at most the given number of bytes. It is called only if
+                the page may send a body.
         """
         try:
             if path == "/start":
@@ -149,7 +149,10 @@ class StartPage:
             return http.HTTPStatus.CONFLICT, str(error)
 
     def _shown(self, query: Query) -> Mapping[str, object]:
-        """All that the form shows for a choice; nothing while something runs: it is costly."""
+        """All data that the form shows for a choice.
+
+        Empty while a session or replay runs, because they are slow to compute.
+        """
         from teleop_console import choices
 
         if not self.is_open:
@@ -235,5 +238,5 @@ class StartPage:
 
 
 def _words(query: Query) -> dict[str, str]:
-    """First value of each word."""
+    """First value of each query parameter."""
     return {name: values[0] for name, values in query.items() if values}

@@ -1,4 +1,4 @@
-"""Status: the text of the page about a session, which buttons have an effect, and which one comes next."""
+"""Status: the page's text about a session, the buttons that have an effect, and the button to press next."""
 
 import html
 import math
@@ -47,7 +47,7 @@ def situation(view: View) -> Situation:
 
 
 def alive(view: View) -> dict[str, bool]:
-    """Names of the controls that have an effect now."""
+    """Names of all controls that have an effect now."""
     states = {State(int(arm.operation["state"])) for arm in view.arms.values() if arm.operation}
     is_stopped = situation(view).is_stopped
     may_move = bool(states) and not is_stopped
@@ -63,7 +63,7 @@ def alive(view: View) -> dict[str, bool]:
 
 
 def next_button(view: View) -> str:
-    """Button that an operator needs next; empty while all arms follow."""
+    """Name of the button that an operator must press next; empty while all arms follow."""
     states = {State(int(arm.operation["state"])) for arm in view.arms.values() if arm.operation}
     if states & {State.FAULT, State.DISABLED}:
         return "Initialize"
@@ -100,7 +100,7 @@ def next_step(view: View, *, is_led_here: bool) -> str:
 
 
 def facts(view: View) -> str:
-    """Rate of the slave, and ages of command and picture; what is not known is left out."""
+    """Text with the rate of the slave, and the ages of command and picture; unknown values are left out."""
     told = (
         (view.rate, f"{view.rate:.0f} Hz"),
         (view.delay[0], f"command {1e3 * view.delay[0]:.1f} ms"),
@@ -111,7 +111,7 @@ def facts(view: View) -> str:
 
 
 def display_text(view: View) -> str:
-    """Rate and delay of the operator's display; empty without one."""
+    """Text with rate and delay of the operator's display; empty without a display."""
     rate, late = view.display
     return f"{rate:.0f} Hz, {1e3 * late:.0f} ms late" if math.isfinite(late) else ""
 
@@ -144,14 +144,14 @@ def task_text(arm: ArmView) -> str:
 
 
 def closes(arm: ArmView) -> bool:
-    """Whether closing the hand has an effect: at a task, or with a jaw, while the arm follows."""
+    """Whether closing the hand has an effect. This is so while the arm follows, in a task or with a jaw."""
     told = arm.operation
     follows = bool(told) and State(int(told["state"])) is State.ENABLED and bool(told["is_homed"])
     return follows and (arm.get(TASK_STATE) is not None or arm.get(SLAVE_JAW_MEASURED_JS) is not None)
 
 
 def status_html(view: View, title: str, doing: str, step: str = "") -> str:
-    """State of every arm, mode, the next step, what is being done, and warnings."""
+    """HTML with the state of every arm, the mode, the next step, the present action, and warnings."""
     lines = [line for name, arm in view.arms.items() for line in _arm_lines(view, name, arm)]
     if step:
         lines.append(f'<span class="t-next">Next: {html.escape(step)}</span>')
@@ -166,7 +166,7 @@ def status_html(view: View, title: str, doing: str, step: str = "") -> str:
 
 
 def _news_line(text: str) -> str:
-    """A warning; a hand that rests is no more than information."""
+    """HTML of a warning; the report that nobody holds the stylus is shown as information."""
     signal, mark = ("muted", "ℹ") if text.endswith(UNHELD) else ("held", "⚠")
     return f'<span class="t-{signal}">{mark} {html.escape(text)}</span>'
 

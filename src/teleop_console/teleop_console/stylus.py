@@ -1,4 +1,4 @@
-"""Stylus: the gizmo by which a person is the hand, and small steps by keys and buttons."""
+"""Stylus: the gizmo with which a person moves the hand, and small steps by keys and buttons."""
 
 import threading
 from collections.abc import Callable, Coroutine
@@ -18,12 +18,14 @@ from teleop_core.kernels.geometry import Array, turn_by
 
 AXES = ("x", "y", "z", "rx", "ry", "rz")
 """Directions of a small step: along and about the axes of master_base."""
-STEP_LENGTH, STEP_TURN = 1e-3, np.radians(1.0)
-"""A small step [m, rad]."""
+STEP_LENGTH = 1e-3
+"""Length of a small step along an axis [m]."""
+STEP_TURN = np.radians(1.0)
+"""Angle of a small step about an axis [rad]."""
 LINGER = 1.0
 """Time for which the stylus is held after a small step, so that the next step can follow [s]."""
 GRIP = "grip"
-"""Name of a gizmo's node below that of its master."""
+"""Name of a gizmo's node below the node of the master."""
 _SIZE = 0.08  # size of a gizmo [m]
 
 
@@ -33,9 +35,9 @@ class _Hand:
 
     Attributes:
         gizmo: Element that a person drags; its pose is in master_base.
-        measured: Last measured pose of the stylus (7,); None before its first sample.
+        measured: Last measured pose of the stylus (7,); None before the first sample.
         wanted: Wanted pose of the stylus (7,); None while no browser holds it.
-        client: Browser that drags the stylus; None if small steps or no browser hold it.
+        client: Browser that drags the stylus; None while small steps hold the stylus, or nothing holds it.
         remaining: Time until a small step releases the stylus [s].
     """
 
@@ -50,8 +52,8 @@ class _Hand:
 class Stylus:
     """Gizmos of all arms.
 
-    While no browser holds it, a gizmo follows its stylus. While a browser holds it, the wanted pose is sent again at
-    every :meth:`tick`, because silence releases the stylus.
+    While no browser holds the gizmo, it follows the stylus. While a browser holds the gizmo, every :meth:`tick` sends
+    the wanted pose again, because silence releases the stylus.
 
     Args:
         server: The page.
@@ -82,7 +84,7 @@ class Stylus:
             hand.gizmo.on_update(self._listener(arm))
 
     def _listener(self, arm: str) -> Callable[[Event], Coroutine[None, None, None]]:
-        # A coroutine: those of one gesture run in their order.
+        # This is a coroutine, because the coroutines of one gesture run in order.
         async def listen(event: Event) -> None:
             self._drag(arm, -1 if event.client_id is None else event.client_id, event.phase)
 
@@ -120,7 +122,7 @@ class Stylus:
         return None if wanted is None else wanted.copy()
 
     def draw(self, view: View) -> None:
-        """Take where the styli are now, and :meth:`tick` by the time since the last view."""
+        """Store the present poses of the styli, and call :meth:`tick` with the time since the last view."""
         for arm, seen in view.arms.items():
             if arm in self._hands and (pose := seen.get(MASTER_MEASURED_CP)) is not None:
                 self.follow(arm, pose)
@@ -128,7 +130,7 @@ class Stylus:
         self._time = view.time
 
     def follow(self, arm: str, pose: Array) -> None:
-        """Store the measured pose (7,) of the stylus in master_base; the gizmo moves there while nothing holds it.
+        """Store the measured pose (7,) of the stylus in master_base; a gizmo that nothing holds moves to this pose.
 
         A pose that is not finite counts as unknown.
         """
@@ -141,7 +143,7 @@ class Stylus:
                 move(hand.gizmo, pose)
 
     def tick(self, dt: float) -> None:
-        """Send all held poses again; to be called at least every 50 ms.
+        """Send the poses of all held styli again; it must be called at least every 50 ms.
 
         Args:
             dt: Time since the last call [s].
@@ -163,8 +165,8 @@ class Stylus:
     def nudge(self, arm: str, axis: str, sign: int) -> None:
         """Command the stylus one small step: 1 mm along an axis, or 1° about it.
 
-        It is held for :data:`LINGER` after the last step, then let go. Before its first sample, and
-        while it is dragged, nothing happens. The caller must check who may take steps.
+        The stylus is held for :data:`LINGER` after the last step, then released. A step has no effect before the first
+        sample of the stylus, and while the stylus is dragged. The caller must check whether the page may command steps.
 
         Args:
             arm: Namespace of the arm.
@@ -172,7 +174,7 @@ class Stylus:
             sign: 1 or -1.
 
         Raises:
-            UnknownNameError: No such axis.
+            UnknownNameError: ``axis`` is unknown.
         """
         if axis not in AXES:
             raise UnknownNameError("axis", axis, AXES)
@@ -202,7 +204,7 @@ class Stylus:
 
 
 def stepped(pose: Array, axis: str, sign: int) -> Array:
-    """Pose (7,) one small step from another, along or about an axis of its base."""
+    """Pose (7,) that is one small step away from ``pose``, along or about an axis of the base."""
     out = pose.copy()
     place = "xyz".index(axis[-1])
     if len(axis) == 1:
@@ -224,16 +226,16 @@ _KEYS: dict[Key, tuple[str, int]] = {
     "pageup": ("z", 1),
     "pagedown": ("z", -1),
 }
-"""Keys and the step that each is, in the master's base."""
+"""Small step of each key, in the master's base."""
 
 
 class Steps:
-    """Buttons in the present container of the page, and keys; with shift, keys turn.
+    """Buttons for small steps in the present container of the page, and keys; with shift, a key rotates the stylus.
 
     Args:
         server: The page.
         stylus: Stylus that moves.
-        arms: Namespaces of the arms; keys move the chosen one.
+        arms: Namespaces of the arms; keys move the chosen arm.
         may_drive: Whether a browser may command the arms.
     """
 

@@ -1,4 +1,4 @@
-"""Tails: the path of the last seconds as a line that fades."""
+"""Tails: paths of the last seconds as lines that fade."""
 
 import numpy as np
 import viser
@@ -12,20 +12,20 @@ PERIOD = 0.25
 """Time between two drawings of a tail [s]."""
 _POINTS = 160
 _GAP = 1.0  # gap between two drawings that counts as a jump of time [s]
-_SHORTEST = 1e-4  # distance between two points of the tail [m]
+_SHORTEST = 1e-4  # smallest distance between two points of the tail [m]
 
 
 def is_jump(before: float, time: float) -> bool:
-    """Whether a time [s] is not the next one of a steady drawing."""
+    """Whether a time [s] is before the previous one, or so long after it that time has jumped."""
     return time < before or time > before + _GAP
 
 
 class Tail:
-    """Path of a point; few messages, of the same size whatever happens.
+    """Path of a point; it needs few messages, and their size is constant.
 
     Args:
         server: The page.
-        name: Path of its node.
+        name: Path of the tail's node.
         color: Colour of the newest part.
         thickness: Thickness of the line [px].
     """
@@ -47,7 +47,7 @@ class Tail:
         )
 
     def set_background(self, color: Color) -> None:
-        """Colour that it fades into."""
+        """Set the colour into which the tail fades."""
         self._background = np.array(color, np.float64)
         self._drawn = -np.inf
 
@@ -57,7 +57,7 @@ class Tail:
         self._line.visible = is_shown and bool(np.isfinite(self._times[-1]))
 
     def draw(self, time: float, point: Array | None) -> None:
-        """Add the position of the point (3,) [m] at a time [s]; None if it is unknown.
+        """Add the position of the point (3,) [m] at a time [s]; None if the position is unknown.
 
         A time before the last time, or long after it, starts a new tail.
         """
@@ -71,7 +71,7 @@ class Tail:
             self._redraw(time)
 
     def fill(self, times: Array, points: Array) -> None:
-        """Take a whole path at once: times (N,) [s], ascending, and points (N, 3) [m]."""
+        """Replace the tail by a whole path: times (N,) [s], ascending, and points (N, 3) [m]."""
         count = min(len(times), _POINTS + 1)
         chosen = np.linspace(0, max(0, len(times) - 1), count).astype(int)
         self._times[:] = -np.inf
@@ -89,7 +89,7 @@ class Tail:
         self._sampled = time
 
     def _redraw(self, time: float) -> None:
-        """Send its segments; those that are too old have no length."""
+        """Send the segments of the tail; segments that are too old have no length."""
         age = np.clip((time - self._times) / LENGTH, 0.0, 1.0)
         kept = np.flatnonzero(age < 1.0)
         if not len(kept):

@@ -1,8 +1,8 @@
-"""Timeline: a strip below the page that shows events over time and the time that the scene shows.
+"""Timeline: a strip at the bottom of the page that shows events over time and the time of the scene.
 
-Its answers are small: each contains no more than the pixels can show. Every page may look; only a page that drives
-moves time. A live session continues whatever is shown, so the scene shows the past only while a page repeats that it
-wants to see it.
+The answers of the timeline are small: each contains no more data than the pixels can show. All pages may see it, but
+only a page that drives may change the time. A live session continues while the past is shown. So the scene shows the
+past only while a page repeatedly requests it.
 """
 
 import http
@@ -24,19 +24,19 @@ from teleop_core.base.errors import ParameterError, TeleopError
 from teleop_core.graph.topics import TELEOP_STATE
 
 CURVES = 6
-"""Columns that are drawn at once."""
+"""Largest number of columns that are drawn together."""
 PIXELS = 4000
-"""Widest strip."""
+"""Largest width of the strip [px]."""
 FOUND = 40
 """Largest number of columns that a search returns."""
 HELD = 2.5
 """Time after which a live scene returns to the present, unless a page requests the past again [s]."""
-_LONGEST = 200  # text of a word
+_LONGEST = 200  # largest number of characters of a word
 _ALIGNMENTS = ("start", "following")
 
 
 class Timeline:
-    """Times of one session.
+    """Timeline of one session.
 
     Args:
         link: The session.
@@ -53,12 +53,12 @@ class Timeline:
             self._seen = self._past = Seen(link.arms)
         self._over: Recorded | None = None
         self._over_name, self._align = "", _ALIGNMENTS[0]
-        self._wanted = (0.0, -math.inf)  # time, and until when
+        self._wanted = (0.0, -math.inf)  # requested time [s], and clock time until which the request is valid [s]
 
     # -- for the page's own drawing ----------------------------------------------------------------
 
     def shown(self, view: View, *, is_stopped: bool = False) -> View:
-        """Add the present view; returns the view that the scene must show, the present or a past one."""
+        """Add the present view; returns the view that the scene must show, which is the present one or a past one."""
         if self._seen is None:
             return view
         self._seen.add(view)
@@ -69,13 +69,16 @@ class Timeline:
 
     @property
     def is_past(self) -> bool:
-        """Whether the scene of a live session shows what was."""
+        """Whether the scene of a live session shows the past."""
         return self._clock() < self._wanted[1]
 
     # -- requests ----------------------------------------------------------------------------------
 
     def state(self, words: Mapping[str, str]) -> object:
-        """The shown time; with ``find`` also the columns whose name or unit contains all words of the search."""
+        """The shown time.
+
+        With ``find`` the answer also contains the columns whose name or unit contains all words of the search.
+        """
         link, seen = self._replay, self._seen
         begin, end = seen.span() if seen is not None else (0.0, link.duration if link else 0.0)
         told = {
@@ -101,7 +104,7 @@ class Timeline:
         return told
 
     def strip(self, words: Mapping[str, str], names: Sequence[str]) -> object:
-        """Bands, ticks and curves between ``begin`` and ``end`` [s], for so many ``pixels``."""
+        """Bands, ticks and curves between ``begin`` and ``end`` [s], for a strip of ``pixels`` pixels."""
         begin, end = _number(words, "begin"), _number(words, "end")
         pixels = _number(words, "pixels")
         if not begin < end:
@@ -133,7 +136,7 @@ class Timeline:
         return told
 
     def go(self, words: Mapping[str, str]) -> object:
-        """Move time: ``seek`` [s], ``now``, ``play`` or ``loop`` as 1 or 0, ``speed``."""
+        """Change the shown time by words: ``seek`` [s], ``now``, ``play`` or ``loop`` (1 or 0), ``speed``."""
         link, asked = self._replay, {name: _number(words, name) for name in words}
         if unknown := asked.keys() - {"seek", "now", "play", "loop", "speed"}:
             raise ParameterError("word", min(unknown), "one of seek, now, play, loop, speed")
@@ -154,7 +157,10 @@ class Timeline:
         return self.state({})
 
     def lay(self, words: Mapping[str, str]) -> object:
-        """Draw the curves of recording ``name`` over these, none for an empty name; ``align`` sets the alignment."""
+        """Overlay the curves of the recording ``name``.
+
+        An empty name removes them. ``align`` sets the alignment in time.
+        """
         if (align := words.get("align", self._align)) not in _ALIGNMENTS:
             raise ParameterError("align", align, f"one of {', '.join(_ALIGNMENTS)}")
         name, folder = words.get("name", self._over_name), self._folder
@@ -176,7 +182,10 @@ class Timeline:
         return [entry.name for entry in Recordings(self._folder).entries() if entry.name != self._link.title]
 
     def _shift(self) -> float | None:
-        """Time of the overlaid recording at time 0 of this one [s]; None while the former is still being read."""
+        """Time of the overlaid recording at time 0 of the shown one [s].
+
+        None while the overlaid one is still being read.
+        """
         if self._over is None or self._align == _ALIGNMENTS[0]:
             return 0.0
         found = [_following(past) for past in (self._past, self._over)]
@@ -194,7 +203,7 @@ class Timeline:
 
 
 def _following(past: Past) -> float | None:
-    """When an arm first followed the hand [s], 0 if none did; None while the recording is still being read."""
+    """Time at which an arm first followed the hand [s]; 0 if none did, None while the recording is still being read."""
     first = math.inf
     for name in tuple(past.columns):
         if not name.endswith(f"{TELEOP_STATE.name} is_following"):
@@ -207,10 +216,10 @@ def _following(past: Past) -> float | None:
 
 
 def _number(words: Mapping[str, str], name: str) -> float:
-    """A finite number.
+    """Return a word as a finite number.
 
     Raises:
-        ParameterError: It is missing, or another text.
+        ParameterError: The word is missing, or is not a finite number.
     """
     try:
         value = float(words.get(name, ""))
@@ -225,7 +234,7 @@ class StripPage:
     """Answers the requests of a page's strip; methods may be called from any thread.
 
     Args:
-        drivers: Knows which page may change the shown time.
+        drivers: Object that knows which page may change the shown time.
 
     Attributes:
         shown: Timeline of the shown session or recording; None while none is shown.
@@ -243,7 +252,7 @@ class StripPage:
 
         Args:
             path: One of :attr:`paths`.
-            query: Query parameters of the request; of each except ``name`` only the first value counts.
+            query: Query parameters of the request; except for ``name``, only the first value of a parameter counts.
             page: Number of the page that sent the request.
             body: Not used.
         """

@@ -1,8 +1,7 @@
-"""View tab: the visible parts of the scene, and for each browser its camera and its role.
+"""View tab: the visible parts of the scene, and the camera and the role of each browser.
 
-Insets are small pictures beside the scene. A browser that shows the page renders them and sends
-them here, and all pages show them; without a browser there are none. Each inset costs that browser one more picture,
-so insets are off by default and updated rarely.
+Insets are small pictures beside the scene. One of the browsers renders them and sends them to the server, and all pages
+show them. For each inset this browser renders one more picture, so insets are off by default and updated rarely.
 """
 
 import threading
@@ -34,7 +33,7 @@ class ViewTab:
 
     Args:
         server: The page.
-        scene: Scene that they control.
+        scene: Scene of the page.
         visitors: Visitors whose cameras are moved.
     """
 
@@ -112,7 +111,7 @@ class Insets:
                 image.label = " · ".join(filter(None, (name, display and f"display {display}")))
 
     def show(self, is_shown: bool) -> None:
-        """Begin with pictures, or end with them."""
+        """Start or stop the pictures."""
         for image in self._images.values():
             image.visible = is_shown
         if self._thread is not None:
@@ -140,15 +139,15 @@ class Insets:
                         transport_format="png",
                     )
                 except (TimeoutError, RuntimeError, OSError, ValueError, SyntaxError):
-                    break  # the browser sleeps, has gone, or sends no picture
+                    break  # the browser sleeps, is closed, or sends no picture
                 if not ends.is_set():
                     self._images[name].image = picture
 
 
 _SETTLING = 4.0  # time until the panel of a new window has its final size [s]
 _LOOK = 1.0  # time between two checks whether the work has left the picture [s]
-_GROWN, _STILL = 0.08, 1e-4  # shares of its distance by which a camera has moved: for a new view, for a view that
-# follows
+_GROWN = 0.08  # smallest motion of a camera that counts as a new view, as a share of the viewing distance
+_STILL = 1e-4  # smallest motion with which a camera follows a body, as a share of the viewing distance
 
 
 @dataclass(frozen=True)
@@ -157,9 +156,9 @@ class _Fit:
 
     Attributes:
         since: Time at which the page was opened [s].
-        aspect: Width over height of its picture.
-        looked: Time at which its picture was last compared with the work [s].
-        camera: Camera that was last set for it.
+        aspect: Width of the browser's picture divided by its height.
+        looked: Time at which the picture was last compared with the work [s].
+        camera: Camera that was last set for the browser.
         is_own: Whether the person at the browser has chosen another view.
     """
 
@@ -171,7 +170,7 @@ class _Fit:
 
 
 def _is_moved(client: viser.ClientHandle, given: Camera) -> bool:
-    """Whether a person has turned the camera since it was given."""
+    """Whether a person has moved the camera since it was last set."""
     camera = client.camera
     now = Camera(np.asarray(camera.position), np.asarray(camera.look_at), given.up)
     return now.is_elsewhere(given, _GROWN)
@@ -184,7 +183,7 @@ class Visitors:
         server: The page.
         drivers: Object that knows which page drives.
         scene: Scene of the page.
-        is_live: Whether it is a session, and not a recording.
+        is_live: Whether the page shows a live session; false for a recording.
     """
 
     def __init__(self, server: Server, drivers: Drivers, scene: Scene, *, is_live: bool) -> None:
@@ -195,7 +194,7 @@ class Visitors:
         self._grips: dict[int, tuple[bool, float]] = {}
 
     def look(self) -> None:
-        """Greet new pages, and show on every page whether it drives or watches."""
+        """Add the elements of new pages, and show on every page whether the page drives or watches."""
         clients = self._server.get_clients()
         for number, client in clients.items():
             text = f'<p class="t-role">{self._role(number)}</p>'
@@ -214,8 +213,8 @@ class Visitors:
 
         Args:
             client: The browser.
-            find: The camera; None for a camera that shows the whole work.
-            is_riding: Whether the camera follows the body that it is attached to.
+            find: Function that returns the camera; None for a camera that shows the whole work.
+            is_riding: Whether the camera follows a moving body.
         """
         number, now = client.client_id, time.monotonic()
         camera = None if find is None else find()
@@ -232,9 +231,9 @@ class Visitors:
         return f"replay: {'you play it' if self._drivers.may_drive(number) else 'another page plays it'}"
 
     def _show_grips(self, number: int) -> None:
-        """Show the handles of the styli on a page if it may drive; on other pages they are hidden each time.
+        """Show the handles of the styli on a page that may drive; on other pages the handles are hidden each time.
 
-        When the handles are shown again, viser informs all pages, including those that only watch.
+        This is needed because viser shows the handles again on all pages, including pages that only watch.
         """
         may_drive, now = self._drivers.may_drive(number), time.monotonic()
         before, told = self._grips.setdefault(number, (True, -_LOOK))
@@ -245,7 +244,7 @@ class Visitors:
             self._server.show_on(number, f"{node}/{GRIP}", is_shown=may_drive)
 
     def _fit(self, number: int, client: viser.ClientHandle) -> None:
-        """Point the camera of a new page at the work; again when the window gets its size or the work grows."""
+        """Point the camera of a new page at the work, and again when the window's size changes or the work grows."""
         now, aspect = time.monotonic(), client.camera.aspect
         fit = self._fitted.setdefault(number, _Fit(now))
         if (find := self._riding.get(number)) is not None:
@@ -265,7 +264,7 @@ class Visitors:
         self._fitted[number] = replace(fit, aspect=aspect, looked=now, camera=given)
 
     def close(self) -> None:
-        """Remove the lines."""
+        """Remove the elements of all pages."""
         for line in self._lines.values():
             line.remove()
         self._lines.clear()

@@ -1,4 +1,4 @@
-"""World nodes: the object that the slave's tip touches on the page, and how it pushes."""
+"""World nodes: the object that the slave's tip touches, and the force of the object, as the page shows them."""
 
 from collections.abc import Mapping
 from contextlib import suppress
@@ -21,7 +21,7 @@ def object_outline(values: Mapping[str, Setting], robot: Robot) -> Array:
     """Segments (N, 2, 3) [m] of the object in the slave's base; empty if the object is unknown.
 
     Args:
-        values: Parameters of the world by name, without the prefix of their names.
+        values: Parameters of the world, by their names without the prefix.
         robot: The slave; an object without ``place`` lies below the slave's start.
     """
     nothing, kind = np.empty((0, 2, 3)), values.get("kind", "empty")
@@ -29,7 +29,7 @@ def object_outline(values: Mapping[str, Setting], robot: Robot) -> Array:
     own = {
         name: value for name, value in values.items() if name in {"kind", "place", "gap"} or name.startswith(of_object)
     }
-    with suppress(Exception):  # a foreign kind may raise any error, which must not stop the page
+    with suppress(Exception):  # a user's own kind may raise any error, which must not stop the page
         world = build(WorldParameters, own)
         if world.kind.kind == "empty":
             return nothing
@@ -40,11 +40,11 @@ def object_outline(values: Mapping[str, Setting], robot: Robot) -> Array:
 
 
 class WorldNodes:
-    """Object and push of one arm, below a node in slave_base.
+    """Object of one arm and its force on the tip, below a node in slave_base.
 
     Args:
         server: The page.
-        path: Path of that node.
+        path: Path of the node in slave_base.
         robot: The slave.
     """
 
@@ -56,7 +56,7 @@ class WorldNodes:
         self.push = ForceArrow(server, f"{path}/push")
 
     def retune(self, values: Mapping[str, Setting]) -> None:
-        """Draw the object that these parameters define, in place of the last one."""
+        """Draw the object that the parameters define; it replaces the previous object."""
         if values == self._values:
             return
         self._values = dict(values)
@@ -72,9 +72,9 @@ class WorldNodes:
             )
 
     def points(self) -> Array:
-        """Lowest and highest corner (2, 3) [m] of the object in slave_base; none (0, 3) without one."""
+        """Lowest and highest corner (2, 3) [m] of the object in slave_base; (0, 3) without an object."""
         return self._corners
 
     def draw(self, tip: Array, force: Array | None) -> None:
-        """Draw the push (3,) [N] at a tip (3,) [m]; None where it is unknown."""
+        """Draw the object's force (3,) [N] on a tip at (3,) [m]; an argument is None if it is unknown."""
         self.push.draw(tip, np.zeros(3) if force is None else force)

@@ -1,6 +1,6 @@
-"""Messages of poses and buttons in bags of other programs, ROS 1 and 2, as rows of numbers.
+"""Bag messages: converts poses and buttons in ROS 1 and 2 bags of other programs to rows of numbers.
 
-The rosbags library reads the messages, which takes about 6 µs each.
+The rosbags library reads the messages; reading a message takes about 6 µs.
 """
 
 import struct
@@ -35,7 +35,7 @@ Frames = tuple[str, str]
 
 
 class Rows(NamedTuple):
-    """Poses of some messages: stamps and times of recording [ns] and rows (n, 7), w before x."""
+    """Poses of some messages: stamps [ns], times of recording [ns], and rows (n, 7) with w before x."""
 
     stamp_ns: Stamps
     log_ns: Stamps
@@ -53,7 +53,7 @@ class PoseReader:
         parent: Parent frame of the wanted poses; empty for any.
 
     Attributes:
-        taken: Parent and child frame of the used poses; None before the first.
+        taken: Parent and child frame of the used poses; None before the first pose.
     """
 
     def __init__(self, typestore: Any, ros_type: str, *, is_ros2: bool, frame: str = "", parent: str = "") -> None:
@@ -119,7 +119,7 @@ class PoseReader:
         return [_Part(header, getattr(message, "child_frame_id", ""), pose)]
 
     def _refuse(self, named: Frames) -> NoReturn:
-        """Refuse a pose whose frames differ from those of earlier poses."""
+        """Raise an error for a pose whose frames differ from those of earlier poses."""
         assert self.taken is not None
         index = 0 if self.taken[0] != named[0] else 1
         option = ("--parent (poses stand in several)", "--frame (poses are of several)")[index]
@@ -137,7 +137,7 @@ def plain(name: str) -> str:
 
 
 class _Part(NamedTuple):
-    """A pose in a message, with its header or None, and its child frame or an empty text."""
+    """A pose in a message, with the header (or None) and the child frame (or an empty text)."""
 
     header: Any
     child: str

@@ -1,4 +1,4 @@
-"""Bag source: recordings of ROS 1 and 2 whose topics are the motion and the buttons of a hand."""
+"""Bag source: recordings of ROS 1 and 2 with topics for the motion and the buttons of a hand."""
 
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
@@ -58,10 +58,10 @@ class BagSource:
 
     @contextmanager
     def _opened(self) -> Iterator[ros_bags.RosBag]:
-        """The recording, to be read message by message.
+        """Open the recording for reading message by message.
 
         Raises:
-            RecordingError: It cannot be read.
+            RecordingError: The recording cannot be read.
         """
         with damage_told(self.path):
             if self._bag is not None:
@@ -220,16 +220,16 @@ class BagSource:
         return source.Presses(stamps[order], logs[order], pressed[order])
 
     def check(self, finite: Array) -> None:
-        """Refuse columns without any number."""
+        """Raise an error if a column contains no number."""
         if not finite.all():
             names = np.array(["x", "y", "z", "orientation"])[finite == 0]
             raise RecordingError(self.path, f"{self._topic}: {', '.join(names)} holds no numbers")
 
 
 def _named(wanted: str, names: Iterable[str]) -> str | None:
-    """The topic with the wanted name, or the only topic that ends with it.
+    """Return the topic with the wanted name, or the only topic whose name ends with the wanted name.
 
-    For ``a|b``, the result is the first existing topic; None if there is no such topic.
+    For ``a|b``, the result is the first existing topic; None if neither exists.
     """
     known = list(names)
     for name in map(plain, wanted.split("|")):

@@ -48,7 +48,8 @@ def add_import(commands: Any) -> None:
 
 
 def _options(parser: argparse.ArgumentParser) -> None:
-    # In `--axes +y -x +z`, -x is a value; argparse accepts a leading minus only in values that look like numbers.
+    # In `--axes +y -x +z`, -x is a value, but argparse accepts a leading minus only in numbers; this pattern allows
+    # axes.
     parser._negative_number_matcher = re.compile(r"-([xyz]|\d+|\d*\.\d+)$")
     _time(parser.add_argument_group("time"))
     _place(parser.add_argument_group("position and orientation"))

@@ -1,4 +1,4 @@
-"""Episodes: a table of several recordings, as in data sets; an import reads one of them."""
+"""Episodes: a table that contains several recordings, as in data sets; an import reads one of them."""
 
 from collections.abc import Iterator
 
@@ -19,7 +19,7 @@ class Episodes:
         wanted: Number of the episode; None if the table must contain only one.
 
     Raises:
-        ParameterError: An episode is wanted, but no column contains the episode numbers.
+        ParameterError: A number of an episode is given, but no column contains the episode numbers.
     """
 
     def __init__(self, table: tables.Table, wanted: int | None) -> None:
@@ -32,8 +32,8 @@ class Episodes:
         """Some columns of the table, block by block.
 
         Raises:
-            RecordingError: There are several episodes, and no number was given; or the file is damaged.
-            UnknownNameError: There is no episode with the wanted number.
+            RecordingError: The table contains several episodes and no number is given, or the file is damaged.
+            UnknownNameError: No episode has the given number.
         """
         if self._column is None:
             yield from self._table.blocks(columns)

@@ -1,4 +1,4 @@
-"""Every episode: converts a table or data set of several recordings to a folder with one recording for each episode."""
+"""Every episode: converts a table or data set to a folder with one recording for each episode."""
 
 import shutil
 from collections.abc import Callable, Mapping
@@ -19,8 +19,8 @@ class EpisodesReport:
 
     Attributes:
         out: Folder of the recordings.
-        made: Report of each made recording, by the number of the episode.
-        kept: Numbers of the episodes whose recording already existed.
+        made: Report of each new recording, by the number of the episode.
+        kept: Numbers of the episodes whose recording existed before the import.
         refused: Reason for each episode that could not be imported, by its number.
     """
 
@@ -49,7 +49,7 @@ def import_episodes(
     that cannot be imported does not stop the import of the others.
 
     Args:
-        file: Table with a column ``episode_index`` or the like, or folder of the data set.
+        file: Table with a column such as ``episode_index``, or folder of the data set.
         out: Folder of the recordings ``episode_000000`` and so on; may already exist.
         options: Options of :func:`teleop_exchange.import_recording`, without ``episode``.
         arms: As in :func:`teleop_exchange.import_recording`.
@@ -61,7 +61,7 @@ def import_episodes(
         ParameterError: No column contains the episode numbers, or an option is wrong.
     """
     base, out = options or ImportOptions(), Path(out)
-    options_of(base, arms, changes)  # refused here, not once for each episode
+    options_of(base, arms, changes)  # raises an error here, not once for each episode
     files = files_of(Path(file), base.changed(**changes))
     made: dict[int, import_report.ImportReport] = {}
     kept, refused = [], dict[int, str]()
@@ -91,8 +91,8 @@ def files_of(path: Path, options: ImportOptions) -> dict[int, Path]:
         options: Options for reading text files.
 
     Raises:
-        RecordingError: There is no file, a file is damaged, or two files contain the same episode.
-        ParameterError: A file has no column of episode numbers.
+        RecordingError: The folder contains no data file, a file is damaged, or two files contain the same episode.
+        ParameterError: A file contains no column of episode numbers.
     """
     files = sorted((path / "data").rglob("*.parquet")) if path.is_dir() else [path]
     if not files or not path.exists():

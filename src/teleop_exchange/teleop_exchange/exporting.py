@@ -1,4 +1,4 @@
-"""Export: converts recordings to tables (CSV or Parquet), or to a data set for learning."""
+"""Export: converts recordings to tables (CSV or Parquet), or to a data set for robot learning."""
 
 import shutil
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -30,7 +30,7 @@ _BY_COLUMN = {
 def unit_of(topic: str, column: str) -> str:
     """Unit of a column of a topic; empty if it has no unit.
 
-    Joints may be revolute or prismatic, so their positions are in rad or m.
+    Joints may be revolute or prismatic, so the unit of their positions is "rad or m".
     """
     known = next((t for n, t in BY_NAME.items() if topic == n or topic.endswith(f"/{n}")), None)
     if known is not None and known.columns:
@@ -64,10 +64,10 @@ class ExportReport:
     """Result of an export.
 
     Attributes:
-        out: File or directory made.
-        rows: Number of rows; for a data set, of frames.
-        columns: Names of the columns; for a data set, of its features.
-        episodes: Number of recordings in it.
+        out: File or directory that was made.
+        rows: Number of rows; for a data set, the number of frames.
+        columns: Names of the columns; for a data set, the names of the features.
+        episodes: Number of exported recordings.
     """
 
     out: Path
@@ -94,20 +94,21 @@ def export_recording(
 ) -> ExportReport:
     """Write recordings in a format of other programs.
 
-    The first column of a table is the time [s] since the recording began. Each number of each topic has one further
-    column, named as in :meth:`teleop_core.Recording.frame`: ``slave/measured_cp.x``. There is one row for each time at
-    which any topic has a message. Columns of topics without a message at that time are empty, except columns of
-    reports such as ``teleop/state``, which keep their values. The columns of Parquet have their units as metadata.
+    The first column of a table is the time [s] since the recording began. Each number of each topic has a further
+    column, named as in :meth:`teleop_core.Recording.frame`: ``slave/measured_cp.x``. Each time at which a topic has a
+    message gives a row. In this row the columns of topics without a message are empty; only reports such as
+    ``teleop/state`` keep their last values. Parquet files contain the units of columns as metadata.
 
-    A data set of LeRobot (version 3.0 of its format, without pictures) has one episode per recording.
+    A LeRobot data set (version 3.0 of the format, without pictures) contains one episode for each recording.
     ``observation.state`` contains the slave's joints and the pose of its tip; ``action`` contains the commands.
 
     Args:
         recording: A recording or its path; several for a data set.
-        out: File to make, or directory of a data set; removed after an error.
+        out: Path of the new file or of the new directory of a data set; it is removed after an error.
         format: ``csv``, ``parquet`` or ``lerobot``; None chooses by the extension of ``out``.
-        topics: Topics of a table; all if empty.
-        rate: Rows per second [Hz], each with the newest values; None for one row per message, or 50 Hz for a data set.
+        topics: Topics of a table; empty for all topics.
+        rate: Rows per second [Hz]; each row contains the newest values. None stands for a row at the time of each
+            message, or for 50 Hz in a data set.
         units: Whether names of columns end with the unit, as in ``slave/measured_cp.x [m]``.
         action: For a data set: ``joints`` (``slave/servo_jp``) or ``tip`` (``slave/servo_cp``).
         task: For a data set: description of the task.
@@ -117,8 +118,8 @@ def export_recording(
 
     Raises:
         RecordingError: A recording cannot be read, or ``out`` exists or cannot be written.
-        UnknownNameError: There is no such format or topic.
-        ParameterError: A value does not fit the format.
+        UnknownNameError: The format or a topic is unknown.
+        ParameterError: A value is not allowed for the format.
     """
     several = [recording] if isinstance(recording, OneRecording) else list(recording)
     path = Path(out)
@@ -173,7 +174,9 @@ def _data_set(recordings: list[Recording], path: Path, rate: float | None, actio
 
 @contextmanager
 def whole(path: Path) -> Iterator[Path]:
-    """Draft beside a path. The draft replaces the path when everything is written, and is removed after an error.
+    """Yield a draft file next to a path.
+
+    The draft replaces the path after complete writing; an error removes the draft.
 
     Raises:
         RecordingError: The draft cannot be written.

@@ -1,7 +1,7 @@
-"""Recordings of other programs as a master, for ``replay`` and for the operators ``bag`` and ``file``.
+"""Foreign: recordings of other programs as the master of ``replay`` and of the operators ``bag`` and ``file``.
 
-This module makes a copy in memory if the pose has another topic or message type, the stamps are useless, the buttons
-are in another Joy message, or rows are damaged.
+This module makes a copy in memory in four cases: the topic or type of the pose differs from ours, the stamps are
+useless, the buttons are in another Joy message, or rows are damaged.
 """
 
 import csv
@@ -27,8 +27,8 @@ def master_of_others(path: Path, bag: reader.Bag | None, prefixes: Sequence[str]
 
     Args:
         path: A recording or table.
-        bag: The opened recording, if it has this package's format.
-        prefixes: Prefix before ``master/measured_cp`` for each of its arms.
+        bag: The opened recording, if its format is that of this package.
+        prefixes: Prefix before ``master/measured_cp`` for each arm of the recording.
 
     Raises:
         RecordingError: The file cannot be read, or contains no motion.
@@ -43,9 +43,9 @@ def master_of_others(path: Path, bag: reader.Bag | None, prefixes: Sequence[str]
 
 
 def columns_of(path: Path) -> ImportOptions:
-    """Options for the columns of a table with the names of an operator's file.
+    """Options for the columns of a table whose columns are named as in a file of an operator.
 
-    For other files the columns are guessed.
+    The columns of other files are guessed.
     """
     if path.suffix.lower() != ".csv" or not path.is_file():
         return ImportOptions()
@@ -94,7 +94,7 @@ def _read(path: Path, arm: str, options: ImportOptions) -> dict[topics.Topic, Se
 
 @contextmanager
 def _options_told(path: Path) -> Iterator[None]:
-    """Add to an error that the advised options are those of ``teleop import``, because a replay has no options."""
+    """Add to an error that its advice refers to options of ``teleop import``; a replay has no such options."""
     try:
         yield
     except TeleopError as error:

@@ -14,14 +14,15 @@ from teleop_exchange.source import Presses, Source
 from teleop_exchange.times import SECOND_NS, Stamps, guessed_unit, is_constant, joined_ns
 
 SAMPLE = 1000
-"""Number of times per block, and of blocks, from which the unit is guessed."""
+"""Largest number of times per block, and largest number of blocks, from which the unit is guessed."""
 MOST_STRANGE = 0.01
 """Largest share of rows with an invalid orientation; a file with more is refused."""
 TOLD_LENGTH = 1e-3
-"""Difference of a quaternion's length from 1 above which it is reported."""
+"""Largest difference of a quaternion's length from 1 that is not reported."""
 _NO_TIME = np.iinfo(np.int64).min
 FARTHEST = 5.0
-"""Largest coordinate of a hand [m]; for larger values an option or the file must state that the unit is metres."""
+"""Largest plausible coordinate of a hand [m]. For larger values an option or the file must state that the unit is
+metres."""
 
 
 @dataclass(eq=False)
@@ -32,7 +33,7 @@ class Gathered:
         rows: Rows (N, 7): position [m] in the file's axes, quaternion w, x, y, z.
         stamp_ns: Times (N,) [ns]; rows without a time are not usable.
         is_usable: Whether all values of a row are numbers (N,).
-        buttons: Pressed or not (N, 3), one row for each pose; None without such columns.
+        buttons: Whether each button is pressed (N, 3), one row for each pose; None without such columns.
         presses: Buttons with their own times; None if there are none.
         told: Texts about what was used and guessed.
         bad_rows: Number of damaged rows that the source left out.
@@ -199,5 +200,5 @@ def _without_stamps(source: Source, parts: _Parts, value: float, told: list[str]
 
 
 def _few(parts: list[NDArray[np.float64] | Stamps]) -> NDArray[np.float64]:
-    """A few of the times in order, for a message."""
+    """Text with a few of the times in order, for a message."""
     return np.concatenate([part[:SAMPLE] for part in parts[:SAMPLE]], dtype=np.float64)

@@ -20,7 +20,7 @@ FAST = 5.0
 """Speed of a hand [m/s] above which the report asks whether the unit is right."""
 SLOW_HZ = 20.0
 SPEED_HZ = 30.0
-"""Rate at which speeds are computed, so that the noise of fast devices does not count."""
+"""Rate at which speeds are computed [Hz]; it is low so that the noise of fast devices does not count."""
 _SHOWN = 5
 
 
@@ -30,22 +30,22 @@ class ImportReport:
 
     Attributes:
         file: Name of the file, without its folder.
-        out: Path of the recording made; None if it is only in memory.
+        out: Path of the new recording; None if it is only in memory.
         counts: Counts of used, changed and left-out rows.
         losses: The counts as texts.
         start_ns: First stamp [ns].
         duration: Time from the first to the last sample [s].
         rate: Samples per second [Hz]: one over the median period.
-        period_ms: Median, 5 % and 95 % of the periods [ms].
+        period_ms: Median, 5th and 95th percentile of the periods [ms].
         range: Extent on x, y, z in the master's axes [m].
         rotation: Largest rotation from the first orientation [rad].
-        speed: Median and 95 % of the speed [m/s], at 30 Hz or the rate if that is lower.
+        speed: Median and 95th percentile of the speed [m/s], computed at 30 Hz or at the rate if it is lower.
         fastest: Largest speed between two samples [m/s].
         gaps: Begin and length [s] of each gap, the longest first.
         told: Texts about what was used, guessed and changed.
         warnings: Texts about possible errors.
         arm: Name of the hand; empty if there is only one hand.
-        others: Reports of the further hands of the same file.
+        others: Reports of the other hands of the file.
     """
 
     file: str
@@ -68,10 +68,10 @@ class ImportReport:
 
     @property
     def recording(self) -> "Recording":
-        """The recording made.
+        """Open the new recording.
 
         Raises:
-            RecordingError: The recording does not exist any more.
+            RecordingError: The recording no longer exists.
         """
         from teleop_core.session.recording import open_recording
 
@@ -108,7 +108,7 @@ class ImportReport:
 
 
 def summary(file: str, out: Path | None, motion: Motion, arm: str = "") -> ImportReport:
-    """Report of a motion."""
+    """Make the report of an imported motion."""
     period = spread_ms(motion.stamp_ns)
     places, turns = motion.poses[:, :3], motion.poses[:, 3:]
     rate = 1e3 / period[0] if period[0] > 0.0 else 0.0

@@ -1,4 +1,4 @@
-"""Motion: an imported hand, cleaned and in the master's axes."""
+"""Motion: the cleaned motion of an imported hand, in the master's axes."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -59,9 +59,9 @@ class Motion:
         gaps: Begin and length [s] of each gap, the longest first.
 
     Raises:
-        RecordingError: The file is missing, damaged or contains no motion. Also if times go back too often or do not
-            change, or fewer than two rows are left.
-        ParameterError: An option does not fit the file.
+        RecordingError: The file is missing or damaged, or contains no motion. The error is also raised if times go back
+            too often or do not change, or if fewer than two rows remain.
+        ParameterError: An option is not allowed for this file.
     """
 
     def __init__(self, path: Path, options: ImportOptions) -> None:
@@ -91,7 +91,7 @@ class Motion:
         gathered.rows = gathered.rows[:0]
 
     def _refuse_several(self, stamps: times.Stamps) -> None:
-        """Refuse several recordings in one table, because they cannot be joined to the motion of one hand.
+        """Raise an error if a table contains several recordings, because they are not the motion of one hand.
 
         Raises:
             RecordingError: There are several recordings; the error states where they begin.
@@ -102,7 +102,7 @@ class Motion:
             raise RecordingError(self._path, f"{reason}; give a file for each, or --stamps log for a bag")
 
     def _check(self) -> None:
-        """Refuse data that are not a motion.
+        """Raise an error if the data are not a motion.
 
         Raises:
             RecordingError: The data are not a motion; the error states the problem.
@@ -123,7 +123,10 @@ class Motion:
             raise RecordingError(self._path, f"holds {what}")
 
     def begin(self, first_ns: int) -> None:
-        """Shift the stamps once so that a time [ns] near 0 becomes 1 s; later times are not changed."""
+        """Shift all stamps so that a first time [ns] near 0 becomes 1 s.
+
+        If the first time is later, nothing is changed.
+        """
         if first_ns >= times.SECOND_NS:
             return
         self.told.append(f"stamps begin at 1 s (in the file at {first_ns / times.SECOND_NS:g} s)")
@@ -144,7 +147,7 @@ class Motion:
     def _in_axes_of_master(self, rows: geometry.Array) -> geometry.Array:
         """Poses (N, 7) of the used rows in the master's axes, with the centre moved to zero."""
         axes, poses = self._options.axis_map(), np.empty((len(self._rows), 7))
-        for begin in range(0, len(poses), ROWS):  # an hour at 1 kHz has 200 MB
+        for begin in range(0, len(poses), ROWS):  # in blocks, because an hour at 1 kHz needs 200 MB
             part = slice(begin, begin + ROWS)
             own = rows[self._rows[part]]
             poses[part, :3] = self._options.scale * product(own[:, :3], axes.T)
@@ -160,7 +163,10 @@ class Motion:
         return poses
 
     def _turned(self, quaternions: geometry.Array, axes: geometry.Array) -> geometry.Array:
-        """Orientations (n, 4) in the master's axes; if the axes are mirrored, the body's axes are mirrored too."""
+        """Orientations (n, 4) in the master's axes.
+
+        If the axes of the file are mirrored, the body's axes are also mirrored.
+        """
         if self._options.handedness == "right":
             turn = np.empty(4)
             geometry.quaternion_from_rotation(np.ascontiguousarray(axes), turn)
@@ -217,7 +223,7 @@ def open_table(path: Path, options: ImportOptions) -> "Table":
     """Table of a file: Parquet, or text.
 
     Raises:
-        RecordingError: It cannot be read.
+        RecordingError: The file cannot be read.
     """
     from teleop_exchange.tables import ParquetTable
     from teleop_exchange.text_table import TextTable

@@ -23,7 +23,7 @@ from teleop_exchange.options import Changes, ImportOptions, Option, options_of
 from teleop_exchange.times import Stamps
 
 ROWS = 20_000
-"""Rows that are written at once."""
+"""Number of rows that are written together."""
 
 
 def import_recording(
@@ -41,20 +41,20 @@ def import_recording(
 
     Args:
         file: File to import.
-        out: Directory of the recording, made here; removed after an error.
+        out: Directory of the new recording; it is removed after an error.
         options: Import options; options that are not given are guessed, and the report states the guesses.
-        arms: Several hands of one file, each with options in addition to the common options: ``{"left": {"position":
-            "1-3"}, "right": {"position": "4-6"}}``. The first is the default arm.
+        arms: Options of each hand of a file with several hands, in addition to the common options: ``{"left":
+            {"position": "1-3"}, "right": {"position": "4-6"}}``. The first hand belongs to the default arm.
         **changes: Options by name: ``position=("x", "y", "z"), unit="mm"``.
 
     Returns:
-        Report of the import: ``report.recording`` is the recording, ``print(report)`` shows the report. For several
-        hands, it is the report of the first hand, and ``report.others`` contains the others.
+        Report of the import. ``report.recording`` is the recording, and ``print(report)`` shows the report. For several
+        hands the report is that of the first hand, and ``report.others`` contains the reports of the other hands.
 
     Raises:
-        RecordingError: The file is missing, damaged, empty, or not a motion; or ``out`` exists.
+        RecordingError: The file is missing, damaged, empty, or not a motion, or ``out`` exists.
         ParameterError: An option is wrong.
-        UnknownNameError: A column or topic does not exist; the error lists the existing ones.
+        UnknownNameError: A column or topic does not exist; the message lists all existing columns or topics.
     """
     path, out = Path(file), Path(out)
     wanted = options_of(options or ImportOptions(), arms, changes)
@@ -70,7 +70,7 @@ def import_recording(
 
 
 def write(motions: Mapping[str, Motion], out: Path, metadata: dict[str, str]) -> None:
-    """Record the motion of each arm, the default arm first. The directory is complete, or it is not made."""
+    """Write the motion of each arm to a recording, the default arm first; after an error no directory remains."""
     streams: dict[Topic, tuple[Stamps, Array]] = {}
     for number, (arm, motion) in enumerate(motions.items()):
         name = arm if number else ""
@@ -90,7 +90,7 @@ def write(motions: Mapping[str, Motion], out: Path, metadata: dict[str, str]) ->
 
 
 def _blocks(streams: Mapping[Topic, tuple[Stamps, Array]]) -> Iterator[dict[Topic, tuple[Stamps, Array, Stamps]]]:
-    """Successive time intervals, each with the samples of every stream."""
+    """Yield successive time intervals, each with the samples of all streams."""
     ends = np.sort(np.concatenate([s[ROWS - 1 :: ROWS] for s, _ in streams.values()]))
     written = dict.fromkeys(streams, 0)
     for end in (*ends, np.iinfo(np.int64).max):
@@ -103,7 +103,7 @@ def _blocks(streams: Mapping[Topic, tuple[Stamps, Array]]) -> Iterator[dict[Topi
 
 
 def command_of(path: Path, out: Path, options: Mapping[str, ImportOptions]) -> str:
-    """Command that makes a recording of a file, with the options of each arm."""
+    """Command line that imports a file, with the options of each arm."""
     words = ["teleop", "import", path.name, "--out", out.name]
     for arm, one in options.items():
         own = one.as_arguments()
@@ -112,7 +112,7 @@ def command_of(path: Path, out: Path, options: Mapping[str, ImportOptions]) -> s
 
 
 def _about(path: Path, out: Path, options: Mapping[str, ImportOptions], report: ImportReport) -> dict[str, str]:
-    """Metadata with which an import can be repeated."""
+    """Metadata that allow an import to be repeated."""
     from teleop_core import __version__
 
     named = {} if "" in options else {ARMS_KEY: " ".join(options)}

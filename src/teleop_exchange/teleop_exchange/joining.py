@@ -1,4 +1,4 @@
-"""Joining: the streams of a recording side by side over time, read in successive time intervals."""
+"""Joining: combines the streams of a recording to rows over time, in successive time intervals."""
 
 import warnings
 from collections.abc import Iterable, Iterator, Mapping
@@ -31,18 +31,18 @@ class Joined:
 
 
 class Streams:
-    """Some topics of a recording, to be read side by side.
+    """Some topics of a recording, whose messages are combined to rows.
 
     Args:
-        recording: Recording that contains them.
-        topics: Their names; all topics with numbers if empty.
+        recording: Recording that contains the topics.
+        topics: Names of the topics; empty for all topics with numbers.
 
     Attributes:
         columns: Names of the columns by topic.
         start_ns: Start time of the recording [ns].
 
     Raises:
-        UnknownNameError: There is no such topic.
+        UnknownNameError: A topic does not exist.
         RecordingError: A topic cannot be read as numbers.
     """
 
@@ -58,7 +58,7 @@ class Streams:
         self.start_ns = self._bag.start_ns
 
     def _first(self) -> dict[str, tuple[str, ...]]:
-        """Columns of the streams, from the first messages of each."""
+        """Columns of the streams, determined from the first messages of each stream."""
         found: dict[str, tuple[str, ...]] = {}
         for block in self._bag.blocks(self._names) if self._names else ():
             for name, series in block.items():
@@ -69,7 +69,7 @@ class Streams:
         return found
 
     def joined(self) -> Iterator[Joined]:
-        """Rows with one row for each time at which a stream has a message.
+        """Yield one row for each time at which a stream has a message.
 
         Reports keep their values until the next report.
         """
@@ -92,9 +92,9 @@ class Streams:
         return newest(times, stream.log_ns, stream.values)
 
     def sampled(self, rate: float) -> Iterator[Joined]:
-        """Rows at a rate [Hz] from the start on, each with the newest message of every topic.
+        """Yield rows at a rate [Hz] from the start of the recording, each with the newest message of every topic.
 
-        If no message came for more than :data:`LONGEST_GAP_NS`, this gap has no rows.
+        A gap of more than :data:`LONGEST_GAP_NS` without any message has no rows.
         """
         step, before = SECOND_NS / rate, np.array([self.start_ns])
         last: dict[str, Series] = {}
@@ -124,7 +124,7 @@ class Streams:
         return newest(times, logs, np.concatenate([series.values for series in known]))
 
     def _pieces(self) -> Iterator[dict[str, Series]]:
-        """Successive time intervals, each with the streams that have messages in it."""
+        """Yield successive time intervals, each with the streams that have messages in this interval."""
         if not self._names:
             yield {name: _series(stream) for name, stream in self._reports.items()}
             return
@@ -135,7 +135,7 @@ class Streams:
                 yield piece
 
     def _is_in_order(self) -> bool:
-        """Whether each chunk of the file begins after, or shortly before, the end of the previous chunk."""
+        """Whether each chunk of the file begins after the end of the previous chunk, or shortly before this end."""
         newest = -(2**62)
         for block in () if isinstance(self._bag, memory.MemoryBag) else self._bag.blocks(self._names):
             logs = [series.log_ns for series in block.values() if len(series)]
@@ -151,7 +151,7 @@ def _numbers(since_ns: Stamps, step: float, first: int) -> Stamps:
     Args:
         since_ns: Times of all messages since row 0 (N,), rising [ns].
         step: Time between two rows [ns].
-        first: Smallest number.
+        first: Smallest number of a row.
     """
     ends = np.flatnonzero(np.diff(since_ns.astype(np.float64)) > LONGEST_GAP_NS)
     if not len(ends):
@@ -189,7 +189,7 @@ def is_report(bag: reader.Bag, name: str) -> bool:
 
 
 def columns_of(bag: reader.Bag, name: str, series: Series) -> tuple[str, ...]:
-    """Names of the columns of a stream, as a recording calls them."""
+    """Names of the columns of a stream in a recording."""
     kind = kind_of(name, bag.topics[name].type)
     assert kind is not None
     if kind.has_joints:
@@ -199,7 +199,7 @@ def columns_of(bag: reader.Bag, name: str, series: Series) -> tuple[str, ...]:
 
 
 def newest(times: Stamps, logs: Stamps, rows: Array) -> Array:
-    """The newest row at each time; NaN before the first."""
+    """The newest row at each time; NaN before the first row."""
     at = np.searchsorted(logs, times, side="right") - 1
     found = np.full((len(times), rows.shape[1]), np.nan)
     found[at >= 0] = rows[at[at >= 0]]

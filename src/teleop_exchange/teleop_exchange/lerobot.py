@@ -1,9 +1,9 @@
 """LeRobot data set: recordings as episodes for learning, in version 3.0 of the format.
 
-It is a folder with ``meta/info.json`` (features, rate, counts), ``meta/stats.json``,
-``meta/tasks.parquet``, ``meta/episodes`` (a row per episode) and ``data`` (a row per frame, a group
-of rows per episode). There are no pictures. The format is that of the ``lerobot`` package, version
-0.4, which reads the folder offline: ``LeRobotDataset("name", root=FOLDER)``.
+A data set is a folder with ``meta/info.json`` (features, rate, counts), ``meta/stats.json``, ``meta/tasks.parquet``,
+``meta/episodes`` (a row for each episode) and ``data`` (a row for each frame, a group of rows for each episode). It
+contains no pictures. The ``lerobot`` package, version 0.4, reads the folder offline: ``LeRobotDataset("name",
+root=FOLDER)``.
 """
 
 import json
@@ -79,8 +79,8 @@ def write_data_set(
     """Write a data set.
 
     Args:
-        recordings: Its episodes, all with the same joints.
-        out: Its folder, made here.
+        recordings: Recordings that become the episodes; all must have the same joints.
+        out: Folder of the new data set.
         fps: Frames per second.
         action: ``joints`` or ``tip``.
         task: Description of the task.
@@ -89,7 +89,7 @@ def write_data_set(
         Number of frames, and the features that are not counters.
 
     Raises:
-        RecordingError: A recording lacks a needed topic, or has other joints.
+        RecordingError: A recording lacks a needed topic, or its joints differ from those of the first recording.
     """
     files, episodes, frames = _Files(out / "data"), [], 0
     names: dict[str, list[str]] = {}
@@ -118,7 +118,7 @@ def write_data_set(
 def _episode(recording: Recording, fps: int, action: str) -> tuple[dict[str, list[str]], Numbers]:
     """Names and numbers (frames, columns) of the features of a recording.
 
-    A frame contains the newest messages at its time; frames before the first message of any topic are left out.
+    A frame contains the newest message of each topic. Frames at which a topic has had no message are left out.
     """
     bag, names, topics = recording.bag, {STATE: list[str](), ACTION: list[str]()}, []
     told = SLAVE_SERVO_JP if action == "joints" else SLAVE_SERVO_CP

@@ -46,7 +46,7 @@ def without_unit(name: str) -> tuple[str, str]:
 
 
 def find_time(names: Sequence[str]) -> tuple[int, ...]:
-    """Column of the time, or columns of seconds and nanoseconds; empty if no name indicates a time."""
+    """Column of the time, or the two columns of seconds and nanoseconds; empty if no name indicates a time."""
     ends = [plain(name).rpartition("_")[2] for name in names]
     for seconds, rest in (("sec", "nanosec"), ("secs", "nsecs"), ("sec", "nsec")):
         raw = [re.sub(r"[^0-9a-z]+", "_", name.lower()).rpartition("_")[2] for name in names]
@@ -63,7 +63,7 @@ def find_time(names: Sequence[str]) -> tuple[int, ...]:
 
 
 def find_positions(names: Sequence[str]) -> list[tuple[int, ...]]:
-    """Columns of x, y and z of all positions that the names suggest equally well, in their order."""
+    """Columns of x, y and z of all positions that the names suggest equally well, in the order of the file."""
     found = _series(names, "xyz", without="w") or _series(names, "xyz")
     good = [(stem, columns) for stem, columns in found.items() if not _NOT_PLACES.search(stem)]
     named = [columns for stem, columns in found.items() if _PLACES.search(stem)]
@@ -72,7 +72,7 @@ def find_positions(names: Sequence[str]) -> list[tuple[int, ...]]:
 
 
 def _after_a_name(names: Sequence[str]) -> list[tuple[int, ...]]:
-    """Adjacent columns ``Tool X``, ``Y``, ``Z``, of which only the first contains the object's name."""
+    """Find adjacent columns such as ``Tool X``, ``Y``, ``Z``; only the first name contains the object's name."""
     plain_names = [plain(name) for name in names]
     return [
         (i, i + 1, i + 2)
@@ -89,7 +89,7 @@ def find_quaternion(names: Sequence[str]) -> tuple[int, ...]:
 
 
 def _numbered(names: Sequence[str]) -> tuple[int, ...]:
-    """Columns q0, q1, q2, q3, of which the first is w by custom."""
+    """Find columns q0, q1, q2, q3; by convention the first is w."""
     whole = [plain(name) for name in names]
     for start in ("q", "q_", "quat_", "quaternion_", "quat", "orientation_"):
         if all(f"{start}{i}" in whole for i in range(4)):
@@ -144,7 +144,7 @@ def find_episode(names: Sequence[str]) -> int | None:
 
 
 def unit_of(names: Sequence[str], columns: Sequence[int]) -> str:
-    """Unit that all these columns have in their names; empty if none or not the same."""
+    """Unit in the names of the given columns; empty if a name has no unit or the units differ."""
     units = {without_unit(names[column])[1] for column in columns}
     return units.pop() if len(units) == 1 else ""
 

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 Columns = tuple[str, ...]
 """Names of columns, or their numbers, counted from 1; ``4-12`` means nine columns."""
 Option = str | int | float | bool | None | tuple[str | int, ...] | list[str] | list[int]
-"""Value of one option; numbers of columns may be whole numbers."""
+"""Value of one option; a column may be given as an integer."""
 Changes = Mapping[str, Option]
 """Import options by name."""
 
@@ -52,44 +52,47 @@ _TUPLES = (*_COUNTS, "axes")
 class ImportOptions:
     """Options of an import: what is read from a file, and how it is converted.
 
-    Columns are given by name or by number, counted from 1; ``"4-12"`` means nine columns. Options that are not given
-    are guessed from the names, and the report states the guesses.
+    Columns are given by name, or by number counted from 1; ``"4-12"`` stands for nine columns. Options that are not
+    given are guessed from the names, and the report lists the guesses.
 
     Attributes:
-        time: Column of the time; or two, whole seconds and nanoseconds.
+        time: Column of the time, or two columns with whole seconds and nanoseconds.
         rate: Samples per second [Hz], for tables without a time.
         time_unit: ``auto``, ``s``, ``ms``, ``us`` or ``ns``.
-        stamps: Times of a bag's messages: stamps of the ``header``, or times of the ``log``.
+        stamps: Source of the times of a bag's messages: ``header`` for their stamps, ``log`` for their times of
+            recording.
         position: Three columns.
-        unit: Unit of the position: ``auto`` (from the names, else m), ``m``, ``cm``, ``mm``, ``in``.
+        unit: Unit of the position: ``m``, ``cm``, ``mm``, ``in``, or ``auto`` (from the names, else m).
         quaternion: Four columns in the order of ``quaternion_order``.
-        quaternion_order: ``wxyz`` or ``xyzw``; ``auto``: from the names, else wxyz.
+        quaternion_order: ``wxyz``, ``xyzw``, or ``auto`` (from the names, else wxyz).
         matrix: Nine columns of a rotation matrix.
-        matrix_order: ``row`` by row, or ``column`` by column.
+        matrix_order: Order of the matrix's columns in the file: ``row`` (row by row) or ``column`` (column by column).
         euler: Order of the axes and three columns: ``("xyz", "roll", "pitch", "yaw")``. Small letters are rotations
             about fixed axes, capital letters about the body's axes (as in SciPy).
         rotation_vector: Three columns.
         angles: Unit of Euler angles and rotation vectors: ``auto``, ``rad`` or ``deg``.
-        orientation: ``auto``: guessed if no columns are given; ``none``: constant.
-        clutch: Column of the button, pressed above ``threshold``; empty for none.
-        fixture: Column of the fixture button, as for ``clutch``.
-        mode: Column of the mode button, as for ``clutch``.
+        orientation: ``auto`` guesses the columns if none are given; ``none`` uses a constant orientation.
+        clutch: Column of the clutch button, which is pressed above ``threshold``; empty for no button.
+        fixture: Column of the fixture button, with the same rules as ``clutch``.
+        mode: Column of the mode button, with the same rules as ``clutch``.
         threshold: Value above which a button counts as pressed.
-        skip: Lines to leave out at the beginning of a text.
-        episode: Number of the recording in a table that contains several; None if it contains one.
-        topic: Topic of the poses in a bag, or the end of its name; empty if there is only one.
-        frame: Child frame, for a topic that has several.
-        parent: Parent frame of the poses, for a topic that has several.
-        buttons_topic: Topic of the Joy messages, or the end of its name; empty if there is at most one. If several
-            names are given, separated by ``|``, the first existing topic is used; an empty last name means no buttons.
-        buttons: Indices of the Joy's buttons: ``"clutch=0,mode=2"``; ``none``: no buttons.
+        skip: Number of lines to leave out at the beginning of a text file.
+        episode: Number of the recording in a table of several recordings; None for a table of one recording.
+        topic: Topic of the poses in a bag, or the end of its name; empty if only one topic contains poses.
+        frame: Child frame of the poses; needed if the topic contains several child frames.
+        parent: Parent frame of the poses; needed if the topic contains several parent frames.
+        buttons_topic: Topic of the Joy messages, or the end of its name; empty if at most one topic contains them. If
+            several names are given, separated by ``|``, the first existing topic is used; an empty last name allows a
+            bag without buttons.
+        buttons: Indices of the buttons in a Joy message, such as ``"clutch=0,mode=2"``; ``none`` for no buttons.
         axes: The master's x, y and z as axes of the file: ``("+y", "-x", "+z")``.
-        handedness: Handedness of the file's axes: ``right``; or ``left``, as in game engines. With ``left``, ``axes``
-            must mirror, and orientations are mirrored too.
+        handedness: Handedness of the file's axes: ``right``, or ``left`` as in game engines. With ``left``, ``axes``
+            must mirror, and orientations are also mirrored.
         scale: Factor for all positions.
-        center: Point that is moved to zero: ``mean`` of the positions, ``middle`` of their range, or their ``start``;
-            ``keep``: positions are not moved.
-        backwards: Rows whose time goes back: ``refuse``, ``drop``, ``sort``; ``auto``: drop up to 1 %, refuse more.
+        center: Point that is moved to zero: ``mean`` of the positions, ``middle`` of their range, or their ``start``.
+            With ``keep``, positions are not moved.
+        backwards: Treatment of rows whose time goes back: ``refuse``, ``drop`` or ``sort``. ``auto`` drops up to 1 % of
+            the rows, and refuses more.
         gap: Gaps longer than this number of periods are reported.
     """
 
@@ -147,7 +150,8 @@ class ImportOptions:
         """Matrix (3, 3) from the file's axes to the master's axes; it mirrors left-handed axes.
 
         Raises:
-            ParameterError: An axis is used twice, or the map mirrors but must not, or does not mirror but must.
+            ParameterError: An axis is used twice, or the map mirrors although ``handedness`` is ``right``, or the map
+                does not mirror although it is ``left``.
         """
         import numpy as np  # this also imports compiled kernels, which `--help` does not need
 
@@ -198,7 +202,7 @@ class ImportOptions:
         """Copy of the options with some values changed.
 
         Raises:
-            UnknownNameError: There is no such option, or a name is not in its list.
+            UnknownNameError: An option does not exist, or the value of an option is not in its list of names.
             ParameterError: A value is not allowed.
         """
         known = [field.name for field in fields(self)]
@@ -221,12 +225,12 @@ def options_of(base: ImportOptions, arms: Mapping[str, Changes], changes: Change
     """Options of each arm, the default arm first; ``{"": ...}`` if the only arm has no name.
 
     Args:
-        base: Options that are changed.
+        base: Common options of all hands.
         arms: Additional options of each hand.
         changes: Changes for all hands.
 
     Raises:
-        UnknownNameError: There is no such option.
+        UnknownNameError: An option does not exist.
         ParameterError: The name of an arm is not allowed in a topic.
     """
     for name in arms:

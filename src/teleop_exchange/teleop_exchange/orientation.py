@@ -1,6 +1,6 @@
 """Orientation: converts orientations in any notation to unit quaternions w, x, y, z, block by block.
 
-Values that are not a valid rotation become NaN and are counted as strange; missing values stay NaN.
+An orientation that is not a valid rotation becomes NaN and is counted as strange. Missing orientations stay NaN.
 """
 
 import math
@@ -13,7 +13,7 @@ from teleop_core.kernels.geometry import quaternion_from_rotation
 
 TOLERANCE = 0.1
 """Largest deviation of a quaternion's length from 1, or of a matrix from a rotation matrix."""
-_MISSING = 1e-6  # shorter quaternions mean that no orientation was measured
+_MISSING = 1e-6  # length of a quaternion below which no orientation was measured
 
 
 @dataclass
@@ -22,10 +22,11 @@ class Attitudes:
 
     Attributes:
         kind: ``quaternion``, ``matrix``, ``euler``, ``rotation_vector`` or ``none``.
-        order: ``wxyz`` or ``xyzw``; ``row`` or ``column``; or the order of Euler angles.
+        order: Order of the numbers: ``wxyz`` or ``xyzw`` of a quaternion, ``row`` or ``column`` of a matrix, or the
+            axes of Euler angles.
         degrees: Whether angles are in degrees.
         strange: Number of rows that are not valid rotations.
-        mirrored: Number of these rows that are mirrored.
+        mirrored: Number of rows that are mirrored rotations; they are included in ``strange``.
         longest: Largest difference of a used quaternion's length from 1.
     """
 
@@ -38,7 +39,7 @@ class Attitudes:
 
     @property
     def width(self) -> int:
-        """Numbers in a row."""
+        """Number of columns of an orientation."""
         return {"quaternion": 4, "matrix": 9, "none": 0}.get(self.kind, 3)
 
     def quaternions(self, rows: Array) -> Array:

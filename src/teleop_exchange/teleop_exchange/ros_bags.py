@@ -1,7 +1,7 @@
 """ROS bags message by message: this package's reader reads MCAP, the rosbags library reads other storages.
 
-This package's reader is faster, and no wrong length in a file leads it beyond the file's end. The library's reader of
-ROS 1 gets a file object that prevents such reads too.
+This package's reader is faster, and a wrong length in a damaged file never makes it read beyond the end of the file.
+The library's reader of ROS 1 bags gets a file object that also prevents such reads.
 """
 
 import io
@@ -28,8 +28,8 @@ class RosBag(Protocol):
     """An opened recording of ROS.
 
     Attributes:
-        types: Topics with at least one message, to their message types.
-        typestore: Message types as rosbags knows them.
+        types: Message type of each topic with at least one message.
+        typestore: Message types of the bag, from rosbags.
         is_ros2: Whether messages are CDR; False for messages of ROS 1.
     """
 
@@ -70,7 +70,7 @@ class ForeignBag:
         """Messages of a topic in the order of the file: time of recording [ns], bytes."""
         chosen = [c for c in self._reader.connections if plain(c.topic) == topic]
         count, listed = 0, sum(connection.msgcount for connection in chosen)
-        # There is only one file, so its reader need not be merged with others.
+        # Only one file is read, so the merge of several readers is skipped.
         for _, log_ns, data in self._reader.readers[0].messages(connections=chosen):
             count += 1
             yield log_ns, data
@@ -82,7 +82,7 @@ def is_plain_mcap(path: Path) -> bool:
     """Whether a path is MCAP that this package's reader accepts: without compression of whole files or messages.
 
     Raises:
-        RecordingError: Its ``metadata.yaml`` is malformed.
+        RecordingError: The ``metadata.yaml`` of the recording is malformed.
     """
     if not path.is_dir():
         return path.suffix.lower() == ".mcap"
@@ -95,7 +95,7 @@ def opened_by_rosbags(path: Path) -> Iterator[ForeignBag]:
     """A ROS 1 ``.bag``, a ``.db3``, or a recording whose files or messages are compressed.
 
     Raises:
-        RecordingError: Messages of a ``.db3`` are still in a file beside it, which is not read.
+        RecordingError: Some messages of a ``.db3`` are still in its log file, which is not read.
     """
     for file in [path] if path.suffix == ".db3" else sorted(path.glob("*.db3")):
         _refuse_unmerged(file)
@@ -105,7 +105,7 @@ def opened_by_rosbags(path: Path) -> Iterator[ForeignBag]:
 
 
 def _refuse_unmerged(file: Path) -> None:
-    """Refuse an SQLite file whose last changes are in its log: its recorder was killed."""
+    """Raise an error if the last changes of an SQLite file are still in its log, because its recorder was killed."""
     for end in ("-wal", "-journal"):
         log = file.with_name(file.name + end)
         if log.exists() and log.stat().st_size:
@@ -114,7 +114,7 @@ def _refuse_unmerged(file: Path) -> None:
 
 
 class _BoundedFile(io.BufferedReader):
-    """File that limits each read to its remaining bytes, because a reader may trust any length."""
+    """File that limits each read to the remaining bytes, because a reader may trust wrong lengths."""
 
     def __init__(self, path: Path) -> None:
         super().__init__(io.FileIO(path))
@@ -130,5 +130,5 @@ class _BoundedPath(type(Path())):  # type: ignore[misc]
     """Path that opens a :class:`_BoundedFile`; rosbags accepts any path with this interface."""
 
     def open(self, mode: str = "r", *arguments: Any, **named: Any) -> Any:
-        """Open for reading bytes, or as any path does."""
+        """Open the file; for reading bytes, the result is a :class:`_BoundedFile`."""
         return _BoundedFile(self) if mode == "rb" else super().open(mode, *arguments, **named)

@@ -1,4 +1,4 @@
-"""Source: file from which an import reads poses and buttons of a hand, block by block."""
+"""Source: a file from which an import reads poses and buttons of a hand, block by block."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -20,8 +20,8 @@ class Block:
         time: Times (n,) in the file's unit; NaN if missing.
         position: Positions (n, 3) in the file's unit and axes.
         quaternion: Orientations (n, 4), w, x, y, z; NaN if missing.
-        buttons: Pressed or not (n, 3): clutch, fixture, mode; None if there are no columns of them.
-        log_ns: Times of recording (n,) [ns], for bags.
+        buttons: Whether clutch, fixture and mode are pressed (n, 3); None if the file has no columns of buttons.
+        log_ns: Times of recording (n,) [ns] of a bag.
     """
 
     time: Array | times.Stamps
@@ -38,7 +38,7 @@ class Presses:
     Attributes:
         stamp_ns: Stamps (n,) [ns].
         log_ns: Times of recording (n,) [ns].
-        pressed: Clutch, fixture, mode (n, 3).
+        pressed: Whether clutch, fixture and mode are pressed (n, 3).
     """
 
     stamp_ns: times.Stamps
@@ -47,16 +47,16 @@ class Presses:
 
 
 class Source(Protocol):
-    """A file being imported.
+    """A file that is imported.
 
     Attributes:
         path: Path of the file.
         told: Texts about what was used.
         time_unit: Unit of the times: ``auto`` if it must be guessed.
         unit: Unit of the positions.
-        is_unit_said: Whether the file or an option states the unit; otherwise metres are assumed.
-        attitudes: Converter of the orientations; counts invalid orientations.
-        has_time: Whether blocks have times.
+        is_unit_said: Whether the file or an option states the unit; if not, metres are assumed.
+        attitudes: Converter of the orientations, which also counts invalid orientations.
+        has_time: Whether the blocks contain times.
     """
 
     path: Path
@@ -74,13 +74,13 @@ class Source(Protocol):
         """Buttons with their own stream; None if there are none. Must be called after the blocks were read."""
 
     def check(self, finite: Array) -> None:
-        """Refuse columns without any number.
+        """Raise an error if a column contains no number.
 
         Args:
             finite: Number of finite values of x, y, z and the orientation (4,).
 
         Raises:
-            RecordingError: A column contains no number; the error names the columns.
+            RecordingError: A column contains no number; the message names all such columns.
         """
 
     @property

@@ -1,4 +1,4 @@
-"""Table source: a table whose columns are the motion of a hand, named or guessed."""
+"""Table source: a table with the motion of a hand; its columns are given by options or guessed."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -18,7 +18,7 @@ _TOLD = 8  # largest number of columns that a message lists by name
 
 @dataclass(frozen=True)
 class Columns:
-    """Columns of a table by their meaning; empty or None for missing ones."""
+    """Columns of a table by their meaning; missing columns are empty or None."""
 
     time: tuple[int, ...]
     position: tuple[int, ...]
@@ -35,8 +35,8 @@ class TableSource:
 
     Raises:
         UnknownNameError: A column does not exist.
-        RecordingError: The table has no time and no rate is given, or it has no position.
-        ParameterError: An option does not fit a table.
+        RecordingError: The table contains no time and no rate is given, or the table contains no position.
+        ParameterError: An option is not allowed for a table.
     """
 
     def __init__(self, table: tables.Table, options: ImportOptions) -> None:
@@ -85,8 +85,8 @@ class TableSource:
     def _position_by_place(self) -> tuple[int, ...]:
         """Columns of a table without names, chosen by the usual layout for its number of columns.
 
-        Three: x, y, z. Four: time, x, y, z. Eight: time, x, y, z and a quaternion, as in the benchmark of Sturm and
-        others 2012. Seven: x, y, z and a quaternion.
+        Three columns are x, y, z. Four columns are time, x, y, z. Seven columns are x, y, z and a quaternion. Eight
+        columns are time, x, y, z and a quaternion, as in the benchmark of Sturm and others 2012.
         """
         width = len(self._table.names)
         if width in {3, 7}:
@@ -133,7 +133,7 @@ class TableSource:
         """Order of the columns of a quaternion.
 
         Raises:
-            ParameterError: The names of the columns indicate another order than the option.
+            ParameterError: The order in the names of the columns differs from the option.
         """
         wanted = self._options.quaternion_order
         letters = [names.plain(self._table.names[column])[-1:] for column in columns]
@@ -171,7 +171,7 @@ class TableSource:
         columns = tuple(range(width - 4, width))
         if width in {7, 8} and not self._options.position and self._are_unit(columns):
             wanted = self._options.quaternion_order
-            order = "xyzw" if wanted == "auto" else wanted  # the order of that benchmark
+            order = "xyzw" if wanted == "auto" else wanted  # the order of the benchmark of Sturm and others
             self._told(f"quaternion in the order {order}", columns)
             return Attitudes("quaternion", order), columns
         self.told.append("orientation: none found, constant")
@@ -273,7 +273,7 @@ class TableSource:
         """All rows in the order of the file.
 
         Raises:
-            RecordingError: A cell is no number, or the file is damaged.
+            RecordingError: A cell is not a number, or the file is damaged.
         """
         c = self._columns
         order = [*c.time, *c.position, *c.orientation, *c.buttons.values()]
@@ -301,13 +301,13 @@ class TableSource:
         return pressed
 
     def check(self, finite: Array) -> None:
-        """Refuse columns without any number.
+        """Raise an error if a column contains no number.
 
         Args:
             finite: Number of finite values of x, y, z and the orientation (4,).
 
         Raises:
-            RecordingError: A column contains no number; the error names the columns.
+            RecordingError: A column contains no number; the message names all such columns.
         """
         at = [self._table.names[column] for column in self._columns.position]
         if empty := [name for name, count in zip(at, finite[:3], strict=True) if not count]:
@@ -319,7 +319,7 @@ class TableSource:
 
 
 def _time(columns: Sequence[tables.Numbers], count: int) -> tables.Numbers:
-    """Times of one column, or times [ns] of a column of seconds and a column of nanoseconds; zeros without a column."""
+    """Times of one column, or times [ns] from a column of seconds and one of nanoseconds; zeros without a column."""
     if not columns:
         return np.zeros(count)
     if len(columns) == 1:

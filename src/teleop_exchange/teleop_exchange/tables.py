@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from teleop_core.base import RecordingError, UnknownNameError, damage_told
 
 Numbers = NDArray[np.float64] | NDArray[np.int64]
-"""A column; whole numbers if the file contains whole numbers, such as times in nanoseconds."""
+"""Values of a column; they are integers if the file contains integers, such as times in nanoseconds."""
 ROWS = 65_536
 """Approximate number of rows of a block."""
 SAMPLE = 1000
@@ -44,7 +44,7 @@ class Table(Protocol):
         """Some columns, block by block.
 
         Raises:
-            RecordingError: A cell is no number, or the file is damaged.
+            RecordingError: A cell is not a number, or the file is damaged.
         """
 
 
@@ -52,7 +52,7 @@ def column_of(table: Table, name: str, option: str) -> int:
     """Column by its name or, counted from 1, by its number.
 
     Raises:
-        UnknownNameError: There is no such column; the error lists the existing columns.
+        UnknownNameError: The column does not exist; the message lists all columns.
     """
     if name in table.names:
         return table.names.index(name)
@@ -77,7 +77,7 @@ def unique(names: Sequence[str]) -> tuple[str, ...]:
 
 
 def numbers(column: "pa.ChunkedArray | pa.Array") -> Numbers:
-    """Column of Arrow as numbers; missing values are NaN."""
+    """Convert a column of Arrow to numbers; missing values become NaN."""
     kind = column.type
     if pa.types.is_timestamp(kind):
         column = column.cast(pa.timestamp("ns", tz=kind.tz)).cast(pa.int64())
@@ -132,7 +132,7 @@ class ParquetTable:
 
 
 def flat(batch: pa.RecordBatch) -> pa.RecordBatch:
-    """Batch without nested columns: each part of a structure, and of lists of one length, becomes a column."""
+    """Return a batch without nested columns; each part of a structure or of lists of equal length becomes a column."""
     names: list[str] = []
     columns: list[pa.Array] = []
     for name, column in zip(batch.schema.names, batch.columns, strict=True):

@@ -1,4 +1,4 @@
-"""Text tables: CSV and similar files; separator, head, decimal sign and compression are detected."""
+"""Text tables: CSV and similar files, with detection of separator, head, decimal sign and compression."""
 
 import csv
 import re
@@ -23,7 +23,7 @@ _MISSING = ("", "nan", "NaN", "NAN", "-nan", "NA", "N/A", "n/a", "null", "NULL",
 _NUMBER = re.compile(r"[+-]?(\d+[.,]?\d*|[.,]\d+)([eE][+-]?\d+)?")
 _NAN = re.compile(r"[+-]?(nan|inf|infinity|null|none|n/?a)", re.I)
 _CLOCK = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d[\d:.]*\s?(Z|[+-]\d\d:?\d\d)?")
-_EXACT = 1 << 53  # whole numbers up to this one are also exact as floating-point numbers
+_EXACT = 1 << 53  # largest integer up to which floating-point numbers are exact
 _BLANK = r"\s+"
 
 
@@ -48,10 +48,10 @@ class Form(NamedTuple):
 
 
 class TextTable:
-    """A text of rows; see :class:`~teleop_exchange.tables.Table`.
+    """A table in a text file; see :class:`~teleop_exchange.tables.Table`.
 
     Args:
-        path: The file; compressed by gzip, bzip2 or zstd too.
+        path: The file; it may be compressed by gzip, bzip2 or zstd.
         skip: Lines to leave out at the beginning.
 
     Raises:
@@ -153,7 +153,8 @@ class TextTable:
             return pa.timestamp("ns", tz="UTC" if clock[1] else None)
         if self._is_truth(column):
             return pa.bool_()
-        # Whole numbers at the beginning do not mean that all numbers are whole, unless they need all digits.
+        # If a column begins with integers, later numbers may have decimals. Only integers that need all digits are
+        # read as integers.
         sample = self.sample(column)
         is_long = sample.dtype.kind == "i" and np.abs(sample).max() > _EXACT
         return pa.int64() if is_long else pa.float64()
@@ -163,10 +164,10 @@ class TextTable:
         return "skip"
 
     def _refuse_cell(self, error: ValueError) -> None:
-        """Raise an error with the column and its bad cell, if a library's error names them.
+        """Raise an error with the column and its bad cell, if a library's error names both.
 
         Raises:
-            RecordingError: The library's error names them.
+            RecordingError: The library's error names the column and the cell.
         """
         text = " ".join(str(error).split())
         for pattern in (r"column #(\d+).*?invalid value '([^']*)'", r"to float.*?(): '([^']*)'"):
@@ -178,7 +179,7 @@ class TextTable:
 
 
 def _clock_ns(column: "pd.Series[str]") -> Numbers:
-    """Dates as times since 1970 [ns]; without a zone they are UTC."""
+    """Convert dates to times since 1970 [ns]; dates without a time zone are UTC."""
     clock = pd.to_datetime(column, format="ISO8601", utc=True).dt.as_unit("ns")
     stamps = np.asarray(clock.astype("int64"), np.int64)
     return np.where(clock.isna(), np.nan, stamps) if clock.hasnans else stamps
@@ -202,7 +203,7 @@ def recognised(path: Path, text: str, skip: int = 0) -> Form:
     rows = [cells(line, separator) for line in body]
     with_numbers = [row for row in rows if _has_numbers(row)]
     width = Counter(map(len, with_numbers)).most_common(1)[0][0] if with_numbers else 0
-    # Lines before the table may contain numbers too, like `NO_OF_FRAMES 720`, but fewer numbers than a row.
+    # Lines before the table, such as `NO_OF_FRAMES 720`, may contain numbers, but fewer than a row of the table.
     begin = next((i for i, row in enumerate(rows) if len(row) == width and _has_numbers(row)), None)
     if begin is None:
         reason = "contains no rows of numbers" if len(rows) < 3 else "contains text, not numbers"
@@ -228,8 +229,7 @@ def _lines_before(lines: list[str], first: int, count: int) -> int:
 def _head(rows: list[list[str]], width: int) -> tuple[str, ...]:
     """Names of the columns from the lines before the numbers; units from a second line are appended to the names.
 
-    The line of names is the last line that has as many cells as there are columns, except for a line of units below
-    it.
+    The line of names is the last line with as many cells as the table has columns. A line of units may follow it.
     """
     padded = [[*row, ""] if len(row) == width - 1 else _cut(row, width) for row in rows]
     fitting = [row for row in padded if len(row) == width and any(cell.strip() for cell in row)]
@@ -243,7 +243,7 @@ def _head(rows: list[list[str]], width: int) -> tuple[str, ...]:
 
 
 def _cut(row: list[str], width: int) -> list[str]:
-    """Row without empty cells after the first ``width`` cells, for example of a line that ends with a separator."""
+    """Remove empty cells after the first ``width`` cells of a row; they come from a separator at the end of a line."""
     return row if any(cell.strip() for cell in row[width:]) else row[:width]
 
 
@@ -277,7 +277,7 @@ def _has_decimal_commas(rows: list[list[str]]) -> bool:
 
 
 def number(cell: str, decimal: str) -> float:
-    """Number in a cell; NaN for anything else."""
+    """Number in a cell; NaN if the cell is not a number."""
     try:
         return float(cell.strip().replace(decimal, "."))
     except ValueError:

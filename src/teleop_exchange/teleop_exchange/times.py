@@ -15,10 +15,10 @@ from teleop_exchange.options import TIMES_NS
 Stamps = NDArray[np.int64]
 SECOND_NS = 1_000_000_000
 RATES_HZ = (5.0, 3000.0)
-"""Smallest and largest plausible rate of a hand's recording; the unit of the times is guessed from them."""
-_EPOCH_S = 3e8  # 1979: later times are seconds since 1970
-_LONGEST_S = 60.0  # longest time between two samples
-_STRETCH = 10  # rows; shorter parts do not count as a separate recording
+"""Smallest and largest plausible rate of a hand's recording [Hz]; the guess of the time unit uses them."""
+_EPOCH_S = 3e8  # a time in 1979 [s]; larger times are seconds since 1970
+_LONGEST_S = 60.0  # longest plausible time between two samples [s]
+_STRETCH = 10  # smallest number of rows of a separate recording
 
 
 class Unit(NamedTuple):
@@ -29,7 +29,7 @@ class Unit(NamedTuple):
 
 
 def guessed_unit(raw: NDArray[np.float64] | Stamps) -> Unit:
-    """Unit of times, guessed from their size if they are clock times, else from their steps.
+    """Unit of times, guessed from their size if they are clock times, else from the steps between them.
 
     Args:
         raw: Times (N,) in the file's unit, finite.
@@ -99,9 +99,9 @@ class Order:
 
 
 def ordered(stamps: Stamps, *, is_sorted: bool = False) -> Order:
-    """Rows with increasing times: of equal times, the first row is used.
+    """Choose rows with increasing times; of rows with equal times, the first is used.
 
-    Otherwise as few rows as possible are left out.
+    As few rows as possible are left out.
 
     Args:
         stamps: Times (N,) [ns] in the order of the file.
@@ -120,10 +120,10 @@ def ordered(stamps: Stamps, *, is_sorted: bool = False) -> Order:
 def _longest_rising(stamps: Stamps) -> NDArray[np.int64]:
     """Largest set of rows in which no time is before the time of an earlier row (Fredman 1975).
 
-    Thus a stamp from the future removes only its own row, not all rows until that time.
+    So a wrong stamp in the future removes only its own row, not all rows until this time.
     """
     newest, oldest = np.maximum.accumulate(stamps), np.minimum.accumulate(stamps[::-1])[::-1]
-    is_kept = (stamps == newest) & (stamps == oldest)  # no other row contradicts these
+    is_kept = (stamps == newest) & (stamps == oldest)  # rows whose order agrees with all other rows
     others = np.flatnonzero(~is_kept)
     before = np.empty(len(others), np.int64)
     ends: list[int] = []  # smallest last time of each number of rows, and the index of that row
@@ -142,8 +142,8 @@ def _longest_rising(stamps: Stamps) -> NDArray[np.int64]:
 def restarts(stamps: Stamps) -> NDArray[np.int64]:
     """Rows at which another recording begins: the time jumps back and then increases again.
 
-    The time must jump back by more than half of the preceding stretch, and then continue within it. Rows that are only
-    stored late do not do this. Single rows with another time do not count.
+    At such a row the time jumps back by more than half of the preceding stretch, and then continues within this
+    stretch. Rows that are only stored late do not meet this condition. Single rows with a different time do not count.
 
     Args:
         stamps: Times (N,) [ns] in the order of the file.
@@ -164,7 +164,7 @@ def gaps(stamps: Stamps, periods: float) -> tuple[tuple[float, float], ...]:
     """Gaps: intervals without a sample that are longer than ``periods`` median periods.
 
     Returns:
-        Begin [s] since the first stamp and length [s], the longest first.
+        Begin since the first stamp [s] and length [s] of each gap, the longest gap first.
     """
     steps = np.diff(stamps)
     if not len(steps):
@@ -175,7 +175,7 @@ def gaps(stamps: Stamps, periods: float) -> tuple[tuple[float, float], ...]:
 
 
 def spread_ms(stamps: Stamps) -> tuple[float, float, float]:
-    """Median, 5 % and 95 % of the periods [ms]."""
+    """Median, 5th and 95th percentile of the periods [ms]."""
     steps = np.diff(stamps) * 1e-6
     low, middle, high = np.percentile(steps, (5, 50, 95)) if len(steps) else (0.0, 0.0, 0.0)
     return float(middle), float(low), float(high)

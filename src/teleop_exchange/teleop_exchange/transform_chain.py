@@ -1,4 +1,4 @@
-"""Transform chain: poses of a frame in an indirect parent frame, composed of the transforms between them."""
+"""Transform chain: poses of a frame in an indirect parent frame, composed of the transforms between the two frames."""
 
 from collections.abc import Collection, Mapping, Sequence
 
@@ -16,11 +16,11 @@ def chain_to(top: str, frame: str, parents: Mapping[str, Collection[str]]) -> li
 
     Args:
         top: The upper frame; empty for the frame without a parent.
-        frame: The frame.
+        frame: The frame at which the chain begins.
         parents: All parent frames of each frame.
 
     Raises:
-        UnknownNameError: No upper frame is named, and a frame of the chain has several parents.
+        UnknownNameError: ``top`` is empty, and a frame of the chain has several parents.
         ParameterError: A frame is its own ancestor.
     """
     ways: dict[str, list[Frames]] = {frame: []}
@@ -42,14 +42,15 @@ def chain_to(top: str, frame: str, parents: Mapping[str, Collection[str]]) -> li
 def composed(edges: Sequence[Rows], *, by_log: bool) -> Rows:
     """Poses of the first transform's child in the last transform's parent.
 
-    The result has the times of the transform with the most poses. Of each other transform, the newest pose that is not
-    later is used; a single pose is used at all times. Times before the first pose of any transform are left out.
+    The times of the result are those of the transform with the most poses. At each time, the newest pose of each other
+    transform is used; a transform with a single pose is constant. Times before the first pose of any transform are left
+    out.
 
     Args:
         edges: Poses of each transform, the transform of the frame itself first; the child of each transform is the
             parent of the previous one.
-        by_log: Whether the time of recording is used as the time of a pose; it is always used if the stamps of a
-            transform never change.
+        by_log: Whether the time of recording is used as the time of a pose. It is always used for a transform whose
+            stamps never change.
     """
     moving = [edge for edge in edges if len(edge.poses) > 1]
     is_log = by_log or any((edge.stamp_ns == edge.stamp_ns[0]).all() for edge in moving)
@@ -76,7 +77,7 @@ def _times(rows: Rows, is_log: bool) -> Stamps:
 
 
 def _carried(carriers: Array, poses: Array) -> Array:
-    """Poses (n, 7), given in frames whose own poses are ``carriers`` (n, 7); NaN if a carrier has no valid rotation."""
+    """Transform poses (n, 7) by the poses ``carriers`` (n, 7) of their frames; NaN for an invalid rotation."""
     size = length(carriers[:, 3:])[:, None]
     turns = carriers[:, 3:] / np.where(size > 0.0, size, np.nan)
     moved = (rotations_from_quaternions(turns) * poses[:, None, :3]).sum(axis=-1)

@@ -16,7 +16,7 @@ Layout = dict[str, Any]
 
 
 def published_points(x: Numbers, y: Numbers, name: str, unit: str = "mm") -> Trace:
-    """Trace of what a source printed."""
+    """Trace of values that a source printed."""
     return {
         "type": "scatter",
         "mode": "markers",
@@ -43,7 +43,7 @@ def joined(x: Numbers, y: Numbers, name: str, color: str, unit: str = "mm") -> T
 
 
 def level(value: float, text: str, axis: str = "y") -> tuple[Layout, Layout]:
-    """Shape and annotation of a published number, across a plot."""
+    """Horizontal line across a plot at a published number, with a text."""
     look = {"color": PUBLISHED, "width": 1.2, "dash": "dot"}
     shape = {"type": "line", "xref": "paper", "yref": axis, "x0": 0, "x1": 1, "y0": value, "y1": value, "line": look}
     note = {"xref": "paper", "yref": axis, "x": 1, "y": value, "xanchor": "right",
@@ -63,7 +63,7 @@ def in_planes(names: str, groups: Sequence[tuple[Numbers, str, str, float]], uni
 
     Args:
         names: Letters of the three axes.
-        groups: Paths (N, 3), each with name, colour and width; NaN lifts the pen.
+        groups: Paths (N, 3), each with name, colour and width; NaN interrupts the line.
         unit: Unit of the paths.
 
     Returns:

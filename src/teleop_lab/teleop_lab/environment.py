@@ -27,12 +27,12 @@ _ACT, _GOAL, _ATTEMPTS, _SUCCESSES, _STEP = (
 )
 _PERIOD = 0.02  # duration of a step [s]
 _SCALE = 0.02
-"""Length that is 1 in an observation [m]."""
+"""Length [m] that an observation represents as 1."""
 _BLOCKS = 3
 
 
 class _TaskEnv(gymnasium.Env[Observed, Observed]):
-    """A task whose hand is moved by actions, with a jaw if the task needs one."""
+    """Task in which actions move the hand, and a jaw if the task needs one."""
 
     metadata = {"render_modes": []}  # noqa: RUF012 - gymnasium's own declaration
 
@@ -96,15 +96,15 @@ class _TaskEnv(gymnasium.Env[Observed, Observed]):
 class ReachEnv(_TaskEnv):
     """Move the slave's tip to a goal.
 
-    An action (3,) in -1 to 1 moves the hand by up to ``reach`` along the axes of the slave, over a step of 20 ms; as in
-    :mod:`teleop_core`, the hand holds a device and the arm follows. The observation (9,) has the vector to the goal,
-    the velocity of the tip, and the vector from the hand's command to the tip, in units of 20 mm and 20 mm/s. The
-    reward is minus the distance in units of 20 mm, and 10 at the goal, where the episode ends. It is truncated after
-    10 s.
+    An action (3,), each value from -1 to 1, moves the hand by up to ``reach`` along each axis of the slave in a step of
+    20 ms. As in :mod:`teleop_core`, the hand holds a device and the arm follows. The observation (9,) contains the
+    vector to the goal, the velocity of the tip, and the vector from the hand's command to the tip, in units of 20 mm
+    and 20 mm/s. The reward is minus the distance in units of 20 mm. At the goal the reward is 10, and the episode ends.
+    An episode is truncated after 10 s.
 
     Args:
-        settings: Parameters of the session, such as ``{"display.latency": 0.2}`` or those of a network. The
-            environment itself sets the operator and the task.
+        settings: Parameters of the session, such as ``{"display.latency": 0.2}``. The environment itself sets the
+            operator and the task.
         reach: Largest displacement of the hand in one step [m].
 
     Raises:
@@ -125,13 +125,12 @@ class ReachEnv(_TaskEnv):
 class PegTransferEnv(_TaskEnv):
     """Carry three blocks with the slave's jaw from their pegs to the pegs of their colours.
 
-    An action (4,) moves the hand as in :class:`ReachEnv`; a fourth number above 0 closes the jaw. The observation
-    (12,) has the values of ``ReachEnv``, the jaw's angle [rad], whether it grips a block, and whether the task asks
-    for a closed
-    jaw. The goal belongs to the present step of the task: reach, grasp, lift, carry, place. The reward is minus the
-    distance in units of 20 mm, plus 5 for each finished step, 20 for each block on its peg, and -20 for each block at
-    rest elsewhere. The
-    episode ends with the third block, and is truncated after 90 s.
+    The first three numbers of an action (4,) move the hand as in :class:`ReachEnv`; a fourth number above 0 closes the
+    jaw. The observation (12,) contains the values of ``ReachEnv``, the jaw's angle [rad], whether the jaw grips a
+    block, and whether the task requires a closed jaw. The goal depends on the present step of the task: reach, grasp,
+    lift, carry, place. The reward is minus the distance in units of 20 mm. A finished step adds 5, a block on its peg
+    adds 20, and a block at rest elsewhere subtracts 20. The episode ends with the third block, and is truncated after
+    90 s.
 
     Args:
         settings: As in :class:`ReachEnv`.
@@ -147,7 +146,7 @@ class PegTransferEnv(_TaskEnv):
             "teleop.stages": stages,
             "task.kind": "peg_transfer",
             "coarse_gain": 2.0,  # the board is wider than the device's workspace
-            # The nearest block first: on its way to another one the jaw would push it over.
+            # The nearest block comes first, because the jaw would push it over on the path to another block.
             "jaw_sim.object.place": [0.281, -0.2357, -0.0911, 0.256, -0.2357, -0.0911, 0.231, -0.2357, -0.0911],
         }
         super().__init__("peg_transfer", given | dict(settings or {}), reach, has_jaw=True)

@@ -1,6 +1,6 @@
-"""Grading: figures of motion of every episode of a data set, the most unusual episode first.
+"""Grading: motion scores of every episode of a data set, the most unusual episode first.
 
-It needs no ROS and no arm: an episode is the motion of a hand. A figure is missing if the data set lacks its data.
+Grading needs no ROS and no arm: an episode is the motion of a hand. A score is missing if the data set lacks its data.
 """
 
 from collections.abc import Callable, Sequence
@@ -22,9 +22,9 @@ FIGURES = (
     "time_s", "path_mm", "speed_median_mm_s", "speed_p95_mm_s", "acceleration_p95_m_s2",
     "idle_share", "peaks_per_s", "reversals", "sparc",
 )  # fmt: skip
-"""Figures of :doc:`scores`, below ``motion.hand``, that an episode is graded by."""
+"""Scores (see :doc:`scores`, keys below ``motion.hand``) by which an episode is graded."""
 ODD, WORST, REASON = "odd", "most_odd", "reason"
-_NORMAL = 1.4826  # median absolute deviations of a normal distribution in a standard deviation
+_NORMAL = 1.4826  # standard deviation of a normal distribution, divided by its median absolute deviation
 
 
 def grade(
@@ -35,11 +35,11 @@ def grade(
     recordings: Path | str | None = None,
     say: Callable[[str], object] = lambda _: None,
 ) -> "pandas.DataFrame":
-    """Numbers of every episode; the oddest episodes come first.
+    """Return the scores of every episode, the oddest episode first.
 
-    The oddness of a number is its deviation from the median of all episodes, in robust standard deviations (1.4826
-    times the median absolute deviation). The oddness of an episode is that of its oddest number. It shows which
-    episodes to look at, not which are wrong.
+    The oddness of a score is its deviation from the median of all episodes, in robust standard deviations (1.4826 times
+    the median absolute deviation). The oddness of an episode is that of its oddest score. A large oddness means that an
+    episode should be inspected, not that it is wrong.
 
     Args:
         data: Folder of a LeRobot data set, or a table with a column of episodes.
@@ -49,13 +49,14 @@ def grade(
         say: Called with a line after each episode.
 
     Returns:
-        A row for each episode by its number: its figures, the oddness ``odd``, the oddest figure ``most_odd``, and the
-        ``reason`` if it has no figures. NaN if the data set lacks the data.
+        A table with a row for each episode, by its number. The columns are the scores, the oddness ``odd``, the oddest
+        score ``most_odd``, and the ``reason`` why an episode has no scores. A score is NaN if the data set lacks its
+        data.
 
     Raises:
-        RecordingError: The data cannot be read, or no episode can.
+        RecordingError: The data set cannot be read, or none of its episodes can.
         ParameterError: ``figures`` is empty, or an option is wrong.
-        UnknownNameError: There is no such figure.
+        UnknownNameError: ``figures`` contains an unknown key.
     """
     import pandas
 
@@ -88,5 +89,5 @@ def grade(
 
 
 def usual(table: "pandas.DataFrame", most: float = 3.5) -> list[int]:
-    """Numbers of the episodes whose oddness is at most `most`, in their order: a list for training."""
+    """Return the sorted numbers of the episodes whose oddness is at most `most`, for example as training data."""
     return sorted(int(number) for number in table.index[table[ODD] <= most])

@@ -1,4 +1,4 @@
-"""Overview: what a report page opens with, each session beside the others."""
+"""Overview: the first part of a report page, with the sessions side by side."""
 
 from collections.abc import Iterator, Sequence
 from html import escape
@@ -8,7 +8,7 @@ from teleop_core.evaluation.score import Score
 from teleop_core.evaluation.verdict import SHARE, Verdict, percent
 
 SHOWN = 5
-"""Figures of a session."""
+"""Number of scores on the card of a session."""
 _FIGURES = (
     (SHARE, "%", "time followed"),
     ("asked_error_mm.max", "mm", "largest lag behind the hand"),
@@ -24,7 +24,7 @@ _OFTEN_NOTHING = {"latency_ms.total.p99", "force_n.max", "fixture.penetration_ma
 
 
 def overview(scores: Sequence[Score]) -> str:
-    """Card of each session: verdict and five figures."""
+    """HTML of a card for each session, with the verdict and five scores."""
     cards = [
         f'<article class="card session"><h2><a href="#recording-{i}">{escape(score.session.place)}'
         f"</a></h2>{_verdict(score.verdict)}{_figures(score)}</article>"
@@ -49,7 +49,7 @@ def _figures(score: Score) -> str:
 
 
 def _known(score: Score) -> Iterator[tuple[str, str, str]]:
-    """Value, unit and meaning of the figures that the score has and that are not trivial."""
+    """Value, unit and meaning of the available scores that are not trivial."""
     values = score.to_dict()
     for key, unit, text in _FIGURES:
         value = values.get(key)

@@ -10,7 +10,7 @@ import numpy as np
 
 from teleop_core.evaluation.figure import Numbers
 
-_LEVEL = 4  # half the time of the usual 6, for 2 % more bytes
+_LEVEL = 4  # compression level; the usual level 6 takes twice the time and saves 2 % of the bytes
 
 
 class Arrays:
@@ -20,7 +20,7 @@ class Arrays:
         self._packed: dict[bytes, tuple[int, str]] = {}  # packed arrays by their contents
 
     def named(self, tree: Any) -> Any:
-        """A trace or layout with places in the list instead of arrays of numbers."""
+        """Return a trace or layout in which indices of the list replace arrays of numbers."""
         if isinstance(tree, dict):
             return {key: self.named(value) for key, value in tree.items()}
         if isinstance(tree, (list, tuple)):
@@ -32,7 +32,7 @@ class Arrays:
         return None if isinstance(tree, float) and not isfinite(tree) else tree
 
     def packed(self) -> list[str]:
-        """All arrays, in the order of their places."""
+        """All packed arrays, in the order of their indices."""
         return [data for _, data in self._packed.values()]
 
     def _place(self, array: Numbers) -> int:
@@ -43,7 +43,7 @@ class Arrays:
 
 
 def packed(values: Numbers) -> str:
-    """Numbers (N,) as float32: differences of their bits, the lowest bytes of all first."""
+    """Pack numbers (N,) as float32: differences of their bit patterns, the lowest bytes of all numbers first."""
     bits = np.asarray(values, "<f4").view("<u4")
     changes = np.diff(bits, prepend=np.zeros(1, "<u4"))  # modulo 2³²
     return deflated(changes.view(np.uint8).reshape(-1, 4).T.tobytes())

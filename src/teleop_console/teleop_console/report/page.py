@@ -26,8 +26,8 @@ _HEADER = "<h1>Teleoperation report</h1>"
 def report_page(studies: Sequence[Study]) -> str:
     """HTML page with the summary of all recordings and the plots of each.
 
-    It works offline and loads nothing: plotly.js is embedded once. All plots against time of a
-    recording show the same time, down to single samples. Texts from recordings are escaped.
+    The page works offline, because it contains plotly.js. All plots of a recording against time show the same interval,
+    down to single samples. Texts from recordings are escaped.
     """
     sections, drawn, arrays = [], [], Arrays()
     for number, study in enumerate(studies):
@@ -44,7 +44,7 @@ def report_page(studies: Sequence[Study]) -> str:
     found = {"recordings": recordings, "arrays": arrays.packed(), "figures": drawn}
     data = json.dumps(found, allow_nan=False)
     scores = [study.score for study in studies]
-    table = (  # page.js folds it; without scripts it stays open
+    table = (  # page.js folds the table; without scripts it stays open
         f'<details class="card table" open><summary>All figures</summary>{_note(scores)}{html_table(scores)}</details>'
     )
     return PAGE.format(
@@ -52,7 +52,7 @@ def report_page(studies: Sequence[Study]) -> str:
         title=escape("Teleoperation: " + ", ".join(score.session.title for score in scores)),
         style=style(),
         body="\n".join((_HEADER, overview(scores), table, *sections)),
-        data=data.replace("<", "\\u003c"),  # nothing inside can end the script element
+        data=data.replace("<", "\\u003c"),  # no text of the data can close the script element
         plotly=deflated(get_plotlyjs().encode()),
         library=f"plotly.js {get_plotlyjs_version()}",
         script=script(),
@@ -69,13 +69,13 @@ def _recording(study: Study) -> dict[str, Any]:
 
 
 def _kept_s(score: Score) -> float:
-    """Time [s] of which the page keeps extremes only; 0 where it keeps all samples."""
+    """Length of the intervals [s] of which the page contains only the extreme values; 0 if it contains all samples."""
     samples = max((topic.count for topic in score.topics.values()), default=0)
     return spacing_s(samples, score.session.duration_s)
 
 
 def _note(scores: Sequence[Score]) -> str:
-    """Explanation of the marks, if published figures are shown beside ours."""
+    """Explanation of the marks, if published numbers are shown beside ours."""
     if not is_compared(side_by_side([score.rows for score in scores])):
         return ""
     return (
@@ -99,7 +99,7 @@ def _section(number: int, study: Study, plots: list[Figure], places: list[str]) 
 
 
 def _legend(bands: Sequence[Band]) -> str:
-    """Legend of the coloured bands; the table contains the share of time of each."""
+    """Legend of the coloured bands; the table contains the share of time of each band."""
     entries = "".join(
         f'<span><i style="background:{escape(band.color)}"></i>{escape(band.cause)}</span>' for band in bands
     )
@@ -107,7 +107,7 @@ def _legend(bands: Sequence[Band]) -> str:
 
 
 def _card(plot: Figure, place: str) -> str:
-    """Place of a plot, or its text if there is nothing to draw."""
+    """HTML element for a plot, or the plot's text if there is nothing to draw."""
     title, sentence = escape(plot.title), escape(plot.sentence)
     if not plot.traces:
         return f'<p class="facts">{title}: {sentence}</p>'

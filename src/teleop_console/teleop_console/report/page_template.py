@@ -3,7 +3,7 @@
 from functools import cache
 from importlib.resources import files
 
-# The browser itself refuses every request; plotly.js compiles its shaders at run time.
+# The browser refuses every request of the page. Evaluation of code is allowed, because plotly.js compiles its shaders.
 POLICY = (
     "default-src 'none'; script-src 'unsafe-inline' 'unsafe-eval'; style-src 'unsafe-inline'; "
     "img-src data: blob:; font-src data:; worker-src blob:"
@@ -19,7 +19,7 @@ def style() -> str:
 
 @cache
 def script() -> str:
-    """All scripts joined; each script may use those before it."""
+    """All scripts as one text; each script may use the scripts before it."""
     parts = "\n".join(_text(f"{name}.js") for name in _SCRIPTS)
     return f'"use strict";\n(function () {{\n{parts}}})();\n'
 

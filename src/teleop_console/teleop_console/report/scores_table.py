@@ -1,4 +1,4 @@
-"""Table of the report: scores side by side, with published figures."""
+"""Table of the report: scores side by side, with published numbers."""
 
 from collections.abc import Sequence
 from html import escape
@@ -12,7 +12,7 @@ _CLASSES = {True: "met", False: "missed", None: "plain"}
 
 
 def html_table(scores: Sequence[Score]) -> str:
-    """Table of the page: one column per score, and one column of published figures beside scores that have them."""
+    """HTML table with a column for each score, and a second column for its published numbers if there are any."""
     found = side_by_side([score.rows for score in scores])
     columns = list(zip(*(line.rows for line in found), strict=True))
     are_compared = [any(row.published for row in rows) for rows in columns]

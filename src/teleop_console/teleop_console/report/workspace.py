@@ -1,4 +1,4 @@
-"""Workspace picture: where a robot's tip can be, and how freely it moves there."""
+"""Workspace picture: positions that a robot's tip can reach, with the manipulability at each position."""
 
 from pathlib import Path
 from typing import Any
@@ -9,7 +9,7 @@ from plotly.subplots import make_subplots
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots.robot import Robot
 
-# More points than this make the page slow and the picture no clearer.
+# Largest number of drawn points; more points make the page slow, and the picture no clearer.
 DRAWN = 20_000
 
 
@@ -17,10 +17,10 @@ def write_workspace_page(robot: Robot, points: Array, values: Array, file: Path)
     """Write one self-contained page: the points in space, from above and from the side.
 
     Args:
-        robot: The arm they belong to.
-        points: Tip positions (N, 3) [m], base axes.
-        values: Manipulability at each (N,).
-        file: Page to write; its folder must exist.
+        robot: The arm of the points.
+        points: Positions of the tip (N, 3) [m] in the axes of the base.
+        values: Manipulability at each position (N,).
+        file: Path of the page; its folder must exist.
 
     Raises:
         OSError: The file cannot be written.

@@ -72,7 +72,7 @@ def _run(arguments: argparse.Namespace) -> int:
             with arm.interrupt.caught(), progress.status("looking") as status:
                 findings = examine(arm, may_move=may_move, report=status.update, robot=robot)
         except KeyboardInterrupt:
-            arm.interrupt = Interrupt()  # time to look for topics that remain
+            arm.interrupt = Interrupt()  # a new one, so that the search for remaining topics can run
             left = left_behind(arm, may_move=may_move)
             print(f"teleop conformance: interrupted; {left}", file=sys.stderr)
             return 130

@@ -1,4 +1,4 @@
-"""``teleop drill --seeds``: random schedules of faults, and the laws that must hold in each."""
+"""``teleop drill --seeds``: runs random schedules of faults, and checks the laws in each of them."""
 
 import argparse
 import json
@@ -14,7 +14,7 @@ def run_schedules(arguments: argparse.Namespace) -> int:
     """Run the schedules; returns 1 if a law was broken.
 
     Raises:
-        ParameterError: Arguments do not go together.
+        ParameterError: Arguments contradict each other.
         RecordingError: The folder for recordings exists already.
     """
     count, first, out = arguments.seeds or 1, arguments.seed, arguments.out
@@ -87,5 +87,5 @@ def _run_many(first: int, count: int, json_file: Path | None, processes: Process
 
 
 def _short(count: str) -> str:
-    """A count that fits into a narrow column: thousands as k."""
+    """Text of a count for a narrow column; thousands are written as k."""
     return count if len(count) < 4 else f"{int(count) // 1000}k"

@@ -1,7 +1,7 @@
-"""Agreement: whether the measurement of an arm agrees with its command, in time and in position.
+"""Agreement: compares the measurements of an arm with its commands, in time and in position.
 
-Two trails of the same motion are compared by their changes: a constant difference, such as that of an uncompensated
-load, is ignored.
+Two trails of the same motion are compared by their changes. So a constant difference, such as the error by an
+uncompensated load, is ignored.
 """
 
 from collections.abc import Callable
@@ -13,17 +13,17 @@ from numpy.typing import NDArray
 Vectors = NDArray[np.float64]
 
 LATEST = 0.25
-"""Largest delay of a measurement behind its setpoint [s]: five times the delay of our own arms, so that a tenth of a
-second remains for networks and slow laws; assumed."""
+"""Largest delay of a measurement behind its setpoint [s]. It is assumed as five times the delay of our own arms, so
+that a tenth of a second remains for networks and slow control laws."""
 SHARE = 0.15
-"""Share of the displacement by which two trails may differ; assumed: larger than the effect of friction, smaller than
-that of a wrong scale."""
+"""Share of the displacement by which two trails may differ. The assumed value is larger than the effect of friction,
+and smaller than the effect of a wrong scale."""
 _GRID = 0.01  # time between two points of a comparison [s]
 _FARTHEST = 1.0  # largest lag that is searched [s]
-_GAP = 0.05  # if messages are farther apart, some were lost in transport, or no reader existed [s]
-_SPAN = 0.25  # time over which positions are averaged: longer than the settling time of a loop [s]
+_GAP = 0.05  # longer time between two messages, which means that messages were lost or had no reader [s]
+_SPAN = 0.25  # time over which positions are averaged [s]; longer than the settling time of a control loop
 _SAMPLES = 20  # least number of messages of a motion for which its speeds can be integrated
-_FEW = 10  # with this number of messages or fewer, nothing can be compared
+_FEW = 10  # largest number of messages that is too small for a comparison
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,8 +31,8 @@ class Trail:
     """Messages of one topic during a motion.
 
     Attributes:
-        sent: Time of sending of each sample, shape (N,) [s].
-        stamp: Time of its sample, shape (N,) [s].
+        sent: Sending time of each message, shape (N,) [s].
+        stamp: Stamp of each message, shape (N,) [s].
         place: Joint positions or position of the tip, shape (N, k).
         rate: Velocities, shape (N, k); empty if the topic has none.
     """
@@ -47,16 +47,16 @@ class Trail:
 
     @property
     def way(self) -> float:
-        """Largest change of any number since the begin; 0 without messages."""
+        """Largest change of any coordinate since the first message; 0 without messages."""
         return float(np.max(np.abs(self.place - self.place[:1]), initial=0.0))
 
 
 def follows(name: str, measured: Trail, wanted: Trail, least: float) -> str:
-    """Difference between a measurement and its setpoint, in words; empty if they agree.
+    """Text about the difference between a measurement and its setpoint; empty if they agree.
 
     Args:
         name: Name of the measurement.
-        measured: Trail that the arm measures.
+        measured: Trail of the measurement.
         wanted: Trail of the setpoint.
         least: Smallest displacement that is compared.
     """
@@ -79,7 +79,7 @@ def follows(name: str, measured: Trail, wanted: Trail, least: float) -> str:
 
 
 def adds_up(trail: Trail, least: float) -> str:
-    """Difference between the velocities and the change of the positions, in words; empty if they agree."""
+    """Text about the difference between velocities and changes of the positions; empty if they agree."""
     if len(trail) < _FEW or not trail.rate.size or trail.way < least:
         return ""
     steps = np.diff(trail.stamp)[:, None]
@@ -96,12 +96,12 @@ def adds_up(trail: Trail, least: float) -> str:
 
 
 def obeys(joints: Trail, tip: Trail, fk: Callable[[Vectors], Vectors], least: float) -> str:
-    """Difference between measured tip positions and forward kinematics, in words; empty if they agree.
+    """Text about the difference between measured tip positions and forward kinematics; empty if they agree.
 
     Args:
         joints: Measured joints.
-        tip: Measured places of the tip, (N, 3) [m].
-        fk: Joints (n,) to the tip's pose (4, 4).
+        tip: Measured positions of the tip, (N, 3) [m].
+        fk: Function from joints (n,) to the tip's pose (4, 4).
         least: Smallest displacement of the tip that is compared [m].
     """
     if len(joints) < _FEW or len(tip) < _FEW:
@@ -119,7 +119,7 @@ def obeys(joints: Trail, tip: Trail, fk: Callable[[Vectors], Vectors], least: fl
 
 
 def _differences(first: Vectors, second: Vectors) -> Vectors:
-    """Differences (M, k) of the rows in which both are known, minus their median."""
+    """Differences (M, k) between the rows in which both arrays are known, minus the median of the differences."""
     found = first - second
     found = found[np.isfinite(found).all(axis=1)]
     return found - np.median(found, axis=0) if len(found) else found
@@ -128,8 +128,8 @@ def _differences(first: Vectors, second: Vectors) -> Vectors:
 def _smooth(times: Vectors, trail: Trail) -> Vectors:
     """Change (M, k) since the first message, averaged over a window around each of the given times (M,).
 
-    The mean hides an overshoot of a few hundredths of a second. NaN where messages are missing; zero before the first
-    one.
+    The mean hides an overshoot of a few hundredths of a second. The change is NaN where messages are missing, and zero
+    before the first message.
     """
     at = np.searchsorted(trail.sent, times, side="right") - 1
     changed = trail.place[np.maximum(at, 0)] - trail.place[0]

@@ -1,4 +1,4 @@
-"""CRTK topics: those of the Collaborative Robotics Toolkit that an arm may have.
+"""CRTK topics: the topics of the Collaborative Robotics Toolkit that an arm may have.
 
 Source:
     Su, Munawar, Deguet et al. 2020 (Collaborative Robotics Toolkit); its pages "Robot operating
@@ -33,7 +33,7 @@ _TWIST, _WRENCH = "geometry_msgs/msg/TwistStamped", "geometry_msgs/msg/WrenchSta
 
 @dataclass(frozen=True)
 class CrtkTopic:
-    """One topic.
+    """One topic of CRTK.
 
     Attributes:
         name: Name below the arm's namespace.
@@ -71,7 +71,7 @@ CRTK_TOPICS = (
     *_typed("servo_cf", Group.COMMAND, _WRENCH),
     *_typed("hold free", Group.COMMAND, "std_msgs/msg/Empty"),
 )
-"""All topics that are looked for, in the order of the table."""
+"""All topics that the test examines, in the order of the table."""
 STATES = ("DISABLED", "ENABLED", "PAUSED", "FAULT")
 """Names of the operating states."""
 

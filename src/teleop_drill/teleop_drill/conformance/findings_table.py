@@ -1,4 +1,4 @@
-"""Table: findings as people and as programs read them."""
+"""Table: findings as a table for people, and as JSON for programs."""
 
 import json
 from collections.abc import Iterable
@@ -19,7 +19,7 @@ _STYLES = {
 
 
 def findings_table(namespace: str, findings: Iterable[Finding]) -> Table:
-    """Table of findings, a row for each."""
+    """Table with a row for each finding."""
     table = Table(title=f"CRTK: {escape(namespace)}", title_justify="left")
     for name in ("topic", "needed", "found", "verdict", "note"):
         table.add_column(name)

@@ -14,7 +14,7 @@ __all__ = [
 ]  # fmt: skip
 
 EXERCISES = (*STOPS, *PROCESSES, *SAMPLES)
-"""Built-in exercises; some exist twice, for composed sessions and for sessions of processes."""
+"""Built-in exercises. Some have one form for composed sessions and one form for sessions of processes."""
 SHORT = ("stop_topic", "kill_motion_scaling", "teleport", "second_commander", "kill_bystander")
 """A short selection that finds gross errors."""
 
@@ -28,16 +28,18 @@ def _checked(name: str, part: object) -> Exercise:
 
 
 FURTHER: Registry[Exercise] = Registry("exercise", "exercises", {}, _checked, package="teleop_drill")
-"""Exercises of installed packages and of the program."""
+"""Exercises that installed packages or the running program have added."""
 
 
 def register_exercise(exercise: Exercise, *, replace: bool = False) -> Exercise:
-    """Add an exercise under its name for the rest of the program; see :meth:`Registry.add`."""
+    """Add an exercise under its name until the program ends; see :meth:`Registry.add`."""
     return FURTHER.add(exercise.name, exercise, replace=replace)
 
 
 def chosen(names: tuple[str, ...], *, is_composed: bool) -> tuple[Exercise, ...]:
-    """Exercises for composed sessions or for sessions of processes, in the order of the table, added ones last.
+    """Exercises for composed sessions or for sessions of processes, in the order of the table.
+
+    Added exercises are last.
 
     Args:
         names: Names of the exercises; empty for all.

@@ -44,7 +44,7 @@ def markdown(outcomes: Sequence[Outcome]) -> str:
 
 
 def summary(outcomes: Sequence[Outcome]) -> list[str]:
-    """Lines below the table: times of stops, the load, and the results that are not as expected."""
+    """Text below the table: the stopping times, the load of the machine, and all unexpected results."""
     lines = []
     for outcome in outcomes:
         name, extra = outcome.exercise.name, outcome.extra

@@ -1,4 +1,4 @@
-"""Exercise: one fault of a drill, the expected reaction of the arm, and how the arm recovers."""
+"""Exercise: one fault of a drill, the expected reaction of the arm, and the actions for its recovery."""
 
 import math
 from collections.abc import Callable
@@ -39,7 +39,7 @@ class Cure(Enum):
 
 
 class Rig(Protocol):
-    """The session under drill, and the actions that break it."""
+    """The session of a drill, and actions that cause faults in it."""
 
     @property
     def is_composed(self) -> bool:
@@ -47,7 +47,7 @@ class Rig(Protocol):
         ...
 
     def mark(self) -> None:
-        """Declare that the fault begins now; without this call it begins when :attr:`Exercise.inject` is called."""
+        """Declare that the fault begins now. Without this call it begins when :attr:`Exercise.inject` is called."""
 
     def note(self, text: str) -> None:
         """Add a note, which the table shows beside the state."""
@@ -63,7 +63,7 @@ class Rig(Protocol):
         ...
 
     def freeze(self, node: str, seconds: float, meanwhile: Callable[[], None] = lambda: None) -> None:
-        """Stop a node's process for a time [s], call `meanwhile` during the stop, then let the process continue."""
+        """Stop a node's process for a time [s], call `meanwhile` during the stop, then continue the process."""
 
     def limit_files(self, node: str, room: int | None) -> None:
         """Let files of a node's process grow by at most `room` bytes; None for no limit."""
@@ -72,16 +72,16 @@ class Rig(Protocol):
         """Keep all cores busy for a time [s]."""
 
     def start_bystander(self) -> None:
-        """Start a foreign ROS process that subscribes to all streams; it is subscribed on return."""
+        """Start a foreign ROS process, and return when it has subscribed to all streams."""
 
     def kill_bystander(self) -> None:
-        """Kill it."""
+        """Kill the foreign process."""
 
     def distort(self, distortion: Distortion) -> None:
         """Apply a distortion to the hand's samples before they are sent."""
 
     def mute_buttons(self, *, is_mute: bool) -> None:
-        """Send no buttons, or send them again."""
+        """Stop or restart the messages of the stylus's buttons."""
 
     def publish(self, topic: Topic, stamp_ns: int, values: Array) -> None:
         """Send one message as another publisher of the topic would."""
@@ -90,7 +90,7 @@ class Rig(Protocol):
         """Send bytes that are not a valid message, as another publisher of the topic would."""
 
     def leave(self, topic: Topic) -> None:
-        """Close that other publisher."""
+        """Close the other publisher of the topic."""
 
     def setpoint(self) -> Array:
         """Newest joint setpoint (n,) of the slave [rad or m]."""
@@ -102,10 +102,10 @@ class Rig(Protocol):
         """Drive the joints (n,) at speeds [rad/s or m/s] for a time [s], as a CRTK client does."""
 
     def now_ns(self) -> int:
-        """Time [ns]."""
+        """Present time [ns]."""
 
     def press(self, *, is_pressed: bool, button: int = 0) -> None:
-        """Send a message of a stop button: the first one, or another."""
+        """Send a message of a stop button with the given number."""
 
     def command(self, name: str) -> bool:
         """Call a service of the slave; returns whether the command was done."""
@@ -125,38 +125,38 @@ Time = Callable[[Numbers], float]
 
 
 def command_timeout(numbers: Numbers) -> float:
-    """Bound for commands that cease: the arm follows the last command for the command timeout."""
+    """Time limit after the last command: the arm follows this command for the command timeout."""
     return numbers.command_timeout
 
 
 def at_once(numbers: Numbers) -> float:
-    """Bound for commands sent directly to the slave: it reads them in every tick."""
+    """Time limit for commands that are sent directly to the slave, which reads them in every tick."""
     return numbers.tick
 
 
 def outage(numbers: Numbers) -> float:
-    """Bound for a stream that fell silent: the time until the arm is PAUSED."""
+    """Time limit for a silent stream: the time until the arm is PAUSED."""
     return numbers.longest_outage
 
 
 def silence(numbers: Numbers) -> float:
-    """Bound for an arm that no longer reports its position: the time until that is a fault."""
+    """Time limit for an arm that no longer reports its position: the time until this silence is a fault."""
     return numbers.longest_silence
 
 
 def unheard(numbers: Numbers) -> float:
-    """Bound for an arm that no longer reports its position: it brakes after the command timeout."""
+    """Time limit for an arm that no longer reports its position, if it brakes after the command timeout."""
     braking = max(numbers.speed_limit / numbers.braking)
     return numbers.command_timeout + float(braking)
 
 
 def never(_: Numbers) -> float:
-    """No time at all."""
+    """Time limit of zero."""
     return 0.0
 
 
 def after(seconds: float) -> Time:
-    """Bound that follows from the exercise itself [s]."""
+    """Time limit that the exercise itself gives [s]."""
     return lambda _: seconds
 
 
@@ -171,27 +171,27 @@ class Exercise:
     Attributes:
         name: Name that selects the exercise.
         text: Description of the fault.
-        inject: Causes the fault; returns when the fault has begun, or is over.
-        undo: Removes a fault that lasts.
+        inject: Function that causes the fault; it returns when the fault has begun or is over.
+        undo: Function that removes a lasting fault.
         motion: Allowed motion of the arm during the fault.
-        states: Operating states that may follow; None among them: the slave is gone.
-        faults: Faults that may be reported; empty for any or none.
+        states: Operating states that may follow; None stands for a slave that has ended.
+        faults: Faults that may be reported; if it is empty, any fault or none may be reported.
         cures: Actions that the arm may need before it moves again.
         master: Kind of operator that moves the hand.
         allowed: Time for which the arm may continue its motion [s] before it must brake.
-        stands: Time for which an arm that is expected to keep moving may stand still [s].
+        stands: Longest time at rest [s] for an arm that is expected to keep moving.
         gap: Longest gap in the commands after which the arm catches up [s].
-        by_drives: Whether the drives stood still during the gap, and catch up with the setpoints sent meanwhile.
-        said: Text that the arm must have answered, as noted by :meth:`Rig.note`; empty: any.
-        told: Time within which ``slave/operation`` reports the state or the fault [s]; None: never.
+        by_drives: Whether the drives stood still during the gap and then catch up with the setpoints of the gap.
+        said: Text that the arm must have answered, as recorded by :meth:`Rig.note`; empty if any answer is allowed.
+        told: Time limit for the report of the state or the fault in ``slave/operation`` [s]; None: no report.
         warns: Whether a node must warn of the fault in ``diagnostics``.
         hand_speed: Largest speed of the hand, or of the commands that replace it [m/s].
         tool_speed: Largest speed of the tip's setpoint that the exercise sets [m/s].
-        lost: Largest duration that may be missing in the recording [s].
+        lost: Longest time that may be missing in the recording [s].
         watch: Time for which the session is observed after the injection [s].
-        ways: Kinds of sessions to which the exercise applies: True for composed, False for processes.
-        cuts_recording: Whether the fault keeps the recorder from closing the recording.
-        breaks_simulator: Whether the exercise breaks the simulated arm, and so needs it.
+        ways: Kinds of sessions to which the exercise applies: True for composed sessions, False for processes.
+        cuts_recording: Whether the recorder cannot close the recording because of the fault.
+        breaks_simulator: Whether the exercise breaks the simulated arm; then it cannot run without it.
         repeats: Number of repetitions; the worst result is reported.
     """
 

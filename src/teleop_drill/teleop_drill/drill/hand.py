@@ -1,6 +1,6 @@
-"""Hand of a drill: moves in a circle at constant speed; its samples can be distorted before they are sent.
+"""Hand of a drill: moves on a circle at constant speed; its samples can be distorted before they are sent.
 
-The speed is constant, so that the allowed motion in a given time is known exactly.
+Because the speed is constant, the allowed motion in a given time is known exactly.
 """
 
 import itertools
@@ -15,9 +15,11 @@ from teleop_core.hand.operators.rest import rest_pose
 from teleop_core.kernels.geometry import Array
 
 PERIOD = 2e-3
-"""Time from sample to sample [s], as of a device at 500 Hz."""
-RADIUS, ROUND = 0.02, 2.0
-"""Radius [m] and time of one round [s] of the circle."""
+"""Time between two samples [s], as for a device with 500 Hz."""
+RADIUS = 0.02
+"""Radius of the circle [m]."""
+ROUND = 2.0
+"""Time of one turn on the circle [s]."""
 SPEED = 2.0 * math.pi * RADIUS / ROUND
 """Speed of the stylus [m/s]."""
 _EASE = 1.0  # time within which the motion reaches full speed [s]
@@ -38,14 +40,14 @@ class Sample:
 
 
 class Distortion(Protocol):
-    """Function that returns the samples that are sent instead of a sample, in their order."""
+    """Function that returns the samples that replace a sample, in the order of sending."""
 
     def __call__(self, sample: Sample, /) -> list[Sample]:
-        """Take one sample."""
+        """Return the samples that replace one sample."""
 
 
 def circle(time: float) -> Array:
-    """Pose (7,) of the stylus after a time [s]; it starts at rest in the inkwell."""
+    """Pose (7,) of the stylus at a time [s]; at time 0 the stylus rests in the inkwell."""
     eased = 0.5 * time * time / _EASE if time < _EASE else time - 0.5 * _EASE
     angle = 2.0 * math.pi * eased / ROUND
     pose = rest_pose()
@@ -55,23 +57,23 @@ def circle(time: float) -> Array:
 
 
 def faithful(sample: Sample) -> list[Sample]:
-    """Send it as it is."""
+    """Send the sample unchanged."""
     return [sample]
 
 
 def silent(_: Sample) -> list[Sample]:
-    """Send nothing."""
+    """Send no sample."""
     return []
 
 
 def lossy(share: float) -> Distortion:
-    """Lose a share of all samples, at random."""
+    """Drop a share of all samples at random."""
     rng = np.random.default_rng(_SEED)
     return lambda sample: [sample] if rng.random() >= share else []
 
 
 def delayed(samples: int) -> Distortion:
-    """Send each sample a number of samples later, as a slow link does."""
+    """Delay each sample by a number of samples, as a slow link does."""
     held: list[Sample] = []
 
     def send(sample: Sample) -> list[Sample]:
@@ -82,7 +84,7 @@ def delayed(samples: int) -> Distortion:
 
 
 def reordered(count: int) -> Distortion:
-    """Send as many samples at a time, the last one first."""
+    """Collect ``count`` samples, then send them in reverse order."""
     held: list[Sample] = []
 
     def send(sample: Sample) -> list[Sample]:
@@ -97,7 +99,7 @@ def reordered(count: int) -> Distortion:
 
 
 def replayed(samples: int) -> Distortion:
-    """Send each sample, and after it an unchanged copy of the sample that came a fixed number of samples earlier."""
+    """Send each sample, then an unchanged copy of an older sample, which came ``samples`` samples before."""
     past: list[Sample] = []
 
     def send(sample: Sample) -> list[Sample]:
@@ -108,7 +110,7 @@ def replayed(samples: int) -> Distortion:
 
 
 def shaken(amplitude: float, frequency: float) -> Distortion:
-    """Swing across the circle by an amplitude [m] at a frequency [Hz], from rest on."""
+    """Add an oscillation across the circle, with an amplitude [m] and a frequency [Hz]; it starts from rest."""
     times = (PERIOD * count for count in itertools.count())
 
     def change(pose: Array) -> Array:
@@ -119,18 +121,18 @@ def shaken(amplitude: float, frequency: float) -> Distortion:
 
 
 def moved(change: Callable[[Array], Array]) -> Distortion:
-    """Send another pose in place of each."""
+    """Replace each pose by the result of ``change``."""
     return lambda sample: [Sample(sample.stamp_ns, change(sample.pose.copy()))]
 
 
 def shifted(way: tuple[float, float, float]) -> Distortion:
-    """Send all poses from another place, a jump away [m]."""
+    """Shift all positions by a constant distance [m], which causes a jump at the begin."""
     offset = np.array([*way, 0.0, 0.0, 0.0, 0.0])
     return moved(lambda pose: pose + offset)
 
 
 def filled(number: float) -> Distortion:
-    """Send the same number, such as NaN, as all coordinates of the place."""
+    """Replace all coordinates of the position by one number, such as NaN."""
 
     def change(pose: Array) -> Array:
         pose[:3] = number
@@ -140,7 +142,7 @@ def filled(number: float) -> Distortion:
 
 
 def scattered(size: float) -> Distortion:
-    """Send places anywhere in a cube of this width [m] around the right one."""
+    """Replace each position by a random one in a cube of this width [m] around the right position."""
     rng = np.random.default_rng(_SEED)
 
     def change(pose: Array) -> Array:
@@ -151,12 +153,12 @@ def scattered(size: float) -> Distortion:
 
 
 def stamped(change: Callable[[int], int]) -> Distortion:
-    """Send the right poses under other stamps [ns]."""
+    """Replace the stamps [ns] of the samples by the results of ``change``; the poses stay right."""
     return lambda sample: [Sample(change(sample.stamp_ns), sample.pose)]
 
 
 def frozen_stamps() -> Distortion:
-    """Send all samples with the stamp of the first, like a driver whose clock stands still."""
+    """Send all samples with the stamp of the first sample, like a driver whose clock stands still."""
     first: list[int] = []
 
     def change(stamp_ns: int) -> int:

@@ -1,7 +1,7 @@
 """Parts of a drill inside the processes under test: a stage that can fail, and a clock that can be stepped.
 
-The processes load this file as a file with own parts, so nodes that no drill has started contain nothing of it. The
-numbers in a file that both sides read control what it does.
+The processes of a drill load this file as a file with own parts. Nodes outside of a drill never load it. The drill and
+the processes share a control file; its numbers determine the faults.
 """
 
 import mmap
@@ -22,21 +22,21 @@ from teleop_core.kernels.geometry import Array
 from teleop_core.slave.slave_sim import SlaveSim
 
 VARIABLE = "TELEOP_DRILL"
-"""Environment variable with the name of the file that controls what breaks."""
+"""Environment variable with the path of the control file."""
 STAGE_NAME = "drill_stage"
 _FORM = struct.Struct("<qq")
 WORKS, HANGS, RAISES, STICKS, RACES = 0, 1, 2, 3, 4
 """What the stage does; or what the joints do, which no parameter of a session makes stick or race.
 """
 _BRAKED = OPERATION.index("is_braked")
-TURN = 5e-3  # time between two readings of what the joints must do [s]
+TURN = 5e-3  # time between two readings of the order to the joints [s]
 
 
 class Control:
-    """Controls what breaks; both sides read it.
+    """Control file of the faults; the drill writes it, and the processes read it.
 
     Args:
-        file: File of 16 bytes: what the stage does, and by how much the clock is off [ns].
+        file: File of 16 bytes: the order to the stage, and the error of the clock [ns].
     """
 
     def __init__(self, file: Path) -> None:
@@ -45,7 +45,7 @@ class Control:
 
     @staticmethod
     def make(file: Path) -> "Control":
-        """Create the file, with a content that breaks nothing."""
+        """Create the file with orders that cause no fault."""
         file.write_bytes(bytes(_FORM.size))
         return Control(file)
 
@@ -60,7 +60,7 @@ class Control:
         return int(_FORM.unpack(self._map)[1])
 
     def write(self, word: int = WORKS, offset_ns: int = 0) -> None:
-        """Set what the stage does and the error of the clock [ns]."""
+        """Write the order to the stage, and the error of the clock [ns]."""
         self._map[:] = _FORM.pack(word, offset_ns)
 
 
@@ -68,11 +68,11 @@ DRILLED_CP = Topic("slave/drilled_cp", Kind.POSE, passed_on(SLAVE_SERVO_CP.name)
 
 
 class Steered(Protocol):
-    """Source that decides what the stage does."""
+    """Source of the orders to a stage."""
 
     @property
     def word(self) -> int:
-        """Present order to the stage, as a number."""
+        """Number of the present order to the stage."""
 
 
 class Passing(RunningStage):
@@ -87,7 +87,7 @@ class Passing(RunningStage):
     sleep: Callable[[float], None] = staticmethod(time.sleep)
 
     def step(self) -> None:
-        """Pass a command on; or hang, or raise."""
+        """Pass a command on, or hang, or raise an exception, as the present order says."""
         while self.control is not None and self.control.word == HANGS:
             self.sleep(0.01)
         if self.control is not None and self.control.word == RAISES:
@@ -95,7 +95,7 @@ class Passing(RunningStage):
         self.signals[DRILLED_CP.field] = self.signals[SLAVE_SERVO_CP.field]
 
     def load(self) -> Any:
-        """Nothing is compiled."""
+        """Do nothing, because the stage has no compiled code."""
         return lambda: None
 
 
@@ -104,7 +104,7 @@ def _make(_: Any, dt: float) -> Passing:
 
 
 def _step_clock(control: Control) -> None:
-    """Let the process read a clock that may be wrong; clocks that measure durations do not change."""
+    """Replace the system clock of the process by a clock with an error; monotonic clocks do not change."""
     right = time.time_ns
     time.time_ns = lambda: right() + control.offset_ns
 
@@ -112,15 +112,15 @@ def _step_clock(control: Control) -> None:
 class Joints:
     """Joints of simulated slaves, which stick or race on command.
 
-    A joint that sticks has dry friction of twice the effort limit of its drive, as with a load far too heavy. If
-    joints race, the first joint is pushed to twice its rated speed until the brakes hold it.
+    A joint that sticks has dry friction of twice the effort limit of its drive, as with a load that is far too heavy.
+    For a race, the first joint is accelerated to twice its rated speed until the brakes stop it.
     """
 
     def __init__(self) -> None:
         self._before: WeakKeyDictionary[SlaveSim, Array] = WeakKeyDictionary()
 
     def obey(self, slave: SlaveSim, word: int) -> None:
-        """Execute an order, given as a word."""
+        """Make the joints of a slave execute an order."""
         friction = slave.parameters["coulomb"]
         if word == STICKS:
             self._before.setdefault(slave, friction.copy())
@@ -133,7 +133,7 @@ class Joints:
 
 
 class _Watched:
-    """All simulated slaves of the process; each obeys as soon as it has been created."""
+    """All simulated slaves of the process; each slave executes the present order as soon as it is created."""
 
     def __init__(self, control: Control) -> None:
         self._control, self._joints = control, Joints()
@@ -152,7 +152,7 @@ class _Watched:
         SlaveSim.__init__ = make  # type: ignore[method-assign, assignment]
 
     def _start(self) -> None:
-        """Start the thread in the process that has a slave: no thread outlives a fork."""
+        """Start the thread in the process that contains a slave, because a fork does not copy threads."""
         if self._owner != os.getpid():
             self._owner = os.getpid()
             threading.Thread(target=self._run, name="joints", daemon=True).start()
@@ -165,7 +165,7 @@ class _Watched:
 
 
 def register() -> None:
-    """Register the stage that breaks, once."""
+    """Register the stage that can fail, unless it is registered already."""
     if STAGE_NAME in STAGES:
         return
     stage = Stage(
@@ -181,7 +181,7 @@ def register() -> None:
 
 
 def install() -> None:
-    """Register the stage in a process of the drill, and start the functions that the control file requests."""
+    """Register the stage in a process of the drill, and start the functions that read the control file."""
     register()
     file = os.environ.get(VARIABLE)
     if file is None:

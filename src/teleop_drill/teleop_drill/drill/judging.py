@@ -1,4 +1,4 @@
-"""Judging: measurements of a fault, and bounds that follow from the parameters of the session."""
+"""Judging: measurements of a fault, and their bounds, which follow from the parameters of the session."""
 
 import math
 from collections.abc import Iterator
@@ -15,31 +15,31 @@ from teleop_drill.drill.numbers import OVERSHOOT, WARNED, Numbers, Scheduling
 
 _ROUNDING = 1e-9
 _HOPS = 4
-"""Topics from the hand to the setpoint."""
+"""Number of topics from the hand to the setpoint."""
 _FULL = 0.9
 """Share of the possible deceleration with which a setpoint must brake."""
 _LEAST = 0.8
 """Share of the hand's path that an arm must travel if it is expected to keep moving."""
 _SLOW = 0.05
 """Share of the hand's speed below which the tip is at rest."""
-_NOW_NS = 15_000_000  # time over which the present speed is measured
+_NOW_NS = 15_000_000  # time over which the present speed is measured [ns]
 _CALM = 10.0
-"""Times :attr:`Numbers.coast` after which the loop has settled to that share: its answer to a
-setpoint that stops, of speed :math:`(1 + x - x^2) e^{-x}`, is below it from x = 6.6 on."""
-_SETTLED = 5.0  # time constants after which a filter has settled
+"""Time after which the control loop's speed is below the share `_SLOW`, as a multiple of :attr:`Numbers.coast`. When
+the setpoint stops, the speed is :math:`(1 + x - x^2) e^{-x}`, which is below the share from x = 6.6 on."""
+_SETTLED = 5.0  # time after which a filter has settled, as a multiple of its time constant
 
 
 @dataclass(frozen=True)
 class Measured:
-    """One number that was measured, and its bounds.
+    """One measured number with its bounds.
 
     Attributes:
-        name: Name in files, with its unit at the end: ``"travel_m"``.
+        name: Name in files, with the unit at the end: ``"travel_m"``.
         text: Error text if the value is outside of its bounds: ``"the tip moved {0:.1f} mm, at most {1:.1f}"``.
-        value: The number in SI units; NaN if it could not be measured, which is no fault.
-        most: Largest that is allowed.
-        least: Smallest that is allowed.
-        scale: Units of the text in one SI unit.
+        value: The number in SI units; NaN if it could not be measured, which is not an error.
+        most: Largest allowed value.
+        least: Smallest allowed value.
+        scale: Factor from SI units to the unit of the text.
     """
 
     name: str
@@ -51,7 +51,7 @@ class Measured:
 
     @property
     def failure(self) -> str:
-        """Error in words; empty if the value is within its bounds."""
+        """Error text; empty if the value is within its bounds."""
         if not (self.value > self.most or self.value < self.least):
             return ""
         bound = self.most if self.value > self.most else self.least
@@ -65,7 +65,7 @@ class Measured:
 
 @dataclass(frozen=True, eq=False)
 class Seen:
-    """Messages of one fault that an independent tap received.
+    """Messages that an independent tap received during one fault.
 
     Attributes:
         begin_ns: Begin of the fault [ns].
@@ -73,8 +73,8 @@ class Seen:
         setpoint_js: Joint setpoints.
         measured_js: Joints that the slave measures: position, speed, effort.
         true_cp: True pose of the tip, from the plant.
-        told_ns: Time at which ``slave/operation`` first reported a state or a fault [ns]; None if it did not.
-        warned_ns: Time of a node's first new warning [ns]; None if none did.
+        told_ns: Time at which ``slave/operation`` first reported the state or the fault [ns]; None without a report.
+        warned_ns: Time of the first new warning of a node [ns]; None without a warning.
         scheduling: Lateness of the drill's wake-ups during the fault.
         deaf: Time for which the slave's process was stopped [s].
     """
@@ -90,7 +90,7 @@ class Seen:
     deaf: float = 0.0
 
     def since(self, time_ns: int | None) -> float:
-        """Time from the fault to another event [s]; infinite if the event never happened."""
+        """Time from the begin of the fault to an event [s]; infinite if the event never happened."""
         return math.inf if time_ns is None else 1e-9 * (time_ns - self.begin_ns)
 
 
@@ -109,14 +109,14 @@ def judge(exercise: Exercise, seen: Seen, numbers: Numbers) -> Iterator[Measured
 def late(seen: Seen, numbers: Numbers) -> float:
     """Delay that transport and machine may add to any time [s].
 
-    A tick for each topic from hand to setpoint, plus twice the wake-up delay of the drill's own thread: once for
-    sending a message, once for receiving it.
+    The delay is a tick for each topic from hand to setpoint, plus twice the wake-up delay of the drill's own thread:
+    once for sending a message, and once for receiving it.
     """
     return _HOPS * numbers.tick + 2.0 * seen.scheduling.worst
 
 
 def _always(exercise: Exercise, seen: Seen, numbers: Numbers) -> Iterator[Measured]:
-    """Limits that hold whatever happens."""
+    """Check the limits that are valid for every fault."""
     robot, setpoints = numbers.robot, seen.setpoint_js
     ratio = measure.step_ratio(setpoints, numbers.speed_limit, numbers.tick)
     text = "a joint step of {0:.3f} times the drive's limit"
@@ -130,7 +130,7 @@ def _always(exercise: Exercise, seen: Seen, numbers: Numbers) -> Iterator[Measur
     way = measure.travel(seen.true_cp, seen.begin_ns, seen.end_ns)
     most = measure.RESOLUTION + 0.1 * (0.0 if math.isnan(way) else way)
     yield Measured("apart_m", text, measure.apart(measured, seen.true_cp), most)
-    # While the arm is silent, its motion is unknown; the slave stops an arm that is silent for longer.
+    # While the arm is silent, its motion is unknown. The slave stops an arm that is silent for longer than this.
     text = "messages of the tip or the joints ended {0:.0f} ms before the setpoints, at most {1:.0f}"
     silence = max(measure.silence(one, setpoints) for one in (seen.true_cp, seen.measured_js))
     yield Measured("silent_s", text, silence, numbers.command_timeout + late(seen, numbers))
@@ -139,7 +139,8 @@ def _always(exercise: Exercise, seen: Seen, numbers: Numbers) -> Iterator[Measur
 def _tool(exercise: Exercise, seen: Seen, numbers: Numbers) -> Measured:
     """Compare steps of the tip's setpoint with the speed limit of the tool.
 
-    Joints are slowed down in proportion, which is exact for the tip up to their step [rad].
+    The slave slows all joints by one factor. For the tip this is exact, except for an error of the order of a joint
+    step [rad].
     """
     since_ns = seen.begin_ns + round(1e9 * late(seen, numbers))
     chosen = seen.setpoint_js.within(since_ns, seen.end_ns)
@@ -152,7 +153,7 @@ def _tool(exercise: Exercise, seen: Seen, numbers: Numbers) -> Measured:
 
 
 def _told(exercise: Exercise, seen: Seen, numbers: Numbers) -> Iterator[Measured]:
-    """Check the times at which the slave reported the fault and ``diagnostics`` warned of it."""
+    """Check the times of the slave's report of the fault and of the warning in ``diagnostics``."""
     if exercise.told is not None:
         most = seen.deaf + exercise.told(numbers) + late(seen, numbers)
         text = "slave/operation reported after {0:.0f} ms, at most {1:.0f}"
@@ -171,7 +172,7 @@ def _stops(exercise: Exercise, seen: Seen, numbers: Numbers) -> Iterator[Measure
     if exercise.motion is Motion.HOLDS:
         yield _held(exercise, seen, numbers)
         return
-    if None not in exercise.states:  # an arm that has ended sends nothing
+    if None not in exercise.states:  # a slave that has ended sends nothing
         yield from _rests(exercise, seen, numbers, going)
     text = "a joint braked with {0:.2f} of its drive's deceleration, at least {1:.2f}"
     stopping = seen.setpoint_js.within(0, seen.end_ns)
@@ -180,7 +181,10 @@ def _stops(exercise: Exercise, seen: Seen, numbers: Numbers) -> Iterator[Measure
 
 
 def _travel_to_rest(exercise: Exercise, seen: Seen, numbers: Numbers, going: float) -> Measured:
-    """Distance to rest: the tip may continue for a time [s], brake, and catch up with its setpoint."""
+    """Check the distance to rest.
+
+    The tip may continue for the time ``going`` [s], brake, and catch up with its setpoint.
+    """
     begin_ns, setpoints, robot = seen.begin_ns, seen.setpoint_js, numbers.robot
     speed = min(measure.speed_before(seen.true_cp, begin_ns), OVERSHOOT * numbers.tip_speed)
     wanted = measure.tips(robot.fk, setpoints, robot.n)
@@ -220,7 +224,7 @@ def _or_never(time: float) -> float:
 
 
 def _held(exercise: Exercise, seen: Seen, numbers: Numbers) -> Measured:
-    """Speed of a tip that is held, once the filter has settled."""
+    """Check the speed of a tip that must not move, after the filter has settled."""
     settling = exercise.allowed(numbers) + _SETTLED * (numbers.filter_time + numbers.coast)
     since_ns = seen.begin_ns + round(1e9 * (settling + late(seen, numbers)))
     left = math.exp(-_SETTLED) * OVERSHOOT * numbers.tip_speed
@@ -242,7 +246,7 @@ def _speed(exercise: Exercise, seen: Seen, numbers: Numbers) -> Measured:
 
 
 def _goes_on(exercise: Exercise, seen: Seen, numbers: Numbers) -> Iterator[Measured]:
-    """An arm that keeps moving must follow the hand: no farther, no faster, and not much less."""
+    """Check that a moving arm follows the hand: no farther, no faster, and not much less."""
     begin_ns, end_ns = seen.begin_ns, seen.end_ns
     yield _speed(exercise, seen, numbers)
     elapsed, stands = 1e-9 * (end_ns - begin_ns), exercise.stands(numbers)

@@ -10,15 +10,15 @@ from teleop_core.kernels.geometry import Array
 
 Stamps = NDArray[np.int64]
 RESOLUTION = 2e-4
-"""Motion of the tip that is always allowed [m]: encoder steps, the onset of gravity, play."""
+"""Motion of the tip that is always allowed [m]; its causes are encoder steps, the onset of gravity, and play."""
 _BEFORE_NS = 300_000_000
-"""Time before a fault in which the motion is measured."""
+"""Time before a fault in which the motion is measured [ns]."""
 JUST_BEFORE_NS = 11_000_000
 """Time before a given moment in which the present speed is measured [ns]."""
-_SILENT_NS = 100_000_000  # longer than the period of any publisher of the tip
-_SHORT = 10  # samples of which the present speed is taken
+_SILENT_NS = 100_000_000  # silence of a publisher of the tip [ns]; longer than the period of any such publisher
+_SHORT = 10  # number of samples over which the present speed is measured
 _ROUNDING = 1e-12  # rounding error of a step [rad or m]
-_ENOUGH = 41  # samples that decide whether an arm follows
+_ENOUGH = 41  # number of samples that decide whether an arm follows
 _MOVING = 0.3  # least share of ticks in which a circling setpoint moves
 _FOLLOWED = 0.1  # least share of the setpoint's path; encoder noise is far less, and a lag does not shorten the path
 
@@ -29,9 +29,9 @@ class Trace:
 
     Attributes:
         sent_ns: Time of sending of each sample, shape (N,) [ns].
-        number: Its number in the sequence of its publisher, shape (N,).
-        values: Shape (N, width).
-        stamp_ns: Stamp of its header, shape (N,) [ns].
+        number: Sequence number of each sample at its publisher, shape (N,).
+        values: Values of each sample, shape (N, width).
+        stamp_ns: Stamp in the header of each sample, shape (N,) [ns].
     """
 
     sent_ns: Stamps
@@ -40,7 +40,7 @@ class Trace:
     stamp_ns: Stamps
 
     def within(self, begin_ns: int, end_ns: int) -> "Trace":
-        """Messages sent in an interval [ns], without its end."""
+        """Messages that were sent in the interval from `begin_ns` to `end_ns` [ns], the end excluded."""
         chosen = (self.sent_ns >= begin_ns) & (self.sent_ns < end_ns)
         return self.only(chosen)
 
@@ -55,8 +55,8 @@ class Trace:
 def step_ratio(setpoints: Trace, speed_limit: Array, dt: float) -> float:
     """Largest step of a setpoint divided by the step that its drive allows; 0 with fewer than two samples.
 
-    A lost message counts as a tick in which the setpoint could move. If the sequence number starts again, there is
-    another publisher, and that step is not counted.
+    A lost message counts as a tick in which the setpoint could move. If the sequence number starts again, the publisher
+    has changed, and this step is not counted.
 
     Args:
         setpoints: Joint setpoints, values (N, n) [rad or m].
@@ -72,7 +72,7 @@ def step_ratio(setpoints: Trace, speed_limit: Array, dt: float) -> float:
 
 
 def stop_delay(setpoints: Trace, since_ns: int) -> float:
-    """Time from ``since_ns`` until the setpoint has stopped and does not move again [s]; NaN if it never stops.
+    """Time from ``since_ns`` until the setpoint stops and does not move again [s]; NaN if it never stops.
 
     Args:
         setpoints: Joint setpoints, values (N, n).
@@ -88,12 +88,12 @@ def stop_delay(setpoints: Trace, since_ns: int) -> float:
 
 
 def travel(places: Trace, since_ns: int, until_ns: int) -> float:
-    """Largest distance of the tip from its position at one moment, up to another moment [m]; NaN if unknown.
+    """Largest distance of the tip from its position at ``since_ns``, until ``until_ns`` [m]; NaN if unknown.
 
     Args:
         places: Positions of the tip, values (N, 3 or more) [m].
         since_ns: Begin of the measured time [ns].
-        until_ns: The other [ns].
+        until_ns: End of the measured time [ns].
     """
     before = places.within(since_ns - _BEFORE_NS, since_ns)
     after = places.within(since_ns, until_ns)
@@ -103,14 +103,14 @@ def travel(places: Trace, since_ns: int, until_ns: int) -> float:
 
 
 def follows(setpoints: Array, measured: Array, speed_limit: Array) -> bool:
-    """Whether an arm follows its setpoints, decided from recent traces of both.
+    """Whether an arm follows its setpoints, decided from recent setpoints and measured joints.
 
-    Moving setpoints alone prove nothing: if the drives do not react, the arm stands still.
+    Moving setpoints alone prove nothing, because the drives may not react.
 
     Args:
         setpoints: Newest setpoints, shape (m, n) [rad or m].
         measured: Newest measured joints over the same time or longer, shape (k, n) [rad or m].
-        speed_limit: Rated speeds, by which joints are compared, shape (n,) [rad/s or m/s].
+        speed_limit: Rated speeds, by which the motions of the joints are divided, shape (n,) [rad/s or m/s].
     """
     if len(setpoints) < _ENOUGH or len(measured) < _ENOUGH:
         return False
@@ -121,7 +121,7 @@ def follows(setpoints: Array, measured: Array, speed_limit: Array) -> bool:
 
 
 def tip_speed(places: Trace) -> float:
-    """Largest speed of the tip over ten samples, by their stamps [m/s]; 0 with fewer samples.
+    """Largest speed of the tip over ten samples, computed with their stamps [m/s]; 0 with fewer samples.
 
     Args:
         places: Positions of the tip, values (N, 3 or more) [m].
@@ -131,7 +131,7 @@ def tip_speed(places: Trace) -> float:
 
 
 def _speeds(places: Trace) -> tuple[Array, Stamps]:
-    """Speeds (M,) of the tip over ten samples [m/s], and when the last of each ten was sent."""
+    """Speeds (M,) of the tip, each over ten samples [m/s], and the sending time of the last of the ten samples."""
     ways = places.values[_SHORT:, :3] - places.values[:-_SHORT, :3]
     times = 1e-9 * (places.stamp_ns[_SHORT:] - places.stamp_ns[:-_SHORT])
     is_later = times > 0.0
@@ -140,14 +140,14 @@ def _speeds(places: Trace) -> tuple[Array, Stamps]:
 
 
 def rest_delay(places: Trace, since_ns: int, slow: float, until_ns: int) -> float:
-    """Time from a moment until the tip is slower than a speed [m/s] for good [s]; NaN if never.
+    """Time from ``since_ns`` until the tip stays slower than ``slow`` [s]; NaN if it never does.
 
-    If the pose of the tip is no longer published, it is the time of the last sample.
+    If the pose of the tip is no longer published, the result is the time of the last sample.
 
     Args:
         places: Positions of the tip.
         since_ns: Begin of the measured time [ns].
-        slow: The speed [m/s].
+        slow: Speed below which the tip is at rest [m/s].
         until_ns: End of the observation [ns].
     """
     speeds, sent_ns = _speeds(places)
@@ -174,10 +174,10 @@ def path(places: Trace, since_ns: int, until_ns: int) -> float:
 
 
 def ramp(setpoints: Trace, braking: Array, dt: float) -> float:
-    """Smallest deceleration with which a joint came to rest, divided by that of its drive; NaN if no joint braked.
+    """Smallest deceleration of a joint to rest, divided by the deceleration of its drive; NaN if no joint braked.
 
-    If a joint brakes at a constant rate, its step shrinks by the same amount in every tick, and its last step is no
-    larger than that amount. A joint that crept behind its reference stops from steps that hardly change.
+    If a joint brakes at a constant rate, its step decreases by the same amount in every tick, and its last step is not
+    larger than this amount. A joint that creeps behind its reference stops after steps that hardly change.
 
     Args:
         setpoints: Joint setpoints up to rest, values (N, n) [rad or m].
@@ -200,7 +200,7 @@ def ramp(setpoints: Trace, braking: Array, dt: float) -> float:
 
 
 def beyond(places: Array, lower: Array, upper: Array) -> float:
-    """Largest distance of joints (N, n) beyond their limits (n,) [rad or m]; 0 inside."""
+    """Largest distance of joints (N, n) beyond their limits (n,) [rad or m]; 0 if all are inside."""
     return float(np.max(np.maximum(places - upper, lower - places), initial=0.0))
 
 
@@ -208,8 +208,8 @@ def tips(fk: Callable[[Array], Array], joints: Trace, n: int) -> Trace:
     """Positions (N, 3) of the tip [m] for joints, by forward kinematics independent of the slave.
 
     Args:
-        fk: Forward kinematics: joints (n,) to the tip's pose (4, 4).
-        joints: Positions first, values (N, n or more) [rad or m].
+        fk: Forward kinematics: function from joints (n,) to the tip's pose (4, 4).
+        joints: Trace of joints; the first n columns of its values (N, n or more) are the positions [rad or m].
         n: Number of joints.
     """
     found = [fk(row)[:3, 3] for row in joints.values[:, :n]]
@@ -220,8 +220,8 @@ def tips(fk: Callable[[Array], Array], joints: Trace, n: int) -> Trace:
 def apart(first: Trace, second: Trace) -> float:
     """Largest difference between the displacements (N, 3) of two traces in the same ticks [m].
 
-    Each trace is relative to its own first position, so a constant offset, such as that of a badly measured tool, does
-    not count.
+    The displacements of each trace begin at its own first position. So a constant offset, for example of a badly
+    measured tool, does not count.
     """
     _, at, other = np.intersect1d(first.stamp_ns, second.stamp_ns, return_indices=True)
     if not len(at):
@@ -231,9 +231,9 @@ def apart(first: Trace, second: Trace) -> float:
 
 
 def silence(places: Trace, setpoints: Trace) -> float:
-    """For how long setpoints were still sent after the last of another trace [s].
+    """Time from the last sample of ``places`` to the last setpoint [s].
 
-    0 without setpoints; infinite if only setpoints were received.
+    The result is 0 without setpoints, and infinite if only setpoints were received.
     """
     if not len(setpoints):
         return 0.0
@@ -243,7 +243,7 @@ def silence(places: Trace, setpoints: Trace) -> float:
 
 
 def way_ratio(places: Trace, speed_limit: float, dt: float) -> float:
-    """Largest step of the tip, values (N, 3) [m], divided by that at a speed limit [m/s]; 0 without two samples."""
+    """Largest step of the tip (N, 3) [m], divided by the step at a speed limit [m/s]; 0 without two samples."""
     ticks = np.diff(places.number)
     steps = np.linalg.norm(np.diff(places.values, axis=0), axis=1)[ticks > 0]
     return float(np.max(steps / (speed_limit * dt * ticks[ticks > 0]), initial=0.0))
@@ -262,8 +262,8 @@ def joint_speeds(setpoints: Trace, since_ns: int, until_ns: int) -> Array:
 def braking_way(setpoints: Trace, moment_ns: int, jacobian: Array, braking: Array) -> float:
     r"""Largest distance that the tip moves if all drives brake from their speeds at a moment [m].
 
-    Joint i, which turns at :math:`\dot q_i` and brakes at :math:`a_i`, needs
-    :math:`\dot q_i^2 / (2 a_i)`; the tip moves no farther than the sum of the motions that the joints cause.
+    Joint i, which moves at :math:`\dot q_i` and brakes at :math:`a_i`, travels :math:`\dot q_i^2 / (2 a_i)`. The tip
+    moves at most by the sum of the displacements that the single joints cause.
 
     Args:
         setpoints: Joint setpoints, values (N, n) [rad or m].
@@ -276,7 +276,7 @@ def braking_way(setpoints: Trace, moment_ns: int, jacobian: Array, braking: Arra
 
 
 def lag(setpoints: Trace, places: Trace, moment_ns: int) -> float:
-    """How far the tip lags behind its setpoint at a moment [m]; it may still catch up by this distance."""
+    """Distance of the tip behind its setpoint at a moment [m]; the tip may still catch up by this distance."""
     wanted = setpoints.within(moment_ns - _BEFORE_NS, moment_ns)
     found = places.within(moment_ns - _BEFORE_NS, moment_ns)
     if not len(wanted) or not len(found):

@@ -13,27 +13,26 @@ from teleop_core.slave.slave import Slave
 from teleop_drill.drill import hand
 
 OVERSHOOT = 1.5
-"""Largest speed of the tip divided by that of its setpoint: three equal poles with a zero at a third of them overshoot
-a step by a quarter
-(:func:`~teleop_core.slave.controllers.pid.critically_damped_gains`). A setpoint that reverses at full speed makes a
-step of twice its speed."""
+"""Largest speed of the tip divided by the speed of its setpoint. Three equal poles with a zero at a third of their
+value overshoot a step by a quarter (:func:`~teleop_core.slave.controllers.pid.critically_damped_gains`). A setpoint
+that reverses at full speed causes a step of twice its speed."""
 _STEP = 0.8
-"""Largest of (3 x - x²) exp(-x), at x = 0.70: speed of a step's answer, over bandwidth and step."""
+"""Largest speed of a step response, divided by bandwidth and step: the maximum of (3 x - x²) exp(-x), at x = 0.70."""
 _COAST = 0.84
-"""Distance that such a loop moves beyond a setpoint that stops at once, in units of speed divided by pole: the maximum
-of
-:math:`(x + x^2) e^{-x}`, the answer to a ramp that ends."""
+"""Distance that a control loop with three equal poles moves beyond a setpoint that stops suddenly, in units of speed
+divided by pole. It is the maximum of :math:`(x + x^2) e^{-x}`, the response to a ramp that ends."""
 WARNED = 2.0
-"""Time of two reports in ``diagnostics`` [s]: the first may still describe the time before the fault."""
+"""Time of two reports in ``diagnostics`` [s]. Two are needed, because the first may describe the time before the fault.
+"""
 
 
 @dataclass(frozen=True)
 class Scheduling:
-    """How late this machine wakes a thread, measured on a thread of the drill.
+    """Wake-up delays of this machine, measured with a thread of the drill.
 
     Attributes:
-        usual: Median [s].
-        worst: Largest of all [s].
+        usual: Median of the delays [s].
+        worst: Largest delay [s].
     """
 
     usual: float = 0.0
@@ -50,7 +49,7 @@ class Numbers:
 
     Attributes:
         robot: The slave.
-        gain: Motion of the tip per motion of the hand.
+        gain: Motion of the tip divided by the motion of the hand.
         speed_limit: Speed limit of each joint's drive, shape (n,) [rad/s or m/s].
         braking: Deceleration of each drive, shape (n,) [rad/s² or m/s²].
         tool_speed: Largest speed of the tip's setpoint [m/s].
@@ -61,8 +60,8 @@ class Numbers:
         hand_timeout: Silence of the hand after which the stylus counts as released [s].
         button_silence: Silence of the buttons that counts as a pressed clutch [s].
         effort_time: Time at the effort limit that is a fault [s].
-        pressing_time: Time beyond a joint's limit after which it is reported [s].
-        filter_time: Time constant of the reference filter [s]; 0 without.
+        pressing_time: Time beyond a joint's limit after which the slave reports it [s].
+        filter_time: Time constant of the reference filter [s]; 0 without a filter.
         coast: Time for which the arm continues at its speed after its setpoint has stopped [s].
         bandwidth: Bandwidth of the fastest drive [rad/s].
     """
@@ -93,10 +92,10 @@ class Numbers:
     def catching_up(self, gap: float, *, by_drives: bool = False) -> float:
         """Speed at which the arm catches up after a gap [s], as a multiple of the hand's speed.
 
-        The hand's motion during the gap arrives at once as a step. The filter follows it at an initial speed of step
-        over time constant; after a longer pause hand and slave are aligned again. If the drives themselves stood still,
-        the setpoint moved on without them, and they follow the difference as a step. With a triple pole w and no
-        derivative of the setpoint, their speed is at most 0.8 w times the step.
+        The hand's motion during the gap arrives as one step. The reference filter follows the step with an initial
+        speed of step divided by time constant. After a longer pause hand and slave are aligned again. If the drives
+        themselves stood still, the setpoint moved without them, and the drives follow the difference as a step. With a
+        triple pole w and no derivative of the setpoint, the speed of the drives is at most 0.8 w times the step.
         """
         rate = 1.0 / max(self.filter_time, self.tick)
         if by_drives:
@@ -105,7 +104,7 @@ class Numbers:
 
     @staticmethod
     def of(configuration: Configuration) -> "Numbers":
-        """Numbers of a session."""
+        """Compute the numbers of a session from its configuration."""
         given, scaling = configuration.group("slave"), configuration.group("motion_scaling")
         slave, lag = Slave(given), given.reference_filter
         drives = slave.robot.drives

@@ -1,4 +1,4 @@
-"""Outcome: the measurements of one fault, and whether they are as expected."""
+"""Outcome: the measurements of one fault, and the result of their check."""
 
 import math
 from dataclasses import dataclass, field
@@ -7,7 +7,7 @@ from teleop_core.slave.operation import Fault, State
 from teleop_drill.drill.exercise import Cure, Exercise
 from teleop_drill.drill.judging import Measured
 
-_SHORT = 20  # notes that fit beside the state
+_SHORT = 20  # largest number of characters of a note that is shown beside the state
 
 
 @dataclass(kw_only=True)
@@ -16,18 +16,18 @@ class Outcome:
 
     Attributes:
         exercise: The exercise that was run.
-        detected: Time until a node reported the fault [s]; NaN if none did.
-        told_by: First node that reported the fault, and its text.
-        told: Time until ``slave/operation`` reported the expected state [s]; None if it did not.
-        state: Operating state that followed; None if the slave was gone.
-        fault: Fault that it reported.
-        measures: All numbers that were measured, by name, each with its bounds.
-        recording: State of the recording in words; empty before it has been checked.
+        detected: Time until a node reported the fault [s]; NaN if no node reported it.
+        told_by: First node that reported the fault, with the text of the report.
+        told: Time until ``slave/operation`` reported the expected state [s]; None without this report.
+        state: Operating state that followed; None if the slave had ended.
+        fault: Fault that the slave reported.
+        measures: All measured numbers with their bounds, by name.
+        recording: Text about the state of the recording; empty before the recording is checked.
         is_recorded: Whether the recording is as expected.
         recovered: Time from the end of the fault until the arm followed again [s]; NaN if never.
         cure: Actions that the arm needed to follow again.
         note: Further remarks.
-        load: Load of the machine over its cores, as the fault began.
+        load: Load of the machine at the begin of the fault, divided by the number of its cores.
     """
 
     exercise: Exercise
@@ -46,17 +46,17 @@ class Outcome:
     extra: dict[str, float] = field(default_factory=dict)
 
     def measured(self, name: str) -> Measured:
-        """A number by its name; NaN if it was not measured."""
+        """Return a number by its name; NaN if it was not measured."""
         return self.measures.get(name, Measured(name, "", math.nan))
 
     def note_loss(self, seconds: float) -> None:
-        """Note the time of messages that the drill's own tap received and that are missing in the recording [s]."""
+        """Store the duration [s] of messages that the drill's own tap received but the recording lacks."""
         text = "{0:.2f} s of a topic that the drill received are not recorded, at most {1:.2f} s"
         most = self.exercise.lost
         self.measures["lost_s"] = Measured("lost_s", text, seconds, most, scale=1.0)
 
     def failures(self) -> list[str]:
-        """Results that are not as expected, in words."""
+        """Texts of all unexpected results."""
         asked, found = self.exercise, []
         if self.state not in asked.states:
             wanted = " or ".join(_state(state) for state in asked.states)
@@ -78,7 +78,7 @@ class Outcome:
 
     @property
     def state_text(self) -> str:
-        """State, fault, and a note if it is short: ``"PAUSED: silence"``."""
+        """Text with the state, the fault, and a short note if there is one: ``"PAUSED: silence"``."""
         text = _state(self.state)
         text = text if self.fault is Fault.NONE else f"{text}: {self.fault.word}"
         return f"{text} ({self.note})" if 0 < len(self.note) < _SHORT else text

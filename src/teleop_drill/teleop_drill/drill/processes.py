@@ -1,4 +1,4 @@
-"""Exercises with processes: killed, stopped for a time, hung, crowded out, on a full disk."""
+"""Exercises with processes that are killed, stopped for a time, hang, get no processor time, or have a full disk."""
 
 from collections.abc import Callable
 from functools import partial
@@ -10,12 +10,12 @@ from teleop_drill.drill.numbers import Numbers
 from teleop_drill.drill.recordings import LONGEST_LOSS
 
 FREEZE = 3.0
-"""For how long a process is stopped [s]."""
+"""Time for which a process is stopped [s]."""
 _STAGES = ("haptic_master", "motion_scaling", "inverse_kinematics")
 _LOOK = 0.01
-"""Time between two checks: of its clocks by the slave, or of a file by the drill [s]."""
+"""Time between two checks of the slave's clocks, or between two checks of a file by the drill [s]."""
 _PATIENCE_NS = 2_000_000_000
-"""Time in which a recorder shows how long it buffers messages [ns]."""
+"""Longest time for which a recorder is observed to find out how long it buffers messages [ns]."""
 _HOUR_NS = 3_600_000_000_000
 
 
@@ -25,7 +25,7 @@ def _kill(node: str, rig: Rig) -> None:
 
 
 def _kill_writer(node: str, rig: Rig) -> None:
-    """Kill the recorder as soon as more data waits for the disk than may be lost; otherwise after a while."""
+    """Kill the recorder as soon as the data that waits for the disk exceeds the allowed loss, or after a time limit."""
     written, since_ns = rig.written(), rig.now_ns()
     end_ns = since_ns + _PATIENCE_NS
     while (now_ns := rig.now_ns()) < end_ns and now_ns - since_ns <= 1e9 * LONGEST_LOSS:
@@ -74,7 +74,7 @@ def _step_clock(offset_ns: int, rig: Rig) -> None:
 
 
 def _killed(node: str) -> Exercise:
-    """Exercise that kills a stage before the slave: its last command times out, then the arm brakes."""
+    """Exercise that kills a stage between hand and slave; the stage's last command times out, then the arm brakes."""
     return Exercise(
         name=f"kill_{node}", text=f"{node} killed", inject=partial(_kill, node),
         states=(State.PAUSED,), faults=(Fault.SILENCE,), cures=(Cure.RESTART,),
@@ -101,7 +101,7 @@ def _let_go(numbers: Numbers) -> float:
 
 
 def _broken(name: str, text: str, inject: Callable[[Rig], None]) -> tuple[Exercise, Exercise]:
-    """Exercises with a stage that breaks: in its own process, and in the process of all stages."""
+    """Two exercises with a stage that fails: in its own process, and in the process of all stages."""
     alone = Exercise(
         name=name, text=text, inject=inject, undo=_mend, states=(State.PAUSED,),
         faults=(Fault.SILENCE,), cures=(Cure.RESTART,), told=outage, watch=2.6, ways=(False,),
@@ -201,4 +201,4 @@ PROCESSES = (
         ways=(True,), cuts_recording=True,
     ),
 )  # fmt: skip
-"""Faults of processes and of their machine."""
+"""Exercises with faults of processes and of their machine."""

@@ -1,4 +1,4 @@
-"""Recordings of a drill: whether our reader and others can open them."""
+"""Recordings of a drill: check whether our reader and other readers can open them."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,16 +16,16 @@ from teleop_drill.drill.measure import Stamps
 from teleop_drill.drill.outcome import Outcome
 
 Counted = dict[str, tuple[Stamps, Stamps]]
-"""Names of streams to the times at which messages were sent, and their stamps [ns]."""
+"""Sending times and stamps of the messages of each stream [ns], by the name of the stream."""
 LONGEST_LOSS = 0.2
 """Largest loss of recorded time when a process ends [s]."""
 DISCOVERY = 1.5
-"""Time after which all processes have discovered a node that starts again [s]."""
-_REPORT_NS = 1_500_000_000  # time after which a node has reported its counts
+"""Time after which all processes have discovered a restarted node [s]."""
+_REPORT_NS = 1_500_000_000  # time after which a node has reported its counts [ns]
 
 _ON_THE_WAY_NS = 5_000_000
-"""Messages sent within this time before a fault may not have reached the recorder when the fault begins [ns]; assumed:
-some ticks, and a turn of the recorder."""
+"""Messages that were sent within this time before a fault may not reach the recorder [ns]. The value is assumed as some
+ticks and a turn of the recorder."""
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class Verdict:
     """State of a recording.
 
     Attributes:
-        text: State of the recording in words.
+        text: Text about the state of the recording.
         is_good: Whether the state is as expected.
         is_saved: Whether the recording can be read up to its end, possibly only after ``recover``.
         bag: The recording, or the result of ``recover``, if it can be read.
@@ -49,7 +49,7 @@ def check_recording(path: Path, killed_ns: int | None = None) -> Verdict:
     """Open a recording with our reader and with that of the ``mcap`` package.
 
     Args:
-        path: Its directory.
+        path: Directory of the recording.
         killed_ns: Time at which the recorder was killed or its disk failed [ns]; None if it could close the file.
     """
     try:

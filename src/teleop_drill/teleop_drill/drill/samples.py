@@ -1,4 +1,4 @@
-"""Exercises with messages: lost, late, out of order, implausible, forged, malformed, too many."""
+"""Exercises with messages that are lost, late, out of order, implausible, forged, malformed, or too many."""
 
 import math
 from functools import partial
@@ -20,11 +20,13 @@ from teleop_drill.drill.hand import Distortion
 
 _FOR = 1.0  # duration of the disturbance of a stream [s]
 _AHEAD_NS = 2_000_000_000
-_WATCH = 0.5  # time for which an arm that keeps moving is observed afterwards [s]
-_SLOW = 0.05  # tool speed under which the hand shakes [m/s]
-_SHAKE, _SHAKES = 0.02, 3.0  # amplitude [m] and frequency [Hz] of a hand that shakes
-_PRESS, _STAY = 1.0, 1.5  # time for the motion of a joint to its limit, and time for pressing into the limit [s]
-_SHARE = 0.5  # share of the hand's speed with which the tip moves there
+_WATCH = 0.5  # time of observation after the disturbance, for an arm that keeps moving [s]
+_SLOW = 0.05  # speed limit of the tool while the hand shakes [m/s]
+_SHAKE = 0.02  # amplitude of a hand that shakes [m]
+_SHAKES = 3.0  # frequency of a hand that shakes [Hz]
+_PRESS = 1.0  # duration of the motion of a joint to its limit [s]
+_STAY = 1.5  # time for which the joint is pressed into the limit [s]
+_SHARE = 0.5  # speed of the tip during the motion to the limit, divided by the hand's speed
 _SHAKEN = hand.SPEED + 2.0 * math.pi * _SHAKE * _SHAKES
 
 
@@ -47,7 +49,10 @@ def _disturbed(
     stands: Time = never,
     warns: bool = False,
 ) -> Exercise:
-    """Exercise with distorted samples of the hand: the arm follows, or holds as if clutched."""
+    """Exercise with distorted samples of the hand.
+
+    The arm follows, or stays at its position as with the clutch pressed.
+    """
     is_going = motion is Motion.GOES_ON
     return Exercise(
         name=name,
@@ -76,13 +81,13 @@ def _calm(rig: Rig) -> None:
 
 
 def _press_limit(rig: Rig) -> None:
-    """Drive a joint into the limit of its range, keep pressing, and go back."""
+    """Drive a joint to its limit, press into the limit for some time, and drive the joint back."""
     rig.distort(hand.silent)
-    rig.wait(0.3)  # time after which other clients may drive the arm
+    rig.wait(0.3)  # wait until other clients may drive the arm
     ways, tip = rig.way_to_limit()
     seconds = max(_PRESS, tip / (_SHARE * hand.SPEED))
     speeds = ways / seconds
-    rig.drive(speeds, seconds - _PRESS)  # over a long distance the tip moves at the speed of the hand
+    rig.drive(speeds, seconds - _PRESS)  # a longer distance is driven with the tip at the hand's speed
     rig.mark()
     rig.drive(speeds, _PRESS + _STAY)
     rig.drive(-speeds, _PRESS)
@@ -100,7 +105,7 @@ def _unmute(rig: Rig) -> None:
 
 
 def _second_master(rig: Rig) -> None:
-    """Another master that holds its hand elsewhere, at the rate of the first."""
+    """A second master publishes another pose of the hand, at the rate of the first master."""
     rig.mark()
     place = hand.circle(0.0)
     place[1] += 0.05
@@ -110,7 +115,7 @@ def _second_master(rig: Rig) -> None:
 
 
 def _second_commander(rig: Rig) -> None:
-    """Another source of joint commands that wants to go elsewhere."""
+    """A second publisher sends joint commands to another position."""
     rig.mark()
     begin = rig.setpoint()
     for count in range(250):
@@ -119,7 +124,7 @@ def _second_commander(rig: Rig) -> None:
 
 
 def _spoof(rig: Rig) -> None:
-    """A setpoint that is not the slave's, without a stamp."""
+    """A second publisher sends a setpoint without a stamp on the slave's topic."""
     rig.mark()
     away = rig.setpoint() + 0.05
     for _ in range(250):
@@ -128,7 +133,7 @@ def _spoof(rig: Rig) -> None:
 
 
 def _garble(topic: Topic, rig: Rig) -> None:
-    """Send bytes that are not a message of the topic."""
+    """Send bytes that are not a valid message of the topic."""
     rng = np.random.default_rng(1)
     rig.mark()
     for length in (0, 1, 3, 4, 5, 8, 16, 64, 200, 1000):
@@ -153,7 +158,7 @@ def _leave_all(topics: tuple[Topic, ...], rig: Rig) -> None:
 
 
 def _flood(rig: Rig) -> None:
-    """Send as many samples as possible, all with the hand's own pose a moment ago."""
+    """Send as many samples as possible, all with a recent pose of the hand itself."""
     rig.mark()
     place = hand.circle(0.0)
     for _ in range(20_000):
@@ -233,4 +238,4 @@ SAMPLES = (
         states=(State.ENABLED, State.PAUSED), cures=(Cure.NOTHING, Cure.RESUME),
     ),
 )  # fmt: skip
-"""Faults of messages in transport, and messages from others."""
+"""Exercises with faults of messages in transport, and with messages of other publishers."""

@@ -9,15 +9,15 @@ from teleop_drill.drill.exercise import Cure, Exercise, Motion, Rig, Time, after
 from teleop_drill.drill.inside import RACES, STICKS, WORKS
 
 HEARTBEAT = 0.5
-"""Silence of the stop button that counts as pressed, while it is drilled [s]."""
+"""Silence of the stop button after which it counts as pressed, in exercises with heartbeats [s]."""
 _SERVICE = 0.02
 """Time in which a service call must reach the arm's loop, through the executors of both sides [s]."""
 _RACE = 0.1
 """Time in which the slave must detect a joint at twice its speed [s]; the drill pushes the joint every 5 ms."""
-_STILL = 0.3  # shorter than the silence that pauses the arm [s]
+_STILL = 0.3  # silence that is too short to pause the arm [s]
 _BEAT = 0.02  # time between two messages of a stop button [s]
 _REFUSED = "refused"
-_ROUNDS = 2.0  # within this time [s] the circle of the hand has pulled in every direction
+_ROUNDS = 2.0  # time in which the hand on its circle has pulled in every direction [s]
 
 
 def _press(rig: Rig) -> None:
@@ -26,9 +26,9 @@ def _press(rig: Rig) -> None:
 
 
 def _press_briefly(rig: Rig) -> None:
-    """A press that a short queue would lose: one message with a press, then many with a release.
+    """Send one message with a press, then many with a release; a short queue would lose the press.
 
-    The process of the slave stands still during this time, so that all these messages wait for it.
+    The process of the slave is stopped during this time, so all these messages wait for it.
     """
 
     def press() -> None:
@@ -40,7 +40,7 @@ def _press_briefly(rig: Rig) -> None:
 
 
 def _release(rig: Rig) -> None:
-    for _ in range(5):  # a reader on a bad line may miss a message
+    for _ in range(5):  # send several messages, because a reader on a bad line may miss one
         rig.press(is_pressed=False)
         rig.wait(0.01)
 
@@ -56,7 +56,7 @@ def _disable(rig: Rig) -> None:
 
 
 def _miss_heartbeat(rig: Rig) -> None:
-    """Two buttons send heartbeats; then only one of them does."""
+    """Send heartbeats of two buttons, then heartbeats of only one button."""
     for count in range(20):
         for button in (1, 0):
             rig.press(is_pressed=False, button=button)
@@ -80,9 +80,9 @@ def _note_answer(rig: Rig, *, is_taken: bool) -> None:
 
 
 def _press_while_masked(rig: Rig) -> None:
-    """Press and ask for a reset; then release, and ask for motion without a reset."""
+    """Press and request a reset; then release, and request motion without a reset."""
     rig.press(is_pressed=True)
-    rig.wait(0.5)  # wait until the arm is at rest, because enable is refused before
+    rig.wait(0.5)  # wait until the arm is at rest; before, enable is refused
     is_taken = rig.command("reset")
     rig.press(is_pressed=False)
     is_taken = rig.command("enable") or rig.command("resume") or is_taken
@@ -90,7 +90,7 @@ def _press_while_masked(rig: Rig) -> None:
 
 
 def _press_two(rig: Rig) -> None:
-    """Press one button, and publish with a second button that this one is released."""
+    """Press one button; a second button then publishes that it is not pressed."""
     rig.press(is_pressed=False, button=1)  # the slave knows the second button before the press
     rig.press(is_pressed=True)
     rig.wait(0.5)
@@ -100,13 +100,13 @@ def _press_two(rig: Rig) -> None:
 
 
 def _resume_early(rig: Rig) -> None:
-    """Pause and resume at once: the resume comes while the arm still brakes."""
+    """Pause and resume immediately, so that the arm still brakes when the resume comes."""
     rig.mark()
     _note_answer(rig, is_taken=rig.commands("pause", "resume")[1])
 
 
 def _hold_fast(fault: Fault, rig: Rig) -> None:
-    """Friction that no drive overcomes, like a payload that is far too heavy, or a hand that holds the arm."""
+    """Make the joints stick by friction that no drive overcomes, as with a far too heavy payload."""
     others = [one.word for one in _STUCK if one is not fault]
     rig.set("slave", "operation.reported", others)
     if fault is Fault.TIP:
@@ -116,7 +116,7 @@ def _hold_fast(fault: Fault, rig: Rig) -> None:
 
 
 def _run_away(rig: Rig) -> None:
-    """A drive that follows no command: one joint races, and only the check of its speed may stop the arm."""
+    """Make one joint race as if its drive ignored all commands; only the check of its speed may stop the arm."""
     rig.set("slave", "operation.reported", [one.word for one in _STUCK if one is not Fault.OVERSPEED])
     rig.mark()
     rig.control(RACES)
@@ -132,9 +132,9 @@ _STUCK = (Fault.TRACKING, Fault.TIP, Fault.EFFORT, Fault.OVERSPEED)
 
 
 def _stuck(fault: Fault, told: Time) -> Exercise:
-    """Exercise with joints that do not move, for one fault; other faults that detect this are only reported.
+    """Exercise with joints that stick, for one fault; other faults that detect this are set to be only reported.
 
-    The drives are off after the fault; the setpoint moves back to the arm, at worst across the whole circle.
+    After the fault the drives are off. The setpoint moves back to the arm, at most across the whole circle.
     """
     return Exercise(
         name=f"stuck_{fault.word}", text=f"joints held fast; {fault.word} alone may stop them",
@@ -145,14 +145,14 @@ def _stuck(fault: Fault, told: Time) -> Exercise:
 
 
 def _take_bad_gains(rig: Rig) -> None:
-    """A bandwidth at which no sampled loop at 1 kHz is stable."""
+    """Set a bandwidth at which no sampled loop at 1 kHz is stable."""
     rig.mark()
     is_taken = rig.set("slave_sim", "controller.pid.bandwidth", [3000.0] * len(rig.setpoint()))
     _note_answer(rig, is_taken=is_taken)
 
 
 def _take_slack_gains(rig: Rig) -> None:
-    """A bandwidth so low that the arm follows no motion."""
+    """Set a bandwidth so low that the arm follows no motion."""
     rig.mark()
     is_taken = rig.set("slave_sim", "controller.pid.bandwidth", [0.1] * len(rig.setpoint()))
     _note_answer(rig, is_taken=is_taken)

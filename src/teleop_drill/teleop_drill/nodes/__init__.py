@@ -1,1 +1,1 @@
-"""Nodes: drills and tests of running nodes, the only part here that needs ROS."""
+"""Nodes: drills and tests of running nodes; only this part of the package needs ROS."""

@@ -1,7 +1,7 @@
-"""Conformance: tests a CRTK arm from outside, first its topics, then its reactions to commands.
+"""Conformance: tests a CRTK arm from outside: first the topics, then the reactions to commands.
 
-It is a stock client: reliable, keep last, stamped with the time of the machine. The arm needs no software of this
-project.
+The test is an ordinary CRTK client: its QoS is reliable and keep-last, and its stamps are the time of the machine. The
+arm needs no software of this project.
 """
 
 from collections.abc import Callable, Iterable
@@ -24,12 +24,12 @@ NEVER_TRIED = {
 
 
 def examine(arm: Arm, *, may_move: bool, report: Report = lambda _: None, robot: Robot | None = None) -> list[Finding]:
-    """Findings of all rows.
+    """Test all rows of the table and return the findings.
 
     Args:
         arm: The arm.
-        may_move: Whether the test commands states and small motions: a few millimetres and hundredths of a radian,
-            each back again.
+        may_move: Whether the test commands states and small motions of a few millimetres or hundredths of a radian;
+            each motion is reversed.
         report: Called with a text for each step.
         robot: Expected robot; its forward kinematics are compared with the measured tip.
     """
@@ -46,7 +46,7 @@ def examine(arm: Arm, *, may_move: bool, report: Report = lambda _: None, robot:
 
 
 def left_behind(arm: Arm, *, may_move: bool) -> str:
-    """State in which an interrupted test leaves an arm, in words."""
+    """Text about the state in which an interrupted test has left an arm."""
     if not may_move:
         return "nothing was commanded"
     state = arm.newest("operating_state", 0.5)
@@ -56,7 +56,7 @@ def left_behind(arm: Arm, *, may_move: bool) -> str:
 
 
 def _insist_on_one(findings: dict[str, Finding]) -> None:
-    """Refuse an arm without any measured position."""
+    """Raise an error if the arm publishes no measured position."""
     pair = [findings[name] for name in ("measured_js", "measured_cp")]
     if all(found.verdict is Verdict.ABSENT for found in pair):
         row = pair[0].row
@@ -64,7 +64,7 @@ def _insist_on_one(findings: dict[str, Finding]) -> None:
 
 
 def _commands(findings: dict[str, Finding]) -> Iterable[tuple[str, CrtkTopic]]:
-    """Commands whose topics passed."""
+    """Commands whose topics passed the test."""
     for name, found in list(findings.items()):
         if found.row.group is not Group.QUERY and found.verdict is Verdict.OK:
             yield name, found.row
@@ -97,10 +97,10 @@ def _try(arm: Arm, findings: dict[str, Finding], report: Report, robot: Robot | 
 
 
 def _watched(trials: Trials, name: str, findings: dict[str, Finding], robot: Robot | None) -> Outcome:
-    """Test a command; the measurement of the arm during the motion must agree with the command.
+    """Test a command; the measurements of the arm during the motion must agree with the command.
 
-    A command that moved only the setpoint did not move the arm. From outside it is unknown which of the two is wrong,
-    so both rows fail.
+    A command that moved only the setpoint did not move the arm. From outside it is unknown whether the command or the
+    measurement is wrong, so both rows fail.
     """
     watch = Watch(trials.arm, None if robot is None else robot.fk)
     verdict, note = TRIALS[name](trials)

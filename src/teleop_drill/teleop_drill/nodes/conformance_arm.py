@@ -16,11 +16,11 @@ from teleop_drill.conformance.crtk_topics import CRTK_TOPICS
 
 _BY_NAME = {row.name: row for row in CRTK_TOPICS}
 _TURN = 0.005
-_SETTLED = 15  # tenths of a second without a new publisher or reader after which discovery counts as complete
+_SETTLED = 15  # discovery is complete after so many tenths of a second without a new publisher or reader
 
 
 class Tap:
-    """Messages of one topic: their number, and the newest one.
+    """Subscription to one topic that counts the messages and stores the newest one.
 
     Args:
         node: Node that listens.
@@ -92,13 +92,13 @@ class Arm(Guest):
         self._publishers: dict[str, Publisher] = {}
 
     def path(self, name: str) -> str:
-        """Full name of one of its topics."""
+        """Full name of a topic of the arm."""
         return f"{self.namespace}/{name}"
 
     # -- what is there ---------------------------------------------------------------------------
 
     def is_there(self, timeout: float) -> bool:
-        """Whether any of its topics appears within a time [s]; if so, wait until no more topics appear."""
+        """Whether any topic of the arm appears within a time [s]; if so, wait until no more topics appear."""
         if not self.wait(lambda: self._ends() > 0, timeout):
             return False
         counts = [0]
@@ -108,7 +108,7 @@ class Arm(Guest):
         return True
 
     def _ends(self) -> int:
-        """Number of publishers and readers of its topics, without our own."""
+        """Number of publishers and readers of the arm's topics, without our own."""
         return sum(len(self.publishers(r.name)) + len(self.readers(r.name)) for r in CRTK_TOPICS)
 
     def publishers(self, name: str) -> list[Endpoint]:
@@ -128,28 +128,28 @@ class Arm(Guest):
     # -- listening and speaking ------------------------------------------------------------------
 
     def tap(self, name: str) -> Tap:
-        """Tap of one of its topics, which receives messages from the first call on."""
+        """Tap of a topic of the arm; it receives messages from the first call on."""
         if name not in self._taps:
             self._taps[name] = Tap(self.ros, self.path(name), _BY_NAME[name].ros_type)
         return self._taps[name]
 
     def untap(self, name: str) -> None:
-        """Stop to listen."""
+        """Close the tap of a topic."""
         if name in self._taps:
             self._taps.pop(name).close()
 
     def keep(self, names: list[str], timeout: float = 2.0) -> None:
-        """Keep all messages of some topics, in addition to those of :meth:`tap`.
+        """Store all messages of some topics, in addition to those of :meth:`tap`.
 
-        Returns when each topic has a message, or after a time [s]. Until a publisher has discovered the new reader,
-        its messages are missed, and a motion that begins earlier would be incomplete.
+        Returns when each topic has had a message, or after a time [s]. The wait is needed because messages are lost
+        until a publisher has discovered the new reader. A motion that began earlier would be incomplete.
         """
         made = [Tap(self.ros, self.path(name), _BY_NAME[name].ros_type) for name in names]
         self._keeping.update(zip(names, made, strict=True))
         self.wait(lambda: all(tap.drain() for tap in made), timeout)
 
     def kept(self) -> dict[str, list[tuple[int, Any]]]:
-        """Kept messages, with the times at which they were sent [ns]; ends the keeping."""
+        """Return the stored messages with their sending times [ns], and stop to store messages."""
         found = {}
         for name, tap in self._keeping.items():
             tap.drain()
@@ -165,28 +165,28 @@ class Arm(Guest):
         return tap.newest
 
     def send(self, name: str, message: Any) -> None:
-        """Send a command, stamped with the time now."""
+        """Send a command with the present time as its stamp."""
         if hasattr(message, "header"):
             stamp = message.header.stamp
             stamp.sec, stamp.nanosec = divmod(self.world.time_ns(), SECOND_NS)
         self.publisher_of(name).publish(message)
 
     def publisher_of(self, name: str) -> Publisher:
-        """Publisher of a command, once the arm reads it."""
+        """Publisher of a command; returned as soon as the arm has discovered the publisher."""
         row = _BY_NAME[name]
         if row.name not in self._publishers:
-            quality = Qos(is_latched=row.name == "state_command")  # the same QoS as in the stock client
+            quality = Qos(is_latched=row.name == "state_command")  # as in the CRTK library's client
             own = self.ros.create_publisher(message_type(row.ros_type), self.path(row.name), quality)
             self._publishers[row.name] = own
             self.wait(lambda: own.get_subscription_count() > 0, 3.0)
         return self._publishers[row.name]
 
     def message(self, name: str, **values: Any) -> Any:
-        """Empty message of a topic, with some fields filled."""
+        """Empty message of a topic, with the given fields filled."""
         return message_type(_BY_NAME[name].ros_type)(**values)
 
     def wait(self, condition: Callable[[], bool], timeout: float) -> bool:
-        """Whether something becomes true within a time [s]."""
+        """Whether a condition becomes true within a time [s]."""
         end_ns = self.world.monotonic_ns() + round(timeout * SECOND_NS)
         while not condition():
             self.interrupt.check()
@@ -209,7 +209,7 @@ def stamp_of(message: Any) -> int:
 
 
 def numbers_of(message: Any) -> dict[str, np.ndarray]:
-    """Vectors of a message by name, as far as it has them."""
+    """Vectors of a message by name; empty fields are left out."""
     if hasattr(message, "position"):
         parts = ("position", "velocity", "effort")
         return {part: np.array(getattr(message, part), dtype=np.float64) for part in parts}

@@ -1,4 +1,4 @@
-"""Queries: whether a topic exists, has the right type, valid numbers and stamps, and reaches every reader."""
+"""Queries: test the existence of a topic, its type, its numbers and stamps, and whether it reaches every reader."""
 
 from itertools import pairwise
 from typing import Any
@@ -11,13 +11,13 @@ from teleop_drill.conformance.crtk_topics import STATES, CrtkTopic, Finding, Gro
 from teleop_drill.nodes.conformance_arm import Arm, numbers_of, stamp_of
 
 _LOOK = 0.5  # time in which messages are counted [s]
-_FIRST = 2.5  # time within which the first must come [s]
+_FIRST = 2.5  # time within which the first message must arrive [s]
 _OLD = 1.0  # largest age of a measurement [s]
 _UNIT = 1e-3
 
 
 def look(arm: Arm, row: CrtkTopic) -> Finding:
-    """Finding of one row, without touching the arm."""
+    """Finding of one row, without any command to the arm."""
     is_command = row.group is Group.COMMAND or row.name == "state_command"
     ends = arm.readers(row.name) if is_command else arm.publishers(row.name)
     side = "reader" if is_command else "publisher"

@@ -1,4 +1,4 @@
-"""Trials: small motions of an arm, each commanded as a stock client does, and taken back."""
+"""Trials: small motions of an arm, each commanded as an ordinary CRTK client does, and then reversed."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -20,15 +20,15 @@ WAY = 0.003
 _NEAR = 0.05  # share of the displacement that may be missing at the end
 _MOVED = 0.3  # least share of the displacement that counts as a motion
 _PATIENCE = 10.0  # longest duration of a move [s]
-_NOTHING = 1.5  # after this time without any motion, none is expected [s]
+_NOTHING = 1.5  # time after which a command that has caused no motion is assumed to cause none [s]
 _STATE = 3.0  # longest duration of a change of state [s]
-_STILL = 1e-4  # a joint that moved by less counts as at rest [rad or m]
+_STILL = 1e-4  # motion of a joint at rest [rad or m]
 Outcome = tuple[Verdict, str]
 _OK: Outcome = (Verdict.OK, "")
 
 
 class Trials:
-    """Trials of one arm that is enabled, homed and at rest.
+    """Trials of one arm, which must be enabled, homed and at rest.
 
     Args:
         arm: The arm.
@@ -63,7 +63,7 @@ class Trials:
         return self._fresh(name)["position"]
 
     def place(self) -> tuple[Array, Array]:
-        """Position and quaternion of its tip."""
+        """Position and quaternion of the arm's tip."""
         name = "setpoint_cp" if self.arm.publishers("setpoint_cp") else "measured_cp"
         found = self._fresh(name)
         return found["position"], found["quaternion"]
@@ -76,14 +76,14 @@ class Trials:
         return numbers_of(tap.newest)
 
     def go_back(self) -> None:
-        """Bring it where it was at the start, smoothly."""
+        """Move the arm smoothly back to its joints at the start."""
         if self.is_back() or not self.arm.readers("move_jp"):
             return
         self.arm.send("move_jp", self.arm.message("move_jp", position=self._start.tolist()))
         self.arm.wait(self.is_back, _PATIENCE)
 
     def is_back(self) -> bool:
-        """Whether its joints are where they were at the start."""
+        """Whether the joints of the arm are where they were at the start."""
         return float(np.abs(self.joints() - self._start).max()) < _STILL
 
     # -- commands --------------------------------------------------------------------------------
@@ -122,7 +122,7 @@ class Trials:
         return self.arm.wait(lambda: self._state() == state, _STATE)
 
     def move_joints(self, name: str, *, is_relative: bool) -> Outcome:
-        """Move a joint and back; the arm must report busy during the motion, and not afterwards."""
+        """Move a joint there and back; the arm must report busy during the motion only."""
         for joint, sign in self._candidates(self._joint, len(self._start)):
             begin = self.joints()
             step = np.zeros(len(begin))
@@ -140,7 +140,7 @@ class Trials:
         return self._watch_move(name, message, off, float(np.abs(goal - begin).max()))
 
     def move_tip(self, name: str) -> Outcome:
-        """Move the tip by a few millimetres; the arm must report busy during the motion, and not afterwards."""
+        """Move the tip by a few millimetres; the arm must report busy during the motion only."""
         for axis, sign in self._candidates(self._axis, 3):
             p, q = self.place()
             goal = p.copy()
@@ -175,7 +175,7 @@ class Trials:
         return (Verdict.FAILED, "still busy at its goal") if tap.newest.is_busy else _OK
 
     def _candidates(self, known: tuple[int, float], count: int) -> list[tuple[int, float]]:
-        """Directions to try: the direction that is known to be free, or all if none is known."""
+        """Directions to try: the direction that is known to be free, or all directions if none is known."""
         return [known] if known[0] >= 0 else list(product(range(count), (1.0, -1.0)))
 
     def stream_joints(self, name: str, rate: float, *, is_relative: bool = False) -> Outcome:
@@ -220,7 +220,7 @@ class Trials:
     def _stream(
         self, name: str, rate: float, sent: Callable[[float, float], Any], where: Callable[[], float]
     ) -> Outcome | None:
-        """Result of a stream whose share of the displacement rises to 1 and falls to 0."""
+        """Result of streamed commands that move to the full displacement and back."""
         self.arm.publisher_of(name)
         count, last, farthest = round(2.0 * rate), 0.0, 0.0
         for i in range(count + 1):
@@ -238,7 +238,7 @@ class Trials:
         return (Verdict.FAILED, f"{rest:.0%} of the way off in the end") if rest > _NEAR else _OK
 
     def run_joints(self, name: str) -> Outcome:
-        """Run a joint at a speed, then fall silent: it must come to rest by itself."""
+        """Command a speed of a joint, then send nothing; the joint must come to rest by itself."""
         for joint, sign in self._candidates(self._joint, len(self._start)):
             begin, speed = self.joints(), np.zeros(len(self._start))
             speed[joint] = sign * 2.0 * TURN
@@ -250,7 +250,7 @@ class Trials:
         return Verdict.FAILED, "no joint reacts to a speed in either direction"
 
     def run_tip(self, name: str) -> Outcome:
-        """Run the tip at a speed, then fall silent: it must come to rest by itself."""
+        """Command a speed of the tip, then send nothing; the tip must come to rest by itself."""
         for axis, sign in self._candidates(self._axis, 3):
             begin, message = self.place()[0], self.arm.message(name)
             setattr(message.twist.linear, "xyz"[axis], sign * 2.0 * WAY)
@@ -261,7 +261,7 @@ class Trials:
         return Verdict.FAILED, "the tip reacts to a speed along no axis in either direction"
 
     def _run(self, name: str, message: Any, halt: Any, where: Callable[[], float]) -> Outcome | None:
-        """Result of half a second at a speed of twice the displacement per second."""
+        """Result of a speed of twice the displacement per second, commanded for half a second."""
         self.arm.publisher_of(name)
         for _ in range(25):
             self.arm.send(name, message)
@@ -281,7 +281,7 @@ class Trials:
         return _OK if 0.3 < went < 3.0 else (Verdict.FAILED, f"moved {went:.0%} of the commanded distance")
 
     def hold(self) -> Outcome:
-        """Hold: nothing moves, and it stays enabled."""
+        """Command hold; the arm must not move and must stay enabled."""
         before = self.joints()
         self.arm.publisher_of("hold")
         self.arm.send("hold", self.arm.message("hold"))

@@ -11,8 +11,8 @@ from teleop_drill.nodes.conformance_arm import Arm, numbers_of, stamp_of
 
 JOINTS, TIP = "measured_js", "measured_cp"
 _NAMES = ("setpoint_js", JOINTS, "setpoint_cp", TIP, "measured_cv")
-_JOINT_WAY, _TIP_WAY = 3e-3, 1e-3
-"""Smallest displacements of joints [rad or m] and of the tip [m] that are compared."""
+_JOINT_WAY = 3e-3  # smallest displacement of a joint that is compared [rad or m]
+_TIP_WAY = 1e-3  # smallest displacement of the tip that is compared [m]
 _AFTERWARDS = 0.5  # time of observation after a motion, for delayed measurements [s]
 
 
@@ -21,7 +21,7 @@ class Watch:
 
     Args:
         arm: The arm.
-        fk: Its forward kinematics: joints (n,) to the tip's pose (4, 4); None if they are unknown.
+        fk: Forward kinematics of the arm: function from joints (n,) to the tip's pose (4, 4); None if unknown.
     """
 
     def __init__(self, arm: Arm, fk: Callable[[Array], Array] | None) -> None:
@@ -29,7 +29,7 @@ class Watch:
         arm.keep([name for name in _NAMES if arm.publishers(name)])
 
     def lies(self) -> dict[str, str]:
-        """Disagreements by topic; ends the watch."""
+        """End the watch, and return the disagreements by topic."""
         self._arm.pause(_AFTERWARDS)
         trails = {name: _trail(messages) for name, messages in self._arm.kept().items()}
         none = _trail([])

@@ -25,7 +25,7 @@ from teleop_drill.nodes.drill_session import ARM, SIMULATOR, LiveSite
 from teleop_drill.nodes.drill_site import Session, Site
 
 _PRIORITY = 30
-_BEFORE = 0.2  # motion that is seen before a fault [s]
+_BEFORE = 0.2  # time of normal motion before a fault [s]
 _FOLLOWS = 90.0  # longest time from the start until the arm follows [s]
 _CIRCLE = (
     "operator.kind=circle",
@@ -36,9 +36,9 @@ _CIRCLE = (
     "operator.rotation=0.0",
 )
 _MEASURED = 2.0  # time in which the wake-up delay of this machine is measured [s]
-_STOOD_STILL = 0.5  # share of the command timeout: if the machine stands still that long, a result is not valid
-_MORE = 2  # number of repetitions of an exercise for that reason
-_STEADY = 4  # checks, a tenth of a second apart, that the arm follows
+_STOOD_STILL = 0.5  # share of the command timeout; a result is invalid if the machine stands still for longer
+_MORE = 2  # number of repetitions of an exercise whose result is not valid
+_STEADY = 4  # number of checks in a row, a tenth of a second apart, that must find that the arm follows
 Say = Callable[[str], None]
 
 
@@ -55,20 +55,20 @@ def drill(
 ) -> list[Outcome]:
     """Run exercises in separate sessions, on a separate ROS domain.
 
-    Loops and the drill's own tap take SCHED_FIFO if the system grants it and ``texts`` set no priority, because seven
-    processes on two cores are late even without a fault.
+    Loops and the drill's own tap use SCHED_FIFO if the system allows it and ``texts`` set no priority. Without it,
+    seven processes on two cores are late even without a fault.
 
     Args:
         exercises: Exercises to run, from :func:`teleop_drill.drill.chosen`.
         folder: Folder of the recordings.
         say: Called with one line about each exercise.
         is_composed: Whether all nodes share one process.
-        files: Parameter files over the scenario ``free_motion``.
-        texts: Parameters ``key=value`` over all files.
-        drives: Command line of drives that replace the simulated ones; exercises that break the simulator are left
-            out.
-        arm: Command line of the process that the drives command, such as the controller of a real arm. It is started
-            before them, and the drill does not break it.
+        files: Parameter files that override the scenario ``free_motion``.
+        texts: Parameters ``key=value`` that override all files.
+        drives: Command line of drives that replace the simulated drives. Exercises that break the simulator are then
+            left out.
+        arm: Command line of the process that the drives command, such as the controller of a real arm. This process is
+            started before the drives, and the drill does not break it.
 
     Raises:
         TeleopError: A parameter is wrong, or a session cannot be started.
@@ -86,8 +86,8 @@ def drill(
 
 
 Sites = Callable[[Master, Configuration, Path, Interrupt], Site]
-"""Makes the site of a session from the source of the hand's motion, the configuration, the folder of files, and the
-interrupt."""
+"""Function that makes the site of a session from the kind of the hand's operator, the configuration, the folder of
+files, and the interrupt."""
 
 
 def drill_at(
@@ -101,12 +101,12 @@ def drill_at(
     """Run exercises like :func:`drill`, but in sessions of any site.
 
     Args:
-        site: Makes the site of each session.
+        site: Function that makes the site of each session.
         exercises: Exercises to run.
         folder: Folder of the recordings.
         say: Called with one line about each exercise.
-        files: Parameter files over the scenario ``free_motion``.
-        texts: Parameters ``key=value`` over all files.
+        files: Parameter files that override the scenario ``free_motion``.
+        texts: Parameters ``key=value`` that override all files.
     """
     outcomes: list[Outcome] = []
     for master in Master:
@@ -139,7 +139,7 @@ class _Drill:
         self.interrupt = Interrupt()
         """Object that ends a wait of this drill with KeyboardInterrupt."""
         self.is_over = False
-        """Whether it was stopped before its end."""
+        """Whether the drill was stopped before its end."""
 
     def run(self, exercises: Sequence[Exercise]) -> list[Outcome]:
         """Run the exercises, and check the recordings at the end."""
@@ -172,7 +172,7 @@ class _Drill:
     # -- sessions --------------------------------------------------------------------------------
 
     def _prepared(self) -> LiveRig:
-        """Like :meth:`_ready`; if a session cannot continue, a new one is tried once."""
+        """Return a ready session as :meth:`_ready` does; if this fails, one new session is tried."""
         if self._rig is None:
             return self._ready()
         try:
@@ -183,7 +183,7 @@ class _Drill:
             return self._ready()
 
     def _ready(self) -> LiveRig:
-        """A session whose slave follows the hand; a new one if the last did not survive."""
+        """Return a session whose slave follows the hand; a new session is started if the last one did not survive."""
         if self._rig is None:
             self._sessions += 1
             folder = self._folder / f"session_{self._sessions}"
@@ -199,7 +199,7 @@ class _Drill:
         return self._rig
 
     def _measure_scheduling(self, rig: LiveRig) -> None:
-        """Lateness of the wake-ups of the drill's own thread while the session works."""
+        """Measure the wake-up delays of the drill's own thread while the session runs."""
         since_ns = rig.now_ns()
         rig.wait(_MEASURED)
         found = self._scheduling = rig.tap.scheduling(since_ns)
@@ -207,7 +207,7 @@ class _Drill:
         self._say(f"wake-ups on this machine are late by {late}; every time limit is extended by twice the worst")
 
     def _await_following(self, rig: LiveRig) -> None:
-        """Wait until the slave follows, and help it; raises SessionError if it does not follow."""
+        """Wait until the slave follows, and send the commands that it needs; raises SessionError if it never does."""
         deadline = rig.now() + _FOLLOWS
         steady = 0
         while steady < _STEADY:
@@ -242,12 +242,12 @@ class _Drill:
             try:
                 self._ready()
             except SessionError:
-                break  # keep the results so far
+                break  # return the results so far
             outcome = self._repeated(exercise, rig)
         return outcome
 
     def _repeated(self, exercise: Exercise, rig: LiveRig) -> Outcome:
-        """The worst of all repetitions, which end with the first failure, with the medians of all."""
+        """Repeat an exercise until the first failure; returns the worst outcome with the medians of all repetitions."""
         found = [self._once(exercise, rig)]
         while len(found) < exercise.repeats and not found[-1].failures():
             try:

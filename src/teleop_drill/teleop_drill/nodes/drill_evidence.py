@@ -14,7 +14,7 @@ _STRENGTH = (Cure.NOTHING, Cure.RESUME, Cure.RESET, Cure.RESTART)
 
 
 def note_state(outcome: Outcome, rig: LiveRig, before: dict[str, float]) -> None:
-    """Note the state that followed, and the node that reported it first."""
+    """Store in the outcome the state that followed, and the node that reported it first."""
     begin_ns = rig.begin_ns
     told: list[tuple[int, str]] = []
     for sent_ns, report in rig.tap.reports(topics.SLAVE_OPERATION):
@@ -37,13 +37,13 @@ def note_state(outcome: Outcome, rig: LiveRig, before: dict[str, float]) -> None
 
 
 def seen_of(outcome: Outcome, rig: LiveRig, time_ns: tuple[int, int], scheduling: Scheduling) -> Seen:
-    """Messages of the tap about a fault, and the reports of the slave about itself.
+    """Return the messages that the tap received during a fault, and the slave's own reports.
 
     Args:
         outcome: Outcome with the reports.
         rig: The session.
         time_ns: Begin and end of the fault [ns].
-        scheduling: Lateness of this machine at the start.
+        scheduling: Wake-up delays of this machine at the start.
     """
     begin_ns, end_ns = time_ns
     true_cp, measured_cp, setpoints, joints = rig.tap.traces(
@@ -69,7 +69,7 @@ def _is_expected(report: dict[str, float], exercise: Exercise) -> bool:
 
 
 def recover(outcome: Outcome, rig: LiveRig) -> None:
-    """Wait until the arm follows again; help it more and more."""
+    """Wait until the arm follows again, and send more and more of the commands that it may need."""
     begin, used = rig.now(), Cure.NOTHING
     while (elapsed := rig.now() - begin) < _LONGEST:
         if rig.is_following():

@@ -1,4 +1,4 @@
-"""Rig of a drill: all that can be done to a running session, on its topics and to its processes."""
+"""Rig of a drill: all actions on the topics and the processes of a running session."""
 
 import re
 import signal
@@ -34,15 +34,15 @@ from teleop_drill.nodes.drill_tap import Tap
 _NUMBERS = re.compile(r"[-+]?[0-9][0-9.e]*")
 _SLAVE = ("slave", "slave_sim")
 _TEXTS = ("operation.reported",)
-_PERIOD_NS = 1_000_000_000  # period of reports: later reports describe the time after the fault
-_ANSWER = 3.0  # patience with a service [s]
-_FOUND = 3.0  # patience with discovery [s]
+_PERIOD_NS = 1_000_000_000  # period of reports; reports that come later than this describe the time after the fault
+_ANSWER = 3.0  # longest wait for the answer of a service [s]
+_FOUND = 3.0  # longest wait for discovery [s]
 _DRIVE_PERIOD = 0.01
 _FRESH = 0.3  # an older setpoint does not come from a running slave [s]
 
 
 class LiveRig:
-    """A session of processes with the drill's own nodes beside them.
+    """A session of processes, together with the drill's own nodes.
 
     Args:
         site: Site of the session.
@@ -62,9 +62,9 @@ class LiveRig:
         self._node, self._own = Guest("drill", domain, world), Guest("drill_hand", domain, world)
         self._executor = self._node.world.executor()
         self._executor.add_node(self._node.ros)
-        # Latched, as a good button is: a button that keeps no state counts as pressed until it sends. Created long
-        # before they are pressed, because a message sent during discovery between button and slave arrives a tenth of
-        # a second late.
+        # The buttons are latched, because the slave treats a button without latched state as pressed until its first
+        # message. They are created long before a press, because a message during the discovery between button and
+        # slave arrives a tenth of a second late.
         self._buttons = [
             self._node.ros.create_publisher(Bool, STOP_TOPIC, Qos(depth=100, is_latched=True)) for _ in range(2)
         ]
@@ -81,7 +81,7 @@ class LiveRig:
         )
 
     def close(self) -> None:
-        """End the processes and leave."""
+        """End the processes, and close the drill's own nodes."""
         try:
             self.session.close()
         finally:
@@ -94,12 +94,12 @@ class LiveRig:
     # -- what is seen ----------------------------------------------------------------------------
 
     def mark(self) -> None:
-        """The fault begins now."""
+        """Declare that the fault begins now."""
         self.begin_ns, self.warned, self.said = self._world.time_ns(), {}, ""
         self._warned_before = self._warnings()
 
     def _warnings(self) -> dict[str, str]:
-        """Present warnings of each node, without numbers, because numbers change with every report."""
+        """Present warnings of each node; numbers are removed, because they change with every report."""
         told = self.observer.statuses.items()
         return {n: _NUMBERS.sub("", s.message) for n, s in told if s.level >= WARNING}
 
@@ -112,11 +112,11 @@ class LiveRig:
         return self._world.time_ns()
 
     def now(self) -> float:
-        """Time of a clock that never goes back [s]."""
+        """Time of a monotonic clock [s]."""
         return 1e-9 * self._world.monotonic_ns()
 
     def wait(self, seconds: float) -> None:
-        """Let time pass [s]; warnings of nodes are noted with their time."""
+        """Wait for a time [s]; new warnings of nodes are stored with their time."""
         deadline = self.now() + seconds
         while (left := deadline - self.now()) > 0.0:
             self.site.interrupt.check()
@@ -154,7 +154,7 @@ class LiveRig:
             self.wait(_DRIVE_PERIOD)
 
     def operation(self) -> dict[str, float]:
-        """Newest report of the slave's operation; empty before the first."""
+        """Newest report of the slave's operation; empty before the first report."""
         reports = self.tap.reports(SLAVE_OPERATION)
         return reports[-1][1] if reports else {}
 
@@ -176,13 +176,13 @@ class LiveRig:
         return measure.follows(*self._recent_joints(), self._speed_limit)
 
     def _recent_joints(self) -> tuple[Array, Array]:
-        """The newest setpoints, and the newest places of the joints [rad or m]."""
+        """The newest setpoints and the newest measured positions of the joints [rad or m]."""
         topics, n = (SLAVE_SETPOINT_JS, SLAVE_MEASURED_JS), self._robot.n
         wanted, measured = (self.tap.recent(topic, 60)[:, :n] for topic in topics)
         return wanted, measured
 
     def complaints(self) -> str:
-        """Complaints of the nodes, in one line."""
+        """Warnings and errors of the nodes, in one line."""
         age = self.tap.age(SLAVE_SETPOINT_JS)
         told = [f"{n}: {s.message}" for n, s in self.observer.statuses.items()]
         moved, went = (int(np.sum(np.any(np.diff(rows, axis=0) != 0.0, axis=1))) for rows in self._recent_joints())
@@ -202,7 +202,7 @@ class LiveRig:
         return sum(file.stat().st_size for file in self.session.recordings[-1].glob("*.mcap"))
 
     def freeze(self, node: str, seconds: float, meanwhile: Callable[[], None] = lambda: None) -> None:
-        """Stop a node's process for a time [s], call `meanwhile` during the stop, then let the process continue."""
+        """Stop a node's process for a time [s], call `meanwhile` during the stop, then continue the process."""
         self.mark()
         self.session.send(node, signal.SIGSTOP)
         begin = self.now()
@@ -231,7 +231,7 @@ class LiveRig:
         self.session.start_bystander()
 
     def kill_bystander(self) -> None:
-        """Kill it."""
+        """Kill the foreign process."""
         self.session.kill_bystander()
 
     def control(self, word: int, offset_ns: int = 0) -> None:
@@ -245,7 +245,7 @@ class LiveRig:
         self.tap.distortion = distortion
 
     def mute_buttons(self, *, is_mute: bool) -> None:
-        """Send no buttons, or send them again."""
+        """Stop or restart the messages of the stylus's buttons."""
         self.tap.is_mute = is_mute
 
     def publish(self, topic: Topic, stamp_ns: int, values: Array) -> None:
@@ -258,13 +258,13 @@ class LiveRig:
         self._intruder(topic).publish(data)
 
     def leave(self, topic: Topic) -> None:
-        """Close that other publisher."""
+        """Close the other publisher of the topic."""
         publisher = self._intruders.pop(topic.name, None)
         if publisher is not None:
             self._own.ros.destroy(publisher)
 
     def _intruder(self, topic: Topic) -> Any:
-        """Other publisher of a topic, once it has a reader; the fault begins then."""
+        """Return another publisher of a topic as soon as it has a reader; at this time the fault begins."""
         if topic.name not in self._intruders:
             kind = message_type(topic.kind.ros_type)
             made = self._own.ros.create_publisher(kind, f"/{topic.name}", profile(topic))
@@ -278,7 +278,7 @@ class LiveRig:
         return self._intruders[topic.name]
 
     def press(self, *, is_pressed: bool, button: int = 0) -> None:
-        """Send a message of a stop button: the first one, or another."""
+        """Send a message of a stop button with the given number."""
         own, deadline = self._buttons[button], self.now() + _FOUND
         while own.get_subscription_count() == 0 and self.now() < deadline:
             self._world.sleep(2e-3)
@@ -309,13 +309,13 @@ class LiveRig:
         return bool(found is not None and all(one.successful for one in found.results))
 
     def _call(self, client: Any, request: Any) -> Any:
-        """Answer of a service; None if there is none in time."""
+        """Call a service and return its answer; None if the answer is late."""
         if not client.wait_for_service(_FOUND):
             return None
         return self._answer(client.call_async(request))
 
     def _answer(self, future: Any) -> Any:
-        """Answer of a service; None if it did not answer in time."""
+        """Wait for the answer of a service; None if the answer is late."""
         deadline = self.now() + _ANSWER
         while not future.done() and (left := deadline - self.now()) > 0.0:
             self._executor.spin_once(left)

@@ -1,4 +1,4 @@
-"""Processes of a drill: the nodes of one session, each of which may be broken and restarted."""
+"""Processes of a drill: the nodes of one session; the drill may break and restart each of them."""
 
 import os
 import resource
@@ -41,20 +41,20 @@ _MIDDLEWARE = ("FASTRTPS_", "FASTDDS_", "ROS_AUTOMATIC", "ROS_LOCALHOST", "ROS_S
 
 
 class DrillSession:
-    """The nodes of a session in processes that this process has started; it affects no other processes.
+    """The nodes of a session, in processes that this process starts; no other processes are affected.
 
     Args:
         configuration: Configuration of the session.
         folder: Folder of the recordings.
         env: Environment of the processes.
-        observer: Receives the reports of the nodes.
+        observer: Node that receives the reports of the session.
         is_composed: Whether all nodes share one process.
         master: Kind of operator that moves the hand.
-        foreign: Commands of processes that are none of ours, by name: of drives in the place of
-            the simulator, and of the arm that these lead.
+        foreign: Command lines of processes of other software, by name: drives that replace the simulator, and the arm
+            that these drives command.
 
     Attributes:
-        recordings: Recordings so far, the present one last.
+        recordings: Recordings so far, the present recording last.
     """
 
     def __init__(
@@ -102,7 +102,7 @@ class DrillSession:
         if process in {RECORDER_NAME, SESSION_NODE}:
             self.recordings.append(self._folder / f"recording_{len(self.recordings) + 1}")
             self._begun_ns.append(time.time_ns())
-        # Kept open: a process that is started later reads it as well.
+        # The file stays open, because processes that are started later read it too.
         file = tempfile.TemporaryFile("w+")  # noqa: SIM115
         file.write(self._parameters())
         file.flush()
@@ -130,17 +130,17 @@ class DrillSession:
                 raise SessionError(f"{', '.join(nodes)}: not at work after {START_TIMEOUT:g} s")
 
     def check(self) -> None:
-        """Make sure that all processes run, those of foreign commands too.
+        """Check that all processes run, including foreign ones.
 
         Raises:
-            SessionError: A process has ended; the text has its exit code and its last output.
+            SessionError: A process has ended; the message contains its exit code and its last output.
         """
         for child in self._children.values():
             if not child.is_running:
                 child.check()
 
     def close(self) -> None:
-        """End all, in order."""
+        """End all processes in order."""
         for other in self._others:
             other.kill()
             other.wait()
@@ -157,7 +157,7 @@ class DrillSession:
             file.close()
 
     def until_ns(self, recording: Path) -> int:
-        """When the recording after the given one was begun [ns]; later than all times if there is none."""
+        """Time at which the recording after the given one began [ns]; later than all times if there is none."""
         place = self.recordings.index(recording) + 1
         return self._begun_ns[place] if place < len(self._begun_ns) else _NEVER_NS
 
@@ -204,14 +204,14 @@ class DrillSession:
             self._others.append(subprocess.Popen([sys.executable, "-S", "-c", _BUSY]))
 
     def relieve(self) -> None:
-        """End them."""
+        """End the processes of :meth:`hog`."""
         while self._others:
             other = self._others.pop()
             other.kill()
             other.wait()
 
     def start_bystander(self) -> None:
-        """Start a ROS process with the middleware's own settings that listens to all streams."""
+        """Start a ROS process with the middleware's default settings that subscribes to all streams."""
         env = {k: v for k, v in self._env.items() if not k.startswith(_MIDDLEWARE)}
         self._bystander = subprocess.Popen(
             [sys.executable, "-c", _BYSTANDER], env=env, stdout=subprocess.PIPE, text=True
@@ -222,14 +222,14 @@ class DrillSession:
             raise SessionError("the bystander did not start")
 
     def kill_bystander(self) -> None:
-        """Kill it."""
+        """Kill the process of :meth:`start_bystander`."""
         if self._bystander is not None:
             self._bystander.kill()
             self._bystander.wait()
 
 
 class LiveSite:
-    """This machine, on a ROS domain of its own.
+    """Site of a drill on this machine, with its own ROS domain.
 
     Args:
         configuration: Configuration of the session.
@@ -237,7 +237,7 @@ class LiveSite:
         master: Kind of operator that moves the hand.
         interrupt: Object that ends a wait of the drill with KeyboardInterrupt.
         is_composed: Whether all nodes share one process.
-        foreign: Commands of processes that are none of ours, by name.
+        foreign: Command lines of processes of other software, by name.
     """
 
     world: World = ROS
@@ -264,11 +264,11 @@ class LiveSite:
         self._env[inside.VARIABLE] = str(file)
 
     def load(self) -> float:
-        """Load of the machine, per processor."""
+        """Load of the machine, divided by the number of processors."""
         return os.getloadavg()[0] / (os.cpu_count() or 1)
 
     def session(self, observer: Observer) -> DrillSession:
-        """Processes of a session, whose reports the observer receives."""
+        """Return the processes of a session; the observer receives their reports."""
         return DrillSession(
             self._configuration,
             self._folder,

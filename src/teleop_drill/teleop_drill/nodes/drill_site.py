@@ -1,4 +1,4 @@
-"""Site: where a session is drilled, this machine or a simulated one, and its processes."""
+"""Site: the machine of a drill (this one or a simulated one), and the processes of a session on it."""
 
 from pathlib import Path
 from typing import Protocol
@@ -11,10 +11,10 @@ from teleop_drill.drill.exercise import Master
 
 
 class Session(Protocol):
-    """Processes of a session, as a drill starts, breaks and ends them.
+    """Processes of a session, which a drill starts, breaks and ends.
 
     Attributes:
-        recordings: Recordings so far, the present one last.
+        recordings: Recordings so far, the present recording last.
     """
 
     recordings: list[Path]
@@ -23,13 +23,13 @@ class Session(Protocol):
         """Start all processes that do not run, and wait until all are ready; raises SessionError."""
 
     def check(self) -> None:
-        """Make sure that all processes run; raises SessionError."""
+        """Check that all processes run; raises SessionError if one has ended."""
 
     def close(self) -> None:
-        """End all, in order."""
+        """End all processes in order."""
 
     def until_ns(self, recording: Path) -> int:
-        """When the recording after the given one was begun [ns]; later than all times if there is none."""
+        """Time at which the recording after the given one began [ns]; later than all times if there is none."""
 
     def is_running(self, node: str) -> bool:
         """Whether the process of a node runs."""
@@ -50,28 +50,28 @@ class Session(Protocol):
         """Keep all processors busy."""
 
     def relieve(self) -> None:
-        """Let them rest."""
+        """End the load of :meth:`hog`."""
 
     def start_bystander(self) -> None:
         """Start a foreign process that subscribes to all streams."""
 
     def kill_bystander(self) -> None:
-        """Kill it."""
+        """Kill the foreign process."""
 
 
 class Steering(Protocol):
-    """Controls what breaks inside of the processes."""
+    """Control of the faults inside the processes."""
 
     def write(self, word: int = inside.WORKS, offset_ns: int = 0) -> None:
-        """Set what the stage does and the error of the clock [ns]."""
+        """Set the order to the stage, and the error of the clock [ns]."""
 
 
 class Site(Protocol):
-    """Where a session is drilled: this machine, or a simulated one.
+    """Machine on which sessions are drilled: this machine, or a simulated one.
 
     Attributes:
-        world: World of the drill itself.
-        domain: ROS domain.
+        world: Middleware and time of the drill itself.
+        domain: ROS domain of the sessions.
         is_composed: Whether all nodes share one process.
         master: Kind of operator that moves the hand.
         control: Control of the faults inside the processes.
@@ -86,7 +86,7 @@ class Site(Protocol):
     interrupt: Interrupt
 
     def session(self, observer: Observer) -> Session:
-        """Processes of a session, whose reports the observer receives."""
+        """Return the processes of a session; the observer receives their reports."""
 
     def load(self) -> float:
-        """Load of the machine, per processor."""
+        """Load of the machine, divided by the number of processors."""

@@ -30,11 +30,11 @@ from teleop_drill.drill.numbers import Scheduling
 from teleop_drill.drill.recordings import Counted
 
 STREAMS_HEARD = (SLAVE_SETPOINT_JS, SLAVE_MEASURED_JS, SLAVE_MEASURED_CP, SLAVE_TRUE_CP)
-"""Streams that are received, and compared with the recording."""
+"""Streams that the tap receives and that are compared with the recording."""
 _HEARD = (*STREAMS_HEARD, SLAVE_OPERATION, TELEOP_STATE)
 _STAMP = struct.Struct("<iI")
 _DAY_NS = 86_400 * SECOND_NS
-_STAMP_AT = 4  # offset of the stamp behind the encapsulation
+_STAMP_AT = 4  # position of the stamp in a message, after the encapsulation [bytes]
 _QUEUE = 4000
 _BUTTONS_EVERY = 5
 _FAR_BEHIND = 0.1
@@ -42,17 +42,17 @@ Heard = list[tuple[int, int, bytes]]
 
 
 class Tap:
-    """Receives the messages of the slave, and moves the hand if it is the master; runs until :meth:`close`.
+    """Receives the messages of the slave, and moves the hand if the tap is the master; runs until :meth:`close`.
 
     Args:
-        owner: Node that owns its topics; no executor serves it.
+        owner: Node that owns the tap's topics; no executor serves this node.
         joint_names: Joint names of the slave.
-        real_time: Priority and other settings of its thread.
-        has_hand: Whether it is the master.
+        real_time: Priority and other settings of the tap's thread.
+        has_hand: Whether the tap is the master.
 
     Attributes:
         distortion: Distortion of the hand's samples.
-        is_mute: Whether no buttons are sent.
+        is_mute: Whether the tap sends no buttons.
     """
 
     def __init__(
@@ -64,7 +64,7 @@ class Tap:
         self._heard: dict[str, Heard] = {topic.name: [] for topic in _HEARD}
         self._counted = {topic.name: (array("q"), array("q")) for topic in STREAMS_HEARD}
         self._late: list[tuple[int, float]] = []
-        self._listened_ns = 0  # time at which it last began to take waiting messages
+        self._listened_ns = 0  # time at which the tap last began to take waiting messages
         self._subscriptions = [Subscription(owner, t, f"/{t.name}", _QUEUE) for t in _HEARD]
         self._hand = _Hand(owner, self) if has_hand else None
         self._is_running, self._lock = True, self._world.lock()
@@ -72,14 +72,14 @@ class Tap:
         self._thread.start()
 
     def close(self) -> None:
-        """Fall silent."""
+        """Stop the thread, and close all topics."""
         self._is_running = False
         self._thread.join()
         for subscription in self._subscriptions:
             subscription.close()
 
     def clear(self) -> None:
-        """Forget all messages, except the last message of topics that are sent only when they change."""
+        """Delete all stored messages, except the last message of topics that are published only at changes."""
         with self._lock:
             self._late.clear()
             for topic in _HEARD:
@@ -89,8 +89,8 @@ class Tap:
     def traces(self, *topics: Topic) -> list[Trace]:
         """Messages of all streams, all up to the same moment.
 
-        On a busy machine, reading thousands of messages takes a tenth of a second. Without a common end, the stream
-        that is read first would seem to have fallen silent.
+        On a busy machine, decoding thousands of messages takes a tenth of a second. Without a common end, the stream
+        that is decoded first would seem to be silent.
         """
         with self._lock:
             heard = [list(self._heard[topic.name]) for topic in topics]
@@ -111,13 +111,13 @@ class Tap:
         )
 
     def counted(self) -> Counted:
-        """Time of sending and stamp of each message since the start [ns], by stream."""
+        """Sending time and stamp of each message since the start [ns], by stream."""
         with self._lock:
             both = {n: [np.array(a, np.int64) for a in two] for n, two in self._counted.items()}
         return {name: (sent, stamps) for name, (sent, stamps) in both.items()}
 
     def scheduling(self, since_ns: int) -> Scheduling:
-        """Lateness of this thread's wake-ups since a time [ns]."""
+        """Wake-up delays of the tap's thread since a time [ns]."""
         with self._lock:
             late = [seconds for at_ns, seconds in self._late if at_ns >= since_ns]
         return Scheduling(float(np.median(late)), max(late)) if late else Scheduling()
@@ -132,17 +132,17 @@ class Tap:
         return np.array(rows) if rows else np.empty((0, form.width))
 
     def _read(self, topic: Topic, form: Layout, data: bytes) -> tuple[int, Values] | Refusal:
-        """Stamp and values of a message, of our own or of a foreign publisher."""
+        """Stamp and values of a message; the publisher may be foreign."""
         return form.decode_one(data) or read_any(topic.kind, data, self._joint_names)
 
     def age(self, topic: Topic) -> float:
-        """Time since the newest message of a topic was sent [s]; infinite before the first."""
+        """Time since the newest message of a topic was sent [s]; infinite before the first message."""
         with self._lock:
             heard = self._heard[topic.name]
             return 1e-9 * (self._world.time_ns() - heard[-1][0]) if heard else float("inf")
 
     def is_commanded(self) -> bool:
-        """Whether the newest setpoint was computed from a command; otherwise the arm moves without one."""
+        """Whether the newest setpoint was computed from a command; if not, the arm moves without a command."""
         with self._lock:
             _, stamps = self._counted[SLAVE_SETPOINT_JS.name]
             return bool(stamps) and stamps[-1] != NO_COMMAND_NS
@@ -212,7 +212,7 @@ class _Hand:
         self._buttons = sender(owner, MASTER_BUTTONS, ())
 
     def move(self) -> None:
-        """Send what is due."""
+        """Send all samples that are due."""
         stamp_ns = self._world.time_ns()
         pose = hand.circle(1e-9 * (self._world.monotonic_ns() - self._begin_ns))
         if self._count % _BUTTONS_EVERY == 0 and not self._tap.is_mute:

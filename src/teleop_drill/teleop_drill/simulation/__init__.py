@@ -1,7 +1,7 @@
 """Simulation: a simulated machine with processes, clocks and middleware; all random choices follow from one seed.
 
-Nodes of teleop_core run in it unchanged: they ask for time, threads and topics through
-:mod:`teleop_core.middleware.world`, and here a scheduler answers in simulated time.
+Nodes of teleop_core run unchanged in the simulation. They get time, threads and topics from
+:mod:`teleop_core.middleware.world`; in the simulation a scheduler provides these in simulated time.
 
 - ``scheduler``: the order in which threads run, and the time that this takes;
 - ``machine``: processes, their faults, and sockets between them;

@@ -1,8 +1,9 @@
-"""Bus: topics and services between simulated processes, as ROS 2 on Fast DDS carries them.
+"""Bus: topics and services between simulated processes, with the behaviour of ROS 2 on Fast DDS.
 
-The model: both sides of a topic discover each other at different times. Earlier messages reach only readers that ask
-for the last messages of a latched topic. A full queue loses its oldest message. A full socket loses arriving messages,
-and reliable writers send them again as long as they still have them. Each writer numbers its messages.
+In this model, writer and reader of a topic discover each other at different times. Messages before the discovery reach
+only readers that request the last messages of a latched topic. A full queue loses its oldest message. A full socket
+loses arriving messages; reliable writers send a lost message again if their history still contains it. Each writer
+numbers its messages.
 """
 
 from collections.abc import Callable, Iterable
@@ -15,14 +16,14 @@ from teleop_drill.simulation.machine import Process
 from teleop_drill.simulation.scheduler import Scheduler
 
 _SOCKET = 4 << 20
-"""Bytes that can wait for a process that does not run, as in the middleware's profile."""
+"""Size of the receive buffer of a process [bytes], as in the middleware's profile."""
 _LEASE_NS = 20_000_000_000
 """Time after which a process that was killed counts as gone [ns]."""
 _GID = 16
-_TOLD_NS, _TOLD_SPREAD_NS = 1_000_000, 20_000_000
-"""Least time in which a known process announces a new topic, and the largest random addition [ns]."""
-_CALL_NS, _SPREAD_NS = 150_000, 300_000
-"""Least time of a request or an answer, and the largest random addition [ns]."""
+_TOLD_NS = 1_000_000  # shortest time in which a known process announces a new topic [ns]
+_TOLD_SPREAD_NS = 20_000_000  # largest random addition to this time [ns]
+_CALL_NS = 150_000  # shortest time of a request or an answer [ns]
+_SPREAD_NS = 300_000  # largest random addition to the time of a request or an answer [ns]
 
 
 @dataclass
@@ -31,7 +32,7 @@ class Line:
 
     Attributes:
         loss: Share of messages that are lost.
-        delay: Time that each message takes in addition to that of this machine [s].
+        delay: Delay of each message in addition to the delay in a machine [s].
         jitter: Mean of the random addition to the delay [s].
         repeats: Share of messages that arrive twice.
         reorders: Share of messages that are overtaken.
@@ -48,7 +49,7 @@ class Bus:
     """The middleware of all processes.
 
     Args:
-        scheduler: Time.
+        scheduler: Scheduler with the simulated time.
     """
 
     def __init__(self, scheduler: Scheduler) -> None:
@@ -64,14 +65,14 @@ class Bus:
         self._called_ns: dict[tuple[Process, Process], int] = {}
         self._gids = self._orders = 0
         self.lines: dict[tuple[str, str], Line] = {}
-        """Lines that are not perfect, by the names of both processes; * for any."""
+        """Lines that are not perfect, by the names of both processes; * stands for any process."""
         self.seen: dict[str, Callable[[Taken], None]] = {}
         """Observers of the messages of a topic when they are sent, by the full name of the topic."""
         self.heard: dict[str, Callable[[Reader, Taken], None]] = {}
-        """Observers of the messages when they are taken."""
+        """Observers of the messages of a topic when readers take them, by the full name of the topic."""
         self._plain = Line()
         self.find = (0.07, 0.3, 1.6)
-        """Least, usual and longest time in which one end finds another [s]."""
+        """Shortest, usual and longest time in which one process discovers another [s]."""
 
     # -- who is there ----------------------------------------------------------------------------
 
@@ -81,38 +82,38 @@ class Bus:
         return self._gids.to_bytes(_GID, "big")
 
     def next_order(self) -> int:
-        """Number of a message that comes, which orders those of one moment."""
+        """Number of an arriving message, by which messages of the same time are ordered."""
         self._orders += 1
         return self._orders
 
     def watch(self, process: Process) -> None:
-        """Take part in the life of a process."""
+        """Register for the end and the continuation of a process."""
         self._born_ns[process] = self.scheduler.now_ns
         process.on_end.append(lambda is_orderly: self._leave(process, is_orderly=is_orderly))
         process.on_resume.append(lambda since_ns: self._wake_up(process, since_ns))
 
     def open_writer(self, writer: Writer) -> Writer:
-        """Let others find a writer."""
+        """Add a writer, which readers then discover."""
         self.writers.setdefault(writer.topic, []).append(writer)
         for reader in self.readers.get(writer.topic, ()):
             self._match(writer, reader)
         return writer
 
     def open_reader(self, reader: Reader) -> Reader:
-        """Let others find a reader."""
+        """Add a reader, which writers then discover."""
         self.readers.setdefault(reader.topic, []).append(reader)
         for writer in self.writers.get(reader.topic, ()):
             self._match(writer, reader)
         return reader
 
     def leave_writer(self, writer: Writer) -> None:
-        """Withdraw a writer."""
+        """Remove a writer."""
         writer.is_open, writer.links = False, []
         if writer in self.writers.get(writer.topic, ()):
             self.writers[writer.topic].remove(writer)
 
     def leave_reader(self, reader: Reader) -> None:
-        """Withdraw a reader."""
+        """Remove a reader."""
         reader.is_open = False
         if reader in self.readers.get(reader.topic, ()):
             self.readers[reader.topic].remove(reader)
@@ -120,7 +121,7 @@ class Bus:
             writer.links = [link for link in writer.links if link.reader is not reader]
 
     def found(self, process: Process, ends: Iterable[Writer | Reader]) -> list[Endpoint]:
-        """Ends of a topic that a process has found."""
+        """Return those writers or readers that a process has discovered."""
         return [
             Endpoint(one.node, one.sender, one.ros_type, one.qos.is_reliable, one.qos.is_latched)
             for one in ends
@@ -128,13 +129,13 @@ class Bus:
         ]
 
     def knows(self, process: Process, entity: Writer | Reader | Service) -> bool:
-        """Whether a process has found an entity."""
+        """Whether a process has discovered a writer, reader or service."""
         return self.found_ns(process, entity) <= self.scheduler.now_ns
 
     def found_ns(self, process: Process, entity: Writer | Reader | Service) -> int:
-        """Time at which a process discovers an entity of another process [ns].
+        """Time at which a process discovers a writer, reader or service of another process [ns].
 
-        Processes first discover each other, which takes long; then they exchange their topics quickly.
+        Processes first discover each other, which takes long. Then they exchange their topics quickly.
         """
         key = (process, entity)
         if key not in self._known:
@@ -160,7 +161,7 @@ class Bus:
         return sorted(names)
 
     def _match(self, writer: Writer, reader: Reader) -> None:
-        """Let a writer and a reader find each other, if their types and qualities go together."""
+        """Connect a writer and a reader, if their types and QoS are compatible."""
         wanted, offered = reader.qos, writer.qos
         if writer.ros_type != reader.ros_type:
             return
@@ -180,7 +181,7 @@ class Bus:
             self.scheduler.at(link.writer_knows_ns, lambda: self._send_last(writer, link))
 
     def _send_last(self, writer: Writer, link: Match) -> None:
-        """Send a late reader what a latched topic has."""
+        """Send the stored messages of a latched topic to a late reader."""
         link.awaits_last = False
         if writer.is_open and not writer.process.is_dead:
             for taken in tuple(writer.history):
@@ -198,7 +199,7 @@ class Bus:
         return self._plain
 
     def carry(self, writer: Writer, link: Match, taken: Taken) -> None:
-        """Bring a message to a reader."""
+        """Deliver a message to a reader."""
         reader, draw = link.reader, self._random.random
         line = self.line(writer.process, reader.process)
         now_ns = self.scheduler.now_ns
@@ -224,7 +225,7 @@ class Bus:
             reader.put(came_ns + 50_000, taken)
 
     def send_again(self, reader: Reader, taken: Taken) -> bool:
-        """Whether a message that a reader's socket lost still arrives, because its writer sends it again."""
+        """Whether a message that a reader's socket lost still arrives, because the writer sends it again."""
         for writer in self.writers.get(reader.topic, ()):
             if writer.sender != taken.sender:
                 continue
@@ -242,7 +243,7 @@ class Bus:
                     room = reader.wake_up(since_ns, room)
 
     def _leave(self, process: Process, *, is_orderly: bool) -> None:
-        """Remove the writers and readers of a process that has ended; other processes notice its end later."""
+        """Remove the writers and readers of a process that has ended; other processes notice the end later."""
         for reader in [r for rs in self.readers.values() for r in rs if r.process is process]:
             self.leave_reader(reader)
         writers = [w for ws in self.writers.values() for w in ws if w.process is process]
@@ -257,7 +258,7 @@ class Bus:
         self.scheduler.at(self.scheduler.now_ns + (1_000_000 if is_orderly else _LEASE_NS), forget)
 
     def call(self, one: Process, other: Process, event: Callable[[], object]) -> None:
-        """Let something happen after the time that a request or an answer takes, in their order."""
+        """Run an event after the time of a request or an answer; events keep their order."""
         due_ns = self.scheduler.now_ns + _CALL_NS + round(_SPREAD_NS * self._random.random())
         due_ns = max(due_ns, self._called_ns.get((one, other), 0) + 1)
         self._called_ns[one, other] = due_ns

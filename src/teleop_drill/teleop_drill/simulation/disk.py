@@ -1,4 +1,4 @@
-"""Disk: the disk to which a simulated process writes its recording, and the thread that writes."""
+"""Disk: the disk to which a simulated process writes its recording, and the writing thread."""
 
 import errno
 import os
@@ -30,7 +30,7 @@ class Jobs:
         self._tell()
 
     def get(self) -> Any:
-        """Take the oldest, as soon as there is one."""
+        """Remove and return the oldest job; waits until there is one."""
         while not self._jobs:
             self._wait()
         job = self._jobs.popleft()
@@ -38,7 +38,7 @@ class Jobs:
         return job
 
     def empty(self) -> bool:
-        """Whether nothing waits."""
+        """Whether no job waits."""
         return not self._jobs
 
     def _wait(self) -> None:
@@ -52,7 +52,7 @@ class Jobs:
 
 
 class Disk:
-    """Simulated form of :class:`~teleop_core.bags.background.Background`, of one process.
+    """Simulated form of :class:`~teleop_core.bags.background.Background` in one process.
 
     Args:
         process: Process that writes.
@@ -62,15 +62,15 @@ class Disk:
         self._process = process
 
     def queue(self, size: int) -> Jobs:
-        """Queue of so many jobs."""
+        """Return a queue for at most ``size`` jobs."""
         return Jobs(self._process, size)
 
     def thread(self, name: str, work: Callable[[], None]) -> Strand:
-        """Thread that does something, once it is started."""
+        """Return a thread that runs ``work`` as soon as it is started."""
         return self._process.machine.scheduler.spawn(self._process, name, work)
 
     def write(self, file: BinaryIO, data: bytes | memoryview) -> int:
-        """Write, as far as the process may; raises OSError."""
+        """Write data up to the limit of the process; raises OSError beyond the limit or if the disk has failed."""
         scheduler = self._process.machine.scheduler
         scheduler.sleep(self._process.disk_delay + 1e-9 * _BYTE_NS * len(data))
         self._insist()
@@ -89,7 +89,7 @@ class Disk:
         SYSTEM.cut(file, size)
 
     def sync(self, file: BinaryIO) -> None:
-        """Do nothing, because all data is on the disk already; raises OSError without a disk."""
+        """Do nothing, because all data is already on the disk; raises OSError if the disk has failed."""
         self._insist()
 
     def _insist(self) -> None:

@@ -1,4 +1,4 @@
-"""Drill: the exercises of a drill on a simulated machine, to the bit the same for the same seed."""
+"""Drill: the exercises of a drill on a simulated machine; equal seeds give exactly equal results."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -28,14 +28,14 @@ class SimulatedSite:
     """A simulated machine.
 
     Args:
-        bus: Its middleware.
+        bus: Middleware of the machine.
         owner: Process of the drill.
         configuration: Configuration of the session.
         folder: Folder of the recordings.
         master: Kind of operator that moves the hand.
         interrupt: Object that ends a wait of the drill with KeyboardInterrupt.
         processes: Distribution of the nodes over processes.
-        foreign: Processes that are none of ours, by name.
+        foreign: Programs of processes of other software, by name.
     """
 
     domain = 0
@@ -54,14 +54,14 @@ class SimulatedSite:
         self.control: Steering = self._steering
 
     def load(self) -> float:
-        """Load of the machine: none beside the simulated one."""
+        """Load of the machine by other programs, which is always zero."""
         return 0.0
 
     def session(self, observer: Observer) -> SimulatedSession:
-        """Processes of a session whose topics an observer receives."""
+        """Return the processes of a session; the observer receives their topics."""
         graph = self._configuration.graph
         shared = {n: nodes for crew in crews(graph, self._processes) for n, nodes in crew.items()}
-        if self.is_composed:  # the recorder too, as of `ros2 run teleop_core teleop_session`
+        if self.is_composed:  # including the recorder, as in `ros2 run teleop_core teleop_session`
             shared = {SESSION: (RECORDER_NAME, *(member.name for member in graph.members))}
         made = SimulatedSession(
             self._bus, self._owner, self._configuration, shared, self._folder, observer, self.master, self._foreign
@@ -88,14 +88,14 @@ def simulated_drill(
         exercises: Exercises to run, from :func:`teleop_drill.drill.chosen`.
         folder: Folder of the recordings.
         say: Called with one line about each exercise.
-        seed: Seed of everything random.
+        seed: Seed of all random numbers.
         processes: Distribution of the nodes over processes.
-        files: Parameter files over the scenario ``free_motion``.
-        texts: Parameters ``key=value`` over all files.
-        drives: Drives that replace the simulated ones, such as a bridge; exercises that break the simulator are left
-            out.
-        arm: Process that the drives command, such as the model of a controller. It is started before the drives, and
-            the drill does not break it.
+        files: Parameter files that override the scenario ``free_motion``.
+        texts: Parameters ``key=value`` that override all files.
+        drives: Program of drives that replace the simulated drives, such as a bridge. Exercises that break the
+            simulator are then left out.
+        arm: Program of the process that the drives command, such as the model of a controller. This process is started
+            before the drives, and the drill does not break it.
 
     Raises:
         ParameterError: ``drives`` are given although all nodes share one process, or an ``arm`` is given without

@@ -11,18 +11,18 @@ from teleop_core.middleware.world import Qos, Taken
 from teleop_drill.simulation.machine import Process
 from teleop_drill.simulation.scheduler import Scheduler, Strand
 
-_PUBLISH_NS, _TAKE_NS = 12_000, 900
-"""Time that the middleware needs to hand over a message, measured with rclpy."""
+_PUBLISH_NS = 12_000  # time that the middleware needs to publish a message, measured with rclpy [ns]
+_TAKE_NS = 900  # time that the middleware needs to take a message, measured with rclpy [ns]
 
 
 def _name_of(kind: Any) -> str:
-    """Type of the messages of a class, such as ``sensor_msgs/msg/JointState``."""
+    """Name of the ROS type of a message class, such as ``sensor_msgs/msg/JointState``."""
     return f"{kind.__module__.partition('.')[0]}/msg/{kind.__name__}"
 
 
 @dataclass
 class Match:
-    """A writer and a reader that have found each other, or will have."""
+    """A writer and a reader that have discovered each other, or will do so."""
 
     reader: "Reader"
     writer_knows_ns: int
@@ -30,11 +30,11 @@ class Match:
     is_reliable: bool
     last_ns: int = 0
     awaits_last: bool = False
-    """Whether what a latched topic has, this message included, is still to be sent."""
+    """Whether the stored messages of a latched topic, including the present one, must still be sent."""
 
 
 class _Carrier(Protocol):
-    """The simulated middleware, as its ends use it: :class:`~teleop_drill.simulation.bus.Bus`."""
+    """Methods of the middleware (:class:`~teleop_drill.simulation.bus.Bus`) that writers and readers use."""
 
     scheduler: Scheduler
     seen: dict[str, Callable[[Taken], None]]
@@ -48,15 +48,15 @@ class _Carrier(Protocol):
 
 
 class Writer:
-    """One end of a topic, with the interface of :class:`~teleop_core.middleware.world.Publisher`.
+    """Writer of a topic, with the interface of :class:`~teleop_core.middleware.world.Publisher`.
 
     Args:
         bus: The simulated middleware.
-        process: Process that owns it.
-        node: Name of its node, with the namespace.
-        topic: Full name.
-        kind: Class of its messages.
-        qos: Its quality.
+        process: Process that owns the writer.
+        node: Name of the writer's node, with the namespace.
+        topic: Full name of the topic.
+        kind: Class of the messages.
+        qos: QoS of the writer.
     """
 
     def __init__(self, bus: _Carrier, process: Process, node: str, topic: str, kind: Any, qos: Qos) -> None:
@@ -68,7 +68,7 @@ class Writer:
         self.history: deque[Taken] = deque(maxlen=None if qos.keeps_all else qos.depth)
 
     def publish(self, message: Any) -> None:
-        """Send a message, or the bytes of one."""
+        """Send a message, or the bytes of a message."""
         self.send(message if isinstance(message, bytes) else write_message(message))
 
     def send(self, data: bytes) -> None:
@@ -88,25 +88,25 @@ class Writer:
                 bus.carry(self, link, taken)
 
     def get_subscription_count(self) -> int:
-        """Readers that were found."""
+        """Number of discovered readers."""
         now_ns = self._bus.scheduler.now_ns
         return sum(link.writer_knows_ns <= now_ns for link in self.links)
 
     def wait_for_all_acked(self, seconds: float) -> None:
-        """Wait until all readers have all messages: a moment, here."""
+        """Wait until all readers have all messages; in the simulation this is a short constant time."""
         self._bus.scheduler.sleep(min(seconds, 1e-3))
 
 
 class Reader:
-    """Other end of a topic; as of :class:`~teleop_core.middleware.world.Taker`.
+    """Reader of a topic, with the interface of :class:`~teleop_core.middleware.world.Taker`.
 
     Args:
         bus: The simulated middleware.
-        process: Process that owns it.
-        kind: Class of its messages.
-        topic: Full name.
-        qos: Its quality.
-        node: Name of its node, with the namespace.
+        process: Process that owns the reader.
+        kind: Class of the messages.
+        topic: Full name of the topic.
+        qos: QoS of the reader.
+        node: Name of the reader's node, with the namespace.
     """
 
     def __init__(self, bus: _Carrier, process: Process, kind: Any, topic: str, qos: Qos, node: str) -> None:
@@ -117,10 +117,10 @@ class Reader:
         self._ready: deque[tuple[int, int, Taken]] = deque(maxlen=None if qos.keeps_all else qos.depth)
         self.waiting: Strand | None = None
         self.told: Callable[[], None] | None = None
-        """Called where a message comes, for those that an executor serves."""
+        """Function that is called when a message arrives; None if no executor serves the reader."""
 
     def take(self) -> Taken | None:
-        """Oldest waiting message; None if there is none."""
+        """Remove and return the oldest waiting message; None if no message waits."""
         scheduler = self._bus.scheduler
         scheduler.now_ns = now_ns = scheduler.now_ns + _TAKE_NS
         coming, ready = self.coming, self._ready
@@ -135,7 +135,7 @@ class Reader:
         return Taken(data, sender, number, sent_ns, came_ns + self.process.machine.clock.ahead_ns(now_ns))
 
     def wait(self, seconds: float) -> None:
-        """Return when there is a message, or after some time [s]."""
+        """Wait until a message arrives, at most for a time [s]."""
         scheduler = self._bus.scheduler
         if self._ready or (self.coming and self.coming[0][0] <= scheduler.now_ns):
             return
@@ -146,14 +146,14 @@ class Reader:
         self.waiting = None
 
     def tell(self) -> None:
-        """A message has come."""
+        """Report that a message has arrived."""
         if self.waiting is not None:
             self._bus.scheduler.wake(self.waiting)
         if self.told is not None:
             self.told()
 
     def waits(self, least: int) -> int:
-        """Number of messages that wait; 0 if there cannot be more than ``least``, which is quicker to find out."""
+        """Number of waiting messages; 0 if there cannot be more than ``least``, which is faster to check."""
         if len(self._ready) + len(self.coming) <= least:
             return 0
         now_ns = self._bus.scheduler.now_ns
@@ -161,11 +161,11 @@ class Reader:
         return came if self.qos.keeps_all else min(came, self.qos.depth)
 
     def close(self) -> None:
-        """Stop listening."""
+        """Close the reader."""
         self._bus.leave_reader(self)
 
     def put(self, came_ns: int, taken: Taken) -> None:
-        """Let a message come at a time [ns]."""
+        """Add a message that arrives at a time [ns]."""
         entry = (came_ns, self._bus.next_order(), taken)
         if self.coming and self.coming[-1][0] > came_ns:
             ordered = list(self.coming)
@@ -177,14 +177,14 @@ class Reader:
             self._bus.scheduler.at(came_ns, self.tell)
 
     def wake_up(self, since_ns: int, room: int) -> int:
-        """Keep, of the messages that arrived while the process did not run, only those for which its socket had room.
+        """Drop messages that arrived while the process did not run and for which its socket had no space.
 
         Args:
             since_ns: Time from which on the process did not run [ns].
-            room: Free bytes of the socket.
+            room: Free space of the socket [bytes].
 
         Returns:
-            The remaining free bytes.
+            Remaining free space [bytes].
         """
         now_ns, kept, lost = self._bus.scheduler.now_ns, deque[tuple[int, int, Taken]](), []
         for entry in self.coming:
@@ -206,9 +206,9 @@ class Service:
     """Service of a node.
 
     Args:
-        process: Process that owns it.
-        answer: Called with a request; sends the answer.
-        born_ns: Time at which it was made [ns].
+        process: Process that owns the service.
+        answer: Function that is called with a request and sends the answer.
+        born_ns: Time at which the service was created [ns].
     """
 
     def __init__(self, process: Process, answer: Callable[[Any, Callable[[Any], None]], object], born_ns: int) -> None:

@@ -1,4 +1,4 @@
-"""Inside: what the drill breaks within simulated processes, and clocks that are off."""
+"""Inside: faults of a drill inside simulated processes, and clocks with an error."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -32,7 +32,7 @@ class SimulatedSteering:
     @staticmethod
     @contextmanager
     def installed(machine: Machine) -> Iterator[None]:
-        """Let stages that the drill breaks wait in simulated time."""
+        """Let stages that the drill orders to hang wait in simulated time."""
         inside.register()
         before = inside.Passing.sleep
         inside.Passing.sleep = staticmethod(machine.scheduler.sleep)
@@ -42,7 +42,7 @@ class SimulatedSteering:
             inside.Passing.control, inside.Passing.sleep = None, before
 
     def write(self, word: int = inside.WORKS, offset_ns: int = 0) -> None:
-        """Say what the stage does and by how much the clock is off [ns]."""
+        """Set the order to the stage, and the error of the clock [ns]."""
         self.word = word
         for process in self._machine.processes:
             if process.name not in {"drill", "arm"}:

@@ -1,4 +1,4 @@
-"""Laws: conditions that must hold under any faults, checked by an observer of the whole machine."""
+"""Laws: conditions that must be true under any faults, checked by an observer of the whole machine."""
 
 import math
 import re
@@ -29,34 +29,39 @@ _NO_DISK = "cannot be written"
 _SAFE = re.compile(r"the first [\d.]+ s \((\d+) of \d+ messages\)")
 _SLACK = 1e-6
 _CURVED = 1e-2
-"""Share by which the tip's displacement in a tick may exceed the one computed from shortened joint steps."""
+"""Largest share by which the tip's displacement in a tick may exceed the limit. The slave shortens joint steps, which
+limits the displacement only approximately."""
 _TELL = 0.3
-"""Time within which a new state is reported to the operator [s]; only time in which the arm works counts."""
+"""Longest time until a new state is reported to the operator [s]; only time in which the slave's process runs counts.
+"""
 _OBEY = 0.1
-"""Time within which a pressed stop is in force [s]; only time in which the arm works counts."""
+"""Longest time until a pressed stop is in force [s]; only time in which the slave's process runs counts."""
 _DOUBT = 0.7
-"""The same time after the slave has discovered a button that was pressed before: half a second plus two checks [s]."""
-_FOUND_NS, _ON_THE_WAY_NS = 1_600_000_000, 300_000_000
-"""Time in which a recorder discovers all topics, and time in which a sent message is recorded [ns]."""
+"""Longest time until a stop is in force after the slave has discovered a button that was already pressed [s]: half a
+second plus two checks."""
+_FOUND_NS = 1_600_000_000
+"""Time in which a recorder discovers all topics [ns]."""
+_ON_THE_WAY_NS = 300_000_000
+"""Time in which a sent message is recorded [ns]."""
 _OLD = 1.0
-"""Age of the oldest command by which an enabled arm moves [s]."""
+"""Largest age of a command that an enabled arm may follow [s]."""
 _JOINING = 20
-"""Number of setpoints in which an enabled slave moves its setpoint to the arm, without a command."""
+"""Number of setpoints by which a newly enabled slave moves its setpoint to the arm without a command."""
 _AFTER_STEP_NS = 5_000_000_000
-"""Time for which stamps from before a step of the clock may arrive [ns]."""
+"""Time after a step of the clock in which stamps from before the step may arrive [ns]."""
 _QUEUES = 2500
-"""Messages that may wait anywhere: what the recorder's longest queue holds, and some."""
+"""Largest number of messages that may wait in any queue; it is somewhat more than the recorder's longest queue."""
 LAWS = ("speed", "tool speed", "motion", "told", "stop", "owner", "age", "ends", "queues", "recorded", "recovery")
 """Names of all laws."""
 
 
 @dataclass(frozen=True)
 class Broken:
-    """A law that did not hold.
+    """Breach of a law.
 
     Attributes:
-        law: Its name.
-        at: When, from the time at which the arm followed [s].
+        law: Name of the law.
+        at: Time of the breach since the arm followed [s].
         text: Description of the breach.
     """
 
@@ -66,17 +71,17 @@ class Broken:
 
 
 def _saved(said: Sequence[str]) -> int | None:
-    """Messages that a recorder reported as safe when its disk failed; None without such a report."""
+    """Number of messages that a recorder reported as safe when its disk failed; None without such a report."""
     found = [_SAFE.search(text) for text in said]
     return next((int(one[1]) for one in reversed(found) if one), None)
 
 
 class Laws:
-    """Checks one session: every setpoint, and everything else two hundred times a second.
+    """Checks the laws in one session: at every setpoint, or two hundred times per second.
 
     Args:
         stage: The session.
-        numbers: Numbers from its drives and parameters.
+        numbers: Numbers from the session's drives and parameters.
 
     Attributes:
         broken: First breach of each law.
@@ -96,23 +101,23 @@ class Laws:
         self.under: Counter[tuple[str, str, str]] = Counter()
         self.begin_ns = self._scheduler.now_ns
         self._last: tuple[Array, Array, Process | None] | None = None
-        """Newest setpoint: joints, the tip's place, and whose it is."""
+        """Newest setpoint: joints, position of the tip, and process of the slave."""
         self._longest_step = numbers.speed_limit * (1.0 + _SLACK) * DT
         self._braking = float(np.max(numbers.speed_limit / numbers.braking))
         self._slave: Any = None
         self._process: Process | None = None
         self._worked = 0.0
-        """Time for which the slave's process has run [s], without the time in which it was stopped."""
+        """Time for which the slave's process has run [s]; time in which it was stopped does not count."""
         self._seen_state, self._since = -1, 0.0
         self._offset_ns = self._stepped_ns = self._old = 0
         self._resting_since: float | None = None
         self._moved_at = 0.0
         self._press: tuple[int, bool] | None = None
-        """Newest press that is not in force: its button, and whether it was sent to the slave."""
+        """Newest press that is not yet in force: number of the button, and whether the press was sent to the slave."""
         self._obey_by, self._was_idle = 0.0, False
         self._presses = 0
         self._sent_ns: dict[bytes, list[int]] = {}  # times of sending, by publisher
-        """Times at which setpoints were sent, by the system's clock [ns]."""
+        """Sending times of setpoints by the system's clock [ns], by publisher."""
         stage.bus.seen[f"/{SLAVE_SETPOINT_JS.name}"] = self._judge_setpoint
         self._scheduler.at(0, self._look)
 
@@ -145,7 +150,7 @@ class Laws:
         self._last, self._stage.setpoint = (q, tip, process), q
 
     def _judge_owner(self, slave: Any, process: Process | None, stamp_ns: int) -> None:
-        """Only one sender commands the arm at a time."""
+        """Check that only one sender commands the arm at a time."""
         self._count("owner")
         is_driven = slave.stage is not None and slave.stage.motion.source == "velocity"
         if wrong := self._owner.judge(process, stamp_ns, is_driven=is_driven):
@@ -181,7 +186,7 @@ class Laws:
             return
         self._count("age")
         master: Any = self._stage.session.node("haptic_master")
-        # A process that started with another clock continues to use it for its stamps.
+        # A process continues to use the clock with which it was started for its stamps.
         epoch_ns = getattr(master, "epoch_ns", offset_ns)
         age = 1e-9 * (self._scheduler.now_ns + epoch_ns - stamp_ns)
         self._old = self._old + 1 if age > _OLD + self._late() else 0
@@ -194,7 +199,7 @@ class Laws:
         self._scheduler.at(self._scheduler.now_ns + _LOOK_NS, self._look)
         stage = self._stage
         slave, process = stage.session.node("slave"), stage.session.process_of("slave")
-        if process is not self._process:  # the reports of the former process do not concern this one
+        if process is not self._process:  # the reports of the former process do not describe this process
             self._process, stage.operation = process, {}
         if slave is not self._slave:
             self._slave, self._seen_state, self._press = slave, -1, None
@@ -210,7 +215,7 @@ class Laws:
         self._judge_queues()
 
     def _judge_state(self, slave: Any) -> None:
-        """An arm that may not move rests; its state is reported in time."""
+        """Check that an arm that must not move is at rest, and that its state is reported in time."""
         state = int(slave.stage.operation["state"])
         if state != self._seen_state:
             self._seen_state, self._since = state, self._worked
@@ -228,10 +233,10 @@ class Laws:
             self._break("told", f"is {State(state).name} for {in_force:.2f} s but has reported {was}")
 
     def _judge_stop(self, slave: Any, process: Process) -> None:
-        """A pressed stop is in force soon, and never lost.
+        """Check that a pressed stop is in force in time, and never lost.
 
-        A press without a reader is in force soon after the slave has discovered its button. If it was released before
-        that, it does not concern an arm that was disabled.
+        A press without a reader must be in force soon after the slave has discovered the button. If the button was
+        released before the discovery, the press does not concern an arm that was disabled.
         """
         stage, now_ns, operation = self._stage, self._scheduler.now_ns, slave.stage.operation
         if len(stage.presses) > self._presses:
@@ -256,7 +261,7 @@ class Laws:
             self._break("stop", f"no stop is in force, although {since} long enough ago")
 
     def _late(self) -> float:
-        """Delay that the machine itself may add [s]: bad lines, and busy processors."""
+        """Delay that bad lines and busy processors of the machine may add [s]."""
         lines = self._stage.bus.lines.values()
         on_the_way = max((line.delay + 20.0 * line.jitter for line in lines), default=0.0)
         lost = 0.2 * any(line.loss for line in lines)
@@ -270,11 +275,11 @@ class Laws:
                 self._stage.killed.add(process)
                 said = [one.text for one in self._stage.machine.log if one.level in _BAD]
                 if process in self._stage.lost_disk and _NO_DISK in "".join(said[-1:]):
-                    continue  # the end of the session checks what the recorder has saved
+                    continue  # the saved messages are checked at the end of the session
                 self._break("ends", f"{process.name} has ended: {' '.join(said[-1:])[-300:]}")
 
     def _judge_queues(self) -> None:
-        """Nothing waits without end."""
+        """Check that no queue grows without limit."""
         self._count("queues")
         for readers in self._stage.bus.readers.values():
             for reader in readers:
@@ -293,7 +298,7 @@ class Laws:
 
         Args:
             path: A recording whose recorder was not killed, while no clock was stepped.
-            told: Final report of the recorder; empty if it has ended before.
+            told: Final report of the recorder; empty if the recorder ended before it could report.
         """
         self._count("recorded")
         said = [one.text for one in self._stage.machine.log if str(path) in one.text]
@@ -302,7 +307,7 @@ class Laws:
             return
         if saved is not None:
             path, count = recover(path)
-            if count < saved:  # a last chunk that lacks only its index is found as well
+            if count < saved:  # a last chunk that lacks only its index can also be read
                 self._break("recorded", f"{saved} messages were said to be safe, {count} are")
         kept_ns = Bag(path).read(SLAVE_SETPOINT_JS).log_ns
         parts = [np.array(times) for times in self._sent_ns.values()]
@@ -322,11 +327,11 @@ class Laws:
             self._break("recorded", f"{sent} setpoints were sent, {kept} recorded, {lost} counted")
 
     def judge_recovery(self, seconds: float | None, bound: float) -> None:
-        """After the recovery the arm follows again, or reports why not.
+        """Check that after the recovery the arm follows again, or reports the reason why it does not.
 
         Args:
-            seconds: Time after which it followed [s]; None if it did not.
-            bound: Time within which it must follow [s].
+            seconds: Time after which the arm followed [s]; None if it did not follow.
+            bound: Time within which the arm must follow [s].
         """
         self._count("recovery")
         if seconds is None:

@@ -43,11 +43,11 @@ class SimulatedLifecycleNode(SimulatedNode):
 
     Args:
         bus: The simulated middleware.
-        process: Process that owns it.
+        process: Process that owns the node.
         name: Name of the node.
-        hooks: Functions that its transitions call.
-        given: Parameters of its file.
-        values: Parameters over those.
+        hooks: Functions that the node's transitions call.
+        given: Parameters of the process's file.
+        values: Parameters that override the file.
         namespace: Namespace of the node.
     """
 
@@ -79,7 +79,7 @@ class SimulatedLifecycleNode(SimulatedNode):
     def declare(
         self, specs: Iterable[Spec], values: Mapping[str, Value], accept: Callable[[Mapping[str, Value]], str]
     ) -> None:
-        """Declare parameters, and have their changes accepted."""
+        """Declare parameters, and register the function that accepts their changes."""
         self._specs = {spec.name: spec for spec in specs}
         self._values, self._accept = dict(values), accept
 
@@ -88,7 +88,7 @@ class SimulatedLifecycleNode(SimulatedNode):
         self._values |= values
 
     def trigger(self, transition: str) -> Outcome:
-        """Bring about a transition."""
+        """Execute a transition."""
         goal = _STATES.get((self.state, transition))
         if goal is None:
             self._hooks.on_no_transition(transition)
@@ -118,7 +118,7 @@ class SimulatedLifecycleNode(SimulatedNode):
         return response
 
     def _take(self, parameters: list[ParameterMessage]) -> SetParametersResult:
-        """Take all changes or none."""
+        """Accept all changes or none of them."""
         changes: dict[str, Any] = {}
         for one in parameters:
             spec = self._specs.get(one.name)

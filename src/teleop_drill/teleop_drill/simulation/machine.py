@@ -9,7 +9,7 @@ from typing import Any
 from teleop_drill.simulation.scheduler import BEGIN_NS, EPOCH_NS, Scheduler, Turns
 
 _ROOM = 212_992
-"""Bytes that wait in a socket of the machine, as Linux has it."""
+"""Size of the buffer of a socket between processes [bytes], as in Linux."""
 
 
 @dataclass
@@ -18,7 +18,7 @@ class Clock:
 
     Attributes:
         offset_ns: Error of the clock [ns].
-        drift: Rate of the clock minus that of real time, as a share.
+        drift: Relative error of the clock's rate.
     """
 
     offset_ns: int = 0
@@ -46,10 +46,10 @@ class Process(Turns):
     Args:
         machine: Machine of the process.
         name: Name of the process.
-        work: Its main thread; what it returns is the exit code.
+        work: Function of the main thread; its return value is the exit code.
 
     Attributes:
-        exit_code: Exit code; None while it runs, negative if a signal ended it.
+        exit_code: Exit code; None while the process runs, negative if a signal ended it.
     """
 
     def __init__(self, machine: "Machine", name: str, work: Callable[[], int]) -> None:
@@ -58,19 +58,20 @@ class Process(Turns):
         self.exit_code: int | None = None
         self.stopped_ns, self.clock = 0, machine.clock
         self.room: int | None = None
-        """Bytes that it may still write; None for no limit."""
+        """Number of bytes that the process may still write; None for no limit."""
         self.disk_delay = 0.0
         """Time that each write of the process waits for the disk [s]."""
         self.disk_error = 0
-        """Number of the error that its writes meet; 0: none."""
+        """Number of the error with which writes of the process fail; 0 for no error."""
         self.due: list[deque[Callable[[], object]]] = []
         """Requests that wait for each executor of the process."""
         self.lines: list[SocketEnd] = []
         self.listeners: list[Listener] = []
         self.on_end: list[Callable[[bool], None]] = []
-        """Called when it ends, with whether it ended in order."""
+        """Functions that are called when the process ends; the argument is whether it ended in order."""
         self.on_resume: list[Callable[[int], None]] = []
-        """Called when it continues, with the time at which it was stopped [ns]."""
+        """Functions that are called when the process continues; the argument is the time at which it was stopped [ns].
+        """
         self.main = machine.scheduler.spawn(self, "main", self._run)
 
     def start(self) -> None:
@@ -78,19 +79,19 @@ class Process(Turns):
         self.main.start()
 
     def stop(self) -> None:
-        """Stand still from now on, as by SIGSTOP."""
+        """Stop the process as SIGSTOP does; it does not run until :meth:`go_on`."""
         if not self.is_stopped:
             self.is_stopped, self.stopped_ns = True, self.machine.scheduler.now_ns
 
     def go_on(self) -> None:
-        """Go on, as by SIGCONT."""
+        """Continue the process as SIGCONT does."""
         if self.is_stopped and not self.is_dead:
             for told in self.on_resume:
                 told(self.stopped_ns)
             self.machine.scheduler.resume(self)
 
     def end(self, exit_code: int, *, is_orderly: bool) -> None:
-        """Be gone, with all threads."""
+        """End the process with all its threads."""
         if self.is_dead:
             return
         self.is_dead, self.exit_code = True, exit_code
@@ -119,11 +120,11 @@ class Listener:
         self.waiting: list[SocketEnd] = []
 
     def accept(self) -> "SocketEnd | None":
-        """Next line; None if there is none."""
+        """Return the next connection; None if none waits."""
         return self.waiting.pop(0) if self.waiting else None
 
     def close(self) -> None:
-        """Accept none any more."""
+        """Stop accepting connections."""
         self._machine.places.pop(self._place, None)
 
 
@@ -136,7 +137,7 @@ class SocketEnd:
         self.is_open = True
 
     def send(self, data: bytes | bytearray) -> int:
-        """Write what it takes; raises BlockingIOError or OSError."""
+        """Write as many bytes as the buffer accepts; raises BlockingIOError or OSError."""
         other = self.other
         if not self.is_open or other is None or not other.is_open:
             raise BrokenPipeError
@@ -147,7 +148,7 @@ class SocketEnd:
         return taken
 
     def recv(self, size: int) -> bytes:
-        """Read what has come; raises BlockingIOError."""
+        """Read the bytes that have arrived; raises BlockingIOError if there are none."""
         if not self.came:
             if self.other is None or not self.other.is_open:
                 return b""
@@ -157,18 +158,18 @@ class SocketEnd:
         return data
 
     def close(self) -> None:
-        """Close it."""
+        """Close the socket."""
         self.is_open = False
 
 
 @dataclass
 class Machine:
-    """One computer.
+    """One simulated computer.
 
     Attributes:
         scheduler: Simulated time of the machine.
         clock: System clock, for all processes without their own clock.
-        processes: All processes that were ever started, in their order.
+        processes: All processes that were started, in the order of their start.
         places: Listeners by address.
         log: Log lines of the nodes.
     """
@@ -180,7 +181,7 @@ class Machine:
     log: list[Said] = field(default_factory=list)
 
     def start(self, name: str, work: Callable[[Process], int], after: float = 0.0) -> Process:
-        """Start a process, which begins to work after a time [s]."""
+        """Start a process, whose main thread begins after a time [s]."""
         box: list[Process] = []
 
         def main() -> int:
@@ -194,7 +195,7 @@ class Machine:
         return box[0]
 
     def run(self, work: Callable[[Process], Any]) -> Any:
-        """Do something in a process of its own, and let time pass until it is done."""
+        """Run a function in its own process, and run the simulation until the function returns."""
         found: list[Any] = []
 
         def main() -> int:
@@ -207,18 +208,18 @@ class Machine:
         return found[0]
 
     def outsider(self, name: str) -> Process:
-        """Process of a caller outside of the simulation that advances the time, such as a test."""
+        """Process for a caller outside of the simulation that advances the simulated time, such as a test."""
         process = Process(self, name, lambda: 0)
         self.processes.append(process)
         return process
 
     def fail(self, process: Process, error: BaseException) -> None:
-        """Note the unexpected error that has ended a process."""
+        """Store the unexpected error that has ended a process."""
         text = "".join(traceback.format_exception(error))
         self.log.append(Said(self.scheduler.now_ns, process.name, "fatal", text))
 
     def connect(self, process: Process, place: str) -> SocketEnd:
-        """Line to who listens at a place; raises ConnectionRefusedError."""
+        """Connect to the listener at an address; raises ConnectionRefusedError if there is none."""
         listener = self.places.get(place)
         if listener is None:
             raise ConnectionRefusedError(place)
@@ -229,7 +230,7 @@ class Machine:
         return near
 
     def listen(self, process: Process, place: str) -> Listener:
-        """Listen at an address; raise OSError if another process already listens there."""
+        """Listen at an address; raises OSError if another process already listens at this address."""
         if place in self.places:
             raise OSError(place)
         self.places[place] = listener = Listener(self, place)

@@ -1,4 +1,4 @@
-"""Nodes of the simulated middleware: topics, services, timers, executors."""
+"""Nodes of the simulated middleware, with their topics, services, timers and executors."""
 
 from collections import deque
 from collections.abc import Callable
@@ -23,16 +23,16 @@ class SimulatedExecutor:
         self._waiting: Strand | None = None
 
     def add_node(self, node: Any) -> None:
-        """Serve a node too."""
+        """Add a node that the executor serves."""
         node.executor = self
 
     def post(self, work: Callable[[], object]) -> None:
-        """Have something done in its turn."""
+        """Add a function to the executor's queue."""
         self._due.append(work)
         self.wake()
 
     def spin_once(self, timeout_sec: float | None = None) -> None:
-        """Serve one request, or none if none comes within the time [s]."""
+        """Serve one request; return without one if none comes within the time [s]."""
         if not self._due:
             self._waiting = self._scheduler.current
             self._scheduler.wait(timeout_sec)
@@ -46,7 +46,7 @@ class SimulatedExecutor:
             self._scheduler.wake(self._waiting)
 
     def shutdown(self) -> None:
-        """Serve nothing any more."""
+        """Stop serving requests."""
         self._due.clear()
 
 
@@ -59,16 +59,16 @@ class Timer:
         self.reset()
 
     def cancel(self) -> None:
-        """Pause."""
+        """Pause the timer."""
         self._round = -abs(self._round) - 1
 
     def reset(self) -> None:
-        """Go on; the next call is one period from now."""
+        """Restart the timer; the next call is one period from now."""
         self._round = abs(self._round) + 1
         self._arrange()
 
     def is_canceled(self) -> bool:
-        """Whether it is paused."""
+        """Whether the timer is paused."""
         return self._round < 0
 
     def _arrange(self) -> None:
@@ -90,7 +90,7 @@ class Guard:
         self.is_open = True
 
     def trigger(self) -> None:
-        """Have the executor call soon, once for all triggers until then."""
+        """Let the executor call the function soon; several triggers before this call lead to one call."""
         if not self._is_due:
             self._is_due = True
             self._node.post(self._call)
@@ -110,11 +110,11 @@ class Answer:
         self._is_done = False
 
     def done(self) -> bool:
-        """Whether it has."""
+        """Whether the answer has arrived."""
         return self._is_done
 
     def result(self) -> Any:
-        """The answer."""
+        """Return the answer."""
         return self._value
 
     def add_done_callback(self, told: Callable[["Answer"], None]) -> None:
@@ -135,13 +135,13 @@ class Client:
         self._node, self.srv_name = node, name
 
     def service_is_ready(self) -> bool:
-        """Whether the service was found."""
+        """Whether the service was discovered."""
         bus = self._node.bus
         service = bus.services.get(self.srv_name)
         return service is not None and bus.knows(self._node.process, service)
 
     def wait_for_service(self, timeout_sec: float | None = None) -> bool:
-        """Wait until the service is found; whether it was."""
+        """Wait until the service is discovered; returns whether it was discovered in time."""
         scheduler = self._node.machine.scheduler
         limit = float("inf") if timeout_sec is None else timeout_sec
         deadline_ns = scheduler.now_ns + 1e9 * limit
@@ -152,7 +152,7 @@ class Client:
         return True
 
     def call_async(self, request: Any) -> Answer:
-        """Ask."""
+        """Send a request, and return the future answer."""
         answer, bus, own = Answer(), self._node.bus, self._node.process
         service = bus.services.get(self.srv_name)
         if service is None:
@@ -165,7 +165,7 @@ class Client:
         return answer
 
     def remove_pending_request(self, future: Any) -> None:
-        """Wait for an answer no longer."""
+        """Cancel the wait for an answer."""
 
 
 class Log:
@@ -188,7 +188,7 @@ class SimulatedNode:
 
     Args:
         bus: The simulated middleware.
-        process: Process that owns it.
+        process: Process that owns the node.
         name: Name of the node.
         namespace: Namespace of the node.
     """
@@ -228,12 +228,12 @@ class SimulatedNode:
         return self.bus.open_writer(Writer(self.bus, self.process, self.full_name, topic, kind, qos))
 
     def create_taker(self, kind: Any, name: str, qos: Qos) -> Reader:
-        """Subscription whose messages are taken by hand."""
+        """Subscription whose messages the caller takes."""
         topic = self.resolve_topic_name(name)
         return self.bus.open_reader(Reader(self.bus, self.process, kind, topic, qos, self.full_name))
 
     def create_subscription(self, kind: Any, name: str, callback: Callable[[Any], None], qos: Qos) -> Reader:
-        """Subscription whose messages the executor hands over."""
+        """Subscription whose messages the executor passes to a callback."""
         reader, turns = self.create_taker(kind, name, qos), 0
 
         def hand_over() -> None:
@@ -244,7 +244,7 @@ class SimulatedNode:
 
         def told() -> None:
             nonlocal turns
-            if qos.keeps_all or turns < qos.depth:  # messages that the queue has lost need no turn
+            if qos.keeps_all or turns < qos.depth:  # messages that the queue has lost need no call
                 turns += 1
                 self.post(hand_over)
 
@@ -266,15 +266,15 @@ class SimulatedNode:
         return Client(self, self.resolve_topic_name(name))
 
     def create_timer(self, period: float, callback: Callable[[], None]) -> Timer:
-        """Call again and again after a period [s]."""
+        """Create a timer that calls a function with a period [s]."""
         return Timer(self, period, callback)
 
     def create_guard_condition(self, callback: Callable[[], None]) -> Guard:
-        """Call when it is triggered."""
+        """Create a guard condition that calls a function when it is triggered."""
         return Guard(self, callback)
 
     def destroy(self, entity: Any) -> None:
-        """Withdraw what one of these methods has made."""
+        """Remove an object that one of these methods has created."""
         if isinstance(entity, Writer):
             self.bus.leave_writer(entity)
         elif isinstance(entity, Reader):
@@ -289,34 +289,34 @@ class SimulatedNode:
             entity.is_open = False
 
     def post(self, work: Callable[[], object]) -> None:
-        """Have the executor do something in its turn; nothing without one."""
+        """Add a function to the executor's queue; without an executor nothing happens."""
         if self.executor is not None and not self.process.is_dead:
             self.executor.post(work)
 
     def defer(self, work: Callable[..., object], *arguments: object) -> None:
-        """Have the executor do something soon; nothing without one."""
+        """Let the executor call a function soon; without an executor nothing happens."""
         self.post(partial(work, *arguments))
 
     def count_publishers(self, name: str) -> int:
-        """Publishers of a topic that were found."""
+        """Number of discovered publishers of a topic."""
         return len(self.publishers(name))
 
     def publishers(self, name: str) -> list[Endpoint]:
-        """The same, one by one."""
+        """Discovered publishers of a topic."""
         return self.bus.found(self.process, self.bus.writers.get(self.resolve_topic_name(name), ()))
 
     def readers(self, name: str) -> list[Endpoint]:
-        """Readers of a topic that were found."""
+        """Discovered readers of a topic."""
         return self.bus.found(self.process, self.bus.readers.get(self.resolve_topic_name(name), ()))
 
     def get_topic_names_and_types(self) -> list[tuple[str, list[str]]]:
-        """Topics that there are, without their types."""
+        """All topics; the type of each is the text ``simulated``."""
         return [(name, ["simulated"]) for name in self.bus.topics()]
 
     def get_service_names_and_types(self) -> list[tuple[str, list[str]]]:
-        """Services that there are, without their types."""
+        """All services; the type of each is the text ``simulated``."""
         return [(name, ["simulated"]) for name in sorted(self.bus.services)]
 
     def destroy_node(self) -> None:
-        """Leave: the end of the process does the rest."""
+        """Detach the node from its executor; the end of the process removes the rest."""
         self.executor = None

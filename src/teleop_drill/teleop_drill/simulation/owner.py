@@ -1,4 +1,4 @@
-"""Owner: which sender commands the arm, judged by messages sent, messages taken, and the slave's own report."""
+"""Owner: finds the sender that commands the arm, from sent messages, taken messages, and the slave's own report."""
 
 import struct
 
@@ -16,7 +16,7 @@ _SLACK_NS = 10_000_000
 _SILENCE_NS = round(1e9 * NodeParameters().owner_silence) - _SLACK_NS
 """Silence of the commanding sender after which another sender may command."""
 _STREAM = 3
-"""Commands in a row that nothing else may interrupt."""
+"""Number of commands in a row that no other sender may interrupt."""
 
 
 class Owner:
@@ -32,8 +32,8 @@ class Owner:
 
     def __init__(self, bus: Bus, timeout: float) -> None:
         self._bus, self._timeout_ns = bus, round(1e9 * timeout) - _SLACK_NS
-        self._senders: dict[int, bytes] = {}  # sender of the command with a stamp
-        self._silences: dict[int, int] = {}  # silence of the leader before each change of the leader [ns]
+        self._senders: dict[int, bytes] = {}  # sender of each command, by the stamp of the command
+        self._silences: dict[int, int] = {}  # silence of the commanding sender before each change of the sender [ns]
         self._heard_ns: dict[bytes, int] = {}
         self._process: Process | None = None
         self._forget(None)

@@ -1,4 +1,4 @@
-"""Report: results of random schedules, and which faults met which states."""
+"""Report: results of random schedules, and counts of the combinations of fault and state."""
 
 from collections import Counter
 from dataclasses import dataclass, field
@@ -32,7 +32,7 @@ class Coverage:
     broken: Counter[str] = field(default_factory=Counter)
 
     def add(self, found: Found) -> None:
-        """Take one more schedule."""
+        """Add the result of a schedule."""
         self.sessions += 1
         self.seconds += found.seconds
         self.met.update(found.met)
@@ -41,7 +41,7 @@ class Coverage:
         self.broken.update(one.law for one in found.broken)
 
     def table(self) -> list[list[str]]:
-        """Faults and states of the arm, with how often they met; the first row is the head."""
+        """Table of faults by states of the arm, with the counts of each combination; the first row is the head."""
         states = [state.name for state in State] + [NO_STATE]
         return [
             ["fault", *states],
@@ -49,14 +49,14 @@ class Coverage:
         ]
 
     def laws(self) -> list[list[str]]:
-        """Faults and laws, with how often each was looked at meanwhile; first row: the head."""
+        """Table of faults by laws, with the number of checks during each fault; the first row is the head."""
         counts: Counter[tuple[str, str]] = Counter()
         for (kind, _, law), count in self.under.items():
             counts[kind, law] += count
         return [["fault", *LAWS], *([kind, *(str(counts[kind, law]) for law in LAWS)] for kind in sorted(KINDS))]
 
     def plain(self) -> dict[str, object]:
-        """All counts, as for JSON; pairs and triples with `` / `` between their names."""
+        """All counts as plain values for JSON; the names of pairs and triples are joined by `` / ``."""
         return {
             "sessions": self.sessions,
             "seconds": self.seconds,
@@ -67,7 +67,7 @@ class Coverage:
         }
 
     def lines(self) -> list[str]:
-        """Result in a few lines."""
+        """Lines that summarize the result."""
         laws = [f"{law}: {self.looks[law]} looks, {self.broken[law]} broken" for law in self.looks]
         return [f"{self.sessions} sessions of {self.seconds:.0f} s in all", *sorted(laws)]
 
@@ -76,8 +76,8 @@ def told(found: Found, shortest: Found, law: str) -> list[str]:
     """Text about a schedule that broke a law, with the command that reproduces it.
 
     Args:
-        found: The schedule as it was drawn.
-        shortest: The faults that are needed to break the law.
+        found: Result of the original schedule.
+        shortest: Faults that are needed to break the law.
         law: Name of the law.
     """
     (one,) = (broken for broken in shortest.broken if broken.law == law)

@@ -1,8 +1,8 @@
 """Scheduler: simulated time, and the strands that run in it, one at a time.
 
-A strand is a thread of a simulated process. One runs at a time, until it waits: for time, for a
-lock, for a message. Strands of one process share its interpreter, so that they exclude each other;
-processes run beside each other. Events are ordered by time, then by the order in which they were scheduled.
+A strand is a thread of a simulated process. Only one strand runs at a time, until it waits for a time, a lock or a
+message. Strands of one process share its interpreter, so in simulated time they exclude each other; strands of
+different processes run in parallel. Events are ordered by time, then by the order in which they were scheduled.
 """
 
 import heapq
@@ -18,13 +18,13 @@ BEGIN_NS = 1_000_000_000_000
 EPOCH_NS = 1_800_000_000_000_000_000
 """Offset of the system's clocks from the monotonic clocks [ns]."""
 _LOOK_NS = 60
-"""Cost of reading a clock [ns], so that time passes in a loop that only reads the clock."""
+"""Time to read a clock [ns]; it makes time pass in a loop that only reads the clock."""
 _BREAK_NS = 1_000_000
-"""Longest time for which a thread that was interrupted in a turn waits for other threads of its process [ns]."""
+"""Longest time for which an interrupted thread waits for other threads of its process [ns]."""
 
 
 class Deadlock(Exception):  # noqa: N818
-    """No further event is scheduled, but the awaited one has not happened."""
+    """No further event is scheduled, but the awaited event has not happened."""
 
 
 class Costs:
@@ -37,12 +37,12 @@ class Costs:
     def __init__(self, random: Random) -> None:
         self._random = random
         self.hiccups = 2e-4
-        """Share of the turns after which a process gets no processor time for a while."""
+        """Share of the turns after which a process gets no processor time for some time."""
         self.crowd_ns = 0.0
-        """Mean time for which a process without priority waits for a processor while others work."""
+        """Mean time for which a process without priority waits for a processor while other processes run [ns]."""
 
     def turn(self) -> int:
-        """Cost of a turn, without that of its messages."""
+        """Duration of a turn [ns], without the time for its messages."""
         random = self._random.random
         cost = 20_000.0 + 40_000.0 * random()
         if random() < self.hiccups:
@@ -50,7 +50,7 @@ class Costs:
         return round(cost)
 
     def wake(self, *, has_priority: bool) -> int:
-        """Delay from the time at which a strand is due until it runs."""
+        """Delay from the time at which a strand is due until it runs [ns]."""
         late = self._random.expovariate(1.0 / 50_000.0)
         if self.crowd_ns and not has_priority:
             late += self._random.expovariate(1.0 / self.crowd_ns)
@@ -90,13 +90,13 @@ class Strand:
         self._scheduler.wake(self)
 
     def join(self, timeout: float | None = None) -> None:
-        """Wait for its end, for ``timeout`` [s] at most."""
+        """Wait for the end of the strand, at most for ``timeout`` [s]."""
         if self.is_alive():
             self._joined.append(self._scheduler.current)
             self._scheduler.wait(timeout)
 
     def is_alive(self) -> bool:
-        """Whether it works still."""
+        """Whether the strand has not ended."""
         return self._has_begun and not self._has_ended and not self.process.is_dead
 
     def _run(self, _: object) -> None:
@@ -113,7 +113,7 @@ class Turns:
     """The scheduler's data about a process."""
 
     def __init__(self) -> None:
-        self.busy_ns = 0  # time until which its interpreter is busy
+        self.busy_ns = 0  # time until which the interpreter of the process is busy
         self.is_dead = self.is_stopped = False
         self.parked: list[tuple[Strand, int, bool]] = []
 
@@ -126,7 +126,7 @@ class Lock:
         self._is_taken = False
 
     def acquire(self, blocking: bool = True, timeout: float = -1.0, /) -> bool:
-        """Take it; whether that was possible within the timeout [s]."""
+        """Acquire the lock; returns whether this was possible within the timeout [s]."""
         scheduler = self._scheduler
         deadline_ns = scheduler.now_ns + round(1e9 * timeout)
         while self._is_taken:
@@ -139,7 +139,7 @@ class Lock:
         return True
 
     def release(self) -> None:
-        """Give it back."""
+        """Release the lock."""
         self._is_taken = False
         if self._waiting:
             self._scheduler.wake(self._waiting.pop(0))
@@ -155,7 +155,7 @@ class Scheduler:
     """Simulated time.
 
     Args:
-        seed: Seed of everything random.
+        seed: Seed of all random numbers.
         breaks: Share of the clock readings after which the interpreter switches to another thread.
 
     Attributes:
@@ -173,10 +173,10 @@ class Scheduler:
         self._orders, self.hub = count(), getcurrent()
         self._outside = Strand(self, Turns(), "outside", lambda: None)
         self.current = self._outside
-        self._kept: list[Strand] = []  # a greenlet that is thrown away would run its `finally`
+        self._kept: list[Strand] = []  # strands are stored, because a deleted greenlet would run its `finally` blocks
 
     def random(self, name: str) -> Random:
-        """Source of numbers for one purpose, which nothing else draws from."""
+        """Random generator for one purpose only."""
         return Random(f"{self.seed}/{name}")
 
     # -- for strands -----------------------------------------------------------------------------
@@ -193,7 +193,7 @@ class Scheduler:
         return self.look_ns()
 
     def sleep(self, seconds: float) -> None:
-        """Wait [s]."""
+        """Let the strand wait for a time [s]."""
         late = self.costs.wake(has_priority=self.current.has_priority)
         self._switch(self.now_ns + max(0, round(1e9 * seconds)) + late)
 
@@ -212,22 +212,22 @@ class Scheduler:
     # -- for whoever arranges --------------------------------------------------------------------
 
     def wake(self, strand: Strand) -> None:
-        """Let a strand that waits go on soon."""
+        """Wake a waiting strand, which then continues soon."""
         late = self.costs.wake(has_priority=strand.has_priority)
         self._push(self.now_ns + late, strand, strand.token, True)
 
     def at(self, time_ns: int, event: Callable[[], object]) -> None:
-        """Let something happen at a time [ns]."""
+        """Schedule an event at a time [ns]."""
         self._push(max(time_ns, self.now_ns), event, 0, False)
 
     def spawn(self, process: Turns, name: str, work: Callable[[], object]) -> Strand:
-        """New strand, which is to be started."""
+        """Create a strand; the caller must start it."""
         strand = Strand(self, process, name, work)
         self._kept.append(strand)
         return strand
 
     def resume(self, process: Turns) -> None:
-        """Let a process that stood still go on."""
+        """Continue a process that was stopped."""
         process.is_stopped = False
         process.busy_ns = max(process.busy_ns, self.now_ns)
         parked, process.parked = process.parked, []
@@ -235,10 +235,10 @@ class Scheduler:
             self._push(self.now_ns, strand, token, value)
 
     def run(self, strand: Strand) -> None:
-        """Let time pass until a strand has ended; raises the error that ended it.
+        """Run the simulation until a strand has ended; raises the error that ended the strand.
 
         Raises:
-            Deadlock: It never will.
+            Deadlock: The strand can never end.
         """
         strand.start()
         strand.join()

@@ -13,12 +13,14 @@ from teleop_core.slave.operation.states import COMMANDS
 from teleop_drill.simulation.bus import Line
 from teleop_drill.simulation.stage import Stage
 
-BEGIN, END = 1.0, 9.0
-"""Within this time of a session all faults begin [s]."""
+BEGIN = 1.0
+"""Earliest time in a session at which a fault begins [s]."""
+END = 9.0
+"""Latest time in a session at which a fault begins [s]."""
 _LONGEST = 3.0  # longest duration of a fault [s]
 _NAMES = sorted((*COMMANDS, "release"))
 _LEADS = {"": 8, "disable": 2, "kill": 3, "pause": 4, "press": 2}
-"""Commands before a fault, with their weights; states that faults met rarely have larger weights."""
+"""Commands before a fault, with their weights. Commands to states that faults rarely met have larger weights."""
 _CLOCK_NS = (200_000_000, 3_600_000_000_000)
 
 
@@ -29,7 +31,7 @@ class Fault:
     Attributes:
         at: Begin, relative to the time at which the arm follows [s].
         kind: Kind of fault.
-        where: Process that it affects; empty for all.
+        where: Process that the fault affects; empty for all processes.
         seconds: Duration [s].
         amount: Strength of the fault, from 0 to 1.
     """
@@ -47,18 +49,18 @@ class Fault:
 
 
 Act = Callable[[Stage, Fault], Callable[[], None] | None]
-"""Begins a fault; returns the function that ends it, or None."""
+"""Function that begins a fault; it returns a function that ends the fault, or None."""
 
 
 def draw(seed: int, processes: tuple[str, ...]) -> tuple[Fault, ...]:
-    """One to five faults of a seed, and commands before them, in the order of their times.
+    """Draw one to five faults and commands before them, in the order of their times.
 
-    Before more than half of the faults a command brings the arm out of ENABLED, because otherwise nearly all faults
+    Before more than half of the faults a command moves the arm out of the state ENABLED. Otherwise nearly all faults
     would meet an ENABLED arm.
 
     Args:
         seed: Seed of the random faults.
-        processes: Names of the processes that they may befall.
+        processes: Names of the processes that faults may affect.
     """
     random = Random(f"{seed}/schedule")
     faults = []
@@ -153,9 +155,9 @@ def _command(stage: Stage, fault: Fault) -> None:
 
 
 def _drive(stage: Stage, fault: Fault) -> Callable[[], None]:
-    """Drive the joints as a client of CRTK does, far faster than they may go.
+    """Drive the joints as a CRTK client does, far beyond their speed limits.
 
-    While the hand's commands arrive, the arm refuses others, so this fault first silences the hand's commands.
+    While the hand's commands arrive, the arm refuses commands of others. So this fault first stops the hand's commands.
     """
     drives = stage.robot.drives
     assert drives is not None
@@ -185,7 +187,7 @@ def _intrude(stage: Stage, fault: Fault) -> Callable[[], None]:
 
 
 def _garbage(stage: Stage, fault: Fault) -> Callable[[], None]:
-    """Send bytes that are no message."""
+    """Send bytes that are not a valid message."""
     data = bytes(int(255 * fault.amount) ^ k & 255 for k in range(int(200 * fault.amount)))
     return stage.every(0.001, lambda: stage.publish(SLAVE_SERVO_JP, data))
 

@@ -1,4 +1,4 @@
-"""Seeds: random schedules, the laws that must hold in each, and the shortest that breaks one."""
+"""Seeds: runs random schedules, checks the laws in each, and finds the shortest schedule that breaks a law."""
 
 import os
 import tempfile
@@ -27,8 +27,8 @@ from teleop_drill.simulation.stage import Stage
 
 PROCESSES = {Processes.SIDES: ("hand_side", "slave_side", RECORDER_NAME), Processes.ONE: (SESSION, RECORDER_NAME)}
 """Processes that a schedule may affect, by the distribution of the nodes."""
-_START, _CURED = 20.0, 15.0
-"""Time in which the arm must follow, at first and after all is cured [s]."""
+_START = 20.0  # time limit until the arm follows after the start [s]
+_CURED = 15.0  # time limit until the arm follows after the end of all faults [s]
 _CIRCLE = (
     "operator.kind=circle",
     f"operator.size=[{2 * hand.RADIUS}, 0.0, {2 * hand.RADIUS}]",
@@ -39,7 +39,7 @@ _CIRCLE = (
     "slave.operation.tool_speed=0.5",
     "slave.start_speed=1.0",
 )
-_ROUND = 20  # schedules that are chosen at once
+_ROUND = 20  # number of schedules that are chosen together
 _PER_CHILD = 25  # sessions per process of this machine: killed simulated processes stay in memory
 
 
@@ -48,11 +48,11 @@ class Found:
     """Result of one schedule.
 
     Attributes:
-        seed: Seed of everything random.
+        seed: Seed of all random numbers.
         faults: The faults that were injected.
         processes: Distribution of the nodes over processes.
         breaks: Share of the clock readings after which another thread of the process runs.
-        broken: Laws that did not hold.
+        broken: Breaches of laws.
         met: Number of times that each fault happened in each state of the arm.
         looks: Number of checks of each law.
         under: Number of checks of each law by present fault and state of the arm.
@@ -83,7 +83,7 @@ def run_seed(
         seed: Seed of the machine, and of the schedule if no faults are given.
         faults: Faults of the schedule; None to draw them.
         folder: Folder of the recording; None for no recording.
-        processes: Distribution of the nodes over processes: by side, or all except the recorder in one.
+        processes: Distribution of the nodes over processes: by side, or all nodes except the recorder in one process.
         breaks: Share of the clock readings after which another thread of the process runs.
     """
     planned = draw(seed, PROCESSES[processes]) if faults is None else tuple(faults)
@@ -114,7 +114,7 @@ class _Run:
         self._ends: list[Callable[[], None]] = []
 
     def run(self) -> Found:
-        """Do it."""
+        """Run the schedule."""
         begin_ns = self._scheduler.now_ns
         self._stage.session.start()
         self._laws.judge_recovery(self._await(_START), _START)
@@ -130,7 +130,7 @@ class _Run:
         self._laws.judge_recovery(self._await(_CURED), _CURED)
         self._found.seconds = 1e-9 * (self._scheduler.now_ns - begin_ns)
         for process in self._stage.session.running.values():
-            self._stage.killed.add(process)  # from now on the processes are told to end
+            self._stage.killed.add(process)  # from now on the processes are ordered to end
         (first, *more), was_killed = self._stage.session.recordings, self._was("kill", "recorder")
         recorder = None if more else self._stage.session.node(RECORDER_NAME)
         self._stage.session.close()
@@ -162,7 +162,7 @@ class _Run:
         self._scheduler.sleep(seconds)
 
     def _await(self, patience: float) -> float | None:
-        """Wait until the arm follows, and help it; returns the time that this took [s]."""
+        """Wait until the arm follows, and send the commands that it needs; returns the waiting time [s]."""
         begin_ns = self._scheduler.now_ns
         steady = 0
         while (elapsed := 1e-9 * (self._scheduler.now_ns - begin_ns)) < patience:
@@ -192,7 +192,7 @@ def shrink(found: Found, law: str) -> Found:
 def run_seeds(
     first: int, count: int, workers: int | None = None, processes: Processes = Processes.SIDES, breaks: float = 0.0
 ) -> Iterator[Found]:
-    """Run schedules on all cores: of each three seeds, the one with the rarest combination of fault and state.
+    """Run schedules on all cores; of every three seeds, the one with the rarest combination of fault and state is run.
 
     The choice is made after every :data:`_ROUND` schedules, so that the same call runs the same seeds.
 
@@ -216,7 +216,7 @@ def run_seeds(
 
 
 def _known(seed: int, met: Counter[tuple[str, str]], processes: Processes) -> float:
-    """Mean, over the faults of a schedule, of how often each fault met its rarest state."""
+    """Mean over the faults of a schedule: the number of times that the fault met its rarest state."""
     states = [state.name for state in State]
     rarest = [min(met[one.kind, s] for s in states) for one in draw(seed, PROCESSES[processes])]
     return sum(rarest) / len(rarest)

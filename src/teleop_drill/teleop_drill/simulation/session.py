@@ -1,4 +1,4 @@
-"""Session: the processes of a session on a simulated machine, started, broken and ended."""
+"""Session: starts, breaks and ends the processes of a session on a simulated machine."""
 
 import signal
 from collections.abc import Callable, Mapping
@@ -23,16 +23,16 @@ from teleop_drill.simulation.machine import Process
 from teleop_drill.simulation.stand_ins import SimulatedWatch, Work, stand_by
 from teleop_drill.simulation.world import SimulatedWorld
 
-_START = 0.4  # time from the start of a process until its node is made [s]
-_STARTED = 60.0  # patience with the start [s]
-_ENDED = 10.0  # patience with the end [s]
+_START = 0.4  # time from the start of a process until its node is created [s]
+_STARTED = 60.0  # time limit for the start [s]
+_ENDED = 10.0  # time limit for the end [s]
 _NEVER_NS = 2**62
 ARM = "arm"
 """Process that the drives command; it is started first, and the drill does not break it."""
 _DRILLED = ("operator", "haptic_master")
 """Nodes that the drill may replace."""
 Processes = Mapping[str, tuple[str, ...]]
-"""Names of processes, each with its nodes; the recorder's comes first."""
+"""Nodes of each process, by the name of the process; the recorder's process is first."""
 
 
 class SimulatedSession:
@@ -44,10 +44,10 @@ class SimulatedSession:
         configuration: Configuration of the session.
         processes: Distribution of the nodes over processes.
         folder: Folder of the recordings.
-        observer: Receives the reports of the nodes.
+        observer: Node that receives the reports of the session.
         master: Kind of operator that moves the hand.
-        foreign: Processes that are none of ours, by name: drives in the place of the simulator, and
-            the arm that these lead.
+        foreign: Programs of processes of other software, by name: drives that replace the simulator, and the arm that
+            these drives command.
     """
 
     def __init__(
@@ -76,7 +76,7 @@ class SimulatedSession:
     # -- start and end ---------------------------------------------------------------------------
 
     def start(self) -> None:
-        """Start what does not run, the recorder first, and wait until all are at work."""
+        """Start all processes that do not run, the recorder first, and wait until all are ready."""
         whole = self._processes.items()
         first = {n: k for n, k in whole if RECORDER_NAME in k or n == ARM}
         rest = {n: k for n, k in whole if n not in first}
@@ -87,7 +87,7 @@ class SimulatedSession:
             self._await([node for name in new if name not in self._foreign for node in crew[name]])
 
     def launch(self, name: str) -> None:
-        """Start a process, and do not wait for it."""
+        """Start a process without waiting until it is ready."""
         nodes = self._processes[name]
         if RECORDER_NAME in nodes:
             self.recordings.append(self._folder / f"recording_{len(self.recordings) + 1}")
@@ -117,7 +117,7 @@ class SimulatedSession:
         return make_node(member.stage, namespace=member.arm, world=world)
 
     def _given(self) -> dict[str, dict[str, Any]]:
-        """Parameters of all nodes, as their file has them."""
+        """Parameters of all nodes, as in their parameter file."""
         found = parameters_of(self._configuration, str(self.recordings[-1]))
         if self._master is not Master.DEVICE:
             for name in _DRILLED:
@@ -136,14 +136,14 @@ class SimulatedSession:
                 raise SessionError(f"{', '.join(nodes)}: not at work after {_STARTED:g} s")
 
     def check(self) -> None:
-        """Make sure that all processes run; raises SessionError."""
+        """Check that all processes run; raises SessionError if one has ended."""
         for process in self.running.values():
             if process.is_dead:
                 said = [one.text for one in self._machine.log if one.level in {"error", "fatal"}]
                 raise SessionError(f"{process.name} has ended: {'; '.join(said[-2:])}")
 
     def close(self) -> None:
-        """End all, in order; the recorder last."""
+        """End all processes in order, the recorder last."""
         self.kill_bystander()
         last = [p for n, p in self.running.items() if RECORDER_NAME in self._processes[n]]
         for crew in ([p for p in self.running.values() if p not in last], last):
@@ -165,18 +165,18 @@ class SimulatedSession:
             process.end(-signal.SIGKILL, is_orderly=False)
 
     def until_ns(self, recording: Path) -> int:
-        """When the recording after the given one was begun [ns]; later than all times if there is none."""
+        """Time at which the recording after the given one began [ns]; later than all times if there is none."""
         place = self.recordings.index(recording) + 1
         return self._begun_ns[place] if place < len(self._begun_ns) else _NEVER_NS
 
     # -- what can be done to them ----------------------------------------------------------------
 
     def process_of(self, node: str) -> Process | None:
-        """Process that holds a node; None if none does."""
+        """Process that contains a node; None if there is none."""
         return self.running.get(self._places.get(node, ""))
 
     def node(self, name: str) -> CoreNode | None:
-        """A node at work, to be looked into; None if there is none."""
+        """A running node, for inspection; None if the node does not run."""
         process = self.process_of(name)
         crew = None if process is None or process.is_dead else self.crews.get(process)
         return None if crew is None else next((one for one in crew.nodes if one.member_name == name), None)
@@ -216,24 +216,24 @@ class SimulatedSession:
         self._machine.scheduler.costs.crowd_ns = 3e6
 
     def relieve(self) -> None:
-        """Let them rest."""
+        """End the load of :meth:`hog`."""
         self._machine.scheduler.costs.crowd_ns = 0.0
 
     def start_bystander(self) -> None:
-        """Start a process of others that listens to all streams."""
+        """Start a foreign process that subscribes to all streams."""
         self._bystander = self._machine.start("bystander", lambda process: stand_by(SimulatedWorld(self._bus, process)))
         self._bus.watch(self._bystander)
         self._machine.scheduler.sleep(0.5)
 
     def kill_bystander(self) -> None:
-        """Kill it."""
+        """Kill the foreign process."""
         if self._bystander is not None:
             self._bystander.end(-signal.SIGKILL, is_orderly=False)
             self._bystander = None
 
 
 def parameters_of(configuration: Configuration, out: str, namespace: str = "") -> dict[str, dict[str, Any]]:
-    """Parameters of all nodes of a session, by their full names, as their file has them.
+    """Parameters of all nodes of a session, by the full names of the nodes, as in their parameter file.
 
     Args:
         configuration: The session.

@@ -1,4 +1,4 @@
-"""Stage: a session by side on a simulated machine, and the faults and commands that a schedule applies to it."""
+"""Stage: a session on a simulated machine, and the faults and commands that a schedule applies to it."""
 
 from collections.abc import Callable
 from contextlib import suppress
@@ -67,7 +67,7 @@ class Stage:
         self.names = tuple(shared)
         self.session = SimulatedSession(bus, owner, configuration, shared, folder, observer, Master.DEVICE)
         self.killed: set[Process] = set()
-        """Processes that were told to end."""
+        """Processes that were ordered to end."""
         self.kills = 0
         """Number of killed node processes."""
         self.lost_disk: set[Process] = set()
@@ -115,7 +115,7 @@ class Stage:
         return self.session.running[name]
 
     def note_stop(self, process: Process) -> None:
-        """Note that a process does not run from now on."""
+        """Record that a process does not run from now on."""
         self.stopped.append((process, self.machine.scheduler.now_ns))
 
     def fail_disk(self, error: int) -> Callable[[], None]:
@@ -153,7 +153,7 @@ class Stage:
         return max(times, default=None)
 
     def command(self, name: str) -> None:
-        """Ask the slave for something, without waiting for its answer."""
+        """Send a request to the slave without waiting for the answer."""
         self._clients[name].call_async(Trigger.Request())
 
     def lead(self, *, by_hand: bool) -> None:

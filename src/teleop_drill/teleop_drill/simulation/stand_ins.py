@@ -1,4 +1,4 @@
-"""Stand-ins: a watchdog of processes without signals and system statistics; a foreign process."""
+"""Stand-ins: a watchdog of processes that uses no signals and no system statistics, and a foreign process."""
 
 from collections.abc import Callable
 from typing import Any
@@ -65,11 +65,11 @@ class SimulatedWatch:
 
 
 Work = Callable[[SimulatedWorld], int]
-"""Program of a simulated process: gets the process's world, and returns the exit code."""
+"""Program of a simulated process: a function of the process's world that returns the exit code."""
 
 
 def run_node(world: SimulatedWorld, stage: str, **values: Any) -> int:
-    """Run one node as the program of a process until it is told to end; return the exit code.
+    """Run one node as the program of a process until the process is ordered to end; returns the exit code.
 
     Args:
         world: World of the process.
@@ -77,14 +77,14 @@ def run_node(world: SimulatedWorld, stage: str, **values: Any) -> int:
         values: Parameters of the node, as in a parameter file.
 
     Raises:
-        TeleopError: There is no such stage, or a parameter is wrong.
+        TeleopError: The stage does not exist, or a parameter is wrong.
     """
     crew = make_node(STAGES.find(stage), values=values, world=world)
     return serve(crew, SimulatedWatch(world, crew, world.process), world)
 
 
 def stand_by(world: SimulatedWorld) -> int:
-    """Listen to all streams, until it is killed."""
+    """Subscribe to all streams until the process is killed."""
     node, executor = world.node("bystander"), world.executor()
     executor.add_node(node)
     for topic in STREAMS:

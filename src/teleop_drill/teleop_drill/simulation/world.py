@@ -22,10 +22,10 @@ class SimulatedWorld:
     Args:
         bus: The middleware.
         process: The process.
-        given: Parameters of its file, by the full names of nodes without the slash before them.
+        given: Parameters of the process's file, by the full names of nodes without the leading slash.
 
     Attributes:
-        process: As given.
+        process: The process.
     """
 
     def __init__(self, bus: Bus, process: Process, given: Mapping[str, Mapping[str, Any]] | None = None) -> None:
@@ -46,27 +46,27 @@ class SimulatedWorld:
         return Lock(self._scheduler)
 
     def thread(self, name: str, work: Callable[[], None]) -> Strand:
-        """Thread that does something, once it is started."""
+        """Return a thread that runs ``work`` as soon as it is started."""
         return self._scheduler.spawn(self.process, name, work)
 
     def thread_ident(self) -> int:
-        """Number of the thread that calls."""
+        """Number of the calling thread."""
         return self._scheduler.current.ident or 0
 
     def take_real_time(self, options: RealTimeParameters) -> list[str]:
-        """Take a priority for the thread that calls."""
+        """Set the priority of the calling thread."""
         self._scheduler.current.has_priority = options.priority > 0
         return []
 
     def tidy(self) -> None:
-        """Throw away what the start has left behind: there is nothing."""
+        """Do nothing, because a simulated start leaves no garbage."""
 
     def connect(self, place: str) -> SocketEnd:
-        """Line to who listens at a place."""
+        """Connect to the listener at an address."""
         return self.process.machine.connect(self.process, place)
 
     def listen(self, place: str) -> Listener:
-        """Listen at a place."""
+        """Listen at an address."""
         return self.process.machine.listen(self.process, place)
 
     def feed_place(self) -> str:
@@ -91,4 +91,4 @@ class SimulatedWorld:
         return self
 
     def shutdown(self) -> None:
-        """Does nothing: the simulated process leaves the middleware when it ends."""
+        """Do nothing, because a simulated process leaves the middleware when it ends."""

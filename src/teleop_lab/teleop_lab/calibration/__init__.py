@@ -1,6 +1,6 @@
 """Calibration: the real geometry of an arm, from measured positions of its tip.
 
-:func:`simulate` measures an arm with known errors, :func:`calibrate` takes measurements of yours::
+:func:`simulate` simulates the measurement of an arm with known errors. :func:`calibrate` uses your measurements::
 
     from teleop_lab.calibration import calibrate, read_measured, simulate
     from teleop_core.robots import load_robot
@@ -43,7 +43,7 @@ __all__ = [
     "simulate",
 ]
 FRESH = 500
-"""Number of poses at which a simulated calibration is tested."""
+"""Number of poses at which the result of a simulated calibration is tested."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,9 +56,9 @@ class Calibration:
         found: Link errors and their confidence intervals.
         fitted: Accuracy at the measured poses.
         tried: Accuracy at poses that were not used to find the errors; None if there are too few poses.
-        truth: Errors of a simulated arm; None for a real one.
-        equivalent: Values of the found entries that a perfect fit would give for ``truth``. If several entries have
-            the same effect, the found entry stands for their sum. Empty for a real arm.
+        truth: Errors of a simulated arm; None for a real arm.
+        equivalent: Values of the found entries that a perfect fit would give for ``truth``. If several entries have the
+            same effect, the value of the found entry is their sum. Empty for a real arm.
     """
 
     robot: Robot
@@ -75,13 +75,13 @@ class Calibration:
         return text(self)
 
     def to_json(self) -> dict[str, object]:
-        """All numbers [m, rad], for JSON."""
+        """All numbers [m, rad] as plain values for JSON."""
         from teleop_lab.calibration.report import content
 
         return content(self)
 
     def table(self) -> "Table":
-        """The calibrated arm, as a table for :func:`teleop_core.robots.robot_from_table`."""
+        """Denavit-Hartenberg table of the calibrated arm for :func:`teleop_core.robots.robot_from_table`."""
         from teleop_lab.calibration.corrected import corrected_table
 
         return corrected_table(self.robot, self.found.errors)
@@ -95,19 +95,19 @@ def calibrate(
     finds_frame: bool = False,
     keeps_all: bool = False,
 ) -> Calibration:
-    """Link errors of an arm from measurements.
+    """Identify the link errors of an arm from measurements.
 
     Args:
-        robot: The arm as drawn; a chain of links.
-        measured: Points or distances of the tip, as of :func:`read_measured`.
+        robot: The nominal arm; it must be a chain of links.
+        measured: Points or distances of the tip, for example from :func:`read_measured`.
         fit: "all" link errors, joint "offsets", or names such as ["d3", "theta2"].
-        finds_frame: Whether points are in a frame with an unknown pose, like those of a tracker.
-        keeps_all: Whether errors are kept that do not differ significantly from zero.
+        finds_frame: Whether the points are in a frame with an unknown pose, such as the frame of a tracker.
+        keeps_all: Whether the result contains errors that do not differ significantly from zero.
 
     Raises:
-        ParameterError: The robot is no chain.
-        UnknownNameError: ``fit`` contains a name that is no link error.
-        CalibrationError: Too few poses, errors that cannot be distinguished, or no convergence.
+        ParameterError: The robot is not a chain.
+        UnknownNameError: ``fit`` contains a name that is not a link error.
+        CalibrationError: There are too few poses, errors cannot be distinguished, or the search does not converge.
     """
     model = Model.of(robot)
     found = identify(model, measured, fit, finds_frame=finds_frame, keeps_all=keeps_all)
@@ -126,23 +126,23 @@ def simulate(
     keeps_all: bool = False,
     seed: int = 1,
 ) -> Calibration:
-    """Calibrate an arm whose errors are known, measured at simulated poses.
+    """Calibrate an arm with known errors from simulated measurements.
 
     Args:
-        robot: The arm as drawn; a chain of links.
+        robot: The nominal arm; it must be a chain of links.
         poses: Number of measured poses.
         noise: Standard deviation of a tracker on each axis [m], or "ruler" for a ruler with 0.5 mm divisions that
             measures along one axis after the other.
-        errors: Tolerances and values for :func:`~teleop_lab.calibration.simulate.true_errors`; None for "cnc", and for
-            the rcrt1 also the published offset of d3.
+        errors: Tolerances and values for :func:`~teleop_lab.calibration.simulate.true_errors`. None stands for "cnc";
+            for the rcrt1 it includes the published offset of d3.
         fit: As in :func:`calibrate`; None for "all", or for "offsets" with a ruler.
         choose: "optimal" or "random" poses of a tracker.
-        finds_frame: Whether the tracker has an unknown frame, which is estimated too.
-        keeps_all: Whether errors are kept that do not differ significantly from zero.
+        finds_frame: Whether the frame of the tracker is unknown; then its pose is also estimated.
+        keeps_all: Whether the result contains errors that do not differ significantly from zero.
         seed: Seed of poses, errors and noise.
 
     Raises:
-        ParameterError, UnknownNameError, CalibrationError: As in :func:`calibrate`, and for impossible values.
+        ParameterError, UnknownNameError, CalibrationError: The reasons of :func:`calibrate`, or an impossible value.
     """
     model, rng = Model.of(robot), np.random.default_rng(seed)
     truth = true_errors(robot, default_errors(robot) if errors is None else errors, rng)
@@ -171,7 +171,7 @@ def simulate(
 def _tried(
     found: Found, truth: LinkErrors, measured: Measured, finds_frame: bool, rng: np.random.Generator
 ) -> Accuracy | None:
-    """Accuracy at fresh poses, without noise; for a tracker with an unknown frame, by cross-validation."""
+    """Accuracy at new poses without noise; for a tracker with an unknown frame, accuracy by cross-validation."""
     if finds_frame:
         return left_out(found, measured)
     q = random_poses(found.model.robot, FRESH, rng)

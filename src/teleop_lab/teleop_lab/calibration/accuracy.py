@@ -1,4 +1,4 @@
-"""Accuracy of a tip, as appendix E counts it: RMS, standard deviation and largest error."""
+"""Accuracy of a tip, with the statistics of appendix E: RMS, standard deviation and largest error."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -13,8 +13,8 @@ from teleop_lab.calibration.model import FRAME
 
 AXES, TOTAL = ("x", "y", "z"), "total"
 _FOLDS = 5
-# Residual of a reading, divided by the typical residual, above which it looks misread: with normal noise one reading
-# in a million.
+# A reading is probably misread if its residual, divided by the typical residual, exceeds this. With normal noise one
+# reading in a million exceeds it.
 _MISREAD = 5.0
 
 
@@ -37,7 +37,7 @@ class Accuracy:
     """Errors of the tip before and after a calibration, by axis and in total.
 
     Attributes:
-        where: Text with the poses at which it was measured.
+        where: Text that describes the poses at which the accuracy was measured.
         before: Spread with the nominal arm.
         after: Spread with the found errors.
     """
@@ -48,10 +48,10 @@ class Accuracy:
 
 
 def of_points(errors: Array) -> dict[str, Spread]:
-    """Spreads of errors (N, 3); NaN for a coordinate that was not read.
+    """Spreads of errors (N, 3) by axis and in total; an error is NaN if its coordinate was not read.
 
-    The total is the spread of the lengths (N,); if no point was read along all three axes, it is the spread of all
-    readings.
+    The total is the spread of the lengths (N,) of the errors. If no point was read along all three axes, the total is
+    the spread of all readings.
     """
     out = {}
     for axis, column in zip(AXES, errors.T, strict=True):
@@ -88,15 +88,15 @@ def at_measured(found: Found, measured: Measured) -> Accuracy:
 
 
 def at_fresh(found: Found, fresh: Measured) -> Accuracy:
-    """Accuracy at other poses, with exact points."""
+    """Accuracy at new poses, at which the exact points are known."""
     accuracy = at_measured(found, fresh)
     return Accuracy(f"at {len(fresh)} fresh poses", accuracy.before, accuracy.after)
 
 
 def left_out(found: Found, measured: Measured) -> Accuracy | None:
-    """Accuracy by cross-validation: a fifth of the measured poses is left out at a time.
+    """Accuracy by cross-validation, in which each fifth of the measured poses is left out once.
 
-    None if too few poses remain.
+    Returns None if too few poses remain.
     """
     links = [name for name in found.names if name not in FRAME]
     finds_frame = len(links) < len(found.names)
@@ -124,7 +124,7 @@ class Misread(NamedTuple):
 
 
 def misread(found: Found, measured: Measured) -> Misread | None:
-    """The pose with the largest residual relative to the other poses, if its reading is probably wrong.
+    """Return the pose with the largest residual, if its reading is probably wrong.
 
     Source:
         Median of the magnitudes divided by 0.6745, instead of a standard deviation: Hampel 1974.

@@ -1,9 +1,9 @@
-"""Appendix E: the accuracy test of the RCRT-1 with a ruler, as printed, and the poses behind it.
+"""Appendix E: the printed readings of the RCRT-1's accuracy test with a ruler, and the poses of these readings.
 
-Ten targets along each axis, 10 mm apart, with the orientation of the tool at home. Along x and z the moves begin at
-home. Along y home lies on the edge of the workspace, so these moves begin 30 mm away from home; the ruler still
-measures from home to the tip. The source does not print the directions; only -x, +y (or its mirror image -y) and +z
-are reachable.
+The test has ten targets along each axis, 10 mm apart, with the tool's orientation at home. Along x and z the moves
+begin at home. Along y the moves begin 30 mm away from home, because home lies on the edge of the workspace; the ruler
+still measures from home to the tip. The source does not print the directions; only -x, +y (or its mirror image -y) and
++z are reachable.
 
 Source:
     Vongbunyong 2008, appendix E.1, tables E.1-E.3.
@@ -21,8 +21,8 @@ STEP = 0.5e-3
 WAY = 0.1
 """Length of the longest move [m]."""
 ESCAPE = 0.03
-"""Distance from home to the begin of a move that is not possible at home [m]."""
-# Distance from home [m]; for table E.2 the column with the ruler's reading.
+"""Distance from home at which a move begins if it is not possible from home [m]."""
+# Distances from home [m]; for table E.2 these are the ruler's readings.
 READ = {
     "x": (10.25, 20.0, 30.0, 40.25, 50.25, 60.5, 70.5, 79.5, 90.0, 100.25),
     "y": (31.5, 36.0, 43.0, 50.5, 58.5, 68.0, 77.0, 86.5, 96.0, 105.5),
@@ -30,14 +30,14 @@ READ = {
 }
 """Ruler's readings [mm] for commands of 10, 20 ... 100 mm along each axis."""
 OFFSET_OF_D3 = 5.5e-3
-"""Offset of joint 3 [m] that explains most of these readings, derived from the tables."""
+"""Offset of joint 3 [m], derived from the tables; it explains most of the readings."""
 
 
 def published(robot: Robot) -> Measured:
-    """The thirty readings at the poses to which the controller sent the arm.
+    """Return the thirty readings, with the commanded poses of the arm.
 
     Raises:
-        CalibrationError: Another robot.
+        CalibrationError: The robot is not the RCRT-1.
     """
     if robot.name != "rcrt1":
         raise CalibrationError(f"appendix E measured the rcrt1, not {robot.name}")
@@ -47,14 +47,14 @@ def published(robot: Robot) -> Measured:
 
 
 def ruler_moves(robot: Robot, count: int) -> Measured:
-    """Poses of such a test for any arm, with the distances of the nominal arm.
+    """Poses of a test as in appendix E for any arm, with the distances that the nominal arm moves.
 
     Args:
         robot: An arm that controls x, y and z.
         count: Number of poses, distributed over the axes, x first.
 
     Raises:
-        CalibrationError: No straight move along an axis, from home or 30 mm beside it.
+        CalibrationError: Along an axis no straight move is possible, neither from home nor from 30 mm beside home.
     """
     joints, labels = [], []
     escapes: list[Array] = []
@@ -71,7 +71,7 @@ def ruler_moves(robot: Robot, count: int) -> Measured:
 
 
 def _move(robot: Robot, axis: int, count: int, escapes: list[Array]) -> tuple[Array, Array]:
-    """Direction (3,) and joints (count, n) of the move along an axis, the + side first."""
+    """Direction (3,) and joints (count, n) of the move along an axis; the positive direction is tried first."""
     targets = WAY * np.arange(1, count + 1) / max(count, 1)
     for start in (np.zeros(3), *(ESCAPE * escape for escape in escapes)):
         for sign in (1.0, -1.0):

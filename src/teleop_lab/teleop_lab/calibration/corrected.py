@@ -18,13 +18,13 @@ _STATED = ("inertia", "viscous", "coulomb", "friction_speed", "effort_limit", "s
 
 
 def corrected_table(robot: Robot, errors: LinkErrors) -> Table:
-    """Table of the arm as built, in the standard convention, radians and metres.
+    """Table of the real arm in the standard convention, in radians and metres.
 
-    Joint vectors, limits, postures and drives stay those of the robot. Link inertias are lost, because a table has
-    none.
+    Joint vectors, limits, postures and drives are equal to those of the nominal robot. Link inertias are lost, because
+    a table cannot contain them.
 
     Raises:
-        ParameterError: The robot is no chain.
+        ParameterError: The robot is not a chain.
     """
     from teleop_lab.calibration.model import Model
 
@@ -42,7 +42,7 @@ def corrected_table(robot: Robot, errors: LinkErrors) -> Table:
 
 
 def _rows(robot: Robot, chain: Chain, errors: LinkErrors) -> Iterator[Comparison]:
-    """A row for each link, plus one row before and one after them if the chain has further transforms there."""
+    """Rows of all links; further transforms before or after the links add a row at that end of the table."""
     first, S = _links(chain.fixed[0])
     if any(abs(value) > 0.0 for value in first.values()):
         yield dict(first)
@@ -63,7 +63,7 @@ def _rows(robot: Robot, chain: Chain, errors: LinkErrors) -> Iterator[Comparison
 
 
 def _links(F: Array) -> tuple[Mapping[str, float], tuple[float, float]]:
-    """Parameters of one transform, and the remaining rotation and translation along the next axis."""
+    """Return the link parameters of one transform, and the remaining rotation and translation along the next axis."""
     S = next_axis_motion(F)
     L = F @ np.linalg.inv(S)
     theta, alpha = math.atan2(L[1, 0], L[0, 0]), math.atan2(L[2, 1], L[2, 2])
@@ -76,7 +76,7 @@ def _with_joint(constant: float, is_against: bool) -> str:
     text = "-q" if is_against else "q"
     if constant == 0.0:
         return text
-    # Expressions of a table know no exponents.
+    # Expressions of a table cannot contain exponents.
     return f"{text} {'-' if constant < 0.0 else '+'} {np.format_float_positional(abs(constant))}"
 
 

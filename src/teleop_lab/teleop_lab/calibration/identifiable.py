@@ -1,12 +1,12 @@
 """Identifiability: which entries of a model the measurements can distinguish, and why not the others.
 
 The method uses the singular values of the identification Jacobian with columns of unit length. While the ratio of the
-largest to the smallest is above a bound, one entry of the weakest combination is fixed at zero; lengths and twists are
-fixed before joint offsets.
+largest to the smallest singular value is above a bound, one entry of the least determined combination is fixed at zero.
+Link lengths and twists are fixed before joint offsets.
 
 Source:
     Bound of 100: Schröer 1993, as quoted in the chapter on model identification by Hollerbach, Khalil and Gautier of
-    the Springer handbook of robotics, 2016, which has the elimination by singular values too.
+    the Springer handbook of robotics, 2016, which also describes the elimination by singular values.
 """
 
 from collections.abc import Sequence
@@ -18,17 +18,17 @@ from teleop_core.kernels.geometry import Array
 from teleop_lab.calibration.model import FRAME, Model
 
 WORST_CONDITION = 100.0
-# An error has no effect if it moves the tip by less than this: per metre, or per radian times arm length [1].
+# An entry has no effect if the tip moves by less than this [m] per metre (an angle is multiplied by the arm's length).
 _NOTHING = 1e-9
-# If less than this share of a column is independent of the other columns, that share is a rounding error.
+# A column depends on the other columns if its independent part is below this share of its length.
 _SAME = 1e-6
-# Order in which entries are left out: links before offsets, and the frame last.
+# Weights that decide which entry is left out first: lengths and twists, then joint offsets, then the frame.
 _LINK, _OFFSET, _FRAME = 1.0, 0.2, 0.01
 
 
 @dataclass(frozen=True)
 class Left:
-    """Entry that was left at zero, and why."""
+    """Entry that was fixed at zero, and the reason."""
 
     name: str
     reason: str
@@ -37,7 +37,7 @@ class Left:
 def select(
     model: Model, J: Array, names: Sequence[str], worst_condition: float
 ) -> tuple[tuple[str, ...], tuple[Left, ...]]:
-    """Names that readings with the Jacobian J (m, 4n + 6) can distinguish, and the others with reasons."""
+    """Return the entries that readings with the Jacobian J (m, 4n + 6) can distinguish, and the others with reasons."""
     column = {name: J[:, model.names.index(name)] for name in names}
     lever = {name: model.size if model.unit(name) == "rad" else 1.0 for name in names}
     effect = {name: float(np.linalg.norm(column[name])) / lever[name] for name in names}
@@ -74,7 +74,7 @@ def _weakest(model: Model, column: dict[str, Array], kept: list[str]) -> str:
 
 
 def _reason(column: dict[str, Array], name: str, kept: Sequence[str]) -> str:
-    """Entries from which an entry cannot be distinguished, in words."""
+    """Text that names the entries from which an entry cannot be distinguished."""
     A = np.column_stack([column[k] for k in kept])
     share = np.linalg.lstsq(_unit_columns(A), column[name], rcond=None)[0]
     rest = column[name] - _unit_columns(A) @ share

@@ -16,7 +16,7 @@ from teleop_lab.calibration.model import FRAME, Model, aligned
 LEVEL = 0.95
 """Level of the confidence intervals."""
 NOT_SURE = "is not told from zero"
-# Largest plausible error of an angle [rad], and of a length as a share of the arm's length.
+# Largest plausible error of an angle [rad], and of a length divided by the arm's length.
 _ABSURD = 0.35
 
 
@@ -25,14 +25,14 @@ class Found:
     """Result of the least squares of a calibration.
 
     Attributes:
-        names: Entries that were found, k of them.
-        values: Their values (k,) [m, rad].
-        half_widths: Halves of their confidence intervals (k,) [m, rad].
+        names: The k entries that were found.
+        values: Values of the found entries (k,) [m, rad].
+        half_widths: Half widths of the confidence intervals (k,) [m, rad].
         vector: All entries of the model; zero for entries that were not found.
         left: Requested entries that were fixed at zero.
         condition: Ratio of the largest to the smallest singular value.
-        residual: Root mean square of the residuals, by degrees of freedom [m].
-        freedom: Number of readings minus number of entries.
+        residual: RMS of the residuals [m]; the sum of squares is divided by ``freedom``.
+        freedom: Number of readings minus number of found entries.
         model: The model with the frame of the measurement.
     """
 
@@ -47,13 +47,13 @@ class Found:
     model: Model
 
     def equivalent(self, errors: LinkErrors, q: Array) -> dict[str, float]:
-        """Values that a perfect fit would find for an arm with these errors [m, rad].
+        """Values that a perfect fit would find for an arm with the given errors [m, rad].
 
-        An entry represents all entries with the same effect, so their sum is found.
+        A found entry represents all entries with the same effect, so its value is their sum.
 
         Args:
             errors: Errors of a simulated arm.
-            q: Joint vectors (N, n), many.
+            q: Joint vectors (N, n); N must be large.
         """
         told = [left.name for left in self.left if left.reason.startswith(NOT_SURE)]
         basis = [*self.names, *told]
@@ -65,12 +65,12 @@ class Found:
 
     @property
     def errors(self) -> LinkErrors:
-        """Link errors that were found; the others are zero."""
+        """Link errors of the arm; entries that were not found are zero."""
         return LinkErrors.from_vector(self.vector[: 4 * self.model.chain.n])
 
 
 def residuals(model: Model, measured: Measured, vector: Array) -> Array:
-    """Readings expected by the model minus the real readings, (m,) [m]."""
+    """Readings that the model predicts, minus the real readings (m,) [m]."""
     tips = model.tips(measured.joints, vector)
     if measured.points is not None:
         return np.asarray((tips - measured.points)[np.isfinite(measured.points)])
@@ -92,10 +92,10 @@ def slopes(model: Model, measured: Measured, vector: Array) -> Array:
 
 
 def wanted_names(model: Model, fit: str | Sequence[str]) -> tuple[str, ...]:
-    """Names of entries: "all" link errors, joint "offsets", or those that are named.
+    """Names of the entries to find: "all" link errors, joint "offsets", or the given names.
 
     Raises:
-        UnknownNameError: No such entry.
+        UnknownNameError: A name is not an entry of the model.
     """
     links = model.names[: -len(FRAME)]
     if fit == "all":
@@ -116,22 +116,22 @@ def identify(
     keeps_all: bool = False,
     worst_condition: float = WORST_CONDITION,
 ) -> Found:
-    """Link errors for which the model agrees best with the measurement, by least squares.
+    """Find the link errors for which the model agrees best with the measurement, by least squares.
 
     Args:
-        model: The arm as drawn.
+        model: Model of the nominal arm.
         measured: Readings.
-        fit: "all" link errors, joint "offsets", or names of entries, which must then all be distinguishable.
-        finds_frame: Whether the base's pose in the frame of the measurement is estimated too.
-        keeps_all: Whether entries are kept whose confidence interval contains zero. Otherwise they are fixed at zero,
-            the least certain first, unless ``fit`` names them. An entry that does not differ from zero fits noise, and
-            causes errors of the tip where nothing was measured.
+        fit: "all" link errors, joint "offsets", or names of entries. All named entries must be distinguishable.
+        finds_frame: Whether the pose of the base in the frame of the measurement is also estimated.
+        keeps_all: Whether the result contains entries whose confidence interval contains zero. Otherwise these entries
+            are fixed at zero, the least certain first, unless ``fit`` names them. An entry that does not differ from
+            zero fits noise, and causes errors of the tip at poses that were not measured.
         worst_condition: Ratio of singular values above which entries are left out, > 1.
 
     Raises:
-        UnknownNameError: ``fit`` contains a name that is no link error.
-        CalibrationError: Too few readings, named entries that cannot be distinguished, or a search that does not end
-            near the nominal arm.
+        UnknownNameError: ``fit`` contains a name that is not a link error.
+        CalibrationError: There are too few readings, named entries cannot be distinguished, or the search does not
+            converge near the nominal arm.
     """
     is_named = fit not in ("all", "offsets")
     names = wanted_names(model, fit)
@@ -153,7 +153,7 @@ def identify(
 
 
 def _pruned(found: Found, measured: Measured) -> Found:
-    """The result without entries that do not differ from zero, which are dropped one by one."""
+    """Remove entries that do not differ from zero, one by one, and return the result without them."""
     while True:
         sure = np.abs(found.values) / np.maximum(found.half_widths, np.finfo(float).tiny)
         sure[[name in FRAME for name in found.names]] = np.inf
@@ -169,10 +169,10 @@ def _pruned(found: Found, measured: Measured) -> Found:
 
 
 def aligned_model(model: Model, measured: Measured) -> Model:
-    """The model in the frame in which the nominal arm fits the points best.
+    """Return the model with the frame in which the nominal arm fits the points best.
 
     Raises:
-        CalibrationError: Fewer than three points with all three coordinates.
+        CalibrationError: Fewer than three points have all three coordinates.
     """
     assert measured.points is not None
     whole = np.isfinite(measured.points).all(axis=1)
@@ -224,7 +224,7 @@ def _solved(model: Model, measured: Measured, names: tuple[str, ...], left: tupl
 
 
 def _drawn(model: Model, measured: Measured, left: tuple[Left, ...]) -> Found:
-    """Result of a search that found no error: the readings agree with the nominal arm."""
+    """Result without any found error; it means that the readings agree with the nominal arm."""
     vector, none = np.zeros(len(model.names)), np.zeros(0)
     rest = residuals(model, measured, vector)
     spread = float(np.sqrt(np.mean(rest**2)))
@@ -232,7 +232,7 @@ def _drawn(model: Model, measured: Measured, left: tuple[Left, ...]) -> Found:
 
 
 def _check_answer(names: tuple[str, ...], x: Array, scale: Array, status: int, message: str) -> None:
-    """Refuse a search that did not end, or ended far from the drawing."""
+    """Raise an error if the search did not converge, or converged far from the nominal arm."""
     if status <= 0:
         raise CalibrationError(f"least squares did not converge: {message}")
     far = np.abs(np.where([name in FRAME for name in names], 0.0, x)) > _ABSURD * scale

@@ -1,4 +1,4 @@
-"""Measured: readings of the tip by an instrument, pose by pose, and how to read them from tables."""
+"""Measured: readings of an instrument that measures the tip pose by pose, and a reader of tables of them."""
 
 import re
 from collections.abc import Iterable
@@ -18,12 +18,12 @@ if TYPE_CHECKING:
 
 _LENGTHS = {"": 1.0, "m": 1.0, "cm": 1e-2, "mm": 1e-3, "in": 0.0254}
 _ANGLES = {"": 1.0, "rad": 1.0, "deg": np.pi / 180.0}
-# Joints farther beyond the limits than this share of the range are taken for values in another unit.
+# If joints exceed their limits by more than this share of the range, their values probably have another unit.
 _BEYOND = 0.5
 
 
 class CalibrationError(TeleopError):
-    """Measurements are not sufficient for the request; the text has the reason, and what would help."""
+    """The measurements are not sufficient for the request; the message contains the reason and a remedy."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -34,13 +34,12 @@ class Measured:
         joints: Encoder readings, (N, n) [rad, m].
         points: Position of the tip (N, 3) [m], NaN for an axis that was not read; None for distances.
         distances: Distance (N,) [m] of the tip from its position at ``origins``; None for points.
-        origins: Joint vectors (N, n) from which distances count; None for points.
-        labels: A name for each distance, by which errors are grouped, such as the axis along which the tip moved;
-            empty for none.
+        origins: Joint vectors (N, n) at the start of each distance; None for points.
+        labels: Name of the group of each distance, such as the axis along which the tip moved; empty for no groups.
 
     Raises:
-        ShapeError: Arrays whose shapes do not match.
-        ParameterError: Neither points nor distances, or joints that are not finite.
+        ShapeError: The shapes of the arrays do not match.
+        ParameterError: Points and distances are both missing, or joints are not finite.
     """
 
     joints: Array
@@ -81,13 +80,13 @@ class Measured:
 
     @property
     def readings(self) -> int:
-        """Numbers that were read: up to three a pose."""
+        """Number of values that were read; a pose has at most three."""
         if self.points is not None:
             return int(np.isfinite(self.points).sum())
         return len(self)
 
     def part(self, rows: Array) -> "Measured":
-        """A part of the poses, selected by a mask or by indices."""
+        """Return the readings of some poses, selected by a mask or by indices."""
         at = np.arange(len(self))[rows]
         return Measured(
             joints=self.joints[at],
@@ -99,15 +98,16 @@ class Measured:
 
 
 def read_measured(path: Path, robot: Robot) -> Measured:
-    """Measured poses from a CSV file: a column per joint, and x, y, z of the tip.
+    """Read measured poses from a CSV file with a column for each joint, and x, y, z of the tip.
 
-    Joint columns have the robot's joint names, or q1 ... qn, in metres and radians; names such as ``x [mm]`` and
-    ``theta1_deg`` set another unit. Cells of x, y, z may be empty. Other columns are ignored.
+    Joint columns are named like the robot's joints, or q1 ... qn. Values are in metres and radians, unless the name of
+    the column contains another unit, such as ``x [mm]`` or ``theta1_deg``. Cells of x, y, z may be empty. Other columns
+    are ignored.
 
     Raises:
         RecordingError: The file cannot be read, or is not a text table.
-        CalibrationError: Columns are missing, cells are not numbers, or joints are far beyond their limits, usually
-            because they have another unit.
+        CalibrationError: Columns are missing, cells are not numbers, or joints are far beyond their limits. The usual
+            cause of the last case is a wrong unit.
     """
     import pandas as pd
 
@@ -148,7 +148,7 @@ def _missing(path: Path, what: str, columns: Iterable[str]) -> CalibrationError:
 def _numbers(
     path: Path, frame: "pd.DataFrame", column: str, units: dict[str, float], *, may_miss: bool = False
 ) -> Array:
-    """Column in SI units; NaN for empty cells if these are allowed."""
+    """Values of a column in SI units; NaN for empty cells if they are allowed."""
     import pandas as pd
 
     cells = frame[column]

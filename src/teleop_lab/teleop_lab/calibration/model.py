@@ -1,7 +1,8 @@
-"""Model of a calibration: the position of the tip of an arm with link errors, and its derivatives.
+"""Model of a calibration: the tip position of an arm with link errors, and the derivatives of this position.
 
-Derivatives are analytic: an error of theta (d) rotates (translates) all later links about (along) the joint's axis; an
-error of alpha (a) does so about (along) the link's common normal.
+The derivatives are analytic. An error of theta rotates all later links about the joint's axis, and an error of d
+translates them along this axis. An error of alpha rotates them about the link's common normal, and an error of a
+translates them along this normal.
 
 Source:
     Mooring, Roth and Driels 1991, Fundamentals of manipulator calibration:
@@ -24,11 +25,11 @@ FRAME = ("frame_x", "frame_y", "frame_z", "frame_rx", "frame_ry", "frame_rz")
 
 @dataclass(frozen=True, eq=False)
 class Frame:
-    """Base of the arm in the frame of a measurement, before its six errors are found.
+    """Pose of the arm's base in the frame of a measurement, before the six errors of the pose are found.
 
     Args:
-        rotation: (3, 3).
-        place: (3,) [m].
+        rotation: Rotation matrix of the base (3, 3).
+        place: Position of the base (3,) [m].
     """
 
     rotation: Array
@@ -36,7 +37,7 @@ class Frame:
 
     @staticmethod
     def known() -> "Frame":
-        """Measured in the arm's base."""
+        """Return the frame of a measurement in the arm's base."""
         return Frame(np.eye(3), np.zeros(3))
 
 
@@ -46,7 +47,7 @@ class Model:
 
     Args:
         robot: The nominal arm.
-        chain: The same as transforms.
+        chain: The nominal arm as transforms.
         frame: Frame of the measurement.
     """
 
@@ -56,7 +57,7 @@ class Model:
 
     @staticmethod
     def of(robot: Robot, frame: Frame | None = None) -> "Model":
-        """Model of a robot that is a chain.
+        """Return the model of a robot that is a chain.
 
         Raises:
             ParameterError: The robot is not a chain.
@@ -79,7 +80,7 @@ class Model:
 
     @property
     def size(self) -> float:
-        """Length [m] of the arm, by which angles are multiplied to compare them with lengths."""
+        """Length [m] of the arm. An angle is multiplied by it for comparisons with lengths."""
         return float(self.chain.row[self.chain.n])
 
     def unit(self, name: str) -> str:
@@ -91,7 +92,7 @@ class Model:
         return self._frames(q, vector)[0]
 
     def jacobian(self, q: Array, vector: Array) -> Array:
-        """Derivatives of :meth:`tips` by the vector, (N, 3, 4n + 6); those by the frame's rotation are at zero."""
+        """Derivatives of :meth:`tips` by the vector (N, 3, 4n + 6); those by the frame's rotation are taken at zero."""
         tip, along, about, alpha_place, theta_place = self._frames(q, vector)
         turns = np.concatenate(
             (np.cross(along, tip[:, None] - alpha_place), np.cross(about, tip[:, None] - theta_place)), axis=1
@@ -112,7 +113,7 @@ class Model:
         return transform(turn @ self.frame.rotation, self._place(vector))
 
     def _frames(self, q: Array, vector: Array) -> tuple[Array, Array, Array, Array, Array]:
-        """Tips (N, 3); normals and joint axes (N, n, 3); places on the normals and on the axes."""
+        """Positions of the tip (N, 3), directions of normals and joint axes (N, n, 3), and points on these lines."""
         errors = LinkErrors.from_vector(vector[: 4 * self.chain.n])
         T = np.tile(self._base(vector) @ self.chain.fixed[0], (len(q), 1, 1))
         shape = (len(q), self.chain.n, 3)
@@ -130,7 +131,7 @@ class Model:
 
 
 def joint_motions(kind: float, q: Array) -> Array:
-    """Transforms (N, 4, 4) of a joint at positions (N,); kinds as in the kernels of chains."""
+    """Transforms (N, 4, 4) of a joint at positions (N,); ``kind`` is that of the kernels of chains."""
     out = np.tile(np.eye(4), (len(q), 1, 1))
     if abs(kind) > 1.5:
         out[:, 2, 3] = 0.5 * kind * q
@@ -151,7 +152,7 @@ def rotation_of(vector: Array) -> Array:
 
 
 def aligned(points: Array, measured: Array) -> Frame:
-    """Frame in which points (N, 3) are nearest to their measured positions (N, 3), by least squares.
+    """Frame in which points (N, 3) are closest to their measured positions (N, 3), by least squares.
 
     Source:
         Kabsch 1976; Umeyama 1991, who keeps the rotation right-handed.

@@ -9,7 +9,7 @@ from teleop_core.robots.robot import Robot
 from teleop_lab.calibration.model import Model
 
 CANDIDATES = 400
-"""Random poses from which the best are chosen."""
+"""Number of random poses from which the best poses are chosen."""
 _START = 1e-6  # prior information about each entry before the first pose
 
 
@@ -19,16 +19,16 @@ def random_poses(robot: Robot, count: int, rng: np.random.Generator) -> Array:
 
 
 def optimal_poses(model: Model, count: int, names: Sequence[str], rng: np.random.Generator) -> Array:
-    """Joint vectors (count, n) at which points of the tip are most informative about some entries.
+    """Joint vectors (count, n) at which points of the tip are most informative about the named entries.
 
-    Each pose is the one of :data:`CANDIDATES` random poses that raises the determinant of the information matrix JᵀJ
-    most. A pose is chosen again only after all others were chosen.
+    Of :data:`CANDIDATES` random poses, each step chooses the pose that increases the determinant of the information
+    matrix JᵀJ most. A pose is chosen again only after all other poses were chosen.
 
     Args:
-        model: The arm as drawn.
+        model: Model of the nominal arm.
         count: Number of poses.
         names: Entries that can be distinguished.
-        rng: Source of the candidates.
+        rng: Random generator of the candidates.
 
     Source:
         Fedorov 1972, Theory of optimal experiments: forward steps; for calibration Borm and Menq 1991.
@@ -37,7 +37,7 @@ def optimal_poses(model: Model, count: int, names: Sequence[str], rng: np.random
     J = model.jacobian(pool, np.zeros(len(model.names)))
     J = J[:, :, [model.names.index(name) for name in names]]
     J = J / np.sqrt((J**2).sum(axis=(0, 1)))
-    # The determinant of a sum M + JᵀJ is that of M times that of I + J M⁻¹ Jᵀ, (3, 3).
+    # The determinant of M + JᵀJ is the product of the determinants of M and of I + J M⁻¹ Jᵀ (3, 3).
     inverse, chosen = np.eye(len(names)) / _START, list[int]()
     for _ in range(count):
         spread = np.einsum("nij,jk,nlk->nil", J, inverse, J, optimize=True)

@@ -1,4 +1,4 @@
-"""Report of a calibration: tables for the terminal, numbers for JSON, a file for sessions."""
+"""Report of a calibration: tables for the terminal, numbers for JSON, and a file for sessions."""
 
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 def text(calibration: "Calibration") -> str:
-    """Lines for the terminal: the found entries, the other entries, and the accuracy."""
+    """Text for the terminal: the found entries, the other entries, and the accuracy."""
     found, measured = calibration.found, calibration.measured
     kind = "points" if measured.points is not None else "distances"
     head = (
@@ -74,7 +74,7 @@ def _verdict(calibration: "Calibration") -> Iterator[str]:
 
 
 def content(calibration: "Calibration") -> dict[str, object]:
-    """All numbers [m, rad]."""
+    """All numbers of a calibration [m, rad], as plain values."""
     found, truth = calibration.found, calibration.truth
     return {
         "robot": calibration.robot.name,
@@ -104,7 +104,7 @@ def _dicts_of(spreads: object) -> dict[str, dict[str, float]]:
 
 
 def correction_file(calibration: "Calibration") -> str:
-    """The calibrated arm as a YAML table for ``--set robot=FILE``; the errors are in comments at its head."""
+    """The calibrated arm as a YAML table for ``--set robot=FILE``; the first lines contain the errors as comments."""
     found = calibration.found
     head = [f"# {calibration.robot.name} as calibrated from {len(calibration.measured)} poses."]
     for name, value, half in zip(found.names, found.values, found.half_widths, strict=True):

@@ -15,16 +15,16 @@ from teleop_lab.calibration.model import Model, rotation_of
 from teleop_lab.calibration.poses import optimal_poses, random_poses
 
 TOLERANCES = {"cnc": 20e-6, "prototype": 100e-6}
-"""Half widths of tolerances [m] of milled and of rapid-prototyped parts, published: Vongbunyong 2008, chapter 3."""
+"""Half widths of the tolerances [m] of milled and of rapid-prototyped parts, from Vongbunyong 2008, chapter 3."""
 SEAT = 0.05
-"""Lever [m] over which a tolerance turns an axis; assumed: the size of a bearing seat or a link."""
+"""Lever arm [m] over which a tolerance rotates an axis. It is assumed as the size of a bearing seat or a link."""
 RULER = "ruler"
 CHOICES = ("optimal", "random")
-_FAR = 0.5  # [m] from the base to a tracker with an unknown pose
+_FAR = 0.5  # distance [m] from the base to a tracker with an unknown pose
 
 
 def default_errors(robot: Robot) -> tuple[str, ...]:
-    """Default errors of an arm: those of milled parts; for the rcrt1 also the offset of d3."""
+    """Default errors of an arm: the tolerances of milled parts, and for the rcrt1 also the offset of d3."""
     offset = (f"d3={appendix_e.OFFSET_OF_D3}",) if robot.name == "rcrt1" else ()
     return ("cnc", *offset)
 
@@ -36,11 +36,11 @@ def true_errors(robot: Robot, texts: Sequence[str], rng: np.random.Generator) ->
         robot: The arm.
         texts: Names of :data:`TOLERANCES`, from which every error is drawn uniformly, and texts such as ``d3=5.5e-3``
             [m, rad], which replace the drawn value.
-        rng: Source of the random errors.
+        rng: Random generator of the errors.
 
     Raises:
-        UnknownNameError: No such tolerance or error.
-        ParameterError: A value that is no number.
+        UnknownNameError: A name is neither a tolerance nor an error.
+        ParameterError: A value is not a number.
     """
     vector, given = np.zeros(4 * robot.n), {}
     for text in texts:
@@ -75,8 +75,8 @@ def chosen_poses(model: Model, count: int, choose: str, fit: str | Sequence[str]
     """Joint vectors (count, n) for a tracker: "random", or "optimal" for the entries to be found.
 
     Raises:
-        UnknownNameError: No such choice, or ``fit`` names what is no link error.
-        CalibrationError: No poses.
+        UnknownNameError: ``choose`` is unknown, or ``fit`` contains a name that is not a link error.
+        CalibrationError: ``count`` is less than 1.
     """
     if choose not in CHOICES:
         raise UnknownNameError("choose", choose, CHOICES)
@@ -97,14 +97,14 @@ def tracked(
 
     Args:
         model: The nominal arm.
-        errors: Its link errors.
+        errors: Link errors of the arm.
         q: Joint vectors (N, n).
         noise: Standard deviation [m], >= 0.
-        rng: Source of the noise.
-        is_elsewhere: Whether the tracker has its own frame, at a random pose.
+        rng: Random generator of the noise.
+        is_elsewhere: Whether the tracker measures in its own frame, which has a random pose.
 
     Raises:
-        ParameterError: Noise that is negative or not finite.
+        ParameterError: The noise is negative or not finite.
     """
     if not 0.0 <= noise < np.inf:
         raise ParameterError("noise", noise, "a finite number [m], >= 0")
@@ -124,5 +124,5 @@ def ruled(model: Model, errors: LinkErrors, count: int) -> Measured:
 
 
 def true_tips(model: Model, errors: LinkErrors, q: Array) -> Array:
-    """Positions of the tip (N, 3) [m] of the arm with its errors, in its base."""
+    """Positions of the tip (N, 3) [m] of an arm with link errors, in the arm's base."""
     return Model.of(model.robot).tips(q, np.concatenate((errors.vector, np.zeros(6))))

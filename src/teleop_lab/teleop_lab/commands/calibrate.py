@@ -62,7 +62,7 @@ def add(commands: Any) -> None:
 
 
 def _add_simulation(parser: argparse.ArgumentParser) -> None:
-    """Options of a simulated measurement; None where not given."""
+    """Add the options of a simulated measurement; an option that is not given is None."""
     parser.add_argument("--poses", type=int, metavar="N", help="number of poses to measure (default: 40)")
     parser.add_argument(
         "--noise",

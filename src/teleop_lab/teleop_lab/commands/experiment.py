@@ -1,4 +1,4 @@
-"""``teleop experiment``: what the sources did, run on our models, beside what they printed."""
+"""``teleop experiment``: the sources' experiments, repeated on our models and compared with the printed results."""
 
 import argparse
 import json
@@ -51,7 +51,7 @@ def _run(arguments: argparse.Namespace) -> int:
     check_places(arguments.json, arguments.html)
     is_all = not arguments.names or ALL in arguments.names
     outcomes = _outcomes(() if is_all else tuple(arguments.names), arguments.seed)
-    # Files are written first, because a reader of the tables may close the pipe before their end.
+    # Files are written before the tables are printed, because a reader of the tables may close the pipe early.
     written = _write(outcomes, arguments.json, arguments.html)
     _show(outcomes)
     print("".join(f"{line}\n" for line in written), end="")
@@ -70,7 +70,7 @@ def _outcomes(names: tuple[str, ...], seed: int) -> "list[Outcome]":
             bench.progress = progress
             outcomes.append(experiment.run(bench))
             progress(1, 1)
-        if len(found) > 1 and not sys.stderr.isatty():  # there is no progress bar
+        if len(found) > 1 and not sys.stderr.isatty():  # without a progress bar, print each name
             took = time.monotonic() - begin
             print(f"{number} of {len(found)}, {experiment.name}: {took:.0f} s", file=sys.stderr)
     return outcomes

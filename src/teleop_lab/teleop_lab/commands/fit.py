@@ -1,4 +1,4 @@
-"""``teleop fit``: numbers of the hardware plant from where a machine came to rest."""
+"""``teleop fit``: fit numbers of the hardware plant to measured rest positions of a machine."""
 
 import argparse
 import json

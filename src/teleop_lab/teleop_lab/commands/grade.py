@@ -1,4 +1,4 @@
-"""``teleop grade``: figures of every episode of a data set, the oddest first."""
+"""``teleop grade``: motion scores of every episode of a data set, the oddest episode first."""
 
 import argparse
 from pathlib import Path

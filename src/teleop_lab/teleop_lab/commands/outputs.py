@@ -1,4 +1,4 @@
-"""Outputs: arguments of commands that run or score many sessions, and the files that they write."""
+"""Outputs: arguments and output files of commands that run or score many sessions."""
 
 import argparse
 from collections.abc import Callable
@@ -16,8 +16,8 @@ def add_study(
         parser: Parser of the command.
         what: Description of the file.
         line: Content of each line of the table.
-        only: Suffix for outputs that need an option, such as ``, of --compare``.
-        must_keep: Whether a store has to be given.
+        only: Suffix of the help of outputs that need an option, such as ``, of --compare``.
+        must_keep: Whether a store is required.
     """
     keeps = (
         "directory that keeps recordings and answers"
@@ -31,7 +31,7 @@ def add_study(
 
 
 def add_files(parser: argparse.ArgumentParser, line: str, only: str = "") -> None:
-    """Add ``--html`` and ``--csv``, which has a line for each ``line``; ``only`` is when they count."""
+    """Add ``--html`` and ``--csv``. ``line`` describes a line of the table; ``only`` names a needed option."""
     parser.add_argument("--html", type=Path, metavar="FILE", help=f"write a page with the results{only}")
     parser.add_argument("--csv", type=Path, metavar="FILE", help=f"write a table with a line for each {line}{only}")
 
@@ -40,7 +40,7 @@ def check_outputs(arguments: argparse.Namespace) -> None:
     """Check that the number of processes is valid, and that the files can be written.
 
     Raises:
-        TeleopError: There are none.
+        TeleopError: The number of processes is invalid, or a file cannot be written.
     """
     from teleop_core.evaluation.command import check_places
 

@@ -1,4 +1,4 @@
-"""``teleop people``: a study with people in the console, and their scores beside the simulated operator's."""
+"""``teleop people``: a study with people at the console; their scores are compared with the simulated operator's."""
 
 import argparse
 import webbrowser

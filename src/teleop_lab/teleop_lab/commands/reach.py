@@ -1,4 +1,4 @@
-"""``teleop reach``: what a slave can follow of a recorded hand, and with what it follows most."""
+"""``teleop reach``: the share of a recorded hand's motion that a slave can follow, and the settings that enlarge it."""
 
 import argparse
 from pathlib import Path

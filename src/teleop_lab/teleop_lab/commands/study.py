@@ -1,4 +1,4 @@
-"""``teleop study``: sessions over named values of parameters, resumed where they were left."""
+"""``teleop study``: sessions over named values of parameters; an interrupted study can be continued."""
 
 import argparse
 from pathlib import Path
@@ -65,10 +65,10 @@ def _run(arguments: argparse.Namespace) -> int:
 
 
 def _client(address: str) -> "Client":
-    """Client of a Dask scheduler.
+    """Connect to a Dask scheduler.
 
     Raises:
-        SessionError: There is none, or Dask is not installed.
+        SessionError: The address has no scheduler, or Dask is not installed.
     """
     try:
         from distributed import Client

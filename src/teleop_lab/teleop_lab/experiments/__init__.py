@@ -1,4 +1,4 @@
-"""Experiments: what the sources did, run on our models, beside the figures they printed.
+"""Experiments: the sources' experiments, repeated on our models; the results are shown beside the printed ones.
 
 >>> from teleop_lab import experiments
 >>> outcome = experiments.run("resolution")
@@ -37,7 +37,7 @@ __all__ = [
 
 
 def list_experiments() -> dict[str, str]:
-    """Names of all experiments, each with its title."""
+    """Titles of all experiments, by name."""
     return {name: EXPERIMENTS.find(name).title for name in EXPERIMENTS}
 
 
@@ -46,15 +46,15 @@ def run(name: str, *, seed: int = 1, bench: Bench | None = None) -> Outcome:
 
     Args:
         name: One of :func:`list_experiments`.
-        seed: First seed of everything random in it.
-        bench: Bench on which its sessions run, in place of a new bench with that seed. Experiments that share a bench
-            run a common session only once.
+        seed: First seed of all random numbers of the experiment.
+        bench: Bench on which the sessions run; None: a new bench with that seed. Experiments on one bench run a session
+            that they share only once.
 
     Returns:
-        Rows of numbers, published and predicted, and plots.
+        Rows of published and predicted numbers, and plots.
 
     Raises:
-        UnknownNameError: There is no such experiment; the alternatives are listed.
+        UnknownNameError: No experiment has the name; the message lists all names.
         ParameterError: The seed is negative.
     """
     return EXPERIMENTS.find(name).run(bench or Bench(seed))
@@ -66,16 +66,16 @@ def run_several(
     bench: Bench | None = None,
     began: Callable[[str, int, int], None] = lambda name, done, total: None,
 ) -> list[Outcome]:
-    """Run experiments one after the other, with each session run once.
+    """Run experiments one after the other; a session that several experiments need runs only once.
 
     Args:
-        names: Names, each taken once; all experiments if there are none.
+        names: Names of experiments; a repeated name runs once. Without names, all experiments run.
         bench: Bench on which the sessions of the experiments run.
         began: Called when an experiment begins, with its name, the number of finished experiments, and the number of
             all.
 
     Raises:
-        UnknownNameError: There is no such experiment, found before any of them runs.
+        UnknownNameError: A name is unknown; raised before the first experiment runs.
     """
     wanted = tuple(dict.fromkeys(names)) or EXPERIMENTS.names()
     found = [EXPERIMENTS.find(name) for name in wanted]

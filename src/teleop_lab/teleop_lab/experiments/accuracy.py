@@ -20,10 +20,10 @@ from teleop_lab.fitting.rests import Mover
 
 DESIRED_MM = np.arange(10.0, 101.0, 10.0)
 ESCAPE_MM = 1e3 * ESCAPE
-"""Move along -x before the moves along y, because home lies on the edge of the workspace."""
+"""Displacement along -x before the moves along y [mm]; it is needed because home lies on the edge of the workspace."""
 RULER_MM = 1e3 * STEP
 D3_OFFSET_MM = 1e3 * OFFSET_OF_D3
-"""Difference between the true d3 and the encoder's value."""
+"""True d3 minus the encoder's value [mm]."""
 
 
 class Axis(NamedTuple):
@@ -31,9 +31,9 @@ class Axis(NamedTuple):
 
     Attributes:
         direction: Unit vector of the moves in the base.
-        escape_mm: Move along -x before them [mm].
+        escape_mm: Displacement along -x before these moves [mm].
         read_mm: Reading of the ruler at each target (10,) [mm].
-        step_mm: Smallest step between those readings [mm].
+        step_mm: Smallest step between two readings [mm].
         error_mm: Desired minus measured, as printed (10,) [mm].
         rms: RMS as printed [mm].
         deviation: Standard deviation as printed [mm].
@@ -50,13 +50,13 @@ class Axis(NamedTuple):
     largest: float
 
 
-# As printed. Table E.2 has 0.39, -1.03 and -1.15 where its readings give 0.395, -1.019 and -1.145.
+# Values as printed. Table E.2 prints 0.39, -1.03 and -1.15, but its readings give 0.395, -1.019 and -1.145.
 _ERROR = {
     "x": (-0.25, 0.0, 0.0, -0.25, -0.25, -0.5, -0.5, 0.5, 0.0, -0.25),
     "y": (0.39, 0.10, -0.81, -0.62, -0.22, -1.03, -0.92, -1.13, -1.19, -1.15),
     "z": (0.0, 0.0, 0.5, -0.5, -0.5, 0.0, -1.0, -1.0, -1.75, -2.0),
 }
-# Tables E.1-E.4; of y the readings are distances from home.
+# Tables E.1-E.4; the readings of y are distances from home.
 AXES = {
     "x": Axis((-1.0, 0.0, 0.0), 0.0, READ["x"], 0.25, _ERROR["x"], 0.32, 0.29, 0.50),
     "y": Axis((0.0, 1.0, 0.0), ESCAPE_MM, READ["y"], 0.5, _ERROR["y"], 0.85, 0.56, 1.19),
@@ -77,9 +77,9 @@ def readings(robot: Robot, which: Axis, rest: Rest) -> Array:
     """Readings of an exact ruler at each target (10,) [mm].
 
     Args:
-        robot: The arm as its controller knows it; its tool stays along x.
+        robot: Model of the arm in its controller; the tool stays parallel to x.
         which: The moves.
-        rest: Moves the arm and returns the position at which the tip rests.
+        rest: Function that moves the arm and returns the rest position of the tip.
 
     Raises:
         TeleopError: A target cannot be reached.
@@ -100,7 +100,7 @@ def as_read(exact: Array, step_mm: float) -> Array:
 
 
 def longer_d3(robot: Robot, offset_mm: float) -> Rest:
-    """An arm that rests exactly at its command, except that its true d3 is longer than the encoder's value."""
+    """Return an arm that rests exactly at its command, but whose true d3 is longer than the encoder's value."""
 
     def rest(q: Array) -> Array:
         true = q.copy()
@@ -111,7 +111,7 @@ def longer_d3(robot: Robot, offset_mm: float) -> Rest:
 
 
 def moved_plant(parameters: ArmParameters) -> Rest:
-    """The plant under its controller, moved by cubics, one target after the other."""
+    """Return an arm that is the plant with its controller; it moves to one target after the other by cubics."""
     mover = Mover(parameters)
 
     def rest(q: Array) -> Array:
@@ -128,7 +128,7 @@ def _wrist(robot: Robot) -> Array:
 
 
 def _joints(robot: Robot, place: Array) -> Array:
-    """Joints (n,) for a place (3,) [m] with the tool along x."""
+    """Joints (n,) that put the tip at a position (3,) [m] with the tool parallel to x."""
     along_x = transform(rotation("y", 0.5 * math.pi), place)
     answer = robot.ik(along_x, robot.home)
     if float(np.max(answer.residual)) > 1e-6:
@@ -192,7 +192,7 @@ def _errors(which: Axis, read_mm: Array) -> Array:
 
 
 def _total_rows(robot: Robot, longer: dict[str, Array], exact: dict[str, Array]) -> list[Comparison]:
-    """All readings of the ruler (along y from home) minus the readings that models predict."""
+    """Rows of the differences between all readings of the ruler and the readings that models predict."""
     read = np.concatenate([which.read_mm for which in AXES.values()])
     drawn = {name: readings(robot, which, longer_d3(robot, 0.0)) for name, which in AXES.items()}
     group = "all readings of the ruler, minus their expected values"

@@ -26,8 +26,8 @@ Job = TypeVar("Job")
 Result = TypeVar("Result")
 _WHOLE = 16  # number of sessions whose streams stay in memory, 25 MB each
 SEEDS = 3
-"""Number of sessions with different hands over which figures are averaged."""
-# Topics that experiments read; the rest of a recording, most of its memory, is deleted.
+"""Number of sessions, each with a different hand, over which results are averaged."""
+# Topics that experiments read. All other topics of a recording are deleted, because they fill most of the memory.
 _KEPT = (
     "master/measured_cp",
     "slave/servo_cp",
@@ -44,13 +44,13 @@ _OF_SLAVE = ("slave/setpoint_js", "slave/setpoint_cp", "slave/measured_js", "sla
 
 @dataclass(frozen=True, eq=False)
 class Session:
-    """One session: its score, and the streams that experiments read.
+    """Score of one session, and the streams that experiments read.
 
     Attributes:
-        name: Scenario.
-        seed: Its seed.
-        judge: Returns its score.
-        read: Returns the streams by topic.
+        name: Name of the scenario.
+        seed: Seed of the session.
+        judge: Function that returns the score of the session.
+        read: Function that returns the streams by topic.
     """
 
     name: str
@@ -60,19 +60,22 @@ class Session:
 
     @property
     def score(self) -> Score:
-        """Score of the session; if it was not scored, the session is run again, with the same bits."""
+        """Score of the session. A session that was not scored is run again and gives exactly the same data."""
         return self.judge()
 
     @property
     def streams(self) -> Mapping[str, Stream]:
-        """Streams by topic. If they are not in memory any more, the session runs again and gives the same bits."""
+        """Streams by topic.
+
+        If memory no longer contains them, the session is run again and gives exactly the same data.
+        """
         return self.read()
 
     def __getitem__(self, topic: str) -> Stream:
-        """A stream by its topic.
+        """Return the stream of a topic.
 
         Raises:
-            UnknownNameError: The topic was not recorded, or is not in memory.
+            UnknownNameError: The topic was not recorded, or its stream is not in memory.
         """
         streams = self.streams
         if topic not in streams:
@@ -90,7 +93,7 @@ class Session:
 
     @property
     def is_followed(self) -> NDArray[np.bool_]:
-        """Whether the slave follows the hand, for each of its poses (N,); false before it follows."""
+        """Whether the slave follows the hand, for each pose of the slave (N,); false before following begins."""
         return self["slave/setpoint_cp"].stamp_ns > NO_COMMAND_NS
 
 
@@ -98,11 +101,11 @@ class Bench:
     """Runs sessions in virtual time, and remembers them.
 
     Args:
-        seed: First seed; sessions of several hands also use the next ones.
+        seed: First seed; sessions of several hands also use the following seeds.
         progress: Called with the progress of the running session.
-        settings: Parameters of every session, over its scenario.
-        workers: Processes that :meth:`map` spreads work over. With more than 1, a program must call this below ``if
-            __name__ == "__main__":``.
+        settings: Parameters of every session; they override the scenario.
+        workers: Number of processes over which :meth:`map` distributes work. With more than 1, a program must call this
+            below ``if __name__ == "__main__":``.
 
     Raises:
         ParameterError: The seed is negative.
@@ -131,13 +134,13 @@ class Bench:
     def session(
         self, scenario: str, seed: int | None = None, settings: Settings | None = None, *, is_scored: bool = True
     ) -> Session:
-        """Run a session, unless the same one ran before.
+        """Return a session; it is run unless the bench has run an equal session before.
 
         Args:
             scenario: One of ``teleop scenarios``.
-            seed: Seed of everything random in it; None for the first of the bench.
-            settings: Parameters over the scenario and the bench's settings.
-            is_scored: Whether its score is needed; scoring takes longer than the session itself.
+            seed: Seed of all random numbers of the session; None for the bench's first seed.
+            settings: Parameters that override the scenario and the bench's settings.
+            is_scored: Whether the score is needed; scoring takes longer than the session itself.
 
         Raises:
             TeleopError: A setting or the scenario is wrong.
@@ -163,17 +166,17 @@ class Bench:
         return self._known[key]
 
     def _keep(self, key: object, streams: Mapping[str, Stream]) -> None:
-        """Store streams in memory, and delete the oldest ones if there are many."""
+        """Store the streams of a session in memory, and delete the oldest streams if there are too many."""
         self._streams[key] = streams
         if len(self._streams) > _WHOLE:
             del self._streams[next(iter(self._streams))]
 
     def sessions(self, scenario: str, settings: Settings | None = None, *, is_scored: bool = True) -> list[Session]:
-        """Run a session with several hands; see :meth:`session`."""
+        """Run one session for each of several hands; see :meth:`session`."""
         return [self.session(scenario, seed, settings, is_scored=is_scored) for seed in self.seeds]
 
     def slave(self, settings: Settings | None = None) -> ArmParameters:
-        """Parameters of a slave under the bench's settings and more, for moves of the slave alone.
+        """Parameters of a slave with the bench's settings and further settings, for experiments with the slave alone.
 
         Raises:
             TeleopError: A setting is wrong.
@@ -187,13 +190,15 @@ class Bench:
     def signals(
         self, scenario: str, seconds: float, settings: Settings | None = None, motion: Motion | None = None
     ) -> Mapping[str, Array]:
-        """Outputs of the stages of a session, a row for each tick; faster than a scored session.
+        """Run a session and return the outputs of its stages, a row for each tick.
+
+        This is faster than a scored session.
 
         Args:
             scenario: One of ``teleop scenarios``.
             seconds: Duration of the session [s].
-            settings: Parameters over the scenario and the bench's settings.
-            motion: Wanted motion of the hand, in place of the scenario's operator.
+            settings: Parameters that override the scenario and the bench's settings.
+            motion: Wanted motion of the hand; it replaces the scenario's operator.
 
         Raises:
             TeleopError: A setting or the scenario is wrong.
@@ -210,7 +215,7 @@ class Bench:
         """Results of ``work(bench, job)`` in the order of the jobs, computed in parallel.
 
         Args:
-            work: A function of a module; its bench has the seed and the settings of this one.
+            work: A function of a module. Its argument ``bench`` has the seed and the settings of this bench.
             jobs: Values that can be sent to another process.
         """
         do = partial(_work, work, self.seed, self._settings)
@@ -235,7 +240,7 @@ def _work(work: Callable[[Bench, Job], Result], seed: int, settings: Settings, j
 
 
 def _aligned(recording: Recording) -> Mapping[str, Stream]:
-    """Streams of the slave, aligned so that a row has the same sample: the measured pose comes a tick later."""
+    """Streams of the slave, aligned so that a row belongs to one sample; the measured pose is recorded a tick later."""
     streams = {name: recording[name] for name in _KEPT}
     for name in _OF_SLAVE:
         streams[name] = streams[name].part(slice(0, -1))
@@ -254,5 +259,5 @@ def rms(values: Array) -> float:
 
 
 def pooled(values: Iterable[float]) -> float:
-    """Root mean square of the root mean squares of sessions of equal length."""
+    """Total RMS of sessions of equal length, computed from the RMS of each session."""
     return rms(np.array(list(values)))

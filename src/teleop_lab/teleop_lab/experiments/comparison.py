@@ -1,4 +1,4 @@
-"""Comparison: a number of an experiment beside the published one, and how far they may differ."""
+"""Comparison: a number of an experiment, the published number, and the tolerance between these two."""
 
 import math
 from dataclasses import dataclass
@@ -11,16 +11,16 @@ Plain = str | int | float | bool | None | list["Plain"] | dict[str, "Plain"]
 _KINDS = ("exact", "share", "absolute", "factor")
 _ROUNDING = 1e-9
 BASES = ("printed", "law", "goal")
-"""Origins of the values against which rows are judged."""
+"""Origins of the reference values with which predictions are compared."""
 
 
 @dataclass(frozen=True)
 class Tolerance:
-    """How far a prediction may be from a published figure and still agree with it.
+    """Largest difference at which a prediction agrees with a published number.
 
     Attributes:
-        kind: "exact" except for rounding errors, "share" of the published figure, "absolute" in the unit of the row,
-            or "factor", which bounds the ratio of prediction and published figure in both directions.
+        kind: "exact" allows only rounding errors. "share" is relative to the published number, and "absolute" is in the
+            unit of the row. "factor" limits the ratio of prediction and published number in both directions.
         amount: Share (0.15), amount in the unit (0.5), or factor above 1 (1.6); 0 for "exact".
 
     Raises:
@@ -42,18 +42,18 @@ class Tolerance:
             raise ParameterError("amount", self.amount, f"finite and above {least:g}")
 
     def allows(self, published: float, predicted: float) -> bool:
-        """Whether both agree."""
+        """Whether the predicted value agrees with the published value."""
         if self.kind == "factor":
             if published * predicted <= 0.0:
                 return False
             return abs(math.log(predicted / published)) <= math.log(self.amount)
         room = self.amount * (abs(published) if self.kind == "share" else 1.0)
-        # A difference equal to the tolerance, except for rounding, agrees.
+        # If the difference is equal to the tolerance, except for rounding, the values agree.
         room += _ROUNDING * (room or max(1.0, abs(published)))
         return abs(predicted - published) <= room
 
     def text(self, unit: str) -> str:
-        """For people: "15 %", "0.5 mm", "factor 1.6", "exact"."""
+        """Text for a table: "15 %", "0.5 mm", "factor 1.6" or "exact"."""
         if self.kind == "exact":
             return self.kind
         if self.kind == "share":
@@ -67,37 +67,37 @@ EXACT = Tolerance("exact")
 
 
 def percent(amount: float) -> Tolerance:
-    """Agreement within so many percent of the published figure."""
+    """Tolerance of ``amount`` percent of the published number."""
     return Tolerance("share", amount / 100.0)
 
 
 def absolute(amount: float) -> Tolerance:
-    """Agreement within an amount in the unit of the row."""
+    """Tolerance of ``amount`` in the unit of the row."""
     return Tolerance("absolute", amount)
 
 
 def factor(amount: float) -> Tolerance:
-    """Agreement within a factor from either side."""
+    """Tolerance of a factor ``amount`` in both directions."""
     return Tolerance("factor", amount)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Comparison:
-    """One quantity of an experiment; values that do not exist are None.
+    """One quantity of an experiment; missing values are None.
 
     Attributes:
         quantity: Name of the quantity.
-        unit: Its unit; empty for pure numbers.
+        unit: Unit of the quantity; empty for pure numbers.
         published: Value that the source printed, or a value of another ``basis``.
         predicted: Value of our model of the source's machine.
         ours: Value with another controller on the same model.
         within: Tolerance for agreement of ``predicted`` with ``published``; None if the row is not judged.
         basis: Origin of ``published``: "printed", a "law" of the source evaluated by us, or a "goal" of our own. Only
-            printed values count as published figures.
-        lowest: Smallest value of several seeds; ``predicted`` is their mean.
-        highest: Largest value of these seeds.
+            printed values count as published numbers.
+        lowest: Smallest value over several seeds; ``predicted`` is the mean over these seeds.
+        highest: Largest value over several seeds.
         group: Heading above the row.
-        note: Remark that a reader of the row needs, such as a misprint.
+        note: Remark on the row, such as a misprint in the source.
 
     Raises:
         ParameterError: A number is not finite, or the basis is unknown.
@@ -135,7 +135,7 @@ class Comparison:
 
     @property
     def agrees(self) -> bool | None:
-        """Whether prediction and publication agree; None where that is not judged."""
+        """Whether the prediction agrees with the published value; None if the row is not judged."""
         if self.within is None or self.published is None or self.predicted is None:
             return None
         return self.within.allows(self.published, self.predicted)
@@ -158,9 +158,9 @@ class Findings(NamedTuple):
     """Return value of an experiment's function.
 
     Attributes:
-        rows: Numbers, published and predicted.
-        figures: Plots for the page, with published points on them where there are any.
-        notes: Sentences that a reader needs so that the numbers do not mislead.
+        rows: Published and predicted numbers.
+        figures: Plots for the page; they include published points if the source printed any.
+        notes: Explanations without which the numbers would mislead a reader.
     """
 
     rows: tuple[Comparison, ...]

@@ -24,7 +24,7 @@ LAWS: Mapping[str, Settings] = {
     "friction_compensation": {"controller": "friction_compensation"},
     "adaptive": {"controller": "adaptive"},
 }
-"""Laws that are compared, each with its own settings."""
+"""Settings of each control law that is compared."""
 _COLORS = (COMMAND, DARK, FIXTURE, FIRST, SECOND, THIRD, MEASURED)
 MODES = {"coarse_box": COARSE, "fine_box": FINE}
 RESOLUTION_UM = 11.4
@@ -40,15 +40,15 @@ _CURVE = 10
 
 
 class Tracking(NamedTuple):
-    """Figures of one session that are compared.
+    """Tracking errors and efforts of one session.
 
     Attributes:
-        rms: Error of the tip at the encoders, root mean square [µm].
-        largest: Largest error of the tip at the encoders [µm].
-        true_rms: Error of the true tip [µm].
+        rms: RMS error of the tip, computed from the encoders [µm].
+        largest: Largest error of the tip, computed from the encoders [µm].
+        true_rms: RMS error of the true tip [µm].
         true_spread: Error of the true tip about its mean [µm]; calibration would remove the mean.
-        effort: Root mean square over joints and time of the effort over the drive's limit [%].
-        chatter: Change of this effort from tick to tick [%].
+        effort: RMS over joints and time of the effort, divided by the drive's limit [%].
+        chatter: RMS change of the effort from tick to tick, divided by the drive's limit [%].
     """
 
     rms: float
@@ -60,7 +60,7 @@ class Tracking(NamedTuple):
 
 
 def tracking_of(session: Session) -> Tracking:
-    """Figures of a session of the RCRT-1, from the time at which its slave follows."""
+    """Tracking of a session of the RCRT-1, evaluated from the time at which the slave begins to follow."""
     kept = session.is_followed
     wanted, seen, true = (
         1e3 * session.places_mm(f"slave/{name}")[kept] for name in ("setpoint_cp", "measured_cp", "true_cp")
@@ -78,7 +78,7 @@ def tracking_of(session: Session) -> Tracking:
 
 
 def _effort_shares(session: Session) -> Array:
-    """Efforts (N, n) over the limits of the drives."""
+    """Efforts (N, n), divided by the limits of the drives."""
     robot = load_robot("rcrt1")
     assert robot.drives is not None
     efforts = session["slave/measured_js"][[f"{name}.effort" for name in robot.joint_names]]
@@ -86,7 +86,7 @@ def _effort_shares(session: Session) -> Array:
 
 
 def compared(bench: Bench, scenario: str, law: str) -> list[Session]:
-    """Sessions of several hands with a law of :data:`LAWS` on the hardware plant."""
+    """Run sessions of several hands with a law of :data:`LAWS` on the hardware plant."""
     return bench.sessions(scenario, {**_PLANT, **LAWS[law]}, is_scored=False)
 
 
@@ -148,7 +148,7 @@ def _measure(bench: Bench) -> Findings:
         found, traces = {}, []
         for law, color in zip(LAWS, _COLORS, strict=True):
             sessions = compared(bench, scenario, law)
-            # Read now, because a bench deletes the streams of older sessions.
+            # The streams are read here, because a bench deletes the streams of older sessions.
             found[law] = [tracking_of(session) for session in sessions]
             traces.append(_error_trace(sessions[0], law, color))
         rows += _tracking_rows(scenario, found)

@@ -1,4 +1,4 @@
-"""Delay: how latency slows an operator who sees the slave, and how far a smaller scale helps."""
+"""Delay: how much latency slows an operator who sees the slave, and how much a smaller scale helps."""
 
 from collections.abc import Callable
 from itertools import pairwise
@@ -19,14 +19,14 @@ DELAYS = (0.0, 0.25, 0.5, 1.0)
 FOLLOWED = DELAYS[:3]
 GAINS = (1.0, 0.5, 0.2)
 SCALED = 0.5
-"""Delay of the commands when scales are compared [s]."""
+"""Delay of the commands in the comparison of scales [s]."""
 _KEYS = ("task.time_s", "task.error_share", "task.effective_width_mm", "task.throughput")
 _FIXED: Settings = {
     "teleop.stages": ("network", "display", "task"),
-    "feedback_timeout": 5.0,  # the delay must not count as an outage
+    "feedback_timeout": 5.0,  # longer than the delay, which must not count as an outage
 }
 Scores = Callable[[str], "DataArray"]
-"""Means over the seeds by the key of a score."""
+"""Function that returns the means over the seeds for the key of a score."""
 
 
 def _study(bench: Bench, kind: str, delays: tuple[float, ...], gains: tuple[float, ...]) -> Scores:
@@ -40,7 +40,7 @@ def _study(bench: Bench, kind: str, delays: tuple[float, ...], gains: tuple[floa
 
 
 def _rises(quantity: str, low: float, high: float, group: str) -> Comparison:
-    """Whether a figure is larger in the second case, as the source reports; 1 for yes."""
+    """Row that tests whether a score is larger in the second case, as the source reports; 1 means yes."""
     is_so = float(high > low)
     note = f"{low:.3g} and {high:.3g}"
     return Comparison(quantity=quantity, published=1.0, predicted=is_so, within=EXACT, group=group, note=note)
@@ -112,7 +112,7 @@ def _scaling(bench: Bench) -> Findings:
 
 
 def _figure(score: Scores) -> Figure:
-    """Spread of the end points against the scale, a line for each delay."""
+    """Plot of the spread of the end points against the scale, with a line for each delay."""
     widths = score("task.effective_width_mm")
     traces = [
         {

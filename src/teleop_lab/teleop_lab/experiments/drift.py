@@ -1,4 +1,4 @@
-"""Drift: offset between the hand's command and the slave's, contact after contact behind a delay."""
+"""Drift: offset between the hand's command and the slave's command over repeated contacts with a delay."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -17,18 +17,20 @@ from teleop_lab.experiments.comparison import Comparison, Findings, absolute
 MATERIALS = ("tissue", "silicone", "steel")
 PASSIVITIES = ("none", "tank", "tdpa", "wave")
 ROUND_TRIPS = (0.2, 0.7)
-"""Round-trip delays [s], half in each direction; the longer one is the longest of Coelho et al. 2019."""
+"""Round-trip delays [s], half in each direction. The longer value is the longest delay of Coelho et al. 2019."""
 CONTACTS = 10
 GOAL_MM = 1.0
-"""Drift that may be left when the next contact begins; assumed."""
-_READY = 4.0  # time at which the arm follows [s], without the network
-_APPROACH, _PERIOD, _REST = 3.0, 2.0, 1.0  # durations of the hand's approach, period and rest [s]; assumed
+"""Largest allowed drift at the begin of the next contact [mm]; assumed."""
+_READY = 4.0  # time at which the arm begins to follow in a session without network [s]
+_APPROACH = 3.0  # duration of the hand's approach [s]; assumed
+_PERIOD = 2.0  # duration of one down and up motion of the hand [s]; assumed
+_REST = 1.0  # duration of the hand's rest after the last contact [s]; assumed
 _WAY = 0.02  # displacement of the hand [m], 9 mm of it within the object of palpation; assumed
-_TOUCH = 0.01  # smallest force of a contact [N]
+_TOUCH = 0.01  # force from which on the tip is in contact [N]
 _STILL = 200  # ticks at the end over which a position is averaged
 
 Job = tuple[str, str, float]
-"""Material, passivity and round trip [s]."""
+"""Material, passivity and round-trip delay [s]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,11 +38,11 @@ class Drift:
     """Drift after ten contacts.
 
     Attributes:
-        leaving: Drift as the tip leaves the object in each contact that ended (N,) [m].
-        left: Drift when the next contact may begin, one period after the start of a contact (N,) [m].
+        leaving: Drift at the end of each contact, when the tip leaves the object (N,) [m].
+        left: Drift one period after the start of each contact, when the next contact may begin (N,) [m].
         peak: Largest drift [m].
-        rest: Distance of the tip from the hand's command, at rest after the last contact [m].
-        given: Energy out of both ports minus the energy into them [J].
+        rest: Distance of the tip from the hand's command during the rest after the last contact [m].
+        given: Energy that comes out of both ports minus the energy that goes into them [J].
         force: Largest force on the tip [N].
     """
 
@@ -53,7 +55,7 @@ class Drift:
 
 
 def _motion(times: Array) -> Array:
-    """Place (N, 3) [m] of the hand: to the object, down and up ten times, and rest."""
+    """Positions (N, 3) [m] of a hand that approaches the object, moves down and up ten times, and rests."""
     place = np.zeros((len(times), 3))
     place[:, 2] = 0.04 * minimum_jerk(times / _APPROACH)
     turns = np.clip((times - _APPROACH) / _PERIOD, 0.0, CONTACTS)
@@ -62,11 +64,11 @@ def _motion(times: Array) -> Array:
 
 
 def measure_drift(bench: Bench, job: Job) -> Drift:
-    """Drift over ten contacts of a hand that ignores the force.
+    """Measure the drift over ten contacts of a hand that ignores the force.
 
     Args:
         bench: Bench on which the sessions run.
-        job: Material, passivity and round trip [s].
+        job: Material, passivity and round-trip delay [s].
     """
     material, passivity, round_trip = job
     settings = {
@@ -81,7 +83,7 @@ def measure_drift(bench: Bench, job: Job) -> Drift:
     drift = np.linalg.norm(wanted - given, axis=1)
     force = np.linalg.norm(rows["slave_measured_cf"][:, :3], axis=1)
     leaving, left = [], []
-    led = int(rows["teleop_state"][:, 0].argmax())  # the hand waits until the arm follows
+    led = int(rows["teleop_state"][:, 0].argmax())  # the hand's motion begins when the arm begins to follow
     period, first = round(1e3 * _PERIOD), led + round(1e3 * (_APPROACH + 0.5 * round_trip))
     for begin in range(first, first + CONTACTS * period, period):
         touching = np.flatnonzero(force[begin : begin + period] > _TOUCH)
@@ -166,7 +168,7 @@ _NOTES = (
 
 
 def report(found: Mapping[Job, Drift]) -> Findings:
-    """Rows and figure of what was measured."""
+    """Rows and figure of the measured drifts."""
     return Findings(_rows(found), (_figure(found),), _NOTES)
 
 

@@ -1,4 +1,4 @@
-"""Experiment: an experiment of a source, as a function from a bench to findings."""
+"""Experiment: an experiment of a source; its function takes a bench and returns findings."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -13,13 +13,13 @@ _PLACE = "teleop_lab.experiments"
 
 @dataclass(frozen=True)
 class Experiment:
-    """An experiment of a source, and its printed results.
+    """An experiment of a source, compared with the printed results.
 
     Attributes:
         name: Name of the experiment for ``teleop experiment``.
         title: One line that describes the experiment.
-        source: Source of the published figures.
-        measure: ``measure(bench)`` runs the experiment; it gets its sessions from the bench, which runs each only
+        source: Source of the published numbers.
+        measure: Function that runs the experiment. It gets its sessions from the bench, which runs each session only
             once.
     """
 
@@ -29,10 +29,10 @@ class Experiment:
     measure: Callable[[Bench], Findings]
 
     def run(self, bench: Bench) -> Outcome:
-        """Run it.
+        """Run the experiment.
 
         Raises:
-            PartError: The function returned something else than :class:`Findings`.
+            PartError: The function ``measure`` did not return :class:`Findings`.
         """
         found = self.measure(bench)
         if not isinstance(found, Findings):
@@ -91,5 +91,5 @@ EXPERIMENTS: Registry[Experiment] = Registry(
 
 
 def register_experiment(name: str, experiment: Experiment, *, replace: bool = False) -> Experiment:
-    """Add an experiment for the rest of the program; see :meth:`Registry.add`."""
+    """Add an experiment until the program ends; see :meth:`Registry.add`."""
     return EXPERIMENTS.add(name, experiment, replace=replace)

@@ -1,4 +1,4 @@
-"""Fitts: movement times of people to a target on a delayed screen, and those of the operator `observer`."""
+"""Fitts: movement times to a target on a delayed screen, of people and of the operator `observer`."""
 
 import math
 
@@ -9,9 +9,11 @@ from teleop_lab.experiments.comparison import Comparison, Findings, percent
 LAGS = (0.0083, 0.025, 0.075, 0.225)
 """Delays of the screen [s]."""
 TIMES = (0.911, 0.934, 1.059, 1.493)
-"""Mean times of movement at these lags [s], printed."""
-WAYS, WIDTHS = (96.0, 192.0, 384.0), (6.0, 12.0, 24.0, 48.0)
-"""Distances and widths of the targets in pixels; only their ratio matters."""
+"""Printed mean movement times at the delays of `LAGS` [s]."""
+WAYS = (96.0, 192.0, 384.0)
+"""Distances of the targets [pixels]; only the ratio of distance and width matters."""
+WIDTHS = (6.0, 12.0, 24.0, 48.0)
+"""Widths of the targets [pixels]."""
 LATENCIES = (0.033, 0.133, 0.333)
 """Latencies of the display in sessions of the scenario ``point`` [s]."""
 
@@ -33,7 +35,7 @@ def _laws() -> list[Comparison]:
 
 
 def _sessions(bench: Bench) -> list[Comparison]:
-    """Movement times of whole sessions, compared with the slowing that the look-move cycle predicts."""
+    """Compare movement times of whole sessions with the slowing that the look-move cycle predicts."""
     times = []
     for latency in LATENCIES:
         session = bench.session("point", settings={"display.latency": latency})

@@ -54,7 +54,7 @@ _NOTES = (
 
 
 def _effort_rows() -> list[Comparison]:
-    """Efforts that hold the arm, beside the closed form for the same parameters."""
+    """Rows of the efforts that balance the arm's weight, compared with the closed form for the same parameters."""
     robot = load_robot("rcrt1")
     assert robot.dynamics is not None
     held = np.zeros(robot.n)

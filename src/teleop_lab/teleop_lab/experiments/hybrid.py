@@ -15,7 +15,8 @@ from teleop_lab.experiments.experiment import Experiment
 _PLACE_CM, _TILT = (93.3013, 20.0, 43.6603), math.radians(30.0)
 _LEGS_CM = (22.3607, 26.7095, 26.7095, 22.3607, 19.1569, 19.1569)
 _OFFSET_CM, _WRIST_CM = (0.0, -5.0, 28.6603), (93.3013, 25.0, 15.0)
-# Four decimals printed, of inputs that are rounded so too; near the stretched arm that makes 2e-4 degrees.
+# The source prints four decimals and rounds its inputs to four decimals. The error is up to 2e-4 degrees near the
+# stretched posture of the arm.
 _LENGTH, _ANGLE = absolute(1e-4), absolute(2e-4)
 _BASE_CM, _PLATFORM_CM, _HEIGHT_CM, _TOOL_CM = 20.0, 10.0, 20.0, 10.0
 

@@ -1,4 +1,4 @@
-"""Joint steps: how each joint of a slave under a control law answers a step, and rests after it."""
+"""Joint steps: the step response of each joint of a slave with a control law, and the motion at rest after the step."""
 
 from typing import NamedTuple
 
@@ -8,8 +8,10 @@ from teleop_core.graph.signals import TICK_NS
 from teleop_core.kernels.geometry import Array
 from teleop_core.slave.pair import ArmParameters, SimulatedArm
 
-_STEP_S = 0.02  # a step is as large as the motion of a joint in this time at full speed
-_SETTLED_TICKS, _WAIT_TICKS, _REST_TICKS = 300, 1500, 2000
+_STEP_S = 0.02  # size of a step, as the time in which the joint moves as far at full speed [s]
+_SETTLED_TICKS = 300  # rest before a step
+_WAIT_TICKS = 1500  # time after a step in which its overshoot is measured
+_REST_TICKS = 2000  # rest after that time
 
 
 class StepAnswer(NamedTuple):
@@ -17,8 +19,8 @@ class StepAnswer(NamedTuple):
 
     Attributes:
         overshoot: Largest overshoot of each joint (n,), as a share of the step.
-        rest_error: Distance of the tip, by the encoders, from where the setpoints put it: root
-            mean square over the rests after all steps [m].
+        rest_error: Distance between the tip by the encoders and the tip by the setpoints: RMS over the rests after all
+            steps [m].
         rest_travel: Largest change of each encoder (n,) during a rest of two seconds, over all steps [counts].
     """
 
@@ -28,10 +30,10 @@ class StepAnswer(NamedTuple):
 
 
 def answer_to_steps(parameters: ArmParameters) -> StepAnswer:
-    """Step each joint by itself, from home, towards the middle of its range.
+    """Apply a step to one joint after the other, each from home and towards the middle of the joint's range.
 
     Args:
-        parameters: Parameters of the slave. Its reference filter should be off, and its start at home.
+        parameters: Parameters of the slave. Switch its reference filter off, and start it at home.
     """
     n = SimulatedArm(parameters).robot.n
     overshoot, travel, errors = np.zeros(n), np.zeros(n), []
@@ -44,7 +46,7 @@ def answer_to_steps(parameters: ArmParameters) -> StepAnswer:
 
 
 def _one_step(slave: SimulatedArm, joint: int) -> tuple[float, float, Array]:
-    """Overshoot [share], rest error of the tip [m] and travel at rest (n,) [counts] of a step."""
+    """Apply a step; returns overshoot [share], rest error of the tip [m] and travel at rest (n,) [counts]."""
     robot = slave.robot
     drives, n = robot.drives, robot.n
     assert drives is not None

@@ -1,7 +1,7 @@
-"""Look and move: the number of looks that a person needs to reach a target, and the time for them.
+"""Look and move: the number of looks that a person needs to reach a target, and the duration of the movement.
 
-The model has the constants of the operator ``observer``, but no arm: it predicts the time of any motion that the eye
-guides.
+The model uses the constants of the operator ``observer``, but contains no arm. It predicts the time of any motion that
+is guided by sight.
 """
 
 import numpy as np
@@ -10,10 +10,10 @@ from teleop_core.hand.operators.observer_parameters import ObserverParameters
 from teleop_core.kernels.geometry import Array
 
 _PEOPLE = 20_000
-_MOST = 60  # looks; nobody needs more
+_MOST = 60  # upper limit of the number of looks, which no person reaches
 CYCLE = 0.325
-"""Time of a look-move cycle of a person without any lag [s], identified from MacKenzie and Ware
-1993: their four lags give MT = 2.7 (0.325 s + lag) within 2 %."""
+"""Time of a look-move cycle of a person without any lag [s], identified from MacKenzie and Ware 1993. The formula MT =
+2.7 (0.325 s + lag) fits their four lags within 2 %."""
 
 
 def looks(way: float, width: float, passed: float = 1.0, seed: int = 1) -> tuple[float, float]:
@@ -21,8 +21,8 @@ def looks(way: float, width: float, passed: float = 1.0, seed: int = 1) -> tuple
 
     Args:
         way: Distance to the target [m].
-        width: Width of the target, within which a motion ends [m].
-        passed: Share of each motion that arrives, for example over a line that loses increments.
+        width: Width of the target in which the motion must end [m].
+        passed: Share of each motion that the slave makes; it is below 1 if, for example, the network loses increments.
         seed: Seed of the hand's noise.
     """
     p, rng = ObserverParameters(), np.random.default_rng(seed)
@@ -39,12 +39,12 @@ def looks(way: float, width: float, passed: float = 1.0, seed: int = 1) -> tuple
 
 
 def movement_time(way: float, width: float, lag: float) -> tuple[float, float]:
-    """Time [s] to press inside a target that is seen late, and the number of looks.
+    """Time [s] to hit a target on a delayed display, and the number of looks.
 
     Args:
         way: Distance to the target [m].
         width: Width of the target [m].
-        lag: Delay of the display, without the delay of the eye [s].
+        lag: Delay of the display [s]; the delay of the eye is not included.
     """
     p = ObserverParameters()
     count, moving = looks(way, width)
@@ -52,6 +52,6 @@ def movement_time(way: float, width: float, lag: float) -> tuple[float, float]:
 
 
 def difficulty(way: float | Array, width: float) -> float | Array:
-    """Index of difficulty [bit]; MacKenzie 1992, in Shannon's form."""
+    """Index of difficulty [bit] in Shannon's form, MacKenzie 1992."""
     found: float | Array = np.log2(way / width + 1.0)
     return found

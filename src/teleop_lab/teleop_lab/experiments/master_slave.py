@@ -18,16 +18,17 @@ MODES = {"coarse_box": COARSE, "fine_box": FINE}
 BOX_MM = {"coarse_box": 30.0, "fine_box": 3.0}
 _LEAST_MM = {"coarse_box": 0.002, "fine_box": 0.015}
 _RATIO = FINE.position_mm[0] / COARSE.position_mm[0]
-# Root mean squares are what the plant must predict; maxima are single events of one person's hand.
+# The plant must predict RMS values; maxima are single events of one person's hand.
 _RMS, _TURN_RMS = percent(100.0 * POSITION_SHARE), factor(ANGLE_FACTOR)
 _MAX = factor(ANGLE_FACTOR)
 _CALLED = {"roll": "the source's yaw", "yaw": "the source's roll"}
-_PATH, _CURVE = 8, 2  # every how many samples one is drawn
+_PATH = 8  # every eighth sample of a path is drawn
+_CURVE = 2  # every second sample of a curve is drawn
 _QUATERNION = ["qw", "qx", "qy", "qz"]
 
 
 class Figures(NamedTuple):
-    """Compared figures of one session: RMS and maximum of position [mm] and angles [°]."""
+    """Errors of one session: RMS and maximum of position [mm] and angles [°]."""
 
     position_mm: tuple[float, float]
     roll_deg: tuple[float, float]
@@ -36,15 +37,15 @@ class Figures(NamedTuple):
     beyond_mm: float
     """Largest distance of the slave beyond the box [mm]."""
     least_mm: float
-    """Smallest error of position [mm]."""
+    """Smallest position error [mm]."""
     offset_mm: float
     """Length of the mean error vector [mm]."""
     about_mm: float
-    """RMS of the position's error about that mean [mm]."""
+    """RMS of the position error about the mean error [mm]."""
 
 
 def figures_of(session: Session) -> Figures:
-    """Figures of one session that are compared."""
+    """Compute the errors of one session that are compared."""
     score = session.score
     turn = score.orientation_error_deg
     pairs = [(s.rms, s.max) for s in (score.position_error_mm, turn.roll, turn.pitch, turn.yaw)]
@@ -138,15 +139,15 @@ def _ratios(found: dict[str, list[Figures]]) -> list[float]:
 
 
 class Drawn(NamedTuple):
-    """Samples of a session with its box on.
+    """Samples of a session from the time at which its box was enabled.
 
     Attributes:
-        times: Since the box came on (N,) [s].
-        measured: Places of the tip (N, 3) [mm].
-        reference: Places of its reference (N, 3) [mm].
+        times: Times since the box was enabled (N,) [s].
+        measured: Positions of the tip (N, 3) [mm].
+        reference: Positions of the tip's reference (N, 3) [mm].
         turns: Roll, pitch and yaw of the tip minus those of the reference (N, 3) [°].
         center: Centre of the box (3,) [mm].
-        size: Its sides (3,) [mm].
+        size: Side lengths of the box (3,) [mm].
     """
 
     times: Array
@@ -158,7 +159,7 @@ class Drawn(NamedTuple):
 
 
 def drawn_of(session: Session) -> Drawn:
-    """Samples of a session from when its box came on."""
+    """Return the samples of a session from the time at which its box was enabled."""
     state = session["teleop/state"]
     on = int(np.argmax(state["is_fixture_on"] > 0.0))
     center, size = (1e3 * state[[f"fixture_{kind}_{letter}" for letter in "xyz"]][on] for kind in ("center", "size"))
@@ -264,7 +265,7 @@ def _turn_figure(name: str, found: Drawn) -> Figure:
 
 
 def _both_boxes(sessions: dict[str, Session]) -> Figure:
-    """Both boxes around one centre, because the source overlays them in its figure."""
+    """Plot both boxes around one centre, as the source does in its figure."""
     traces = []
     for name, color in (("coarse_box", COMMAND), ("fine_box", MEASURED)):
         found, mode = drawn_of(sessions[name]), MODES[name].mode

@@ -20,7 +20,7 @@ TABLE_4_7 = {
     "12": ((3.6, -71.3, 482.1), (3.6, -72.9, 481.5)),
 }
 _SERIAL_HOME = np.radians([0.0, -90.0, 90.0, 0.0, 90.0, 0.0, 0.0])
-# One decimal printed, once cut instead of rounded; the prototype was measured by hand.
+# The source prints one decimal; one of its values is cut, not rounded. The prototype was measured by hand.
 _PRINTED, _BY_HAND = absolute(0.07), absolute(3.0)
 
 

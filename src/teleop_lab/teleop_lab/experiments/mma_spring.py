@@ -11,7 +11,8 @@ from teleop_lab.experiments.comparison import EXACT, Comparison, Findings, absol
 from teleop_lab.experiments.experiment import Experiment
 from teleop_machines import mma_balance
 
-_OPEN, _SQUARE = math.radians(135.0), math.radians(90.0)
+_OPEN = math.radians(135.0)  # angle of the spring's triangle with the arm at 45°
+_SQUARE = math.radians(90.0)  # angle of the spring's triangle with the arm level
 _SAFETY = 1.15
 _CLOSE = percent(0.1)
 

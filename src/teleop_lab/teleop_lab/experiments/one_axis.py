@@ -1,4 +1,4 @@
-"""One axis: a hand at a spring with a delayed force, computed exactly and with our own stages."""
+"""One axis: a hand that presses on a spring with a delayed force, computed exactly and with our own stages."""
 
 import math
 from collections import deque
@@ -17,9 +17,11 @@ from teleop_core.hand.master.haptic_master import HapticMaster, HapticMasterPara
 from teleop_core.kernels.geometry import Array
 
 _AXIS = 1  # axis of the master's base along which the hand is pushed
-_KICK = 1e-5  # speed that the hand is given [m/s]: far from every limit
-_SETTLE, _LOOK = 1.0, 3.0  # time before the growth is measured, and time for which it is measured [s]
-_SETTLED, _LOOKS = 10, 20  # additional times of the same kind, in units of the force's delay
+_KICK = 1e-5  # initial speed of the hand [m/s]; so small that no limit takes effect
+_SETTLE = 1.0  # time before the growth rate is measured [s]
+_LOOK = 3.0  # time in which the growth rate is measured [s]
+_SETTLED = 10  # increase of _SETTLE, as a multiple of the force's delay
+_LOOKS = 20  # increase of _LOOK, as a multiple of the force's delay
 _BLOCK = 500  # ticks
 _GRID = 4000
 _LEAST_HAND = 0.01  # smallest mass of a hand that the parameters allow [kg]
@@ -27,10 +29,10 @@ _LEAST_HAND = 0.01  # smallest mass of a hand that the parameters allow [kg]
 
 @dataclass(frozen=True)
 class Grip:
-    """How a hand holds the stylus.
+    """Mechanical model of a hand that holds the stylus.
 
     Attributes:
-        mass: Hand and device together [kg].
+        mass: Mass of hand and device together [kg].
         stiffness: Stiffness towards the wanted position of the stylus [N/m].
         damping: Damping of the grip [N·s/m].
     """
@@ -46,7 +48,7 @@ def exact_boundary(grip: Grip, delay: float, period: float = DT) -> float:
     Args:
         grip: The hand.
         delay: Delay of the force [s].
-        period: Time for which a force is held [s]; half of it adds to the delay.
+        period: Time for which a force is held [s]; half of this time adds to the delay.
 
     Source:
         Roots of m s² + b s + k + K exp(-s t) on the imaginary axis: b w = K sin(w t) and
@@ -77,9 +79,9 @@ def sampled_boundary(grip: Grip, ticks: int, damping: float = 0.0, period: float
 
     Args:
         grip: The hand.
-        ticks: Whole periods by which the wall's force comes late.
-        damping: Damping of the wall, on the difference of two samples [N·s/m].
-        period: Time between two samples, for which a force is held [s].
+        ticks: Delay of the wall's force, as a number of periods.
+        damping: Damping of the wall [N·s/m]; it acts on the difference of two samples.
+        period: Time between two samples [s]; a force is held for this time.
 
     Source:
         Eigenvalues of the exact step of mass, spring and damper under a held force, with the delayed positions and
@@ -90,7 +92,7 @@ def sampled_boundary(grip: Grip, ticks: int, damping: float = 0.0, period: float
     step = expm(free * period)
 
     def grows(stiffness: float) -> bool:
-        # State: place, speed, place before, then forces, the newest first.
+        # State: position, speed, previous position, then the forces, the newest force first.
         matrix = np.eye(3 + ticks, k=-1)
         matrix[:4] = 0.0
         matrix[:2, :2], matrix[2, 0] = step[:2, :2], 1.0
@@ -112,14 +114,14 @@ def sampled_boundary(grip: Grip, ticks: int, damping: float = 0.0, period: float
 
 
 class Mapped:
-    """Our hand, ideal device and mapping, tick by tick; the caller provides the arm.
+    """Simulation of our hand, an ideal device and the mapping, tick by tick; the caller simulates the arm.
 
     Args:
         grip: The hand.
         own: Parameters of the motion scaling.
 
     Attributes:
-        master: The device and the hand.
+        master: Simulation of the device and the hand.
     """
 
     def __init__(self, grip: Grip, own: Mapping[str, float | str] | None = None) -> None:
@@ -137,7 +139,7 @@ class Mapped:
         """Make one tick; returns the command (3,) [m].
 
         Args:
-            force: On the tip (3,) [N], as it arrives, in the slave's base.
+            force: Force on the tip (3,) [N] that arrives in this tick, in the slave's base.
         """
         felt, told = self.master.signals, self._mapping.signals
         if self._ticks % _BLOCK == 0:
@@ -158,9 +160,9 @@ class Mapped:
 
 
 def growth(grip: Grip, delay: float, stiffness: float) -> float:
-    """Growth rate [1/s] of the oscillation of our hand, device and mapping at a spring; negative if it decays.
+    """Growth rate [1/s] of the oscillation of our hand, device and mapping at a spring; negative for a decay.
 
-    The device is rigid, without friction, encoder steps and thermal limit.
+    The device is rigid. It has no friction, no encoder steps and no thermal limit.
 
     Args:
         grip: The hand.
@@ -184,10 +186,11 @@ def growth(grip: Grip, delay: float, stiffness: float) -> float:
 
 
 def growth_rate(speed: Array, period: float = DT) -> float:
-    """Rate [1/s] at which speeds (N,), a period [s] apart, grow from their first half to the last.
+    """Growth rate [1/s] from the first half of speeds (N,) to the second half; negative for a decay.
 
-    Returns:
-        The rate; negative if the speeds decay.
+    Args:
+        speed: Speeds (N,).
+        period: Time between two speeds [s].
     """
     half = len(speed) // 2
     before, after = (float(part @ part) for part in (speed[:half], speed[half:]))
@@ -201,12 +204,13 @@ def found_boundary(grip: Grip, delay: float) -> float:
 
 
 def boundary_from_below(rate_at: Callable[[float], float], start: float) -> float:
-    """Stiffness [N/m] at which a rate of growth passes 0.
+    """Stiffness [N/m] at which a growth rate becomes 0.
 
-    The search begins at low stiffness, because the largest force bounds strong oscillations, which then do not grow.
+    The search begins at low stiffness. At high stiffness the largest force limits the oscillations, so they would not
+    grow.
 
     Args:
-        rate_at: Rate of growth [1/s] by stiffness [N/m].
+        rate_at: Function that returns the growth rate [1/s] for a stiffness [N/m].
         start: A stable stiffness [N/m].
     """
     high, rate = start, -math.inf
@@ -244,7 +248,7 @@ _IDEAL_DEVICE = {
 
 
 def ideal_device(grip: Grip, **own: float) -> HapticMasterParameters:
-    """Our hand and device with a grip: rigid, without friction, encoder steps and thermal limit.
+    """Our hand with a grip, and our device: rigid, without friction, encoder steps and thermal limit.
 
     Args:
         grip: The hand. If its mass is hardly larger than that of our device, a lighter device is used.

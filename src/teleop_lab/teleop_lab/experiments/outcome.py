@@ -1,4 +1,4 @@
-"""Outcome: results of an experiment, and its table on the terminal, published beside predicted."""
+"""Outcome: results of an experiment, and a table of published and predicted numbers for the terminal."""
 
 import io
 import math
@@ -21,7 +21,7 @@ MARKS = {True: "✓", False: "✗", None: ""}
 _COLORS = {True: "green", False: "red", None: "default"}
 _KEPT = {"printed": "published figures agree", "law": "laws hold", "goal": "goals are kept"}
 _WIDTH = 110
-_DIGITS = 6  # decimals, the most that any source prints
+_DIGITS = 6  # largest number of decimals that a source prints
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,11 +31,11 @@ class Outcome:
     Attributes:
         name: Name of the experiment.
         title: One line that describes the experiment.
-        source: Source of the published figures.
-        seed: Seed of everything random in it.
-        rows: Numbers, published and predicted.
+        source: Source of the published numbers.
+        seed: Seed of all random numbers of the experiment.
+        rows: Published and predicted numbers.
         figures: Plots for the page.
-        notes: Sentences that a reader needs so that the numbers do not mislead.
+        notes: Explanations without which the numbers would mislead a reader.
     """
 
     name: str
@@ -47,25 +47,25 @@ class Outcome:
     notes: tuple[str, ...] = ()
 
     def count(self, basis: str = "printed") -> tuple[int, int]:
-        """Number of rows with a basis that agree with it, and number of judged rows with that basis."""
+        """Number of agreeing rows with the given basis, and number of judged rows with this basis."""
         marks = [row.agrees for row in self.rows if row.basis == basis]
         return marks.count(True), len(marks) - marks.count(None)
 
     @property
     def judged(self) -> int:
-        """Number of published figures that are judged."""
+        """Number of judged rows whose value the source printed."""
         return self.count()[1]
 
     @property
     def agreeing(self) -> int:
-        """Number of rows that agree with the published figure."""
+        """Number of rows that agree with the value that the source printed."""
         return self.count()[0]
 
     def row(self, quantity: str, group: str = "") -> Comparison:
-        """The row of a quantity.
+        """Return the row of a quantity.
 
         Raises:
-            UnknownNameError: There is no such row; the text lists the existing ones.
+            UnknownNameError: No row has this quantity; the message lists all quantities.
         """
         for row in self.rows:
             if row.quantity == quantity and (not group or row.group == group):
@@ -74,7 +74,7 @@ class Outcome:
         raise UnknownNameError(kind, quantity, dict.fromkeys(row.quantity for row in self.rows))
 
     def to_json(self) -> dict[str, Plain]:
-        """The outcome as plain values, without its plots; numbers are exact."""
+        """The outcome as plain values without the plots; numbers are not rounded."""
         return {
             "name": self.name,
             "title": self.title,
@@ -95,9 +95,9 @@ class Outcome:
 
 
 def numbers(row: Comparison) -> tuple[str, str, str, str]:
-    """Texts of published, predicted, ours and difference.
+    """Texts of the published value, the predicted value, our value and the difference.
 
-    A predicted number has one decimal more than the printed one, so that rounding is visible.
+    A predicted number is shown with one decimal more than the printed number, so that rounding is visible.
     """
     if row.published is None:
         return "", _four_digits(row.predicted), _four_digits(row.ours), ""
@@ -107,13 +107,13 @@ def numbers(row: Comparison) -> tuple[str, str, str, str]:
 
 
 def _printed(published: float) -> str:
-    """A published number as printed, or with four digits if it was computed from printed numbers."""
+    """Text of a published number: as printed, or with four digits if it was computed from printed numbers."""
     text = f"{published:.9g}"
     return text if len(text.partition(".")[2]) <= _DIGITS else f"{published:.4g}"
 
 
 def _beside(value: float | None, published: float) -> str:
-    """Text of a number with one decimal more than the printed one, or with three digits if that is more."""
+    """Text of a number with one decimal more than the published number, but with at least three digits."""
     if value is None:
         return ""
     if 0.0 < abs(published) < 1e-4:
@@ -128,7 +128,7 @@ def _four_digits(value: float | None) -> str:
 
 
 def _signed(difference: float, published: float) -> str:
-    """Text of a difference; zero if it is only rounding."""
+    """Text of a difference; zero if the difference is only a rounding error."""
     if abs(difference) <= 1e-12 * max(1.0, abs(published)):
         return "0"
     digits = 2 if abs(difference) < 10.0 else int(math.log10(abs(difference))) + 1
@@ -150,7 +150,7 @@ def within(row: Comparison) -> str:
 
 
 def summary(outcomes: Sequence[Outcome]) -> str:
-    """One line: how many figures agree, and how many laws and goals are met."""
+    """One line with the number of printed values that agree, and the numbers of laws and goals that are met."""
     found = {basis: np.sum([o.count(basis) for o in outcomes], axis=0) for basis in _KEPT}
     told = [f"{kept} of {of} {_KEPT[b]}" for b, (kept, of) in found.items() if of or b == "printed"]
     rest = sum(len(o.rows) for o in outcomes) - sum(of for _, of in found.values())
@@ -205,7 +205,7 @@ def show(outcome: Outcome, console: Console) -> None:
 
 
 def terminal() -> Console:
-    """Console on standard output; if this is not a terminal, the console is as wide as a table needs."""
+    """Console on standard output. If standard output is not a terminal, the console is as wide as the tables."""
     console = Console(legacy_windows=False)
     return console if console.is_terminal else Console(width=_WIDTH, legacy_windows=False)
 

@@ -1,4 +1,4 @@
-"""Page: experiments as one self-contained HTML file, in the look of the report page."""
+"""Page: results of experiments as one self-contained HTML file, in the style of the report page."""
 
 import json
 from collections.abc import Sequence
@@ -28,7 +28,7 @@ p.note { margin: 6px 0; color: var(--soft); font-size: 0.93rem; }
 def experiments_page(outcomes: Sequence[Outcome]) -> str:
     """HTML page with the table and the figures of every experiment.
 
-    The page works offline and loads nothing: it contains plotly.js once.
+    The page works offline, because it contains plotly.js.
 
     Args:
         outcomes: Results of the experiments, in the order of the page.
@@ -49,7 +49,7 @@ def experiments_page(outcomes: Sequence[Outcome]) -> str:
         title="Experiments: published and predicted",
         style=page_template.style() + _STYLE,
         body="\n".join((_head(outcomes), *sections)),
-        data=data.replace("<", "\\u003c"),  # nothing inside can end the script element
+        data=data.replace("<", "\\u003c"),  # no text of the data can close the script element
         plotly=packing.deflated(get_plotlyjs().encode()),
         library=f"plotly.js {get_plotlyjs_version()}",
         script=page_template.script(),
@@ -57,7 +57,7 @@ def experiments_page(outcomes: Sequence[Outcome]) -> str:
 
 
 def _duration(outcome: Outcome) -> float:
-    """Longest time [s] that a figure against time shows; 1 without any."""
+    """Longest time [s] of all figures with a time axis; 1 if there is no such figure."""
     ends = [
         float(trace["x"][-1])
         for figure in outcome.figures
@@ -88,7 +88,7 @@ def _head(outcomes: Sequence[Outcome]) -> str:
 
 
 def _counts(outcome: Outcome) -> str:
-    """Counts of published figures, laws and goals, as far as the experiment has them."""
+    """Counts of printed values, laws and goals of the experiment; a kind without rows is left out."""
     found = {basis: outcome.count(basis) for basis in BASES}
     return "; ".join(
         f"{kept} of {of}" + f" {basis}s" * (basis != "printed") for basis, (kept, of) in found.items() if of

@@ -9,7 +9,8 @@ from teleop_lab.experiments.comparison import EXACT, Comparison, Findings
 from teleop_lab.experiments.experiment import Experiment
 from teleop_machines import four_bar_loop, mobility
 
-# Mechanism: space, links, joints, freedoms of the joints, and the printed freedom.
+# For each mechanism: degrees of freedom of the space, number of links, number of joints, degrees of freedom of the
+# joints, and the printed mobility.
 _COUNTS = {
     "planar 4-bar": (mobility.PLANAR, 4, 4, 4, 1),
     "3-RPS": (mobility.SPATIAL, 8, 9, 15, 3),

@@ -1,4 +1,4 @@
-"""Points: the real task, 24 points of a circuit board seen by a camera (section 7.7)."""
+"""Points: the source's real task with 24 points of a circuit board that a camera shows (section 7.7)."""
 
 from collections.abc import Callable
 from typing import NamedTuple
@@ -20,23 +20,23 @@ from teleop_lab.experiments.experiment import Experiment
 
 SCENARIO = "points24"
 INNER_MM = 0.5
-"""Radius of the inner circle of a point; not published, half of a pad of 1 mm assumed."""
+"""Radius of the inner circle of a point [mm]. It is not published; half of a pad of 1 mm is assumed."""
 POINTS = 24
 # Only the second half of a rest counts, because the low-pass has almost settled then.
 _SETTLED = 0.5
 
 
 class Visits(NamedTuple):
-    """Result of the task in a session; distances in the plane of the board.
+    """Result of the task in a session; distances are in the plane of the board.
 
     Attributes:
-        targets: Places of the points in the slave's base (24, 3) [mm].
-        missed_mm: Mean of tip minus point while the tip rests there (24, 3) [mm].
-        off_mm: Largest distance of the tip from each while it rests there (24,) [mm].
-        mean_mm: Mean distance of the tip from each while it rests there (24,) [mm].
-        line_mm: Smallest distance of the line from each point (24,) [mm].
-        visiting: Path while it visits (N, 3) [mm].
-        tracing: Path while it draws the line (M, 3) [mm].
+        targets: Positions of the points in the slave's base (24, 3) [mm].
+        missed_mm: Mean of tip minus point while the tip rests at the point (24, 3) [mm].
+        off_mm: Largest distance of the tip from each point while the tip rests there (24,) [mm].
+        mean_mm: Mean distance of the tip from each point while the tip rests there (24,) [mm].
+        line_mm: Smallest distance of the drawn line from each point (24,) [mm].
+        visiting: Path of the tip while it visits the points (N, 3) [mm].
+        tracing: Path of the tip while it draws the line (M, 3) [mm].
     """
 
     targets: Array
@@ -53,21 +53,21 @@ def visits_of(session: Session, p: TourParameters, center: Array, approach_s: fl
 
     Args:
         session: A session of the scenario.
-        p: Its tour.
+        p: Parameters of the tour.
         center: Centre of the tour relative to the start of the hand (3,) [m].
-        approach_s: Time of the hand's approach [s].
+        approach_s: Duration of the hand's approach [s].
 
     Raises:
-        TeleopError: The session is over before the tour is.
+        TeleopError: The session ends before the tour ends.
     """
     follows = session.is_followed
     times = session.time[follows] - session.time[follows][0] - approach_s
     path = session.places_mm("slave/measured_cp")[follows]
     sent = session["slave/servo_cp"].time >= session.time[follows][0]
-    start = session.places_mm("slave/servo_cp")[sent][0]  # the hand waits until the slave follows
+    start = session.places_mm("slave/servo_cp")[sent][0]  # the hand's motion begins when the slave begins to follow
     axes = axis_map("axes", MotionScalingParameters.axes)
     targets = start + 1e3 * (center + p.stops) @ axes.T
-    if times[-1] < (needed := p.visit_time + p.trace_time) - DT:  # the last tick ends there
+    if times[-1] < (needed := p.visit_time + p.trace_time) - DT:  # the last tick ends one period after its time
         text = f"the session ends {needed - times[-1]:.1f} s before its tour of {needed:.1f} s"
         raise TeleopError(f"{SCENARIO}: {text}; give it more time (duration)")
     cycle = p.leg_time + p.rest_time
@@ -89,12 +89,12 @@ def visits_of(session: Session, p: TourParameters, center: Array, approach_s: fl
 
 
 def _in_plane(off: Array) -> Array:
-    """Distances (N,) in the plane of the board of (N, 3)."""
+    """Lengths (N,) of the components of vectors (N, 3) in the plane of the board."""
     return np.asarray(np.linalg.norm(off[:, :2], axis=1), dtype=np.float64)
 
 
 def _visits(bench: Bench, settings: Settings, *, seeing: bool) -> list[Visits]:
-    """Results of both hands; a hand that sees repeats the task with its aim corrected by the first errors."""
+    """Results of all hands. A hand that sees repeats the task and corrects the errors of the first run."""
     from teleop_core.session.api import configuration
 
     made = configuration(SCENARIO).group("operator")
@@ -104,7 +104,7 @@ def _visits(bench: Bench, settings: Settings, *, seeing: bool) -> list[Visits]:
         return first
     axes, found = axis_map("axes", MotionScalingParameters.axes), []
     for seed, visits in zip(bench.seeds, first, strict=True):
-        missed = 1e-3 * visits.missed_mm * (1.0, 1.0, 0.0)  # only the part in the plane that the camera shows
+        missed = 1e-3 * visits.missed_mm * (1.0, 1.0, 0.0)  # the camera shows only the board's plane
         aims = tuple((p.stops - missed @ axes).ravel().tolist())
         again = bench.session(SCENARIO, seed, {**settings, "operator.tour.points": aims})
         found.append(visits_of(again, p, center, approach))
@@ -112,12 +112,12 @@ def _visits(bench: Bench, settings: Settings, *, seeing: bool) -> list[Visits]:
 
 
 def _held(visits: Visits) -> float:
-    """Points at which the tip rested inside the inner circle."""
+    """Number of points at which the tip rested inside the inner circle."""
     return float((visits.off_mm < INNER_MM).sum())
 
 
 def _met(visits: Visits) -> float:
-    """Points that the line meets within the inner circle."""
+    """Number of points whose inner circle the drawn line crosses."""
     return float((visits.line_mm < INNER_MM).sum())
 
 
@@ -158,7 +158,7 @@ _NOTES = (
 
 
 def _circles(targets: Array, radius: float) -> Array:
-    """One line (N, 3) around all points; NaN lifts the pen."""
+    """Circles around all points as one line (N, 3); NaN separates the circles."""
     angles = np.linspace(0.0, 2.0 * np.pi, 25)
     ring = radius * np.column_stack((np.cos(angles), np.sin(angles), np.zeros(25)))
     gap = np.full((1, 3), np.nan)

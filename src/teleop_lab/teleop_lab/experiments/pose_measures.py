@@ -10,10 +10,10 @@ def accuracy(attained: Array, commanded: Array) -> Array:
 
     Args:
         attained: Positions (..., N, 3) after N moves to the same position.
-        commanded: That place (..., 3).
+        commanded: The commanded position (..., 3).
 
     Returns:
-        AP (...), in their unit.
+        AP (...), in the unit of the positions.
 
     Source:
         ISO 9283:1998, 7.2.1.
@@ -26,10 +26,10 @@ def repeatability(attained: Array) -> Array:
     """Radius around the mean of the attained positions: mean distance plus three standard deviations.
 
     Args:
-        attained: Places (..., N, 3) after N moves to the same place, N >= 2.
+        attained: Positions (..., N, 3) after N moves to the same position, N >= 2.
 
     Returns:
-        RP (...), in their unit.
+        RP (...), in the unit of the positions.
 
     Source:
         ISO 9283:1998, 7.2.2.

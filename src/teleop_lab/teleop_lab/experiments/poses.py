@@ -23,7 +23,7 @@ class Target(NamedTuple):
     Attributes:
         joints: Joint values that give the printed matrix [rad, m].
         place_mm: Position as printed [mm].
-        turn: Rotation as printed, rows of n, o, a.
+        turn: Rotation as printed; rows of the matrix with the columns n, o and a.
         note: Description of a misprint.
     """
 
@@ -49,7 +49,7 @@ TARGETS = {
               ((-0.677, 0.734, -0.059), (0.595, 0.593, 0.543), (0.434, 0.332, -0.838)),
               "z misprinted as -388.104"),
 }  # fmt: skip
-# Printed to 1e-3, some numbers cut instead of rounded.
+# The source prints three decimals; some numbers are cut, not rounded.
 _PLACE, _TURN = absolute(1.05e-3), absolute(1.05e-3)
 
 

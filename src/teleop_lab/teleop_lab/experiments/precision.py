@@ -18,7 +18,7 @@ from teleop_lab.fitting.rest_table import PUBLISHED, RestTable, read_rests
 from teleop_lab.fitting.rests import rest_positions
 
 _RUNS = 10
-# Table 7.7, mm: RMS, S.D., largest, smallest of each point.
+# Errors of each point in table 7.7 [mm]: RMS, standard deviation, largest, smallest.
 _SUMMARY = (
     (0.098, 0.039, 0.152, 0.053),
     (0.432, 0.025, 0.459, 0.373),
@@ -27,7 +27,8 @@ _SUMMARY = (
     (0.143, 0.025, 0.177, 0.112),
     (0.076, 0.017, 0.105, 0.054),
 )
-_PRECISION_MM, _REPEATABILITY_MM = 0.514, 0.050  # table 8.1; the latter is printed as 0.005
+_PRECISION_MM = 0.514  # table 8.1
+_REPEATABILITY_MM = 0.050  # table 8.1 prints 0.005
 _SOURCE = "Vongbunyong 2008, tables 7.1-7.7 and 8.1, misprints corrected"
 
 
@@ -48,7 +49,7 @@ class Rests(NamedTuple):
 
 
 def simulated_rests(bench: Bench, settings: Settings) -> Rests:
-    """The test on the plant, from encoder angles as the source took them."""
+    """Run the test on the plant and return its rest positions; like the source, it reads the encoder angles."""
     table = _table()
     pairs = {"robot": "rcrt1", "seed": bench.seed, **settings}
     group = configure(None, settings=[f"{name}={value}" for name, value in pairs.items()])
@@ -60,7 +61,7 @@ def simulated_rests(bench: Bench, settings: Settings) -> Rests:
 
 
 def published_rests() -> Rests:
-    """The published tables; the error of run 5 in table 7.4 is computed from its joints, because it is misprinted."""
+    """Return the published tables. The error of run 5 in table 7.4 is misprinted, so it is computed from the joints."""
     table = _table()
     return _rests(table.rests, table.targets)
 

@@ -1,4 +1,4 @@
-"""Puncture: how far the tip overshoots behind a membrane before the hand that feels it stops."""
+"""Puncture: overshoot of the tip behind a membrane until the hand, which feels the puncture, stops."""
 
 import math
 from collections.abc import Mapping
@@ -27,32 +27,34 @@ WAYS: tuple[Way, ...] = (
     ("three_channel", "none"),
     ("four_channel", "none"),
 )
-"""Architectures and passivities, as of the experiment ``transparency``."""
+"""Architectures with passivities, as in the experiment ``transparency``."""
 ROUND_TRIPS = (0.0, 0.1, 0.2, 0.4)
 """Round-trip delays [s], half in each direction."""
 SPEED = 0.01
 """Speed with which the hand pushes [m/s]; assumed."""
 NOTICED = 0.1
-"""The hand notices a puncture once its force fell by this share of the largest; assumed."""
-_TICKS_MS = 10.0  # delay of the stages and of the fall until it is noticed; assumed
+"""The hand notices a puncture when its force has fallen by this share of the largest force; assumed."""
+_TICKS_MS = 10.0  # time [ms] in which the stages transmit a fall of the force and the hand notices the fall; assumed
 _REACTION = HumanParameters().reaction_time
-_FELL = 0.1  # smallest fall of the force on the tip from tick to tick, as of a puncture [N]
-_WITHIN = 0.2  # time in which a fall of the force counts [s]; assumed
-_READY, _APPROACH, _PUSH = 4.0, 2.0, 2.5  # [s]
+_FELL = 0.1  # smallest fall of the force on the tip within a tick that counts as a puncture [N]
+_WITHIN = 0.2  # time in which a fall of the force counts as the hand's fall [s]; assumed
+_READY = 4.0  # time until the arm follows [s]
+_APPROACH = 2.0  # duration of the hand's approach [s]
+_PUSH = 2.5  # duration of the hand's push [s]
 Job = tuple[Way, float]
-"""Way and round trip [s]."""
+"""Architecture with passivity, and round-trip delay [s]."""
 
 
 @dataclass(frozen=True)
 class Puncture:
-    """Reaction of a hand to a puncture; infinity or NaN if the hand does not notice it.
+    """Reaction of a hand to a puncture; times are infinite if the hand does not notice it, NaN without a puncture.
 
     Attributes:
         tip_drop: Largest fall of the force on the tip from tick to tick [N].
         hand_drop: Largest fall of the force at the hand within 0.2 s after the puncture can be felt [N].
-        notice: Time from the puncture until the hand notices [s].
-        overshoot: How far the tip moves beyond the puncture point if the hand stops a reaction time after it noticed
-            [m].
+        notice: Time from the puncture until the hand notices it [s].
+        overshoot: Distance that the tip moves beyond the puncture point, if the hand stops one reaction time after it
+            noticed the puncture [m].
     """
 
     tip_drop: float
@@ -62,7 +64,7 @@ class Puncture:
 
 
 def _motion(times: Array, stop: float = math.inf) -> Array:
-    """Positions (N, 3) [m] of a hand that moves to the block, then pushes on until ``stop`` [s]."""
+    """Positions (N, 3) [m] of a hand that moves to the block, then pushes until ``stop`` [s]."""
     place = np.zeros((len(times), 3))
     place[:, 2] = 0.04 * minimum_jerk(times / _APPROACH)
     place[:, 1] = -SPEED * np.clip(times - _APPROACH, 0.0, min(stop - _APPROACH, _PUSH))
@@ -84,11 +86,11 @@ def _settings(way: Way, round_trip: float) -> Settings:
 
 
 def measure_puncture(bench: Bench, job: Job) -> Puncture:
-    """A puncture by a hand that pushes on, and by the same hand that stops as it has noticed.
+    """Measure a puncture with two sessions: in the first the hand continues to push, in the second it stops.
 
     Args:
         bench: Bench on which the sessions run.
-        job: Way and round trip [s].
+        job: Architecture with passivity, and round-trip delay [s].
     """
     settings, late = _settings(*job), job[1]
     seconds = _READY + _APPROACH + _PUSH + late
@@ -99,8 +101,8 @@ def measure_puncture(bench: Bench, job: Job) -> Puncture:
     if falls[begin] < _FELL:  # the tip never punctured the membrane
         return Puncture(float(falls[begin]), math.nan, math.nan, math.nan)
     hears = begin + round(0.5e3 * late)  # the force before this time cannot show the puncture
-    led = int(rows["teleop_state"][:, 0].argmax())  # the hand waits until the arm follows
-    end = led + round(1e3 * (_APPROACH + _PUSH))  # from this sample on the hand itself reduces the force
+    led = int(rows["teleop_state"][:, 0].argmax())  # the hand's motion begins when the arm begins to follow
+    end = led + round(1e3 * (_APPROACH + _PUSH))  # at this sample the push ends, so the force falls without a puncture
     push = np.linalg.norm(rows["master_servo_cf"][hears:end, :3], axis=1)
     most = np.maximum.accumulate(push)
     fell = np.flatnonzero(push < (1.0 - NOTICED) * most)
@@ -153,9 +155,9 @@ def _rows(found: Mapping[Job, Puncture]) -> tuple[Comparison, ...]:
 
 
 def least_overshoot(round_trip: float) -> float:
-    """Overshoot [m] that no hand avoids: its speed times the sum of round trip and reaction time.
+    """Smallest possible overshoot [m]: the hand's speed times the sum of round-trip delay and reaction time.
 
-    The force travels half of the round trip, the stop the other half.
+    The force needs half of the round trip to the hand, and the hand's stop needs the other half to the tip.
     """
     return SPEED * (round_trip + _REACTION)
 
@@ -198,7 +200,7 @@ _NOTES = (
 
 
 def report(found: Mapping[Job, Puncture]) -> Findings:
-    """Rows and figure of what was measured."""
+    """Rows and figure of the measured punctures."""
     return Findings(_rows(found), (_figure(found),), _NOTES)
 
 

@@ -14,10 +14,11 @@ from teleop_lab.experiments.bench import Bench, Session, Settings
 from teleop_lab.experiments.comparison import EXACT, Comparison, Findings, absolute, factor
 from teleop_lab.experiments.experiment import Experiment
 
-# Eqs. 6.2.8 and 6.2.9, sign corrected; printed to two digits.
+# Coefficients of eqs. 6.2.8 and 6.2.9, printed to two digits; a wrong sign is corrected.
 _COEFFICIENTS = {"of the last output": 0.99, "of the last input": -0.09, "of the input": 0.1}
 _STEP = (0.1, 0.109, 0.11791)
-_BEFORE, _AFTER = 2e-3, 5e-4
+_BEFORE = 2e-3  # printed jitter before the filter [rad]
+_AFTER = 5e-4  # printed jitter after the filter [rad]
 _RESTS: Settings = {
     "operator.kind": "hold",
     "operator.rotation": 0.0,
@@ -25,19 +26,19 @@ _RESTS: Settings = {
     "buttons.fixture": (),
     "duration": 16.0,
 }
-_JUDGED = "theta5"  # the gimbal turns theta5 one to one; near the home pose theta4 and theta6 turn more
+_JUDGED = "theta5"  # theta5 turns by the gimbal's angle; near the home pose theta4 and theta6 turn by more
 _WRIST = ("theta4", "theta5", "theta6")
-_QUIET_S = 6.0  # begin of the quiet time, after the approach and the settling of the filter [s]
+_QUIET_S = 6.0  # time at which the approach is over and the filter has settled [s]
 
 
 def lag(value: float, last_input: float, last_output: float) -> float:
-    """Next output of the filter with its default parameters."""
+    """Next output of the reference filter with the default parameters."""
     p = ReferenceFilterParameters()
     return float(lag_step(value, last_input, last_output, p.gain, p.zero, p.pole, DT))
 
 
 def step_response(count: int) -> Array:
-    """Answer (count,) to a unit step, from rest."""
+    """Response (count,) of the filter to a unit step, from rest."""
     out, last_input, last = [], 0.0, 0.0
     for _ in range(count):
         last = lag(1.0, last_input, last)
@@ -115,7 +116,7 @@ _NOTES = (
 
 
 def _ramp_lag_ms() -> float:
-    """Delay [ms] behind a ramp after ten seconds."""
+    """Delay [ms] of the filter's output behind a ramp, after ten seconds."""
     last = 0.0
     ticks = 10_000
     for k in range(1, ticks + 1):
@@ -124,7 +125,7 @@ def _ramp_lag_ms() -> float:
 
 
 def _quiet(session: Session, name: str) -> tuple[Array, Array, Array]:
-    """Times [s], and reference before and after the filter [rad], with the stylus at rest."""
+    """Times [s] and references before and after the filter [rad], while the stylus rests."""
     before, after = session["slave/servo_jp"], session["slave/setpoint_js"]
     start = float(before.time[np.argmax(session.is_followed)]) + _QUIET_S
     kept, same = before.time >= start, after.time >= start
@@ -132,7 +133,7 @@ def _quiet(session: Session, name: str) -> tuple[Array, Array, Array]:
 
 
 def _jitter(session: Session, name: str) -> tuple[float, float]:
-    """Half of peak to peak of a joint's reference [rad] before and after the filter."""
+    """Jitter of a joint's reference before and after the filter [rad], as half of the peak-to-peak value."""
     _, before, after = _quiet(session, name)
     return 0.5 * float(np.ptp(before)), 0.5 * float(np.ptp(after))
 

@@ -1,4 +1,4 @@
-"""Resolution: what the encoders resolve at the joints and at the tip (chapter 3, table 3.6)."""
+"""Resolution: the encoders' resolution at the joints and at the tip (chapter 3, table 3.6)."""
 
 import math
 
@@ -13,17 +13,20 @@ from teleop_lab.experiments.comparison import EXACT, Comparison, Findings, perce
 from teleop_lab.experiments.experiment import Experiment
 
 _DEGREE, _UM = math.pi / 180.0, 1e-6
-# Printed steps of the joints [°] and of the screw [µm]; the source's own appendix A.4 has the
-# screw's, where table 3.6 prints 13.161 µm.
+# Printed steps of the joints [°] and of the screw [µm]. The screw's step is that of the source's appendix A.4; table
+# 3.6 prints 13.161 µm.
 _JOINTS = {"theta1": 1.0e-3, "theta2": 1.0e-3, "theta4": 1.247e-3, "theta5": 2.313e-3, "theta6": 2.313e-3}
 _SPEEDS_RPM = {"theta1": 30.0, "theta2": 30.0, "theta4": 70.213, "theta5": 130.263, "theta6": 130.263}
-_SCREW_UM, _SCREW_RPM, _LEAD_MM = 0.1316, 3719.677, 1.0
-# Reach of the prismatic link and the tip as the source rounds it [m], and its tip steps [µm].
-_REACH, _TIP_UM, _TIP_ALL_UM = 0.460, 8.029, 11.355
+_SCREW_UM = 0.1316
+_SCREW_RPM = 3719.677
+_LEAD_MM = 1.0
+_REACH = 0.460  # rounded reach of prismatic link and tip in the source [m]
+_TIP_UM = 8.029  # printed step of the tip by one joint [µm]
+_TIP_ALL_UM = 11.355  # printed step of the tip by all axes [µm]
 
 
 def link_step(reach: float, step: float) -> float:
-    """Way of the tip [m] for one encoder step [rad] at a reach [m]: ΔS = L Δθ (chapter 3)."""
+    """Displacement of the tip [m] for one encoder step [rad] at a reach [m]: ΔS = L Δθ (chapter 3)."""
     return reach * step
 
 

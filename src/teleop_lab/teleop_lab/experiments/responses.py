@@ -18,30 +18,31 @@ from teleop_lab.experiments.bench import Bench, Settings
 from teleop_lab.experiments.comparison import Comparison, Findings, factor
 from teleop_lab.fitting.rest_table import PUBLISHED, read_rests
 
-# What the text reads from its plots once the tip rests [mm].
+# Errors with the tip at rest [mm], which the source's text reads from its plots.
 _AT_REST_MM = (0.091, 0.432, 0.432, 0.128, 0.142, 0.075)
 _POINT_3_Z_MM = 0.332
-# What it reads of the way there: the largest errors, of two points alone, and when they and the
-# rest come [s]; the axis of these times is wrong, see the notes.
+# Values during the move, which the source's text reads from its plots: the largest errors of two points, the times of
+# the largest errors, and the settling times [s]. The time axis of these plots is wrong, see the notes.
 _LARGEST_MM = (None, 1.521, 1.524, None, None, None)
 _PEAK_S = (0.08, 0.0, 0.0, 0.08, 0.02, 0.02)
 _SETTLED_S = (None, 0.12, 0.12, 0.10, None, None)
 _REST = 0.1  # share of (largest error minus error at rest) within which an error has settled
-_SPEED, _SETTLE_S = 0.5, 1.0  # share of the speed limits; rest after the move
+_SPEED = 0.5  # speed of the move, as a share of the speed limits
+_SETTLE_S = 1.0  # rest after the move
 _CURVE = 4  # every fourth sample is drawn
 _SCALES = np.array([math.degrees(1.0), math.degrees(1.0), 1e3, *[math.degrees(1.0)] * 3])
 _UNITS = ("°", "°", "mm", "°", "°", "°")
 
 
 class Response(NamedTuple):
-    """One move, with a row for each tick.
+    """Signals of one move, with a row for each tick.
 
     Attributes:
-        times: Since the move began (N,) [s].
-        reference: Joints that the control law follows (N, 6) [rad, m].
-        measured: Joints that the encoders show (N, 6) [rad, m].
-        wanted_mm: Tip of the reference (N, 3) [mm].
-        reached_mm: Tip by the encoders (N, 3) [mm].
+        times: Times since the move began (N,) [s].
+        reference: Joint references of the control law (N, 6) [rad, m].
+        measured: Joints measured by the encoders (N, 6) [rad, m].
+        wanted_mm: Positions of the tip at the reference (N, 3) [mm].
+        reached_mm: Positions of the tip at the measured joints (N, 3) [mm].
     """
 
     times: Array
@@ -52,7 +53,7 @@ class Response(NamedTuple):
 
     @property
     def error_mm(self) -> Array:
-        """Reached less wanted (N, 3) [mm]."""
+        """Reached minus wanted position of the tip (N, 3) [mm]."""
         return self.reached_mm - self.wanted_mm
 
 
@@ -87,7 +88,7 @@ def _rest_mm(found: Response) -> float:
 
 
 def _transient(found: Response) -> tuple[float, float, float]:
-    """Largest error during the move [mm], its time, and the time at which the error has settled [s]."""
+    """Largest error during the move [mm], the time of the largest error [s], and the settling time of the error [s]."""
     error = np.linalg.norm(found.error_mm, axis=1)
     peak, room = int(error.argmax()), _REST * (error.max() - error[-1])
     off = np.flatnonzero(np.abs(error - error[-1]) > room)

@@ -28,7 +28,7 @@ LAWS: Mapping[str, Settings] = {
         "controller.disturbance_observer.observer_ratio": 2.0,
     },
 }
-"""Laws that are compared, each with its own settings."""
+"""Settings of each control law that is compared."""
 _COLORS = (COMMAND, DARK, FIRST, SECOND, THIRD, MEASURED, FIXTURE)
 _FAULTS = faults_of(load_robot("rcrt1"))
 _DELAY, _GAIN = "plant.hardware.effort_delay", "plant.hardware.drive_gain"
@@ -47,12 +47,15 @@ DISTURBANCES: Mapping[str, Settings] = {
     "the same gears, motors of half the inertia": _LIGHT,
     "both": {**_LIGHT, _DELAY: 2e-3},
 }
-"""Differences of the plants; delays and gears are assumed, because no source has them."""
-_LONGEST, _STRONGEST, _ROUNDS = 30, 10.0, 7
+"""Settings in which each plant differs from the design plant. Delays and gears are assumed, because no source gives
+them."""
+_LONGEST = 30  # longest delay that is tried [ticks]
+_STRONGEST = 10.0  # largest factor of the gain that is tried
+_ROUNDS = 7  # number of bisections of the gain
 
 
 def error_of(bench: Bench, law: str, disturbance: str) -> tuple[float, float] | None:
-    """Tracking error at the encoders in coarse_box, RMS and maximum [µm]; None: refused.
+    """RMS and maximum of the tracking error at the encoders in coarse_box [µm]; None if the slave refuses to start.
 
     A slave refuses to start if small errors grow, or if large errors do not decay.
     """
@@ -65,7 +68,7 @@ def error_of(bench: Bench, law: str, disturbance: str) -> tuple[float, float] | 
 
 
 def is_stable(bench: Bench, law: str, more: Settings) -> bool:
-    """Whether a slave starts with a law on a plant: small and large errors decay."""
+    """Whether a slave starts with a law on a plant; it starts if small and large errors decay."""
     try:
         SimulatedArm(bench.slave({**_PLANT, **LAWS[law], **more, "slave.starts_at_home": True}))
     except ParameterError:
@@ -74,12 +77,12 @@ def is_stable(bench: Bench, law: str, more: Settings) -> bool:
 
 
 def delay_margin(bench: Bench, law: str) -> int:
-    """Largest delay of efforts with which a law is stable [ms], in whole ticks up to 30."""
+    """Largest delay of the efforts at which a law is stable [ms], a whole number of ticks up to 30."""
     return int(_last(lambda ticks: is_stable(bench, law, {_DELAY: 1e-3 * ticks}), _LONGEST))
 
 
 def gain_margin(bench: Bench, law: str) -> float:
-    """Largest gain of the drives with which a law is stable, divided by the gain that the law assumes, up to 10."""
+    """Largest stable gain of the drives, divided by the gain that the law assumes; at most 10."""
     low, high = 1.0, _STRONGEST
     if is_stable(bench, law, {_GAIN: high}):
         return high
@@ -90,7 +93,7 @@ def gain_margin(bench: Bench, law: str) -> float:
 
 
 def _last(holds: Callable[[int], bool], most: int) -> int:
-    """Largest number up to ``most`` up to which a condition holds."""
+    """Largest number, at most ``most``, up to which a condition is true."""
     low, high = 0, most + 1
     while high - low > 1:
         middle = (low + high) // 2

@@ -1,4 +1,4 @@
-"""Sampled wall: our device and the hand that holds it, at a wall whose force is sampled and held."""
+"""Sampled wall: our device and hand at a wall whose force is sampled and held."""
 
 from collections import deque
 from dataclasses import dataclass
@@ -13,12 +13,14 @@ from teleop_lab.experiments import one_axis
 
 AXIS = 1  # axis of the master's base along which the hand is pushed
 _BLOCK = 500  # ticks for which noise is drawn at once
-_KICK = 1e-4  # speed that the hand is given [m/s]
-_SECONDS, _SETTLE = 0.6, 0.1  # duration of a simulation, and time before the growth is measured [s]
-_DELAYS, _SETTLED = 40, 10  # additional times of the same kind, in units of the force's delay
+_KICK = 1e-4  # initial speed of the hand [m/s]
+_SECONDS = 0.6  # duration of a simulation [s]
+_SETTLE = 0.1  # time before the growth rate is measured [s]
+_DELAYS = 40  # increase of _SECONDS, as a multiple of the force's delay
+_SETTLED = 10  # increase of _SETTLE, as a multiple of the force's delay
 _DEAD = 1e-12  # RMS speed [m/s] below which rounding errors dominate
 _SHARES = (0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875)
-"""Parts of a step of the wall's force by which a push exceeds one step."""
+"""Pushes that are tried, each minus one step of the wall's force, as parts of this step."""
 _TAKEN, _RETURNED = (topics.MASTER_CONTACT.columns.index(name) for name in ("taken", "returned"))
 
 
@@ -28,8 +30,8 @@ class Wall:
 
     Attributes:
         stiffness: Stiffness of the wall's spring [N/m].
-        damping: On the difference of two samples [N·s/m].
-        late: Whole periods by which its force comes late.
+        damping: Damping of the wall [N·s/m]; it acts on the difference of two samples.
+        late: Delay of the wall's force, as a number of periods.
     """
 
     stiffness: float
@@ -40,12 +42,12 @@ class Wall:
 class SampledDevice:
     """Our device at a wall; between two samples the force is held.
 
-    The spring is the chain's own (``walls.wall_force``, what ``wall=soft`` renders), without the
-    bound of 5000 N/m that its parameter has.
+    The spring is computed by ``walls.wall_force`` of the chain, as for ``wall=soft``, but without the limit of 5000 N/m
+    of its parameter.
 
     Args:
         grip: The hand.
-        wall: The wall, through the place where the device begins.
+        wall: The wall; its plane contains the initial position of the device.
         own: Parameters of the device.
     """
 
@@ -72,12 +74,12 @@ class SampledDevice:
 
     @property
     def given(self) -> float:
-        """Energy that the present contact gave minus the energy that it took [J], by ``master/contact``."""
+        """Energy that the present contact returned minus the energy that it took [J], from ``master/contact``."""
         contact = self.master.signals["master_contact"]
         return float(contact[_RETURNED] - contact[_TAKEN])
 
     def move(self, speed: float) -> None:
-        """Give hand and device a speed [m/s]."""
+        """Set the speed of hand and device [m/s]."""
         self.master.state["speed"][AXIS] = self.master.state["hand_speed"][AXIS] = speed
 
     def aim(self, place: float) -> None:
@@ -107,7 +109,7 @@ class SampledDevice:
 
 
 def wall_growth(grip: one_axis.Grip, wall: Wall) -> float:
-    """Growth rate [1/s] of the oscillation of our hand and device at a wall; negative if it decays."""
+    """Growth rate [1/s] of the oscillation of our hand and device at a wall; negative for a decay."""
     loop = SampledDevice(grip, wall)
     loop.move(_KICK)
     place = np.empty(round(_SECONDS / DT) + _DELAYS * wall.late)
@@ -116,7 +118,7 @@ def wall_growth(grip: one_axis.Grip, wall: Wall) -> float:
         place[i] = loop.place
     speed: Array = np.diff(place)[round(_SETTLE / DT) + _SETTLED * wall.late :] / DT
     rest = speed[len(speed) // 2 :]
-    # A motion that has died out does not grow, although its rounding errors may.
+    # A motion below this speed has decayed; only its rounding errors may grow.
     return -1.0 / DT if np.sqrt(np.mean(rest * rest)) < _DEAD else one_axis.growth_rate(speed)
 
 
@@ -126,27 +128,27 @@ def wall_boundary(grip: one_axis.Grip, damping: float, late: int) -> float:
     Args:
         grip: The hand.
         damping: Damping of the wall [N·s/m].
-        late: Periods by which its force comes late.
+        late: Delay of the wall's force, as a number of periods.
     """
     start = 0.3 * one_axis.sampled_boundary(grip, late, damping)
     return one_axis.boundary_from_below(lambda stiffness: wall_growth(grip, Wall(stiffness, damping, late)), start)
 
 
 def press_energy(damping: float, wall: Wall, length: int, speed: float) -> float:
-    """Energy [J] that a hand gets from a press into a wall: in at one speed, out at the same speed.
+    """Energy [J] that a hand gets from a press into a wall, if it moves in and out at the same speed.
 
-    No force changes the motion of this hand. It has pressed once before, so the press begins within the wall. The
-    wall's work is that of ``master/contact``. Our device has no viscous friction, so the energy that this friction
-    would take is computed here.
+    No force changes the motion of this hand. The hand has pressed once before, so the press begins within the wall. The
+    wall's work is that of ``master/contact``. The simulated device has no viscous friction; the energy that this
+    friction would take is subtracted here.
 
     Args:
         damping: Viscous friction of the device [N·s/m].
         wall: The wall.
-        length: Periods in, and as many out.
+        length: Number of periods of the motion into the wall, equal to that of the motion out of the wall.
         speed: Speed of the hand [m/s].
     """
     loop = SampledDevice(one_axis.Grip(5.0, 1.0, 0.1), wall)
-    loop.origin -= 0.25 * speed * DT  # no sample is on the plane: force 0 would end the contact
+    loop.origin -= 0.25 * speed * DT  # no sample may lie on the plane, where the force 0 would end the contact
     before, lost = 0.0, 0.0
     for i in range(4 * length):
         if i == 2 * length:
@@ -159,7 +161,7 @@ def press_energy(damping: float, wall: Wall, length: int, speed: float) -> float
 
 
 def passive_boundary(damping: float, wall_damping: float, length: int, speed: float) -> float:
-    """Stiffness [N/m] above which a press gains energy from the wall; the wall's work is linear in the stiffness."""
+    """Stiffness [N/m] above which the hand gains energy in a press; the wall's work is linear in the stiffness."""
     tried = 1000.0
     soft, stiff = (press_energy(damping, Wall(stiffness, wall_damping), length, speed) for stiffness in (0.0, tried))
     return tried * soft / (soft - stiff)
@@ -168,13 +170,13 @@ def passive_boundary(damping: float, wall_damping: float, length: int, speed: fl
 def is_restless(wall: Wall, friction: float, resolution: float, push: float) -> bool:
     """Whether a loose hand that presses on a wall keeps moving, because of dry friction and encoder steps.
 
-    A push between two steps of the wall's force comes to rest only if friction spans half a step: 2 f >= K Delta. The
-    force is checked after 0.3 s, for 0.3 s.
+    If the push lies between two steps of the wall's force, the hand comes to rest only if the friction reaches half a
+    step: 2 f >= K Delta. The force is observed for 0.3 s, after 0.3 s.
 
     Args:
         wall: The wall.
         friction: Dry friction of the device [N].
-        resolution: Step of its reading [m].
+        resolution: Encoder step of the device [m].
         push: Push of the hand [steps of the wall's force].
     """
     grip = one_axis.Grip(0.045, 1.0, 0.1)
@@ -186,7 +188,7 @@ def is_restless(wall: Wall, friction: float, resolution: float, push: float) -> 
 
 
 def restless_boundary(friction: float, resolution: float) -> float:
-    """Stiffness [N/m] above which some push of a loose hand leaves the wall restless, to 0.3 %."""
+    """Stiffness [N/m] above which a loose hand keeps moving at some push, within 0.3 %."""
 
     def some(stiffness: float) -> bool:
         wall = Wall(stiffness)

@@ -1,4 +1,4 @@
-"""Stability: largest stiffness that is stable behind a delay, by delay, grip and architecture."""
+"""Stability: largest stable stiffness of an object by delay, grip and architecture."""
 
 import math
 from collections.abc import Mapping
@@ -18,11 +18,13 @@ GRIPS: Mapping[str, one_axis.Grip] = {
     "medium": one_axis.Grip(0.25, 300.0, 12.0),
     "firm": one_axis.Grip(0.25, 1000.0, 25.0),
 }
-"""Hands that hold the stylus: mass with the device, stiffness and damping; assumed."""
+"""Models of hands: mass including the device, stiffness and damping; assumed."""
 DELAYS = (0.0, 0.02, 0.05, 0.1, 0.2)
 """Delays of the force [s]."""
-SOFTEST, STIFFEST = 20.0, 50_000.0
-"""Objects that are tried [N/m]: softer than tissue, and steel."""
+SOFTEST = 20.0
+"""Smallest stiffness of an object that is tried [N/m]; tissue is stiffer."""
+STIFFEST = 50_000.0
+"""Largest stiffness of an object that is tried [N/m]: steel."""
 _WAYS: tuple[transmission.Way, ...] = (
     ("position_force", "none"),
     ("position_force", "tank"),
@@ -33,10 +35,10 @@ _TWO_PORTS = ("tdpa",)
 """Passivities that need the slave's port."""
 _ROUNDS = 8
 _SECONDS = 8.0  # duration of each session: two touches [s]
-_TOUCH = 2000  # ticks before the tip is on its path
-_WINDOW = 20  # ticks over which a speed is measured: encoder steps are small compared with the motion in this time
+_TOUCH = 2000  # ticks until the tip follows its path
+_WINDOW = 20  # ticks over which a speed is measured; the motion in this time is much larger than an encoder step
 _THROWN = 2.0
-"""A hand counts as thrown if it gets this many times as fast as the same hand without any object."""
+"""A hand counts as thrown if its speed exceeds this multiple of its speed without an object."""
 _COLORS = (FIRST, SECOND, FIXTURE)
 _APPARENT_MASS = DeviceParameters().apparent_mass
 
@@ -58,7 +60,8 @@ def _settings(grip: one_axis.Grip, delay: float, stiffness: float, way: transmis
         "hand.mass": grip.mass - _APPARENT_MASS,
         "hand.stiffness": grip.stiffness,
         "hand.damping": grip.damping,
-        # The fault of an arm that is pressed into steel is only reported, because a stopped arm would look stable.
+        # The fault of an arm that presses into steel is only reported. If the fault stopped the arm, the arm would
+        # look stable.
         "operation.reported": ("effort",),
         "delays": tuple(late),
         "stages": (*channels.stages, *ports),
@@ -82,14 +85,14 @@ def fastest(bench: Bench, grip: one_axis.Grip, delay: float, stiffness: float, w
 
 
 def calm_speed(bench: Bench, grip: one_axis.Grip) -> float:
-    """Largest speed [m/s] of a hand that is not thrown: its speed at the softest object without delay."""
+    """Largest speed [m/s] of a hand that is not thrown, computed from its speed at the softest object without delay."""
     return _THROWN * fastest(bench, grip, 0.0, SOFTEST, _WAYS[0])
 
 
 def chain_boundary(bench: Bench, grip: one_axis.Grip, delay: float, way: transmission.Way, calm: float) -> float:
     """Largest stiffness [N/m] at which the hand is stable with the whole chain, from 20 to 50 000 N/m.
 
-    The device has its friction and its steps, the arm its lag and the reference its filter.
+    The simulation includes the device's friction and encoder steps, the arm's lag and the reference filter.
 
     Args:
         bench: Bench on which the sessions run.

@@ -16,16 +16,17 @@ from teleop_lab.experiments.two_port import Complex, Ports, S, excitation, hybri
 
 AIR = "air"
 WORLDS = (AIR, "tissue", "silicone")
-"""Nothing to touch, and two of the chain's materials."""
-_BACK = 2.0 * DT  # a force waits for a tick before the network and for one before the mapping
-_SECONDS = 24.0  # the arm becomes ready, the hand approaches, and one period passes until transients have decayed
+"""Names of the worlds: no object, and two materials of the chain."""
+_BACK = 2.0 * DT  # delay of a force by the stages [s]: one tick before the network, and one tick before the mapping
+# The arm gets ready, the hand approaches, transients decay for one period, and one period is measured.
+_SECONDS = 24.0  # [s]
 _MIDDLE = (0.0, -0.014, 0.02)  # middle of the hand's motion [m], 3 mm inside the object of palpation
 _TICK: Complex = np.exp(-DT * S)
 
 Way = tuple[str, str]
-"""Architecture, or ``impedance``, and passivity."""
+"""Name of the architecture (or ``impedance``), and name of the passivity."""
 Job = tuple[Way, float, str]
-"""Way, round trip [s] and world."""
+"""Architecture with passivity, round-trip delay [s] and world."""
 
 
 class Channels(NamedTuple):
@@ -36,7 +37,7 @@ class Channels(NamedTuple):
         stiffness: Force at the hand divided by the lag of the tip [N/m].
         hand: Force that commands the slave, divided by the hand's force.
         yields: Whether the slave has its stage ``impedance``.
-        architecture: Name of the architecture in a session; empty if it is the same name.
+        architecture: Name of the architecture in a session; empty if it is equal to the key of :data:`CHANNELS`.
     """
 
     force: float = 0.0
@@ -47,7 +48,7 @@ class Channels(NamedTuple):
 
     @property
     def stages(self) -> tuple[str, ...]:
-        """Stages of a session beside those of every chain."""
+        """Stages of a session in addition to those that every chain contains."""
         return ("impedance",) if self.yields else ()
 
 
@@ -60,16 +61,16 @@ CHANNELS = {
     "three_channel": Channels(_THREE.force_gain, _THREE.stiffness, yields=True),
     "four_channel": Channels(_FOUR.force_gain, _FOUR.stiffness, _FOUR.hand_gain, yields=True),
 }
-"""Channels of each architecture with default parameters; ``impedance`` is position-force with a slave that yields."""
+"""Channels of each architecture with default parameters. ``impedance`` is position-force with a slave that yields."""
 
 
 class Cell(NamedTuple):
     """Measurement of an architecture with a passivity and a round trip.
 
     Attributes:
-        ports: Ports by world.
-        hybrid: Hybrid matrix (L, 2, 2) of all worlds together.
-        stray: Largest share of a force outside of the spectral lines.
+        ports: Measured ports by world.
+        hybrid: Hybrid matrix (L, 2, 2) that fits the ports of all worlds.
+        stray: Largest share of a force that lies outside of the spectral lines.
     """
 
     ports: Mapping[str, Ports]
@@ -78,7 +79,7 @@ class Cell(NamedTuple):
 
     @classmethod
     def of(cls, ports: Mapping[str, Ports]) -> "Cell":
-        """The cell of at least two worlds."""
+        """Return the cell of the ports of at least two worlds."""
         found = ports.values()
         return cls(ports, hybrid_matrix(list(found)), max(each.stray for each in found))
 
@@ -91,7 +92,7 @@ def _motion(times: Array) -> Array:
 
 
 def far_settings(round_trip: float) -> Settings:
-    """Parameters of a network with a round-trip delay [s], half in each direction, and of a calm hand."""
+    """Parameters of a network with a round-trip delay [s], half in each direction, without gimbal noise."""
     return {
         "network.there.least_delay": 0.5 * round_trip,
         "network.back.least_delay": 0.5 * round_trip,
@@ -106,7 +107,7 @@ def settings(way: Way, round_trip: float, world: str) -> Settings:
 
     Args:
         way: Architecture and passivity.
-        round_trip: Half of it each way [s].
+        round_trip: Round-trip delay [s], half in each direction.
         world: One of :data:`WORLDS`, or another material.
     """
     architecture, passivity = way
@@ -125,11 +126,11 @@ def settings(way: Way, round_trip: float, world: str) -> Settings:
 
 
 def measure_ports(bench: Bench, job: Job) -> Ports:
-    """Both ports in a session of the whole chain, along the normal of the object.
+    """Measure both ports in a session of the whole chain, along the normal of the object.
 
     Args:
         bench: Bench on which the sessions run.
-        job: Way, round trip [s] and world.
+        job: Architecture with passivity, round-trip delay [s] and world.
     """
     rows = bench.signals("palpation", _SECONDS, settings(*job), _motion)
     return Ports.of(
@@ -143,14 +144,14 @@ def measure_ports(bench: Bench, job: Job) -> Ports:
 def measure_cells(
     bench: Bench, cells: Iterable[tuple[Way, float]], worlds: Iterable[str] = WORLDS
 ) -> dict[tuple[Way, float], Cell]:
-    """Results by architecture with passivity and by round-trip delay [s], each for all worlds."""
+    """Measure all worlds; the results are by architecture with passivity and by round-trip delay [s]."""
     wanted, every = list(cells), tuple(worlds)
     found = iter(bench.map(measure_ports, [(*cell, world) for cell in wanted for world in every]))
     return {cell: Cell.of({world: next(found) for world in every}) for cell in wanted}
 
 
 def predicted_hybrid(arm: Complex, architecture: str, round_trip: float) -> Complex:
-    """Hybrid matrix (L, 2, 2) of an architecture without passivity, predicted from the motion of the arm alone.
+    """Predict the hybrid matrix (L, 2, 2) of an architecture without passivity from the motion of the arm alone.
 
     The arm follows its command with T and yields with Y. Its command is the hand's position plus the stage's
     admittance A times (hand's force minus force on the tip). Both exchanges contain the delays::
@@ -159,9 +160,9 @@ def predicted_hybrid(arm: Complex, architecture: str, round_trip: float) -> Comp
         f_hand = k f_tip + K/s (v_hand - v_tip)
 
     Args:
-        arm: Hybrid matrix of position-force without a round trip, of which the arm's row is taken.
+        arm: Hybrid matrix of position-force without delay; only the row of the arm's motion is used.
         architecture: One of :data:`CHANNELS`.
-        round_trip: Half of it each way [s].
+        round_trip: Round-trip delay [s], half in each direction.
 
     Source:
         Lawrence 1993, general four-channel architecture, for a slave that is an admittance as in
@@ -182,6 +183,6 @@ def predicted_hybrid(arm: Complex, architecture: str, round_trip: float) -> Comp
 
 
 def _admittance() -> Complex:
-    """Way over force (L,) [m/N] of the stage ``impedance``, in steps backwards in time."""
+    """Displacement divided by force (L,) [m/N] of the stage ``impedance``, discretized by backward differences."""
     own, rate = ImpedanceParameters(), (1.0 - _TICK) / DT
     return 1.0 / ((own.mass * rate + own.damping) * rate + own.stiffness)

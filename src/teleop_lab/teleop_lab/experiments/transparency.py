@@ -1,4 +1,4 @@
-"""Transparency: what the hand feels of the world, by architecture, passivity and round trip."""
+"""Transparency: the impedance that the hand feels, by architecture, passivity and round-trip delay."""
 
 import math
 from collections.abc import Mapping
@@ -28,14 +28,14 @@ WAYS = (
     ("three_channel", "none"),
     ("four_channel", "none"),
 )
-"""Architectures and passivities. With ``wave`` the architecture has no effect; ``impedance`` is position-force with a
+"""Architectures with passivities. With ``wave`` the architecture has no effect. ``impedance`` is position-force with a
 slave that yields."""
 ROUND_TRIPS = (0.0, 0.02, 0.1, 0.2)
 """Round-trip delays [s], half in each direction."""
 LAG = Lag(0.05, 1e-4, 20)
-"""Arm of the two-port that is known exactly: with the lag of our arm, and 20 ms of delay in each direction; assumed."""
+"""Arm of the exactly known two-port. It has the lag of our arm and a delay of 20 ms in each direction; assumed."""
 STRAY = 0.3
-"""Share of a force off the lines up to which a gain of that force means something; assumed."""
+"""Largest share of a force outside of the spectral lines at which a gain of this force is meaningful; assumed."""
 _AT = int(np.abs(LINES - 1.0).argmin())
 _WITHIN, _NEAR = percent(5.0), absolute(0.05)
 _FORCE, _POSITION = ("position_force", "none"), ("position_position", "none")
@@ -51,7 +51,7 @@ class Number:
 
     Attributes:
         quantity: Name of the number.
-        unit: Its unit.
+        unit: Unit of the number.
         measured: Value measured at the ports.
         law: Value computed from a hybrid matrix.
         stray: Share of the underlying signals outside of the excited lines.
@@ -65,7 +65,7 @@ class Number:
 
 
 def numbers(cell: Cell, hybrid: Complex) -> list[Number]:
-    """Numbers of a cell, each as measured and by a hybrid matrix (L, 2, 2)."""
+    """Numbers of a cell, each as measured and as computed from a hybrid matrix (L, 2, 2)."""
     air, soft, tip = cell.ports[AIR], cell.ports["tissue"], -hybrid[:, 1, 0]
     hz = f"at {LINES[_AT]:g} Hz"
     follows = [bandwidth(air.tip_speed / air.hand_speed), bandwidth(tip)]
@@ -90,13 +90,13 @@ def numbers(cell: Cell, hybrid: Complex) -> list[Number]:
 
 
 def _rows(found: list[Number], group: str, told: str, *, is_judged: bool) -> list[Comparison]:
-    """Rows of numbers that are finite and of a chain that is linear enough."""
+    """Rows of all finite numbers; the stray share of their signals is at most :data:`STRAY`."""
     rows = []
     for each in found:
         if each.stray > STRAY or not math.isfinite(each.measured):
             continue
         law = each.law if is_judged and math.isfinite(each.law) else None
-        # Where the law is 0 there is no share of it; Llewellyn's number is one of a few.
+        # A relative tolerance does not suit a law that is 0, nor Llewellyn's number.
         within = _NEAR if not each.law or "Llewellyn" in each.quantity else _WITHIN
         rows.append(
             Comparison(
@@ -133,7 +133,7 @@ def _cell_rows(way: Way, round_trip: float, cell: Cell, arm: Complex) -> list[Co
 
 
 def lag_cell() -> Cell:
-    """The two-port whose hybrid matrix is known, measured before nothing and two springs."""
+    """Measure the two-port whose hybrid matrix is known: without an object, and at two springs."""
     return Cell.of({AIR: LAG.ports(0.0), "tissue": LAG.ports(200.0), "silicone": LAG.ports(1000.0)})
 
 
@@ -158,11 +158,11 @@ def _lag_rows(cell: Cell) -> list[Comparison]:
 
 
 def report(cells: Cells, known: Cell) -> Findings:
-    """Rows and figures of what was measured.
+    """Rows and figures of the measurements.
 
     Args:
-        cells: Results of the chain; they include position-force without passivity and round trip.
-        known: The two-port of :func:`lag_cell`.
+        cells: Results of the chain, which must include position-force without passivity and without delay.
+        known: Result of :func:`lag_cell`.
     """
     arm, rows = cells[_FORCE, 0.0].hybrid, _lag_rows(known)
     for (way, late), cell in cells.items():

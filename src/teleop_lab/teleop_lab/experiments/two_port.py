@@ -1,4 +1,4 @@
-"""Two-port: hybrid matrix, felt impedance, bandwidth and Llewellyn's number, measured at lines."""
+"""Two-port: hybrid matrix, felt impedance, bandwidth and Llewellyn's number, measured at spectral lines."""
 
 import math
 from collections import deque
@@ -17,19 +17,21 @@ from teleop_lab.experiments.one_axis import Grip, Mapped
 Complex = NDArray[np.complex128]
 
 PERIOD = 10.0
-"""Period of the excitation [s]; its lines are multiples of 0.1 Hz."""
+"""Period of the excitation [s]; the excited frequencies are multiples of 0.1 Hz."""
 _TICKS = round(PERIOD / DT)
 BINS = np.unique(2 * (np.geomspace(1.0, 300.0, 24) / 2.0).round().astype(int) + 1)
-"""Odd multiples of 1/PERIOD that are excited, 0.1 to 30 Hz: quadratic distortion has only even multiples."""
+"""Excited multiples of 1/PERIOD, from 0.1 to 30 Hz. They are odd, because quadratic distortion appears only at even
+multiples."""
 LINES: Array = BINS / PERIOD
 """Frequencies that are excited (L,) [Hz]."""
 S: Complex = np.multiply(2j * np.pi, LINES, dtype=np.complex128)
 """Laplace's variable at the lines (L,) [rad/s]."""
 AMPLITUDE = 0.15e-3
 """Amplitude of each line of the hand's displacement [m]."""
-_APPROACH, _GROWTH = 3.0, 1.0  # duration of the hand's approach to its centre, then of the rise of the multisine [s]
+_APPROACH = 3.0  # duration of the hand's approach to the centre of its motion [s]
+_GROWTH = 1.0  # duration in which the multisine then rises to its full amplitude [s]
 _FIRM = Grip(0.02, 5000.0, 40.0)
-"""A hand that hardly yields, so that its motion does not depend on the force."""
+"""A stiff hand, whose motion hardly depends on the force."""
 
 
 def multisine(times: Array) -> Array:
@@ -45,22 +47,22 @@ def multisine(times: Array) -> Array:
 
 
 def excitation(times: Array) -> tuple[Array, Array]:
-    """Completed share of the approach (N,), and the displacement (N,) [m] that is added to it."""
+    """Completed share of the approach (N,), and the displacement (N,) [m] that is added to the approach."""
     grown = minimum_jerk((times - _APPROACH) / _GROWTH)
     return minimum_jerk(times / _APPROACH), grown * multisine(times)
 
 
 @dataclass(frozen=True, eq=False)
 class Ports:
-    """Both ports at the excited lines, in one experiment; each complex, shape (L,).
+    """Signals of both ports in one experiment: complex amplitudes (L,) at the excited lines.
 
     Attributes:
         hand_speed: Speed of the hand at the master [m/s].
         hand_force: Force of the hand on the master [N].
         tip_speed: Speed of the slave's tip [m/s].
         tip_force: Force of the tip on the world [N].
-        stray: Share of a force, or of the tip's displacement if that is larger, outside of the lines up to the last
-            line; 0 for a linear system in steady state.
+        stray: Share of a signal outside of the lines, up to the last line: the largest value of the forces and the
+            tip's displacement. It is 0 for a linear system in steady state.
     """
 
     hand_speed: Complex
@@ -71,16 +73,16 @@ class Ports:
 
     @classmethod
     def of(cls, hand: Array, push: Array, tip: Array, reaction: Array) -> "Ports":
-        """Ports computed from measurements along one axis; only the last period is used.
+        """Compute the ports from measurements along one axis; only the last period is used.
 
         Args:
-            hand: Place of the hand (N,) [m].
-            push: Push of the master on the hand (N,) [N].
-            tip: Place of the slave's tip (N,) [m].
-            reaction: Push of the world on the tip (N,) [N].
+            hand: Positions of the hand (N,) [m].
+            push: Force of the master on the hand (N,) [N].
+            tip: Positions of the slave's tip (N,) [m].
+            reaction: Force of the world on the tip (N,) [N].
 
         Raises:
-            ParameterError: There is no whole period.
+            ParameterError: The measurements are shorter than one period.
         """
         if len(hand) < _TICKS:
             raise ParameterError("ticks", len(hand), f"{_TICKS} or more, a whole period")
@@ -110,20 +112,20 @@ def _stray(values: Complex) -> float:
     power = np.abs(values[1 : BINS[-1] + 1]) ** 2
     whole, lines = float(power.sum()), BINS - 1
     power[lines] = 0.0
-    # A nanonewton, or a nanometre, is rounding.
+    # Amplitudes below a nanonewton or a nanometre are rounding errors.
     return math.sqrt(float(power.sum()) / whole) if whole > 1e-18 else 0.0
 
 
 def hybrid_matrix(experiments: Sequence[Ports]) -> Complex:
     """Hybrid matrix (L, 2, 2) that fits the given experiments best.
 
-    It maps speed of the hand and force on the world to force of the hand and the negative speed of the tip.
+    The matrix maps (speed of the hand, force on the world) to (force of the hand, negative speed of the tip).
 
     Raises:
-        ParameterError: The experiments do not differ, such as with one world alone.
+        ParameterError: The experiments do not differ enough, for example because all have the same world.
 
     Source:
-        Hannaford 1989 for the matrix of teleoperators. Each row by least squares.
+        Hannaford 1989 for the matrix of teleoperators. Each row is fitted by least squares.
     """
     given = np.stack([np.stack((ports.hand_speed, ports.tip_force), axis=-1) for ports in experiments], axis=1)
     answers = np.stack([np.stack((ports.hand_force, -ports.tip_speed), axis=-1) for ports in experiments], axis=1)
@@ -140,7 +142,7 @@ def felt_impedance(hybrid: Complex, world: Complex) -> Complex:
 
     Args:
         hybrid: The matrix.
-        world: Impedance beyond it (L,) [N·s/m].
+        world: Impedance of the world (L,) [N·s/m].
 
     Source:
         Hashtrudi-Zaad and Salcudean 2001, transmitted impedance.
@@ -150,10 +152,9 @@ def felt_impedance(hybrid: Complex, world: Complex) -> Complex:
 
 
 def llewellyn(hybrid: Complex) -> Array:
-    """Llewellyn's number (L,) of hybrid matrices (L, 2, 2): absolutely stable from 1 on.
+    """Llewellyn's number (L,) of hybrid matrices (L, 2, 2); the two-port is absolutely stable if it is at least 1.
 
-    If one port alone is active, the number is smaller than without that port. The number is infinite if one direction
-    has no transmission.
+    An active port reduces the number. The number is infinite if nothing is transmitted in one direction.
 
     Source:
         Llewellyn 1952, in the form of Adams and Hannaford 1999 and Hashtrudi-Zaad and
@@ -170,10 +171,10 @@ def llewellyn(hybrid: Complex) -> Array:
 
 
 def bandwidth(gain: Complex) -> float:
-    """Frequency [Hz] at which a gain (L,) with the ideal value 1 first falls by 3 dB, interpolated between the lines.
+    """Lowest frequency [Hz] at which a gain (L,) is 3 dB below the ideal value 1, interpolated between the lines.
 
     Returns:
-        The frequency; 0 if the gain is too small at the first line, infinity if it is too small at no line.
+        The frequency; 0 if the gain is already lower at the first line, infinity if the gain is lower at no line.
     """
     size = np.abs(gain)
     low = np.flatnonzero(size < math.sqrt(0.5))
@@ -188,12 +189,12 @@ def bandwidth(gain: Complex) -> float:
 
 @dataclass(frozen=True)
 class Lag:
-    """An arm that follows its command with a first-order lag and yields to force, in ticks of 1 ms.
+    """Model of an arm, in ticks of 1 ms, that follows its command with a first-order lag and yields to force.
 
     Attributes:
         time: Time constant [s].
-        compliance: Displacement of the arm per force of the world [m/N].
-        late: Delay of a command, and of a force, in ticks.
+        compliance: Displacement of the arm divided by the force of the world [m/N].
+        late: Delay of commands and of forces, in ticks.
     """
 
     time: float
@@ -206,7 +207,7 @@ class Lag:
         return -math.expm1(-DT / self.time)
 
     def hybrid(self) -> Complex:
-        """Hybrid matrix (L, 2, 2) of position-force with this arm, exactly.
+        """Exact hybrid matrix (L, 2, 2) of position-force with this arm.
 
         Source:
             Lawrence 1993, position-force: the position is sent to the slave, and the force is sent back. The sampled
@@ -221,10 +222,10 @@ class Lag:
         return matrix
 
     def ports(self, stiffness: float) -> Ports:
-        """Both ports of our hand, device and mapping with this arm at a spring.
+        """Simulate our hand, device and mapping with this arm at a spring, and return both ports.
 
         Args:
-            stiffness: Stiffness of the spring [N/m], which also pulls; 0 for no spring.
+            stiffness: Stiffness of the spring [N/m]; 0 for no spring. The spring pushes and pulls.
         """
         chain = Mapped(_FIRM, {"coarse_gain": 1.0})
         begin = chain.step(np.zeros(3))[2]

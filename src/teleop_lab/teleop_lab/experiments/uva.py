@@ -1,7 +1,7 @@
 """UVA: times of a user study of fifteen people, predicted before its table was read.
 
-``uva_prediction.csv`` contains the prediction as it was first stored; ``docs/predicted_study.md`` describes when and
-how it was made.
+``uva_prediction.csv`` contains the original prediction. ``docs/predicted_study.md`` describes when and how the
+prediction was made.
 """
 
 import csv
@@ -16,10 +16,10 @@ from teleop_lab.experiments.experiment import Experiment
 from teleop_lab.experiments.look_and_move import CYCLE, difficulty, looks
 
 LATENCY = 0.033 + 0.050
-"""Latency of the station itself [s]: two frames at 60 Hz, and 50 ms for encoding and decoding the video (Nankaku et
+"""Latency of the operator's station [s]: two frames at 60 Hz, and 50 ms for encoding and decoding the video (Nankaku et
 al. 2022)."""
 TOTAL = 22.1
-"""Mean time of a transfer without faults [s], printed: the one number of the study that scales the prediction."""
+"""Printed mean time of a transfer without faults [s]. It is the only number of the study that the prediction uses."""
 
 
 class Primitive(NamedTuple):
@@ -27,7 +27,7 @@ class Primitive(NamedTuple):
 
     name: str
     way: float  # [m]
-    width: float  # within which it is done [m]
+    width: float  # width of the target [m]
 
 
 PRIMITIVES = (
@@ -41,17 +41,17 @@ PRIMITIVES = (
     Primitive("left reaches the goal", 0.055, 0.004),
     Primitive("left releases", 0.015, 0.002),
 )
-"""Distances follow from the geometry of the board. Widths are assumed: 2 mm for fingers on a block, 2 to 4 mm for a
-peg in its hole, 6 mm to be clear of a peg, 10 mm to be out of the other arm's path."""
+"""Primitives of a transfer. Distances follow from the geometry of the board. Widths are assumed: 2 mm for fingers on a
+block, 2 to 4 mm for a peg in its hole, 6 mm to be clear of a peg, 10 mm to be out of the other arm's path."""
 
 
 class Level(NamedTuple):
-    """A level of the study: the faults of its network."""
+    """A level of the study, which is defined by the faults of the network."""
 
     name: str
     delay: float = 0.0  # mean [s]
-    loss: float = 0.0  # share of the increments
-    outage: float = 0.0  # mean length [s]
+    loss: float = 0.0  # share of the increments that is lost
+    outage: float = 0.0  # mean duration of an outage [s]
     pause: float = 0.0  # time between two outages [s]
 
 
@@ -72,8 +72,8 @@ LEVELS = (
 def _unscaled_time(primitive: Primitive, level: Level) -> float:
     """Time of a primitive at a level [s], before the common scale factor is applied.
 
-    Each look takes a cycle, the station's latency and the delay. Lost motion must be repeated. An outage costs its
-    length and the cycle that it interrupts.
+    The time of a look is the sum of a cycle, the station's latency and the delay. Lost motion must be repeated. An
+    outage costs its duration and the time of the look that it interrupts.
     """
     count, _ = looks(primitive.way, primitive.width, 1.0 - level.loss)
     time = count * (CYCLE + LATENCY + level.delay)
@@ -89,10 +89,10 @@ def _mackenzie(primitive: Primitive, level: Level) -> float:
 
 
 def predict() -> dict[str, dict[str, dict[str, float]]]:
-    """Times [s] by model, level and primitive; each model takes :data:`TOTAL` without faults.
+    """Times [s] by model, level and primitive; without faults the total of each model is :data:`TOTAL`.
 
-    ``looks`` is the prediction; ``constant`` slows every primitive of every level by the same factor, the mean of the
-    printed totals; ``mackenzie`` is the law for pointing, which considers only delays.
+    ``looks`` is the prediction. ``constant`` multiplies every time by one factor: the mean of the printed totals,
+    divided by the printed total without faults. ``mackenzie`` is the law for pointing, which considers only delays.
     """
     slower = sum((22.1, 24.4, 26.6, 36.2, 27.1, 34.1, 47.9, 28.9, 47.4, 64.3)) / 10.0 / TOTAL
     normal = LEVELS[0]
@@ -117,7 +117,7 @@ _FOLDER = files("teleop_lab.experiments")
 
 
 def registered() -> dict[str, Table]:
-    """The prediction as it was written down, by model."""
+    """The stored original prediction, by model."""
     found: dict[str, Table] = {}
     for row in _lines("uva_prediction.csv"):
         levels = found.setdefault(row["model"], {})
@@ -126,13 +126,13 @@ def registered() -> dict[str, Table]:
 
 
 def published() -> tuple[Table, Table]:
-    """Means of the persons as printed [s], and half of their 95 % intervals."""
+    """Printed means over the persons [s], and half widths of the 95 % intervals."""
     means: Table = {}
     halves: Table = {}
     for row in _lines("uva_published.csv"):
         means.setdefault(row["level"], {})[row["primitive"]] = float(row["mean"])
         half = _T95 * float(row["deviation"]) / math.sqrt(PERSONS)
-        # Printed to 0.1 s: smaller differences count as agreement.
+        # The times are printed to 0.1 s, so smaller differences count as agreement.
         halves.setdefault(row["level"], {})[row["primitive"]] = half + 0.05
     return means, halves
 
@@ -142,7 +142,7 @@ def _lines(name: str) -> list[dict[str, str]]:
 
 
 def from_normal(table: Table) -> Table:
-    """Times with the predicted slowing of each level, from the printed times without faults."""
+    """Printed times without faults, multiplied by the predicted slowing of each level."""
     means, _ = published()
     begin = LEVELS[0].name
     return {
@@ -152,7 +152,7 @@ def from_normal(table: Table) -> Table:
 
 
 def inside(table: Table, levels: Iterable[Level] = LEVELS) -> int:
-    """Number of times of a table that lie within people's intervals."""
+    """Number of times of a table that lie within the 95 % intervals of the persons."""
     means, halves = published()
     return sum(
         abs(table[level.name][p.name] - means[level.name][p.name]) <= halves[level.name][p.name]

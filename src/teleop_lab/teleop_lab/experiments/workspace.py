@@ -1,4 +1,4 @@
-"""Workspace: reach, and where the tip can be (figure 4.1)."""
+"""Workspace: reach of the arm, and positions that the tip can reach (figure 4.1)."""
 
 import numpy as np
 
@@ -38,7 +38,7 @@ _NOTES = (
 
 
 def _samples(robot: Robot, seed: int) -> Array:
-    """Places of the tip (N, 3) [mm] for joints drawn evenly within their ranges."""
+    """Positions of the tip (N, 3) [mm] for joints that are uniformly distributed in their ranges."""
     joints = np.random.default_rng(seed).uniform(robot.lower, robot.upper, (_SAMPLES, robot.n))
     return 1e3 * robot.fk(joints)[:, :3, 3]
 
@@ -51,7 +51,7 @@ def _in_space(places: Array) -> Figure:
 
 
 def _sections(places: Array, robot: Robot) -> Figure:
-    """Cuts through the shoulder, upright and level, with the edge of the wrist's range."""
+    """Vertical and horizontal section through the shoulder, with the boundary of the wrist's range."""
     angles = np.linspace(robot.lower[1], robot.upper[1], 60)
     turns = np.linspace(robot.lower[0], robot.upper[0], 60)
     far = 1e3 * float(robot.upper[2])

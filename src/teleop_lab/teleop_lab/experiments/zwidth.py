@@ -1,4 +1,4 @@
-"""Z-width: how stiff a fixture our device renders, by three laws and through our own stage."""
+"""Z-width: the largest stiffness of a fixture that our device renders, by three laws and through our own stage."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -15,16 +15,15 @@ from teleop_lab.experiments.bench import Bench
 from teleop_lab.experiments.comparison import Comparison, Findings, absolute, percent
 
 BARE = one_axis.Grip(0.045, 1.0, 2.0)
-"""Mass of our device in a hand that holds it as loosely as the parameters allow, and its viscous friction; the
-friction is assumed."""
+"""Grip of the loosest hand that the parameters allow, with the mass and an assumed viscous friction of our device."""
 LATE = (0, 1, 2, 3, 5, 10)
-"""Periods of 1 ms by which the wall's force comes later."""
+"""Delays of the wall's force, as numbers of periods of 1 ms."""
 WALL_DAMPINGS = (0.0, 5.0)
 """Dampings of the walls [N·s/m]; assumed."""
 DAMPINGS = ((2.0, 0.0), (5.0, 2.0), (5.0, 5.0))
-"""Viscous frictions of the device and dampings of the wall for which the energy is computed [N·s/m]."""
+"""Pairs of the device's viscous friction and the wall's damping [N·s/m] for which the energy is computed."""
 PRESSES = (1, 2, 5, 20, 50)
-"""Lengths of the presses, in periods in and as many out."""
+"""Lengths of the presses, as the number of periods in each direction."""
 SPEEDS = (0.005, 0.1)
 """Speeds of the presses [m/s]."""
 _OWN = DeviceParameters()
@@ -33,15 +32,15 @@ DEVICES = (
     (0.5 * _OWN.friction, _OWN.position_resolution),
     (_OWN.friction, 0.5 * _OWN.position_resolution),
 )
-"""Dry frictions [N] and reading steps [m]: the values of our device, and half of them."""
+"""Pairs of dry friction [N] and encoder step [m] that are tried, made of our device's values and half of them."""
 _WITHIN, _EXACT = percent(10.0), percent(2.0)
-_NONE = absolute(10.0)  # N/m; if a law allows no stiffness, a relative difference is undefined
+_NONE = absolute(10.0)  # [N/m]; used if a law allows no stiffness, because a relative difference is then undefined
 _CASES = tuple((b, late) for b in WALL_DAMPINGS for late in LATE)
 _COLORS = (FIRST, SECOND)
 Boundaries = Mapping[tuple[float, int], float]
-"""Stiffness [N/m] by damping of the wall and periods of delay."""
+"""Stiffness [N/m] by the wall's damping and the delay in periods."""
 Bounds = Mapping[tuple[float, float, int], float]
-"""Stiffness [N/m] by damping of device and wall, and length of the press."""
+"""Stiffness [N/m] by the device's damping, the wall's damping and the length of the press."""
 
 
 def linear_law(damping: float, wall_damping: float, delay: float) -> float:
@@ -50,7 +49,7 @@ def linear_law(damping: float, wall_damping: float, delay: float) -> float:
     Args:
         damping: Viscous friction of the device [N·s/m].
         wall_damping: Damping of the wall [N·s/m].
-        delay: Delay of the force, in addition to half a period for its hold [s].
+        delay: Delay of the force [s], without the half period of the hold.
 
     Source:
         Gil et al. 2009, K < (b + B) / (T / 2 + td).
@@ -59,7 +58,7 @@ def linear_law(damping: float, wall_damping: float, delay: float) -> float:
 
 
 def passive_law(damping: float, wall_damping: float) -> float:
-    """Stiffness [N/m] up to which a wall is passive, whatever the hand does.
+    """Stiffness [N/m] up to which a wall is passive for any motion of the hand.
 
     Source:
         Colgate and Schenkel 1997, b > K T / 2 + |B|.
@@ -68,22 +67,22 @@ def passive_law(damping: float, wall_damping: float) -> float:
 
 
 def press_law(damping: float, wall_damping: float, length: int) -> float:
-    """Stiffness [N/m] above which a press gives energy if the hand moves in and out at the same speed.
+    """Stiffness [N/m] above which the hand gains energy in a press, if it moves in and out at the same speed.
 
     In each period, in units of the squared speed, the spring gives K T / 2, the device takes b and the damper takes B.
-    But in the period after each of the two reversals the damper gives B. The shortest
-    press, a period in and one out, is :func:`passive_law`; the longest is :func:`linear_law`.
+    But in the period after each of the two reversals the damper gives B. The shortest press (one period in each
+    direction) leads to :func:`passive_law`, the longest to :func:`linear_law`.
 
     Args:
         damping: Viscous friction of the device [N·s/m].
         wall_damping: Damping of the wall [N·s/m].
-        length: Periods in, and as many out.
+        length: Number of periods of the motion into the wall, equal to that of the motion out of the wall.
     """
     return (damping + wall_damping * (1.0 - 2.0 / length)) / (0.5 * DT)
 
 
 def quiet_law(friction: float, resolution: float) -> float:
-    """Stiffness [N/m] up to which dry friction [N] holds the device between steps [m].
+    """Stiffness [N/m] up to which dry friction [N] keeps the device at rest between two encoder steps [m].
 
     Source:
         Abbott and Okamura 2005, K <= 2 f / Delta; Diolaiti et al. 2006.
@@ -92,7 +91,7 @@ def quiet_law(friction: float, resolution: float) -> float:
 
 
 def _stability(found: Boundaries) -> list[Comparison]:
-    """Rows of the linear law for every damping, then of the exact axis."""
+    """Rows that compare our device with the linear law for every damping, then with the exact one-axis solution."""
     laws, exact = [], []
     for (wall_damping, late), predicted in found.items():
         axis_ = one_axis.sampled_boundary(BARE, late, wall_damping)
@@ -132,7 +131,7 @@ def _energy(found: Bounds) -> list[Comparison]:
 
 
 def _divergence() -> Comparison:
-    grip = stability.GRIPS["loose"]  # b of 5 N·s/m and 0.25 kg
+    grip = stability.GRIPS["loose"]  # the grip has a damping of 5 N·s/m and a mass of 0.25 kg
     return Comparison(
         quantity="b = B = 5 N·s/m, 0.25 kg",
         unit="N/m",

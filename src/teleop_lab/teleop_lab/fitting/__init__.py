@@ -1,6 +1,6 @@
 """Fitting: numbers of a plant from measurements on the machine.
 
-:func:`fit_plant` does what ``teleop fit`` does::
+:func:`fit_plant` is the function behind ``teleop fit``::
 
     import teleop_core as tc
 
@@ -42,12 +42,12 @@ def fit_plant(
     """Fit the plant ``hardware`` of a robot to the rest positions of its joints.
 
     Args:
-        table: CSV as :func:`read_rests` takes it; None for the published one of the RCRT-1.
+        table: CSV file for :func:`read_rests`; None for the published table of the RCRT-1.
         robot: Robot of the table's joints.
         free: Names of the fitted numbers, as in :func:`fit`; None for those that the table determines.
-        files: Parameter files of the slave; without any, the controller is the source's PID.
-        texts: Parameters of the slave over them, ``key=value``.
-        loss: One of :data:`LOSSES`: how much the weight of outliers is reduced.
+        files: Parameter files of the slave; without a file, the controller is the source's PID.
+        texts: Parameters of the slave as ``key=value``; they override the files.
+        loss: One of :data:`LOSSES`; it determines how much the weight of outliers is reduced.
         progress: Called with the completed share, 0 to 1.
 
     Raises:

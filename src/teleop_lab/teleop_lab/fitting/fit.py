@@ -1,8 +1,8 @@
-"""Fit: the faults of a real arm from its rest positions, by simulating the same moves.
+"""Fit: finds the faults of a real arm from its rest positions, by simulation of the same moves.
 
-Free parameters are the dry friction of joints, the bias of amplifiers, and weights that no source states. Under a
-controller without integral action, the rest error of a joint is their effort over Kp. So the fitted numbers are valid
-only for the gains of the fit.
+Free parameters are the dry friction of joints, the bias of amplifiers, and weights that no source states. With a
+controller without integral action, the rest error of a joint is the effort of these faults divided by Kp. So the fitted
+numbers are valid only for the gains of the fit.
 """
 
 from collections.abc import Callable, Sequence
@@ -23,14 +23,15 @@ from teleop_lab.fitting.fit_result import FitResult, Fitted
 from teleop_lab.fitting.rest_table import RestTable
 from teleop_lab.fitting.rests import rest_positions
 
-_WEAK = 0.1  # singular value over the largest below which a direction is not identifiable
+_WEAK = 0.1  # share of the largest singular value below which a direction is not identifiable
 _STEP = 0.01  # step of finite differences, in units of the start value
 _SHARE = 0.95  # confidence level of intervals
 _ROUNDS = 60
 _UNITS = {"coulomb": "N·m or N", "bias": "N·m or N", "weight": "kg·m"}
-_WANDER = 0.3  # relative variation of friction with which its effect is measured
-# Simulated runs divided by runs of the table. The position at which a joint sticks is practically random, so a change
-# of the last bit changes the spread of ten runs by a tenth, and that of forty runs by a thirtieth.
+_WANDER = 0.3  # relative variation of friction that is simulated to measure its effect
+# Number of simulated runs, divided by the number of runs in the table. The position at which a joint sticks is
+# practically random. A change of the last bit changes the spread of ten runs by 1/10, and the spread of forty runs by
+# 1/30.
 _TIMES = 4
 
 
@@ -40,7 +41,7 @@ LOSSES: dict[str, Callable[[Array], Array]] = {
     "soft_l1": lambda r: 1.0 / np.sqrt(1.0 + r**2),
     "linear": np.ones_like,
 }
-"""Losses by the names of scipy, each with the weight that it gives to a residual."""
+"""Losses by their names in scipy; each function returns the weight of a residual."""
 
 
 class FitError(TeleopError):
@@ -48,7 +49,7 @@ class FitError(TeleopError):
 
 
 class _Problem:
-    """Rest positions of a robot as a function of scaled numbers; 1 corresponds to the errors in the table."""
+    """Rest positions of a robot as a function of scaled numbers; the scale follows from the errors in the table."""
 
     def __init__(self, robot: Robot, parameters: pair.ArmParameters, table: RestTable, free: Sequence[str]) -> None:
         self.robot, self.parameters, self.table, self.free = robot, parameters, table, tuple(free)
@@ -78,7 +79,7 @@ class _Problem:
         return float(effort[axis] / lever[axis])
 
     def faults(self, x: Array, wander: Array | None = None) -> hardware.Hardware:
-        """The arm's faults, with the scaled numbers ``x`` inserted."""
+        """Return the arm's faults with the values of the scaled numbers ``x``."""
         base, model = faults_of(self.robot), self.robot.dynamics
         assert model is not None
         coulomb, bias = base.coulomb.copy(), np.zeros(self.robot.n)
@@ -94,7 +95,7 @@ class _Problem:
         return replace(base, coulomb=coulomb, bias=bias, wander=still, dynamics=row)
 
     def rests(self, x: Array, runs: int = 1, wander: Array | None = None) -> Array:
-        """Simulated rest position minus target: (k, runs, n); without varying friction it is smooth in ``x``."""
+        """Simulated rest positions minus targets (k, runs, n); they are smooth in ``x`` if friction does not vary."""
         faults, table = self.faults(x, wander), self.table
         inside = np.clip(table.targets, self.robot.lower, self.robot.upper)
         is_smooth = wander is None
@@ -102,7 +103,7 @@ class _Problem:
         return rests - inside[:, None]
 
     def residuals(self, x: Array) -> Array:
-        """Simulated minus measured rest positions in standard deviations of the runs, flattened."""
+        """Simulated minus measured rest positions, divided by the standard deviation of the runs, as a vector."""
         predicted, measured = self.rests(x)[:, 0], self.table.mean
         predicted = np.where(self.one_sided, np.abs(predicted), predicted)
         measured = np.where(self.one_sided, np.abs(measured), measured)
@@ -119,16 +120,17 @@ class _Problem:
 
 
 def one_sided(robot: Robot, table: RestTable) -> NDArray[np.bool_]:
-    """Axes (n,) that every move of a table, from home, approaches from the same side."""
+    """Axes (n,) whose targets are all approached from the same side, in moves from home."""
     way = np.sign(table.targets - robot.home)
     return np.asarray(np.abs(way.sum(axis=0)) == len(way))
 
 
 def default_free(robot: Robot, table: RestTable) -> tuple[str, ...]:
-    """Names for :func:`fit` of the numbers that a table determines for a robot.
+    """Names of the numbers that a table determines for a robot, for :func:`fit`.
 
-    These are the dry friction of every axis without an integrator for gravity, and weights that no source states. The
-    bias is included for those of these axes that are approached from both sides and not loaded by gravity.
+    These numbers are the dry friction of every axis without an integrator for gravity, and weights that no source
+    states. The bias of such an axis is included if its targets are approached from both sides and gravity does not load
+    it.
     """
     from teleop_core.slave.controllers.source_pid import loaded_axes
 
@@ -158,23 +160,21 @@ def fit(
 ) -> FitResult:
     """Fit numbers of the plant ``hardware`` to the rest positions of a machine.
 
-    Residuals count in standard deviations of the runs; Cauchy's loss gives little weight to points that the model
-    cannot explain.
-    Intervals are those of M-estimates. The variation of friction is computed afterwards, from the spread of the runs.
+    Residuals are divided by the standard deviation of the runs. Cauchy's loss reduces the weight of points that the
+    model cannot explain. The confidence intervals are those of M-estimates. The variation of friction is computed
+    afterwards, from the spread of the runs.
 
     Args:
-        table: Measured rests.
+        table: Measured rest positions.
         parameters: The slave, its controller and gains; its plant must be ``hardware``.
-        free: ``coulomb.<joint>``, ``bias.<joint>``, ``weight.<name>``; None for
-            :func:`default_free`.
+        free: ``coulomb.<joint>``, ``bias.<joint>``, ``weight.<name>``; None for :func:`default_free`.
         progress: Called with the completed share.
         loss: One of :data:`LOSSES`.
 
     Raises:
-        ParameterError: Another plant.
-        UnknownNameError: No such loss.
-        UnknownNameError: ``free`` names what cannot be fitted.
-        FitError: The fit does not converge, or parameters cannot be distinguished; the text names them.
+        ParameterError: The plant of the slave is not ``hardware``.
+        UnknownNameError: ``loss`` is unknown, or ``free`` contains a number that cannot be fitted.
+        FitError: The fit does not converge, or parameters cannot be distinguished; the message names them.
     """
     robot = load_robot_set(parameters.robot, parameters.geometry)
     if parameters.plant.kind.kind != "hardware":
@@ -217,7 +217,7 @@ def _insist_on_known(names: Sequence[str], robot: Robot) -> None:
 
 
 def _insist_on_identifiable(names: Sequence[str], slopes: Array) -> None:
-    """Refuse parameters that the table does not determine, or cannot separate from others."""
+    """Raise an error for parameters that the table does not determine or cannot distinguish from others."""
     sizes = np.linalg.norm(slopes, axis=0)
     unseen = [name for name, size in zip(names, sizes, strict=True) if size < _WEAK * sizes.max()]
     if unseen or not sizes.any():

@@ -29,16 +29,16 @@ class FitResult:
 
     Attributes:
         robot: Name of the robot.
-        joint_names: Its joints.
+        joint_names: Names of the robot's joints.
         table: Name of the table.
         numbers: Fitted numbers in their order.
         measured: Mean of rest position minus target in the table (k, n) [rad or m].
-        predicted: The same, simulated with the fitted numbers.
-        measured_spread: Standard deviation (n,) of the runs [rad or m].
-        predicted_spread: The same, simulated.
-        encoder_step: Smallest difference (n,) that is measured [rad or m].
-        one_sided: Axes (n,) that all moves approach from one side. For these axes the distance to the target is
-            fitted, not its sign, because friction and bias cannot be distinguished there.
+        predicted: Mean of rest position minus target (k, n), simulated with the fitted numbers [rad or m].
+        measured_spread: Standard deviation (n,) of the runs in the table [rad or m].
+        predicted_spread: Standard deviation (n,) of the simulated runs [rad or m].
+        encoder_step: Smallest difference (n,) that the encoders measure [rad or m].
+        one_sided: Axes (n,) whose targets are all approached from one side. For these axes only the distance to the
+            target is fitted, not the sign, because friction and bias cannot be distinguished.
     """
 
     robot: str
@@ -56,7 +56,7 @@ class FitResult:
         """Return a fitted number by its name.
 
         Raises:
-            UnknownNameError: The number was not fitted; the text lists the fitted ones.
+            UnknownNameError: The number was not fitted; the message lists the fitted numbers.
         """
         found = {number.name: number.value for number in self.numbers}
         if name not in found:
@@ -64,7 +64,7 @@ class FitResult:
         return found[name]
 
     def __str__(self) -> str:
-        """Numbers with their intervals, and measured beside simulated rest positions of the joints."""
+        """Table of the numbers with their intervals, and table of measured and simulated rest positions."""
         width = max(len(number.name) for number in self.numbers)
         lines = [f"{self.robot} from {self.table}, 95 % intervals", ""]
         for n in self.numbers:
@@ -88,7 +88,7 @@ class FitResult:
         return "\n".join(lines)
 
     def to_json(self) -> dict[str, object]:
-        """The whole result as plain values; numbers are exact, in SI units."""
+        """The whole result as plain values in SI units; numbers are not rounded."""
         return {
             "robot": self.robot,
             "table": self.table,
@@ -102,7 +102,7 @@ class FitResult:
         }
 
     def parameter_file(self) -> str:
-        """ROS 2 parameter file: the plant ``hardware`` with fitted numbers over the robot's."""
+        """ROS 2 parameter file of the plant ``hardware``, in which the fitted numbers replace those of the robot."""
         values = {number.name: float(f"{number.value:.4g}") for number in self.numbers}
         own = faults_of(load_robot(self.robot))
         given: dict[str, object] = {

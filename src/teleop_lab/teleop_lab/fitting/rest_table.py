@@ -1,4 +1,4 @@
-"""Table: joints at rest after moves to targets, as measured on a machine."""
+"""Table: measured joint positions of a machine that rests after moves to targets."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,17 +11,17 @@ from teleop_core.kernels.geometry import Array
 from teleop_core.robots.robot import Robot
 
 PUBLISHED = Path(__file__).with_name("rcrt1_precision.csv")
-"""Ten runs to each of six points (Vongbunyong 2008, tables 7.1-7.6, misprints corrected)."""
+"""File with ten runs to each of six points (Vongbunyong 2008, tables 7.1-7.6, misprints corrected)."""
 
 
 @dataclass(frozen=True, eq=False)
 class RestTable:
-    """Targets and rests of a precision test.
+    """Targets and rest positions of a precision test.
 
     Attributes:
         name: Origin of the table.
         targets: Joint targets (k, n) [rad or m].
-        rests: Joints at rest of every run, one array (runs, n) per target [rad or m].
+        rests: Rest positions of every run, one array (runs, n) for each target [rad or m].
     """
 
     name: str
@@ -50,7 +50,8 @@ def read_rests(file: Path, robot: Robot) -> RestTable:
         robot: Robot of the table's joints.
 
     Raises:
-        TeleopError: It cannot be read, columns or numbers are missing, or a point has one run alone or several targets.
+        TeleopError: The file cannot be read, columns or numbers are missing, or a point has only one run or several
+            targets.
     """
     with damage_told(file):
         table = pd.read_csv(file)

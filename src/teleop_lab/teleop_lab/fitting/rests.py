@@ -19,7 +19,7 @@ _FINE = 1e-4  # step of smooth encoders, divided by the real encoder step
 
 @kernel
 def _drive(steps: Any, server: Any, simulated: Any, row: SlaveRow, way: Array, begin_ns: int, dt: float) -> None:
-    """Command a joint path (N, n), one joint vector per tick, from the tick after ``begin_ns`` on."""
+    """Command a joint path (N, n), one joint vector per tick; the first tick is the one after ``begin_ns``."""
     for k in range(way.shape[0]):
         row.now_ns = begin_ns + (k + 1) * TICK_NS
         row.slave_servo_jp_ns = row.now_ns
@@ -33,9 +33,9 @@ class Mover:
 
     Args:
         parameters: Parameters of the slave, which always starts at home.
-        faults: Errors of the arm that replace its known ones; None for the known ones.
-        speed: Share of the speed limits that the moves use.
-        settle: Time at rest after each move [s]; where joints stick, the rests do not depend on it.
+        faults: Faults of the arm that replace its known faults; None for the known faults.
+        speed: Speed of the moves as a share of the speed limits.
+        settle: Time at rest after each move [s]. If joints stick, the rest positions do not depend on this time.
         is_smooth: Whether encoders and drives have no steps, because a fit needs derivatives.
     """
 
@@ -65,7 +65,7 @@ class Mover:
         self._limit = self.slave.robot.drives.speed_limit * speed
 
     def move(self, target: Array) -> Array:
-        """Joints (n,) that the encoders show when the slave has come to rest at a target (n,).
+        """Move to a target (n,); returns the joints (n,) that the encoders measure at rest.
 
         A target outside the joint limits is replaced by the nearest joints within them.
         """
@@ -88,7 +88,7 @@ class Mover:
 def rest_positions(
     parameters: ArmParameters, targets: Array, runs: int, faults: Hardware | None = None, *, is_smooth: bool = False
 ) -> Array:
-    """Joints at rest (k, runs, n) [rad or m] of ``runs`` moves from home to each target (k, n).
+    """Rest positions (k, runs, n) [rad or m] after ``runs`` moves from home to each target (k, n).
 
     The slave goes home after each move, as in Vongbunyong 2008, section 7.3.
 
@@ -96,7 +96,7 @@ def rest_positions(
         parameters: Parameters of the slave.
         targets: Joint targets; values outside the limits are set to the limits.
         runs: Number of moves to each target.
-        faults: Errors of the arm that replace its known ones.
+        faults: Faults of the arm that replace its known faults.
         is_smooth: Whether encoders and drives have no steps.
     """
     mover = Mover(parameters, faults, is_smooth=is_smooth)

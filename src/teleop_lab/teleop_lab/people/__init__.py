@@ -1,4 +1,4 @@
-"""People: studies with people in the console, and their scores beside the simulated operator's."""
+"""People: studies with people at the console; their scores are compared with the simulated operator's."""
 
 from teleop_lab.people.compare import people_dataset
 from teleop_lab.people.journal import Journal

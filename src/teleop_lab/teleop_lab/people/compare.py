@@ -1,4 +1,4 @@
-"""Compare: scores of people as a data set like that of a study, and beside those of the simulated operator."""
+"""Compare: scores of people as a data set like a study's, and a comparison with the simulated operator."""
 
 from html import escape
 from typing import TYPE_CHECKING, Any
@@ -24,10 +24,10 @@ _ABOUT = (
 
 
 def people_dataset(plan: Plan, journal: Journal) -> "xarray.Dataset":
-    """Scores of people, in the form of :meth:`Study.run`, with a dimension ``participant`` in place of the seed.
+    """Scores of people in the form of :meth:`Study.run`, with the dimension ``participant`` instead of the seed.
 
-    A value is the mean over the valid trials without practice; NaN if there is none. Questions are variables too, 0 to
-    100, and so is ``trials``, the number of trials that were done.
+    A value is the mean over the valid trials without practice trials; NaN if there is no such trial. Each question is a
+    variable with values from 0 to 100. The variable ``trials`` is the number of trials that were done.
     """
     import xarray
 
@@ -61,7 +61,7 @@ def _mean(values: list[float | None]) -> float:
 def compared(
     plan: Plan, people: "xarray.Dataset", simulated: "xarray.Dataset", metric: str
 ) -> list[tuple[str, Mean, Mean, Mean]]:
-    """For each condition: its name, medians of people and of the simulated operator, and their difference."""
+    """Return for each condition: name, median of people, median of the simulated operator, and difference."""
     found = []
     pairs = zip(conditions(plan.study, people), conditions(plan.study, simulated), strict=True)
     for (values, theirs), (_, its) in pairs:
@@ -72,7 +72,7 @@ def compared(
 
 
 def comparison_table(plan: Plan, people: "xarray.Dataset", simulated: "xarray.Dataset") -> str:
-    """People beside the simulated operator, as text."""
+    """Table that compares people with the simulated operator, as text."""
     rows = []
     for metric in plan.study.metrics:
         rows += [[metric, row[0], *map(str, row[1:])] for row in compared(plan, people, simulated, metric)]
@@ -81,7 +81,7 @@ def comparison_table(plan: Plan, people: "xarray.Dataset", simulated: "xarray.Da
 
 
 def comparison_page(plan: Plan, people: "xarray.Dataset", simulated: "xarray.Dataset") -> str:
-    """HTML page of the same, with plots, changes pair by pair, and answers; it works offline."""
+    """HTML page of this comparison, with plots, paired differences and answers; it works offline."""
     parts = []
     both = {"people": (people, FIRST), "simulated operator": (simulated, SECOND)}
     for metric in plan.study.metrics:

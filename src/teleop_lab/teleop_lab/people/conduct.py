@@ -1,4 +1,4 @@
-"""Conduct: a study with people, trial after trial, behind the console's page."""
+"""Conduct: runs a study with people, trial after trial, while the console's page shows it."""
 
 from functools import partial
 from pathlib import Path
@@ -16,10 +16,10 @@ IF_STOPPED = "The arm is stopped. Call the person who conducts the study."
 
 
 def serve(plan: Plan, journal: Journal, port: int, host: str, token: str) -> tuple[ConsoleServer, PeoplePage]:
-    """Server of the pages of a study, and its pages.
+    """Start the server of a study's pages; returns the server and the pages.
 
     Raises:
-        TeleopError: As in :class:`~teleop_console.server.ConsoleServer`.
+        TeleopError: The reasons of :class:`~teleop_console.server.ConsoleServer`.
     """
     server = ConsoleServer(port, host, token, form=partial(PeoplePage, plan=plan, journal=journal))
     page = server.answers.form
@@ -28,7 +28,7 @@ def serve(plan: Plan, journal: Journal, port: int, host: str, token: str) -> tup
 
 
 def conduct(server: ConsoleServer, page: PeoplePage, plan: Plan, journal: Journal) -> None:
-    """Run trials when they are begun, until Ctrl-C; each is recorded and scored like any session."""
+    """Run each trial that a page begins, until Ctrl-C; a trial is recorded and scored like any session."""
     score_all(plan, journal)
     while True:
         server.answers.situation = Situation(can_stop=False, chooses=True)
@@ -46,7 +46,7 @@ def conduct(server: ConsoleServer, page: PeoplePage, plan: Plan, journal: Journa
 
 
 def score_all(plan: Plan, journal: Journal) -> None:
-    """Score the trials that were done and have no scores yet."""
+    """Score all finished trials that have no scores yet."""
     for code in plan.codes:
         for trial in plan.trials(code):
             event = journal.event(code, trial.number)
@@ -56,7 +56,7 @@ def score_all(plan: Plan, journal: Journal) -> None:
 
 
 def scores_of(plan: Plan, bag: Path) -> tuple[dict[str, float | None], str]:
-    """Scores of one recording that the study compares, and its verdict; without scores, the reason for that."""
+    """Return the compared scores of a recording, and its verdict; without scores, the text is the reason."""
     try:
         score = open_recording(bag).score()
         return {metric: score.value(metric) for metric in plan.study.metrics}, score.verdict.text

@@ -1,4 +1,4 @@
-"""Journal: what the participants of a study have done so far, on disk after each step."""
+"""Journal: finished steps of a study's participants; each step is written to disk immediately."""
 
 import hashlib
 import json
@@ -14,22 +14,22 @@ from teleop_lab.studies.store import write_whole
 
 FORMAT = 1
 DONE, SKIPPED, AGAIN, FAILED = "done", "skipped", "again", "failed"
-"""State of a trial: ``again`` must be done once more, ``failed`` waits for the conductor."""
+"""State of a trial. A trial in ``again`` must be repeated; a trial in ``failed`` waits for the conductor's decision."""
 _ABOUT, _FILE = "people.json", "journal.json"
 
 
 class Journal:
-    """Finished trials by participant; each change is on disk when its method returns.
+    """Finished trials by participant. Each method that changes the journal writes the change to disk before it returns.
 
     Args:
         folder: Folder of the journal, created if missing; it contains a folder of recordings for each participant.
         plan: Plan of the study.
 
     Attributes:
-        now: Code of the participant who is taking part.
+        now: Code of the present participant.
 
     Raises:
-        SessionError: The folder contains something else, or the journal of another plan or a newer version.
+        SessionError: The folder contains other files, or the journal of another plan or of a newer version.
     """
 
     def __init__(self, folder: Path, plan: Plan) -> None:
@@ -78,40 +78,40 @@ class Journal:
             raise SessionError(f"{file} cannot be written: {error.strerror}; earlier answers are kept") from error
 
     def choose(self, code: str) -> None:
-        """Let a participant take part now."""
+        """Make a participant the present one."""
         self.now = code
         self._save(self.folder / _ABOUT, self._about | {"now": code})
 
     def agree(self, code: str) -> None:
-        """Note that a participant agrees to the consent text, and when."""
+        """Record that a participant agrees to the consent text, with the time."""
         self._own[code]["consent"] = time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime())
         self._write(code)
 
     def note(self, code: str, trial: int, state: str, **facts: object) -> None:
-        """Note the new state of a trial.
+        """Record the new state of a trial.
 
         Args:
             code: Code of the participant.
-            trial: Its number.
+            trial: Number of the trial.
             state: One of :data:`DONE`, :data:`SKIPPED`, :data:`AGAIN` and :data:`FAILED`.
-            facts: Such as ``bag``, ``scores``, ``verdict`` and ``reason``.
+            facts: Further entries, such as ``bag``, ``scores``, ``verdict`` and ``reason``.
         """
         self._own[code]["events"].append({"trial": trial, "state": state, **facts})
         self._write(code)
 
     def score(self, code: str, trial: int, scores: Mapping[str, float | None], verdict: str) -> None:
-        """Note the scores of the last run of a trial."""
+        """Record the scores of the last run of a trial."""
         done = [one for one in self._own[code]["events"] if one["trial"] == trial and one["state"] == DONE]
         done[-1] |= {"scores": dict(scores), "verdict": verdict}
         self._write(code)
 
     def answer(self, code: str, trial: int, answers: Mapping[str, float]) -> None:
-        """Keep the answers to the questions after a trial."""
+        """Record the answers to the questions after a trial."""
         self._own[code]["answers"][str(trial)] = dict(answers)
         self._write(code)
 
     def event(self, code: str, trial: int) -> Mapping[str, Any]:
-        """Newest event of a trial; empty without one."""
+        """Newest event of a trial; empty if the trial has no event."""
         events = [event for event in self._own[code]["events"] if event["trial"] == trial]
         return events[-1] if events else {}
 
@@ -121,7 +121,7 @@ class Journal:
         return found
 
     def place(self, code: str, trial: int) -> Path:
-        """Path for the recording of a trial that begins now: a directory that does not exist yet."""
+        """Path for the recording of a trial that begins now; the directory does not exist yet."""
         name, tries = f"trial_{trial:02d}", 1
         while (path := self.folder / code / (name if tries == 1 else f"{name}_{tries}")).exists():
             tries += 1
@@ -141,13 +141,13 @@ class Journal:
         return "thanks", None
 
     def _was_done(self, code: str, trial: Trial, trials: Sequence[Trial]) -> bool:
-        """Whether any of the trials was done that the questions after a trial are about."""
+        """Whether any of the trials to which the questions after a trial refer was done."""
         about = [one.number for one in trials[: trial.number] if one.condition == trial.condition]
         about = [trial.number] if self._plan.people.ask == "trial" else about
         return any(self.event(code, number).get("state") == DONE for number in about)
 
     def rows(self) -> list[dict[str, object]]:
-        """A row for each trial that has a state: its place, state, scores, and the answers after it."""
+        """Return a row for each trial with a state: participant, number, state, scores and answers."""
         found = []
         for code in self._plan.codes:
             for trial in self._plan.trials(code):

@@ -1,4 +1,4 @@
-"""Pages: one for the participant of a study, one for its conductor, and all requests that they may send."""
+"""Pages: the participant's page and the conductor's page of a study, and all requests of both pages."""
 
 import http
 import queue
@@ -18,7 +18,7 @@ from teleop_core.graph.topics import TASK_STATE
 from teleop_lab.people.journal import AGAIN, DONE, SKIPPED, Journal
 from teleop_lab.people.plan import Plan, Trial
 
-_LONGEST = 200  # characters of a reason
+_LONGEST = 200  # largest number of characters of a reason
 _TRIED = TASK_STATE.columns.index("attempts")
 _CONDUCT = """<!doctype html><html lang="en"><head><meta charset="utf-8"><title>Conductor</title>
 <meta name="viewport" content="width=device-width"><link rel="icon" href="data:,">
@@ -29,17 +29,17 @@ _CONDUCT = """<!doctype html><html lang="en"><head><meta charset="utf-8"><title>
 class PeoplePage:
     """Content and requests of both pages; methods may be called from any thread.
 
-    The participant's page shows the next step and may begin it, if the page drives. The conductor has a key, which no
-    answer contains.
+    The participant's page shows the next step. It may begin this step if it is the page that drives. The conductor
+    needs a key, which no answer contains.
 
     Args:
-        drivers: Knows which page is the participant's.
+        drivers: Object that knows which page is the participant's.
         plan: Plan of the study.
         journal: Journal of the study.
 
     Attributes:
         key: Secret of the conductor.
-        is_stopped: Whether the arms of the session that runs, or ran last, are stopped.
+        is_stopped: Whether the arms of the present or last session are stopped.
     """
 
     script, style = Path(__file__).with_name("people.js"), Path(__file__).with_name("people.css")
@@ -69,16 +69,16 @@ class PeoplePage:
 
     @property
     def paths(self) -> frozenset[str]:
-        """Paths of requests: two of the participant, three of the conductor."""
+        """Paths of all requests: two for the participant, three for the conductor."""
         return frozenset({"/people", "/go", "/conducting", "/act", "/table"})
 
     def link(self, url: str) -> str:
-        """Address of the conductor's page, from that of the participant's page."""
+        """Address of the conductor's page, made from the address of the participant's page."""
         address, _, query = url.partition("?")
         return f"{address}conduct{'?' + query if query else ''}#{quote(self.key)}"
 
     def answer(self, path: str, query: Query, page: int, body: Body = bytes) -> Told:
-        """Answer to a request; every parameter of the request is checked."""
+        """Check every parameter of a request, and return the answer."""
         del body
         try:
             with self._lock:
@@ -111,7 +111,7 @@ class PeoplePage:
         return self._ends.is_set() or 0 < self._plan.people.attempts <= self._tried
 
     def close(self, state: str, reason: str, bag: str) -> None:
-        """Note the state of the trial that ran, the reason, and the name of its recording."""
+        """Record the state of the trial that ran, with the reason and the name of its recording."""
         with self._lock:
             assert self._running is not None
             code, trial = self._running
@@ -144,7 +144,7 @@ class PeoplePage:
         return shown
 
     def _go(self, query: Query, page: int) -> Told:
-        """Begin the step that a page shows; a second press of the same button does nothing."""
+        """Begin the step that a page shows; a second press of the button has no effect."""
         if _word(query, "step") == "take":
             self._drivers.take(page)
         if not self._drivers.may_drive(page):
@@ -191,7 +191,7 @@ class PeoplePage:
         self._is_paused = is_paused
 
     def _judge(self, query: Query, state: str) -> None:
-        """Have a trial repeated, or skip it, with a reason."""
+        """Set a trial to be repeated or skipped, for a reason that the conductor gives."""
         code, word, reason = self._journal.now, _word(query, "trial"), _word(query, "reason").strip()
         numbers = [str(trial.number) for trial in self._plan.trials(code)]
         if word not in numbers or (self._running and self._running[1].number == int(word)):
@@ -225,5 +225,5 @@ class PeoplePage:
 
 
 def _word(query: Query, name: str) -> str:
-    """First value of a word; empty if there is none."""
+    """First value of a parameter of the request; empty if the request does not contain the parameter."""
     return next(iter(query.get(name, ())), "")

@@ -17,20 +17,20 @@ from teleop_lab.studies.study import Study, named, read_entries, read_study
 
 PEOPLE = "people"
 MOST = 200
-"""Participants, and trials of one."""
+"""Largest number of participants, and of trials of one participant."""
 _TEXTS = {"title": 200, "consent": 10_000, "instructions": 2_000, "operator": 100}
-"""Texts that a plan must have, with their largest lengths."""
+"""Largest length of each text that a plan must contain."""
 
 
 @dataclass(frozen=True)
 class Question:
-    """A scale from 0 to 100.
+    """A question that is answered on a scale from 0 to 100.
 
     Attributes:
-        name: Its column in tables.
+        name: Name of the question's column in tables.
         text: Text of the question.
-        low: Word at 0.
-        high: Word at 100.
+        low: Label at 0.
+        high: Label at 100.
     """
 
     name: str
@@ -62,7 +62,7 @@ TLX = (
         "very high",
     ),
 )
-"""NASA-TLX (Hart and Staveland 1988). Its raw score is the mean of the six (Hart 2006)."""
+"""Questions of NASA-TLX (Hart and Staveland 1988). The raw score is the mean of the six answers (Hart 2006)."""
 
 
 @dataclass(frozen=True)
@@ -70,11 +70,11 @@ class Trial:
     """One trial of a participant.
 
     Attributes:
-        number: Position in the participant's order, from 1 on.
-        condition: Index among the study's combinations of swept values.
-        values: Its swept values.
-        repetition: Number among the trials of its condition, from 1 on; 0 for practice.
-        asks: Whether questions follow the trial, unless it was skipped.
+        number: Position of the trial in the participant's order, starting with 1.
+        condition: Index of the trial's combination of swept values in the study.
+        values: Swept values of the trial.
+        repetition: Number of the trial within its condition, starting with 1; 0 for practice.
+        asks: Whether questions follow the trial; they are left out if the trial was skipped.
     """
 
     number: int
@@ -111,11 +111,11 @@ class PeopleParameters:
 
 @dataclass(frozen=True)
 class Plan:
-    """Work of the people in a study.
+    """Plan of a study with people.
 
     Attributes:
-        study: Conditions, and the scores that are compared.
-        people: Entries of its file about people.
+        study: Study with the conditions and the compared scores.
+        people: Entries of the study's file below ``people``.
         questions: Questions after trials.
     """
 
@@ -125,7 +125,7 @@ class Plan:
 
     @property
     def codes(self) -> tuple[str, ...]:
-        """Codes of the participants, p01 and so on."""
+        """Codes of the participants: p01, p02 and so on."""
         return tuple(f"p{number:02d}" for number in range(1, self.people.participants + 1))
 
     def trials(self, code: str) -> list[Trial]:
@@ -147,7 +147,7 @@ class Plan:
         """Configuration of a trial; the recording contains the number of the trial.
 
         Raises:
-            TeleopError: It cannot run.
+            TeleopError: The trial cannot run.
         """
         about = f"study {self.people.title!r}, participant {code}, trial {trial.number}, repetition {trial.repetition}"
         own: dict[str, Setting] = {"operator.kind": self.people.operator, f"{SESSION}.description": about}
@@ -157,16 +157,16 @@ class Plan:
 
 
 def conditions_of(participant: int, count: int, order: str) -> list[int]:
-    """Order of some conditions for a participant.
+    """Order of the conditions for a participant.
 
     Args:
-        participant: Number from 0 on.
+        participant: Number of the participant, starting with 0.
         count: Number of conditions.
-        order: One of fixed, shuffled and latin; ``shuffled`` is the same for the same participant always.
+        order: One of fixed, shuffled and latin. The order of ``shuffled`` depends only on the participant's number.
 
     Source:
-        Williams 1949: a square in which each condition follows each other one equally often; with
-        an odd number of conditions every second round of rows is read backwards.
+        Williams 1949: a square in which each condition follows each other condition equally often. With an odd number
+        of conditions every second round of rows is read backwards.
     """
     if order == "fixed":
         return list(range(count))
@@ -180,7 +180,7 @@ def conditions_of(participant: int, count: int, order: str) -> list[int]:
 
 
 def read_plan(path: Path | str) -> Plan:
-    """Plan in a YAML file, which is the file of a study with an entry ``people``.
+    """Read a plan from the YAML file of a study with an entry ``people``.
 
     Raises:
         TeleopError: The file cannot be read or contains a wrong entry; no session was started.
@@ -196,7 +196,7 @@ def read_plan(path: Path | str) -> Plan:
     trials = plan.trials(plan.codes[0])
     if len(trials) > MOST:
         raise ParameterError("people.repetitions", plan.people.repetitions, f"small enough for at most {MOST} trials")
-    study.points()  # a trial that cannot run is reported here
+    study.points()  # raises an error if a trial cannot run
     for trial in {trial.condition: trial for trial in trials}.values():
         stages = plan.configuration(plan.codes[0], trial).groups
         if plan.people.attempts and "task" not in stages:

@@ -1,1 +1,1 @@
-"""Planning: how much of a hand's motion a slave can follow, before a session is run."""
+"""Planning: computes, before a session is run, how much of a hand's motion a slave can follow."""

@@ -1,7 +1,7 @@
 """Aim: let the tool turn about the axes about which the hand turns.
 
-``tool_axes`` and ``tool_roll`` map rotations of the stylus to rotations of the tool about the tool's own axes. Seen
-from outside, through the map of ``axes``, the tool turns as the hand does only if these parameters fit the
+``tool_axes`` and ``tool_roll`` map rotations of the stylus to rotations of the tool about the tool's own axes. In
+space, after the map of ``axes``, the tool turns about the axes of the hand's rotation only if these parameters fit the
 orientations of stylus and tool at engagement.
 """
 
@@ -17,7 +17,7 @@ from teleop_core.robots.robot import Robot
 from teleop_lab.planning.placement import Placement
 from teleop_lab.planning.turns import turns
 
-# The given value is kept if it fits within this angle of the best one.
+# The given tool axes and roll are kept if their misfit exceeds the smallest misfit by at most this angle.
 _NEAR_ENOUGH = math.radians(5.0)
 _DIGITS = 4
 
@@ -46,7 +46,10 @@ class Aim:
         return _angle(np.trace(given.T @ self.wanted(placement)))
 
     def aimed(self, placement: Placement) -> Placement:
-        """The placement with the best tool axes and roll; the given ones if they fit as well."""
+        """Return the placement with the best tool axes and roll.
+
+        If the given axes and roll fit as well, they are preferred.
+        """
         left = _matrices() @ self.wanted(placement)
         rolls = np.arctan2(left[:, 1, 0] - left[:, 0, 1], left[:, 0, 0] + left[:, 1, 1])
         # Trace of Rz(-roll) times each of the matrices.

@@ -51,12 +51,13 @@ class AskedPath:
     def excerpt(self, rate: float, count: int) -> "AskedPath":
         """Fewer samples of the same motion.
 
-        At most ``rate`` samples a second are kept, and all samples at which a button changes. If more than ``count``
-        samples remain, only ten stretches of the path are kept, with their original times.
+        The excerpt contains at most ``rate`` samples per second. It also contains all samples at which a button
+        changes. If more than ``count`` samples remain, it contains only ten stretches of the path, with their original
+        times.
 
         Args:
             rate: Samples per second.
-            count: Largest number of samples, without those of buttons.
+            count: Largest number of samples; samples at which a button changes are not counted.
         """
         slots = np.floor(self.time * rate)
         is_kept = np.append(True, np.diff(slots) > 0.0)
@@ -73,10 +74,10 @@ def asked_path(bag: Bag) -> AskedPath:
     """Motion of the hand in a recording.
 
     Args:
-        bag: Recording with ``master/measured_cp`` and, if it has them, ``master/buttons``.
+        bag: Recording that contains ``master/measured_cp``; ``master/buttons`` is optional.
 
     Raises:
-        RecordingError: It has no such pose, or fewer than two at different times.
+        RecordingError: The recording contains fewer than two poses of the master at different times.
     """
     bag.require((MASTER_MEASURED_CP,))
     series = bag.read(MASTER_MEASURED_CP)

@@ -1,4 +1,4 @@
-"""Page: the motion that a slave can follow, in space and against time, with the given and the proposed settings."""
+"""Page: plots of the motion that a slave can follow, in space and against time, for given and proposed settings."""
 
 from collections.abc import Iterable, Sequence
 from html import escape
@@ -17,9 +17,10 @@ from teleop_lab.planning import asked, walk
 from teleop_lab.planning.reach_result import LABELS, Followed, Reach
 
 COLORS = {Limit.NONE: "#1c7c54", **LIMIT_COLORS}
-"""Colours of samples that are followed, and of other samples by their causes."""
-# More points than these make the page slow and the picture no clearer.
-_POINTS, _WORKSPACE, _BINS = 6_000, 3_000, 1_500
+"""Colour of a sample by the cause that keeps the slave from following it; ``Limit.NONE`` for followed samples."""
+_POINTS = 6_000  # largest number of drawn samples of a path; more make the page slow, and the plot no clearer
+_WORKSPACE = 3_000  # drawn positions that the tip can reach
+_BINS = 1_500  # time bins in which causes are drawn
 _ROWS = (2, 3)  # rows of the figure that show curves over time
 _AXES = (("x", "#1971c2"), ("y", "#495057"), ("z", "#b08900"))
 _STYLE = """\
@@ -55,7 +56,7 @@ def write_reach_page(reaches: "Sequence[Reach]", file: Path) -> None:
 
     Args:
         reaches: Result for each recording, at least one.
-        file: Page to write; its folder must exist.
+        file: Path of the page; the folder must exist.
 
     Raises:
         OSError: The file cannot be written.
@@ -77,7 +78,7 @@ def write_reach_page(reaches: "Sequence[Reach]", file: Path) -> None:
 
 
 def reach_figure(reach: "Reach", followed: "Followed", name: str) -> plots.Figure:
-    """Figure of one placement: in space, then position and turn against time."""
+    """Figure of one placement: the path in space, then position and rotation against time."""
     titles = (
         f"{name}, in space: {followed.in_place.share:.1%} within reach",
         f"{name}, against time: {followed.share:.1%} followed",
@@ -129,7 +130,7 @@ def _in_space(followed: "Followed") -> list[Any]:
 
 
 def _add_times(figure: Any, path: asked.AskedPath, walked: walk.Walked) -> None:
-    """Curves of position and turn since the start, with bands where the slave does not follow."""
+    """Add curves of position and rotation since the start; bands mark the times at which the slave does not follow."""
     kept, time = _spread(len(path), _POINTS), path.time
     moves = 1e3 * (walked.asked[:, :3] - walked.asked[0, :3])
     turns = np.degrees(rotation_vectors(walked.asked[:, 3:]))
@@ -169,9 +170,11 @@ def _add_band(figure: Any, row: int, bins: tuple[Array, Array], cause: Limit) ->
 
 
 def _bands(path: asked.AskedPath, walked: walk.Walked) -> Iterable[tuple[Limit, tuple[Array, Array]]]:
-    """Causes that occur, each with the begins of time bins (M,) [s], and 1 for a bin in which it occurs, else 0.
+    """Yield each cause that occurs, with the edges of the time bins (M,) [s], and 1 or 0 for each bin.
 
-    No stretch is too short to be seen.
+    The number is 1 if the cause occurs in the bin.
+
+    Even the shortest occurrence fills a whole bin, so it is visible.
     """
     edges = np.linspace(0.0, path.time[-1], _BINS + 1)
     at = np.minimum(np.searchsorted(edges, path.time, side="right") - 1, _BINS - 1)

@@ -1,4 +1,4 @@
-"""Placement: the start of a slave, and how the hand's motion is rotated and scaled for it."""
+"""Placement: the start posture of a slave, and the rotation and scale of the hand's motion."""
 
 from dataclasses import dataclass
 
@@ -37,7 +37,7 @@ class Placement:
 
     @staticmethod
     def of(parameters: MotionScalingParameters, slave: RobotParameters, start: tuple[float, ...]) -> "Placement":
-        """Placement that parameters of motion scaling, a slave and its start make."""
+        """Return the placement that corresponds to parameters of motion scaling, a slave and its start."""
         return Placement(
             robot=slave.robot,
             geometry=slave.geometry,
@@ -51,10 +51,10 @@ class Placement:
         )
 
     def settings(self, arm: str = "") -> dict[str, Setting]:
-        """Parameters by name, as ``settings=`` of sessions takes them; no number is of NumPy.
+        """Parameters by name, for ``settings=`` of sessions; all numbers are plain Python numbers.
 
         Args:
-            arm: Namespace of the arm that they are for; empty for the default one.
+            arm: Namespace of the arm; empty for the default arm.
         """
         prefix = f"{arm}/" if arm else ""
         robot: dict[str, Setting] = {}

@@ -20,10 +20,10 @@ GOAL = 0.99
 """Default share of the time in which the slave must follow."""
 Progress = Callable[[int, int], None]
 Setting = float | str | bool | Sequence[float] | Sequence[str]
-# Largest number of computed samples: of the whole path, and of the excerpt that the search uses.
-_WHOLE, _EXCERPT = 150_000, 6_000
+_WHOLE = 150_000  # largest number of samples of the whole path
+_EXCERPT = 6_000  # largest number of samples of the excerpt that the search uses
 _EXCERPT_RATE = 20.0  # Hz
-# Walks that a search usually takes, for the progress.
+# Usual number of walks of a search; the progress bar needs it.
 _USUAL_WALKS = 500
 # The short excerpt is easier to follow than the whole path, so the search raises its goal up to this many times.
 _ATTEMPTS = 3
@@ -45,26 +45,26 @@ def reach(
     """Find the share of a hand's motion that a slave can follow, and the settings with which this share is largest.
 
     Args:
-        source: A recording, its path, or the name of a scenario, which is run first. The search starts
-            from the recording's own configuration. A foreign recording, in any file that replay reads, has none: then
-            the search starts from the default configuration.
-        robot: Slave that replaces the configuration's; the start is then the default start of that robot.
+        source: A recording, its path, or the name of a scenario, which is run first. The search starts from the
+            configuration in the recording. A foreign recording, in any file format that replay reads, contains no
+            configuration; then the search starts from the default configuration.
+        robot: Robot that replaces the slave of the configuration; the start is then the default start of this robot.
         geometry: Lengths and angles of the slave [m, rad] as ``symbol=value``.
-        share: Share of the time that is to be followed, above 0 and at most 1.
-        arm: Namespace of the arm; empty for the default one.
+        share: Share of the time in which the slave must follow, above 0 and at most 1.
+        arm: Namespace of the arm; empty for the default arm.
         keeps_axes: Whether the map of axes from hand to slave must not change, for example because a camera looks at
             the slave from a fixed side.
         progress: Called with the progress.
-        files: ROS 2 parameter files over the configuration.
-        settings: Parameters over the files.
+        files: ROS 2 parameter files whose values override the configuration.
+        settings: Parameters that override the files.
         texts: Parameters as ``key=value``, which override the settings.
 
     Returns:
-        Shares and causes, and a proposal.
+        Followed shares, causes of the rest, and proposed settings.
 
     Raises:
-        TeleopError: The recording or scenario is missing, has no pose of a master, or a parameter
-            is wrong; the text names it.
+        TeleopError: The recording or scenario is missing or contains no pose of a master, or a parameter is wrong. The
+            message names the wrong value.
     """
     if not 0.0 < share <= 1.0:
         raise ParameterError("share", share, "above 0 and at most 1")
@@ -93,7 +93,7 @@ def _changes(
 def _configured(
     source: recording.Recording | Path | str, changes: list[Layer]
 ) -> tuple[configuration.Configuration, reader.Bag]:
-    """Configuration with the changes, and the recording; a scenario is run now to record one."""
+    """Return the configuration with the changes, and the recording. A scenario is run first to make its recording."""
     if isinstance(source, str) and not Path(source).exists():
         if Path(source).name != source or Path(source).suffix:
             reason = "does not exist; give a recording, or one of `teleop scenarios`"
@@ -152,7 +152,7 @@ def _followed(walker: Walker, placement: Placement, given: Placement, aim: Aim) 
 
 
 def _proposed(whole: Walker, search: Search, given: Followed, goal: float, aim: Aim) -> Followed:
-    """Best placement found; the goal on the excerpt is raised until the whole path reaches it."""
+    """Return the best placement found; the goal on the excerpt is raised until the whole path reaches `goal`."""
     best, wanted = (given.share, given.placement), goal
     for _ in range(_ATTEMPTS):
         placement = search.best(min(wanted, 1.0))[1]

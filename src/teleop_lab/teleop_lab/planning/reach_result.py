@@ -1,4 +1,4 @@
-"""Reach result: the share that a slave can follow, with given and proposed settings, and how to use the proposal."""
+"""Reach result: the shares that a slave can follow with given and with proposed settings."""
 
 import math
 import shlex
@@ -26,8 +26,8 @@ class Followed:
 
     Attributes:
         placement: Start, turn and gains.
-        session: Walk as in a session: limits cut the hand's motion, and joints have their speed limits.
-        in_place: Walk along the original path: nothing is cut off, and joints are as fast as needed.
+        session: Walk with the limits of a session: they cut the hand's motion, and the joint speeds are limited.
+        in_place: Walk along the original path: no motion is cut off, and joint speeds are not limited.
         at_given_gain: Share of the time in which a session would follow with the given gains.
         misfit: Angle [rad] between the rotation axes of the tool and those of the hand.
     """
@@ -53,8 +53,8 @@ class Reach:
         robot: The slave.
         goal: Share of the time in which the slave must follow.
         given: Result with the given parameters.
-        proposed: Result with the best placement; the given one if that reaches the goal.
-        arm: Namespace of the arm; empty for the default one.
+        proposed: Result with the best placement; equal to ``given`` if ``given`` reaches the goal.
+        arm: Namespace of the arm; empty for the default arm.
     """
 
     path: AskedPath
@@ -70,7 +70,7 @@ class Reach:
         return self.given.placement == self.proposed.placement
 
     def settings(self) -> dict[str, float | str | list[float] | list[str]]:
-        """Proposed parameters, as ``tc.replay(..., settings=...)`` takes them."""
+        """Proposed parameters for ``tc.replay(..., settings=...)``."""
         return self.proposed.placement.settings(self.arm)
 
     def texts(self) -> list[str]:
@@ -82,7 +82,7 @@ class Reach:
         return self.proposed.placement.parameter_file(self.arm)
 
     def __str__(self) -> str:
-        """Lines for the terminal: a table, and what to do next."""
+        """Text for the terminal: a table, and the next command to run."""
         path, rate = self.path, (len(self.path) - 1) / self.path.time[-1]
         head = f"{path.name}: {path.time[-1]:.4g} s of motion at {rate:.4g} Hz; {self.robot.name}"
         columns = [self.given] if self.is_given else [self.given, self.proposed]

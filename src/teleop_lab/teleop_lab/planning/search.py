@@ -1,8 +1,8 @@
 """Search: the placement, turn and gains with which a slave follows a hand's motion.
 
-The largest rotation gain that can reach the goal comes first, then the largest gain. If the motion drifts against a
-limit, the start is shifted by the motion that was cut off, which is the distance of the start from the centre of its
-free range.
+The search first finds the largest rotation gain that can reach the goal, then the largest gain of translation. If the
+motion drifts against a limit, the search shifts the start by the motion that was cut off. This motion is the distance
+of the start from the centre of the free range.
 """
 
 import math
@@ -21,21 +21,22 @@ from teleop_lab.planning.placement import Placement
 ROTATION_GAINS = (1.0, 0.75, 0.5, 0.25, 0.1, 0.0)
 """Rotation gains that are tried, the largest first."""
 LEAST_GAIN = 0.1
-"""Smallest gain that is tried, as a share of the given one, before the rotation gain is lowered."""
+"""Smallest share of the given gain that is tried before the rotation gain is lowered."""
 STARTS = 24
-"""Postures that are tried as starts."""
+"""Number of postures that are tried as starts."""
 CUT = 0.03
-"""How much smaller the followed share of the original path, with nothing cut off, may be than that of a session. So a
-placement must fit the motion; it is not enough that limits cut the motion to fit."""
-# Another start (the eye must get used to it) or other axes (the hand must get used to them) must increase the gain by
-# this factor.
+"""Largest excess of the followed share of a session over the followed share of the original path; a larger excess does
+not count. Without this bound, limits that cut most of the motion would make a placement look good."""
+# A different start or different axes must increase the gain by this factor, because the operator must get used to
+# them.
 _WORTH = 1.25
 _IMPROVED = 3  # number of the best tried placements that are kept
-_ROUNDS, _BISECTIONS = 3, 6
+_ROUNDS = 3  # largest number of shifts of a start
+_BISECTIONS = 6
 _MOMENTS = (0.25, 0.5, 0.75, 1.0)
 _DIGITS = 4
 Found = tuple[float, Placement]
-"""Share of the time that is followed, and the placement."""
+"""Share of the time in which the slave follows, and the placement."""
 
 
 class Search:
@@ -43,7 +44,7 @@ class Search:
 
     Args:
         walker: Walks the path, or an excerpt of it.
-        given: First placement; larger gains than its gains are not tried.
+        given: First placement; its gains are the largest that are tried.
         aim: Fits the tool's axes to every start and turn.
         tell: Called before every walk.
         keeps_axes: Whether ``axes`` must not change.
@@ -59,7 +60,7 @@ class Search:
         self._starts = [self._rounded(q) for q in free_postures(walker.robot, STARTS)]
 
     def best(self, goal: float) -> Found:
-        """The placement with the largest gains that reaches the goal, or else the placement nearest to the goal.
+        """Return the placement with the largest gains that reaches the goal, or else the placement nearest to the goal.
 
         Args:
             goal: Wanted share of the time in which the slave follows.
@@ -82,9 +83,10 @@ class Search:
         return [given, *(gain for gain in ROTATION_GAINS if gain < given)]
 
     def _at_rest(self, rotation_gain: float) -> list[Found]:
-        """The best placements with the least gain, best first: with the given start and axes if these are enough.
+        """Return the best placements with the least gain, best first.
 
-        Else other starts are tried, then other axes.
+        The given start and axes are tried first. If they do not reach the goal, other starts are tried, then other
+        axes.
         """
         scaled = self._scaled(self._given, LEAST_GAIN, self._given)
         least = replace(scaled, rotation_gain=rotation_gain)
@@ -100,7 +102,7 @@ class Search:
         return [replace(placement, start=start) for start in self._starts]
 
     def _other_turns(self, placement: Placement) -> list[Placement]:
-        """The placement with every map of axes that may be taken."""
+        """Return copies of the placement, one for each allowed map of axes."""
         return [replace(placement, axes=axes) for axes in self._turns]
 
     def _raised(self, found: Sequence[Found]) -> Found:
@@ -108,7 +110,7 @@ class Search:
         low, high, best = math.log(LEAST_GAIN), 0.0, found[0]
         pool = list(found)
         for i in range(_BISECTIONS + 1):
-            middle = high if i == 0 else 0.5 * (low + high)  # first what is given
+            middle = high if i == 0 else 0.5 * (low + high)  # the given gains first
             tried = self._sorted(self._scaled(self._given, math.exp(middle), placement) for _, placement in pool)
             reached = self._first(tried)
             if reached is None:
@@ -121,7 +123,7 @@ class Search:
         return best
 
     def _with_other(self, best: Found, others: Callable[[Placement], Iterable[Placement]]) -> Found:
-        """One of the other placements in place of `best`, if its gain is larger by enough."""
+        """Return one of the other placements if its gain exceeds that of `best` by the factor `_WORTH`, else `best`."""
         while (factor := _WORTH * self._factor(best[1])) <= 1.0:
             raised = self._scaled(self._given, factor, best[1])
             reached = self._first(self._sorted(others(raised))[:_IMPROVED])
@@ -131,7 +133,7 @@ class Search:
         return best
 
     def _first(self, tried: Iterable[Found]) -> Found | None:
-        """First placement that reaches the goal, with its start shifted if needed."""
+        """Return the first placement that reaches the goal; its start is shifted if needed."""
         for found in tried:
             better = found if found[0] >= self._goal else self._improved(found)
             if better[0] >= self._goal:
@@ -139,7 +141,7 @@ class Search:
         return None
 
     def _improved(self, found: Found) -> Found:
-        """Placement whose start is shifted by the motion that was cut off, as long as this increases the share."""
+        """Shift the start by the motion that was cut off; repeat this while the shift increases the followed share."""
         for _ in range(_ROUNDS):
             if found[0] >= 1.0:
                 break
@@ -181,7 +183,10 @@ class Search:
         return self._known[placement], placement
 
     def _share(self, placement: Placement) -> float:
-        """Share of the time in which a session would follow; below the goal only an upper bound, which is faster."""
+        """Share of the time in which the slave would follow in a session.
+
+        Below the goal it is an upper bound, which takes less time to compute.
+        """
         self._tell()
         share = self._walker.share(placement, is_cut=False) + CUT
         if share < self._goal:
@@ -190,7 +195,7 @@ class Search:
         return min(share, self._walker.share(placement))
 
     def _sorted(self, placements: Iterable[Placement]) -> list[Found]:
-        """Shares of placements, the best first; equal ones keep their order."""
+        """Return placements with their shares, the largest share first; equal shares keep their order."""
         found = [self._found(placement) for placement in dict.fromkeys(placements)]
         return sorted(found, key=_share, reverse=True)
 
@@ -203,7 +208,7 @@ class Search:
         return placement.coarse_gain / self._given.coarse_gain
 
     def _scaled(self, gains: Placement, factor: float, placement: Placement) -> Placement:
-        """Placement with the gains of another, times a factor, to three digits."""
+        """Placement whose gains are those of `gains`, multiplied by a factor and cut to three digits."""
         return replace(
             placement,
             coarse_gain=_three_digits(gains.coarse_gain * factor),
@@ -216,6 +221,6 @@ def _share(found: Found) -> float:
 
 
 def _three_digits(value: float) -> float:
-    """Value cut to three digits, never above it; not below the least gain that parameters allow."""
+    """Round a gain down to three digits, but not below the smallest gain that the parameters allow."""
     digits = 2 - math.floor(math.log10(value))
     return max(math.floor(value * 10.0**digits + 1e-9) / 10.0**digits, 1e-3)

@@ -1,7 +1,7 @@
 """Walk: a hand's path through motion scaling and inverse kinematics alone.
 
-The stages of a session process sample after sample, with a slave that reaches every command at once. So the followed
-motion, the cut-off motion and the causes are the same as in a session, but computed about a hundred times faster.
+A walk runs the stages of a session sample after sample, with a slave that reaches every command at once. The followed
+motion, the cut-off motion and the causes are those of a session. The computation is about a hundred times faster.
 """
 
 from dataclasses import dataclass, replace
@@ -54,8 +54,8 @@ class Walked:
     Attributes:
         weights: Share of the time (N,) that each sample represents; they add up to 1.
         asked: Poses (N, 7) [m] commanded to the slave.
-        reached: Poses (N, 7) [m] of its answer.
-        q: Joints (N, n) [rad, m] of its answer.
+        reached: Poses (N, 7) [m] that the slave reaches.
+        q: Joints (N, n) [rad, m] of the slave.
         limit: :class:`~teleop_core.graph.topics.Limit` (N,) that kept the slave from following.
         joint: Joint (N,) that was at its limit; -1 for none.
         residual: Distance [m] and angle [rad] (N, 2) from the commanded pose.
@@ -76,7 +76,7 @@ class Walked:
 
     @property
     def causes(self) -> dict[str, float]:
-        """Share of the time in which it does not follow, by the name of the cause."""
+        """Share of the time in which the slave does not follow, by the name of the cause."""
         causes = (limit for limit in topics.Limit if limit is not topics.Limit.NONE)
         return {c.name.lower(): float(self.weights[self.limit == c].sum()) for c in causes}
 
@@ -103,7 +103,7 @@ class Walker:
         self._walk = self._bind()
 
     def _pauses(self, longest: float) -> tuple[int, int]:
-        """Longest pauses [ns] of both stages; thinned samples are farther apart than real ones."""
+        """Return the longest allowed pauses of both stages [ns]; a thinned path allows longer pauses."""
         usual_ns = 3 * int(np.median(np.diff(self.path.stamp_ns)))
         solving_ns = int(self._solving.parameters["longest_ns"])
         return max(round(longest * 1e9), usual_ns), max(solving_ns, usual_ns)
@@ -136,7 +136,10 @@ class Walker:
         )  # fmt: skip
 
     def share(self, placement: Placement, *, is_cut: bool = True) -> float:
-        """Share of the time that a placement follows, as in :attr:`Walked.share`; see `walk`."""
+        """Share of the time in which the slave follows with a placement, as :attr:`Walked.share`.
+
+        For the arguments see `walk`.
+        """
         self._run(placement, is_cut=is_cut, is_fast=False)
         is_followed = self._answers["reach"][:, _COLUMN["limit"]] == topics.Limit.NONE
         return float(self.weights[is_followed].sum())

@@ -1,4 +1,4 @@
-"""Studies: sessions over named values of parameters and seeds, resumed where they were left.
+"""Studies: sessions over named values of parameters and seeds; an interrupted study can be continued.
 
 >>> from teleop_lab import sweep
 >>> found = sweep("point", metrics=["task.time_s"], seed=range(5),

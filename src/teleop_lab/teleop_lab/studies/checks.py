@@ -12,12 +12,12 @@ from teleop_core.session.configuration import Configuration
 from teleop_core.slave.world.contents import WorldParameters
 
 _NEAR = 0.02
-"""An object counts as reachable if the tip comes this near [m], because other orientations of the tool reach farther.
-"""
+"""An object is reachable if its distance from the tip can be below this [m]. Other orientations of the tool reach
+farther."""
 
 
 def insist_on_scores(made: Configuration, metrics: Sequence[str]) -> None:
-    """Insist on sessions that have the scores.
+    """Check that the sessions produce the scores.
 
     Raises:
         ParameterError: A score needs topics that no stage writes, or an object that does not exist.

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def swept_coordinates(swept: Mapping[str, Sequence[object]]) -> dict[str, object]:
-    """Values of each swept parameter; values that are not plain are converted to texts."""
+    """Values of each swept parameter; lists and other composite values are converted to texts."""
     return {name: [v if isinstance(v, int | float | str) else str(v) for v in values] for name, values in swept.items()}
 
 
@@ -30,13 +30,13 @@ def dataset_of(
 ) -> "xarray.Dataset":
     """Results as an xarray data set.
 
-    It has a variable for each score, NaN where the score does not apply or the session failed. ``error`` is the reason
-    of a failure, and ``seconds`` the duration of the session.
+    Each score is a variable. Its value is NaN where the score does not apply or the session failed. The variable
+    ``error`` contains the reason of a failure, and ``seconds`` contains the duration of the session.
 
     Args:
         coordinates: Values of each dimension.
         metrics: Keys of the scores.
-        results: Result of each point, in the order of the dimensions; None if it is missing.
+        results: Result of each point, in the order of the dimensions; None if the result is missing.
         about: Attributes of the data set.
     """
     import xarray

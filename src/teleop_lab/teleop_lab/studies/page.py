@@ -43,7 +43,7 @@ def study_page(study: "Study", found: "xarray.Dataset", title: str) -> str:
 
 
 def tuning_page(tuning: "Tuning", tuned: "Tuned", title: str) -> str:
-    """HTML page of a search: the score by trial, and by each parameter; it works offline."""
+    """HTML page of a search. It shows the score by trial and by each parameter, and works offline."""
     numbers = [str(n) for n in range(1, len(tuned.trials) + 1)]
     columns: dict[str, list[Any]] = {"trial": [int(n) for n in numbers]}
     columns |= {name: [trial.values[name] for trial in tuned.trials] for name in tuning.searched}
@@ -132,7 +132,7 @@ def label_of(study: "Study", found: "xarray.Dataset", metric: str) -> dict[str, 
 
 
 def _heat(study: "Study", found: "xarray.Dataset", metric: str) -> tuple[Any, Any] | None:
-    """Means for the values of the first two parameters, over all others; None with fewer than two."""
+    """Heat map of means for the values of the first two parameters; None if fewer than two are swept."""
     if len(study.swept) < 2:
         return None
     first, second = list(study.swept)[:2]

@@ -21,7 +21,7 @@ from teleop_core.session import api, configuration
 
 @dataclass(frozen=True)
 class Key:
-    """Digests of everything that a result depends on: its parameters, and the code that made it."""
+    """Digests of everything that a result depends on: the parameters and the code."""
 
     recipe: str
     code: str
@@ -32,12 +32,12 @@ class Point:
     """One session of a study.
 
     Attributes:
-        place: Its value in every dimension.
+        place: Value of the point in every dimension.
         scenario: Scenario of the study.
-        settings: All parameters that are given.
-        seed: Its seed.
+        settings: All given parameters.
+        seed: Seed of the session.
         length: Duration of the hand's motion [s].
-        key: Digests of all that its result depends on.
+        key: Digests of everything that the result depends on.
     """
 
     place: Mapping[str, api.Setting]
@@ -49,7 +49,7 @@ class Point:
 
     @property
     def name(self) -> str:
-        """Name of its result, which depends only on its place."""
+        """Name of the point's result; it depends only on ``place``."""
         text = json.dumps({name: repr(value) for name, value in self.place.items()}, sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()[:20]
 
@@ -60,9 +60,9 @@ class Result:
 
     Attributes:
         name: Name of the point.
-        key: Its key.
-        scores: Numbers by key of a score; None where it does not apply.
-        error: Text of the error; empty without one.
+        key: Key of the point.
+        scores: Numbers by key of a score; None for a score that does not apply.
+        error: Text of the error; empty if the session succeeded.
         seconds: Time that the session took [s].
     """
 
@@ -73,15 +73,15 @@ class Result:
     seconds: float
 
     def to_json(self) -> str:
-        """The result as a text that :meth:`from_json` reads, to the bit."""
+        """Return the result as a text; :meth:`from_json` restores each number exactly."""
         return json.dumps(asdict(self))
 
     @staticmethod
     def from_json(text: str) -> "Result":
-        """Result of a text.
+        """Return the result that :meth:`to_json` converted to a text.
 
         Raises:
-            ValueError: It is another text.
+            ValueError: The text does not contain a result.
         """
         found = json.loads(text)
         try:
@@ -92,7 +92,7 @@ class Result:
 
 
 def recipe_of(made: configuration.Configuration) -> str:
-    """Digest of a whole configuration, whatever its seed."""
+    """Digest of a whole configuration without its seed."""
     lines = [line for line in made.text().splitlines() if line.strip().partition(":")[0] != "seed"]
     return hashlib.sha256("\n".join(lines).encode()).hexdigest()[:20]
 
@@ -105,7 +105,7 @@ def point_key(recipe: str, seed: int, metrics: Sequence[str], code: str) -> Key:
 
 @cache
 def code_digest() -> str:
-    """Digest of the code of ``teleop_core`` and installed parts, because other code may give other numbers."""
+    """Digest of the code of ``teleop_core`` and installed parts, because changed code may change the numbers."""
     groups = entry_points()
     names = {"teleop_core"}
     for group in groups.groups - _NO_PARTS:
@@ -116,7 +116,10 @@ def code_digest() -> str:
 
 
 def own_digest() -> str:
-    """Digest of the code of the files of own parts and of the files in their folders; empty without own parts."""
+    """Digest of the code of a user's own parts: of their files and all files in the same folders.
+
+    Empty without own parts.
+    """
     found = [(path.name, path) for path in own_files()]
     return f"+{files_digest(found)}" if found else ""
 
@@ -130,7 +133,7 @@ def _sources(package: str) -> list[tuple[str, Path]]:
 
 
 def files_digest(files: Iterable[tuple[str, Path]]) -> str:
-    """Digest of named Python files; comments, docstrings and layout do not count, Python's version does."""
+    """Digest of named Python files. It ignores comments, docstrings and layout, but depends on Python's version."""
     found = hashlib.sha256()
     for name, path in files:
         code = compile(path.read_bytes(), "", "exec", dont_inherit=True, optimize=2)
@@ -151,16 +154,16 @@ def _done_by(code: CodeType) -> str:
 
 _NO_PARTS = {"teleop_core.commands", "teleop_core.pages", "teleop_core.readers"}
 _READ_MORE: set[tuple[str, ...]] = set()
-"""Scores for which all streams must be kept."""
+"""Sets of scores whose sessions must keep all streams in memory."""
 
 
 def _kept(metrics: tuple[str, ...]) -> frozenset[str] | None:
-    """Streams that some scores need; None: all streams."""
+    """Streams that the given scores need; None if they need all streams."""
     return None if metrics in _READ_MORE else streams_of(metrics)
 
 
 def compute(point: Point, metrics: Sequence[str], recordings: Path | None) -> Result:
-    """Run a point's session and score it; an error is a result too."""
+    """Run a point's session and score it; if the session fails, the result contains the error."""
     begin = time.monotonic()
     scores: dict[str, float | None] = {}
     error = ""
@@ -169,11 +172,11 @@ def compute(point: Point, metrics: Sequence[str], recordings: Path | None) -> Re
         run = partial(api.run, point.scenario, seed=point.seed, settings=point.settings, out=out)
         try:
             scores = measure(run(keep=_kept(tuple(metrics))).bag, metrics)
-        except LeftOutError:  # a metric reads more than it declares
+        except LeftOutError:  # a metric reads a stream that it does not declare
             _READ_MORE.add(tuple(metrics))
             scores = measure(run().bag, metrics)
     except TeleopError as raised:
         error = " ".join(str(raised).split())
-    except Exception as raised:  # a user's part may raise any error: the study continues, and the point has the error
+    except Exception as raised:  # a user's part may raise any error; the result records it, and the study continues
         error = f"{type(raised).__name__}: {' '.join(str(raised).split())}"
     return Result(point.name, point.key, scores, error, time.monotonic() - begin)

@@ -16,7 +16,7 @@ class Store:
     """Results by the names of their points.
 
     Args:
-        folder: Folder of the results; None: they stay in memory.
+        folder: Folder of the results; None: the results stay in memory.
     """
 
     def __init__(self, folder: Path | None) -> None:
@@ -25,12 +25,12 @@ class Store:
 
     @staticmethod
     def open(folder: Path | str | None, scenario: str | None, names: Sequence[str]) -> "Store":
-        """Store of a study, made if it is missing.
+        """Open the store of a study; a missing store is created.
 
         Args:
             folder: Where the results are kept; None: in memory.
             scenario: Scenario of the study.
-            names: Names of its dimensions.
+            names: Names of the study's dimensions.
 
         Raises:
             SessionError: The store belongs to another study or a newer version, or cannot be written.
@@ -70,7 +70,7 @@ class Store:
         return self._results.get(point.name)
 
     def reason(self, point: Point) -> str:
-        """Reason why a point must be run; empty if it need not."""
+        """Reason why a point must be run; empty if the stored result is valid."""
         found = self.result(point)
         if found is None:
             return "missing"
@@ -81,10 +81,10 @@ class Store:
         return "failed" if found.error else ""
 
     def take(self, result: Result) -> None:
-        """Keep a result.
+        """Store a result.
 
         Raises:
-            SessionError: The disk cannot take it; what is there stays.
+            SessionError: The result cannot be written; earlier results stay unchanged.
         """
         self._results[result.name] = result
         if self.folder is not None:
@@ -95,7 +95,7 @@ def write_result(folder: Path, result: Result) -> None:
     """Write a result completely or not at all; writing it again changes nothing.
 
     Raises:
-        SessionError: The disk cannot take it.
+        SessionError: The result cannot be written.
     """
     place = folder / result.name[:2]
     try:
@@ -107,7 +107,7 @@ def write_result(folder: Path, result: Result) -> None:
 
 
 def write_whole(path: Path, text: str) -> None:
-    """Write a file under another name, then rename it, so that it is never seen half written."""
+    """Write a file under a temporary name, then rename it, so that no reader sees an incomplete file."""
     half = path.with_name(f".{path.name}.{os.getpid()}")
     try:
         half.write_text(text, "utf-8")

@@ -1,4 +1,4 @@
-"""Study: sessions that are compared, their points, and how they are run."""
+"""Study: the points of a comparison, and how their sessions are run."""
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -25,13 +25,13 @@ if TYPE_CHECKING:
 SEED = "seed"
 _KEYS = ("scenario", "seeds", "set", "sweep", "metrics", "parts", "duration", "people")
 _SPEED = 25.0
-"""Simulated seconds that a process makes in a second, with scores; measured on a busy machine."""
-_BEGIN, _START = 0.1, 4.0
-"""Additional time of each session, and of the processes before the first session [s]."""
+"""Simulated seconds per second that one process computes, scoring included; measured on a busy machine."""
+_BEGIN = 0.1  # time to begin a session [s]
+_START = 4.0  # time to start the processes [s]
 _RESULT = 4096
-"""Bytes of a stored result: a file takes a block of a disk."""
+"""Size of a stored result on the disk [bytes]: one block."""
 _SECOND = 200_000
-"""Bytes of a recorded second, compressed."""
+"""Compressed size of one second of a recording [bytes]."""
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ class Explained:
         to_run: Number of sessions that are missing, failed or changed.
         why: Number of these sessions by reason: missing, failed, changed code, changed parameters.
         simulated: Simulated time of the sessions to run [s].
-        wall: Estimated time to run them with the given number of processes [s].
+        wall: Estimated duration of these sessions with the given number of processes [s].
         stored: Bytes of all results.
         recorded: Bytes of the recordings of all sessions, if recordings are made.
     """
@@ -72,14 +72,14 @@ class Study:
 
     Attributes:
         scenario: One of ``teleop scenarios``; None for the defaults.
-        swept: Values of each parameter, named as on the command line; a dimension each.
-        seeds: A dimension too.
-        metrics: Keys of scores, such as ``task.time_s``; a variable each.
+        swept: Values of each parameter, named as on the command line; each parameter is a dimension.
+        seeds: Seeds of the sessions; they are the last dimension.
+        metrics: Keys of scores, such as ``task.time_s``; each score is a variable of the results.
         settings: Parameters that are the same in all sessions.
         parts: Files that register parts of your own.
 
     Raises:
-        TeleopError: A parameter, value, key of a score or part is wrong; nothing was run.
+        TeleopError: A parameter, value, key of a score or part is wrong; no session was run.
     """
 
     scenario: str | None
@@ -111,7 +111,7 @@ class Study:
         return (*self.swept, SEED)
 
     def points(self) -> list[Point]:
-        """All points, in the order of the dimensions; each configuration is checked here.
+        """Return all points, in the order of the dimensions, after a check of each configuration.
 
         Raises:
             TeleopError: A point cannot run; the text names the wrong value.
@@ -122,7 +122,9 @@ class Study:
         return found
 
     def points_at(self, chosen: Mapping[str, api.Setting]) -> list[Point]:
-        """Points of all seeds at a value for each swept parameter, be it one of the study or not.
+        """Return the points of all seeds for one value of each swept parameter.
+
+        The value need not be one of the study's.
 
         Raises:
             TeleopError: Some points cannot run; the text names the wrong value.
@@ -140,14 +142,14 @@ class Study:
         return found
 
     def explain(self, store: Path | str | None = None, jobs: int | None = None) -> Explained:
-        """Number, duration and bytes of the sessions, without running one.
+        """Estimate number, duration and storage of the sessions, without running one.
 
         Args:
             store: Store with earlier results.
             jobs: Processes; None: as many as processors.
 
         Raises:
-            TeleopError: As in :meth:`points`, or the store belongs to another study.
+            TeleopError: The reasons of :meth:`points`, or the store belongs to another study.
         """
         points = self.points()
         kept = self.store(store) if store is not None else None
@@ -174,18 +176,18 @@ class Study:
     ) -> "xarray.Dataset":
         """Run the sessions that are missing, failed or changed, and return all results.
 
-        Results are written one by one as they are computed. So after a killed call, another call with the same store
-        continues the study. If a session fails, its point has the error.
+        Each result is written as soon as it is computed. If a call is killed, the next call with the same store
+        continues the study. The result of a failed session contains the error.
 
         Args:
             store: Directory of the results, made if it is missing; None keeps them in memory.
-            jobs: Processes of this machine, a session at a time in each; None: as many as processors.
-            client: A Dask client whose workers run the sessions in place of processes; only values are sent.
-            recordings: Directory for a recording of each session; None: none are kept.
+            jobs: Number of processes, each with one session at a time; None: as many as processors.
+            client: A Dask client whose workers run the sessions instead of local processes; only values are sent.
+            recordings: Directory for a recording of each session; None: sessions are not recorded.
             progress: Called with the number of finished points, and the number of all.
 
         Raises:
-            TeleopError: As in :meth:`explain`, before the first session.
+            TeleopError: The reasons of :meth:`explain`; raised before the first session.
         """
         from teleop_lab.studies.dataset import dataset_of, swept_coordinates
         from teleop_lab.studies.workers import in_processes, on_dask
@@ -213,7 +215,7 @@ class Study:
         return dataset_of(coordinates, self.metrics, [kept.result(point) for point in points], about)
 
     def store(self, folder: Path | str | None) -> Store:
-        """Store of the study's results, made if it is missing.
+        """Open the store of the study's results; a missing store is created.
 
         Raises:
             SessionError: The store belongs to another study or a newer version, or cannot be written.
@@ -222,7 +224,7 @@ class Study:
 
 
 def _code() -> str:
-    """Digest of the code that computes the scores, with that of parts of your own."""
+    """Digest of the code that computes the scores, including the user's own parts."""
     return code_digest() + own_digest()
 
 
@@ -239,13 +241,13 @@ def sweep(
     progress: Callable[[int, int], None] = runner.silent,
     **parameters: api.Setting | Sequence[api.Setting],
 ) -> "xarray.Dataset":
-    """Scores over named values of parameters: a dimension each, and one for the seed.
+    """Return scores over named values of parameters. Each parameter is a dimension, and so is the seed.
 
     Args:
         scenario: One of ``teleop scenarios``.
-        metrics: Keys of scores; a variable each.
+        metrics: Keys of scores; each score is a variable.
         seed: Seeds.
-        settings: Parameters by name; a list is swept, any other value applies to all sessions.
+        settings: Parameters by name; the values of a list are swept, any other value applies to all sessions.
         parts: Files that register parts of your own.
         store: As in :meth:`Study.run`.
         jobs: As in :meth:`Study.run`.
@@ -254,7 +256,7 @@ def sweep(
         **parameters: Parameters like ``settings``, with ``__`` for each dot: ``display__latency=[0.0, 0.3]``.
 
     Raises:
-        TeleopError: A name or value is wrong; nothing was run.
+        TeleopError: A name or value is wrong; no session was run.
     """
     named = {name.replace("__", "."): value for name, value in parameters.items()}
     study = _study(scenario, list(seed), metrics, dict(settings or {}) | named, parts)
@@ -274,13 +276,13 @@ def _study(
 
 
 def read_study(path: Path | str) -> Study:
-    """Study of a YAML file: scenario, set, sweep, seeds, metrics, parts, duration.
+    """Read a study from a YAML file with the entries scenario, set, sweep, seeds, metrics, parts and duration.
 
-    ``seeds`` is the number of seeds, beginning with 1, or a list. ``parts`` are files in the same folder. Entries
-    below ``people`` are for :mod:`teleop_lab.people`.
+    ``seeds`` is a list, or the number of seeds, which then begin with 1. ``parts`` are files in the folder of the YAML
+    file. Entries below ``people`` are for :mod:`teleop_lab.people`.
 
     Raises:
-        TeleopError: The file cannot be read, or is no study.
+        TeleopError: The file cannot be read, or does not describe a study.
     """
     content = read_entries(path)
     swept = named(content, "sweep")
@@ -298,7 +300,7 @@ def read_entries(path: Path | str, known: Sequence[str] = _KEYS) -> dict[str, An
     """Entries of a YAML file of a study.
 
     Raises:
-        TeleopError: The file cannot be read, or has another entry.
+        TeleopError: The file cannot be read, or contains an unknown entry.
     """
     content = load(Path(path))
     if not isinstance(content, dict):
@@ -326,7 +328,7 @@ def common(content: Mapping[str, Any], path: Path) -> dict[str, Any]:
 
 
 def listed(content: Mapping[str, Any], name: str) -> list[Any]:
-    """Entry that is a list."""
+    """Return an entry that must be a list."""
     found = content.get(name, [])
     if not isinstance(found, list):
         raise ParameterError(name, found, "a list")
@@ -334,7 +336,7 @@ def listed(content: Mapping[str, Any], name: str) -> list[Any]:
 
 
 def named(content: Mapping[str, Any], name: str) -> dict[str, Any]:
-    """Entry that has values by name."""
+    """Return an entry that must map names to values."""
     found = content.get(name) or {}
     if not isinstance(found, dict):
         raise ParameterError(name, found, "parameters by name, each with its value")
@@ -342,5 +344,5 @@ def named(content: Mapping[str, Any], name: str) -> dict[str, Any]:
 
 
 def is_number(value: object) -> bool:
-    """Whether a value of a parameter is a finite number, which an axis can show."""
+    """Whether a value of a parameter is a finite number, so that an axis of a plot can show it."""
     return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)

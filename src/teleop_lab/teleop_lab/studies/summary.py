@@ -18,7 +18,7 @@ _SHARE = (2.5, 97.5)
 
 
 class Mean(NamedTuple):
-    """A mean or another figure, and its 95 % interval by the bootstrap; NaN without values."""
+    """A mean or another statistic, and its 95 % bootstrap interval; NaN without values."""
 
     value: float
     low: float
@@ -34,20 +34,20 @@ class Mean(NamedTuple):
 
 
 Statistic = Callable[..., Any]
-"""Figure of samples along an axis, such as ``np.mean``."""
+"""Statistic of samples along an axis, such as ``np.mean``."""
 
 
 def mean_of(values: Array) -> Mean:
-    """Mean of the numbers among some values (N,).
+    """Mean of values (N,) with its interval; values that are not numbers are ignored.
 
     Source:
-        Efron 1979: percentiles of the means of samples drawn anew, always with the same numbers.
+        Efron 1979: percentiles of the means of resampled values; the random numbers are the same in each call.
     """
     return _figure(values, np.mean)
 
 
 def median_of(values: Array) -> Mean:
-    """Median of the numbers among some values (N,), as :func:`mean_of`."""
+    """Median of values (N,) with its interval, computed as in :func:`mean_of`."""
     return _figure(values, np.median)
 
 
@@ -77,13 +77,16 @@ def _known(values: Array) -> Array:
 
 
 def _drawn(known: Array, statistic: Statistic, seed: int) -> Array:
-    """Figure of each sample that is resampled from some values (N,)."""
+    """Statistic of each sample that is resampled from values (N,)."""
     draws = np.random.default_rng(seed).integers(0, len(known), (_DRAWS, len(known)))
     return np.asarray(statistic(known[draws], axis=1))
 
 
 def conditions(study: "Study", found: "xarray.Dataset") -> "Iterator[tuple[dict[str, Any], Any]]":
-    """Each combination of the swept values, with its part of the data set, whose only dimension is the seed."""
+    """Yield each combination of the swept values with its part of the data set.
+
+    The seed is the only dimension of this part.
+    """
     places = [range(len(values)) for values in study.swept.values()]
     for indices in product(*places):
         at = dict(zip(study.swept, indices, strict=True))

@@ -15,13 +15,12 @@ from teleop_lab.studies.workers import in_processes
 
 _KEYS = ("scenario", "seeds", "set", "tune", "minimize", "maximize", "parts", "duration")
 _TOGETHER = 5
-"""Number of trials whose values are chosen together, before the first of them has run, so that several processes can
-run them.
-This is not an option, because the result must not depend on the machine."""
+"""Number of trials whose values are chosen together, before any of them runs, so that several processes can run them.
+It is not an option, because the result must not depend on the machine."""
 
 
 class Range(NamedTuple):
-    """Range in which a parameter is searched; if both ends are whole numbers, only whole numbers are tried.
+    """Range in which a parameter is searched. If ``low`` and ``high`` are integers, only integers are tried.
 
     Attributes:
         low: Least value.
@@ -35,12 +34,12 @@ class Range(NamedTuple):
 
 
 class Trial(NamedTuple):
-    """Result of some values.
+    """Result of one set of parameter values.
 
     Attributes:
         values: Values by parameter.
-        score: Mean over the seeds; None where a session failed or does not have it.
-        error: Reason why there is no score.
+        score: Mean over the seeds; None if a session failed or has no such score.
+        error: Reason why the score is missing.
     """
 
     values: Mapping[str, api.Setting]
@@ -68,14 +67,14 @@ class Tuning:
     Attributes:
         scenario: One of ``teleop scenarios``; None for the defaults.
         searched: A :class:`Range` or a list of choices for each parameter, named as on the command line.
-        seeds: Hands over which a score is averaged, because values that suit only one hand are useless.
+        seeds: Seeds of the hands over which a score is averaged; values that suit only one hand are useless.
         metric: Key of the score, such as ``task.time_s``.
         is_largest: Whether the largest score is the best one.
         settings: Parameters that are the same in all sessions.
         parts: Files that register parts of your own.
 
     Raises:
-        TeleopError: A range, parameter, key of a score or part is wrong; nothing was run.
+        TeleopError: A range, parameter, key of a score or part is wrong; no session was run.
     """
 
     scenario: str | None
@@ -95,13 +94,13 @@ class Tuning:
             if isinstance(where, Range) and where.is_log and where.low <= 0.0:
                 raise ParameterError(f"low of {name}", where.low, "above 0 with log")
         study = self._study()
-        for name, values in study.swept.items():  # each end separately, so that an error names its parameter
+        for name, values in study.swept.items():  # each value separately, so that an error names its parameter
             for value in values:
                 first = {other: ends[0] for other, ends in study.swept.items()}
                 study.points_at({**first, name: value})
 
     def _study(self) -> Study:
-        """Study of the ends of all ranges, whose store is this search's."""
+        """Study over the lowest and highest values of all ranges; the search uses its store."""
         ends = {name: where[:2] if isinstance(where, Range) else tuple(where) for name, where in self.searched.items()}
         return Study(self.scenario, ends, self.seeds, (self.metric,), self.settings, self.parts)
 
@@ -113,10 +112,10 @@ class Tuning:
         jobs: int | None = None,
         progress: Callable[[int, int], None] = runner.silent,
     ) -> Tuned:
-        """Try values, each chosen by the scores of the earlier ones.
+        """Run trials; the values of each trial depend on the scores of earlier trials.
 
-        With a store, a search that was killed and continued tries the same values as an uninterrupted one, and a
-        search with more trials continues after the existing ones.
+        If a search with a store is killed and continued, it tries the same values as an uninterrupted search. A search
+        with more trials continues after the stored trials.
 
         Args:
             store: Directory of the results, made if it is missing; None keeps them in memory.
@@ -133,7 +132,7 @@ class Tuning:
         optuna = _optuna()
         study = self._study()
         kept = study.store(store)
-        # The random numbers are the same in each call: with the same results the search proposes the same values.
+        # The random numbers are the same in each call, so equal results lead to equal proposals.
         search = optuna.create_study(
             direction="maximize" if self.is_largest else "minimize", sampler=optuna.samplers.TPESampler(seed=0)
         )
@@ -166,7 +165,7 @@ class Tuning:
         return found
 
     def _scores(self, study: Study, chosen: list[dict[str, api.Setting]], kept: Store, jobs: int | None) -> list[Trial]:
-        """Scores of some values; sessions that are missing in the store are run."""
+        """Scores of the chosen values; sessions that are missing in the store are run."""
         points, refused = [], []
         for values in chosen:
             try:
@@ -202,12 +201,14 @@ def _optuna() -> Any:
 
 
 def read_tuning(path: Path | str) -> Tuning:
-    """Search of a YAML file: scenario, set, tune, minimize or maximize, seeds, parts, duration.
+    """Read a search from a YAML file.
 
-    A parameter below ``tune`` has a list of choices, or ``{low: 0.1, high: 1.0, log: true}``.
+    The entries are scenario, set, tune, minimize or maximize, seeds, parts and duration.
+
+    A parameter below ``tune`` is a list of choices, or a range such as ``{low: 0.1, high: 1.0, log: true}``.
 
     Raises:
-        TeleopError: The file cannot be read, or is no search.
+        TeleopError: The file cannot be read, or does not describe a search.
     """
     content = read_entries(path, _KEYS)
     metrics = [(word, content[word]) for word in ("minimize", "maximize") if word in content]

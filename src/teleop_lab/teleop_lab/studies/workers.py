@@ -1,4 +1,4 @@
-"""Workers: points on the processes of this machine, or on those of a Dask cluster."""
+"""Workers: compute points by the processes of this machine, or by the workers of a Dask cluster."""
 
 import atexit
 import os
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from distributed import Client
 
 BATCH = 100
-"""Sessions of a task on a cluster, at most: a scheduler copes with some 0.2 million tasks."""
+"""Largest number of sessions per task of a cluster; a scheduler can manage about 0.2 million tasks."""
 _TRIES = 3
 _FOLDER = "teleop_parts_"
 
@@ -37,11 +37,10 @@ def in_processes(
 ) -> Iterator[Result]:
     """Yield results as they are computed by processes of this machine, each with one session at a time.
 
-    The process that computes a result writes it. If a process dies, the sessions that were running then are tried
-    again.
+    The process that computes a result writes it. If a process dies, the sessions that were running are repeated.
 
     Raises:
-        SessionError: No process begins.
+        SessionError: No process can be started.
     """
     if getattr(current_process(), "_inheriting", False):
         raise SystemExit(1)  # the caller's program starts processes without a guard; the caller reports this
@@ -69,14 +68,14 @@ def in_processes(
 
 
 def _begin(parts: tuple[Path, ...]) -> None:
-    """Prepare a process, which ends as soon as its parent process is gone."""
+    """Prepare a worker process; it exits as soon as its parent process no longer exists."""
     Thread(target=_end_with, args=(parent_process(),), daemon=True).start()
     load_own_parts(parts)
 
 
 def _end_with(other: Any) -> None:
     other.join()
-    os._exit(1)  # the results that it has written are complete
+    os._exit(1)  # all results on the disk are complete
 
 
 def _as_they_come(pool: ProcessPoolExecutor, do: "partial[Result]", points: list[Point], most: int) -> Iterator[Result]:
@@ -105,7 +104,7 @@ def on_dask(
     """Yield results as they are computed by the workers of a Dask cluster, which share no folder with this machine.
 
     Raises:
-        SessionError: A worker has other code, or there is none.
+        SessionError: The code of a worker differs from the code of this process, or the cluster has no worker.
     """
     from distributed import as_completed
 
@@ -144,7 +143,7 @@ def on_dask(
 
 
 def _codes(client: "Client", own: str) -> tuple[list[str], dict[str, object]]:
-    """Addresses of workers with the same code, and the code of the other workers; workers may join later."""
+    """Return the addresses of workers with the same code, and the code of all other workers; workers may join later."""
     found = client.run(code_digest, on_error="return")
     return [worker for worker, code in found.items() if code == own], {w: c for w, c in found.items() if c != own}
 
@@ -155,7 +154,7 @@ def _batch(
     """Results of some points on a worker; parts of a user travel as texts.
 
     Raises:
-        SessionError: This worker joined later and has other code.
+        SessionError: This worker joined later, and its code differs.
     """
     if code_digest() != code:
         raise SessionError(f"this worker has code {code_digest()}, must be {code}")
@@ -165,7 +164,10 @@ def _batch(
 
 @lru_cache(1)
 def _written(parts: tuple[tuple[str, str], ...]) -> list[Path]:
-    """Files of the worker's and the study's parts; they exist until this process ends or another study begins."""
+    """Write the study's parts to files and return them with the worker's own.
+
+    The files exist until this process ends or another study begins.
+    """
     own = [path for path in named_files() if not path.parent.name.startswith(_FOLDER)]
     forget_own_parts()
     folder = Path(tempfile.mkdtemp(prefix=_FOLDER))
