@@ -96,7 +96,7 @@ def test_what_is_wrong_for_all_episodes_is_said_once(tmp_path: Path) -> None:
     path = data_set(tmp_path / "set")
     with pytest.raises(tc.UnknownNameError, match="import option"):
         teleop_exchange.import_episodes(path, tmp_path / "out", sclae=2.0)
-    with pytest.raises(tc.ParameterError, match="import_episodes takes all"):
+    with pytest.raises(tc.ParameterError, match="`import_episodes` imports all"):
         teleop_exchange.import_recording(path, tmp_path / "out", episode="all")
     table().drop(columns="episode").to_csv(tmp_path / "one.csv")
     with pytest.raises(tc.ParameterError, match=r"--episode is 'all'.*episode_index"):

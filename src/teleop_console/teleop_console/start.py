@@ -63,7 +63,7 @@ class Form(Protocol):
 
     @property
     def paths(self) -> frozenset[str]:
-        """Paths of the form's requests."""
+        """Paths of the addresses to which the form sends its requests."""
 
     def answer(self, path: str, query: Query, page: int, body: Body = bytes) -> Told:
         """Answer to a request; ``page`` is the number of the page, or -1 if the page is not open."""
@@ -101,7 +101,7 @@ class StartPage:
 
     @property
     def paths(self) -> frozenset[str]:
-        """Paths of the form's requests."""
+        """Paths of the addresses to which the form sends its requests."""
         return frozenset({"/start", "/take", "/robot", *self._acts})
 
     def wait(self) -> Wish:

@@ -1,6 +1,6 @@
-"""Foreign: recordings of other programs as the master of ``replay`` and of the operators ``bag`` and ``file``.
+"""Foreign: reads recordings of other programs, for ``replay`` and for the operators ``bag`` and ``file``.
 
-This module makes a copy in memory in four cases: the topic or type of the pose differs from ours, the stamps are
+The recording is copied into memory in four cases: the topic or type of the pose differs from ours, the stamps are
 useless, the buttons are in another Joy message, or rows are damaged.
 """
 

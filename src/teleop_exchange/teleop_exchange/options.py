@@ -189,7 +189,9 @@ class ImportOptions:
             if value is not None and not 0.0 < value < float("inf"):
                 raise ParameterError(option(name), value, "finite and above 0")
         if self.episode is not None and not isinstance(self.episode, int):
-            raise ParameterError("--episode", self.episode, "a number; import_episodes takes all")
+            raise ParameterError(
+                "--episode", self.episode, "the number of one episode; `import_episodes` imports all of them"
+            )
         if self.skip < 0:
             raise ParameterError("--skip", self.skip, "0 or more")
 

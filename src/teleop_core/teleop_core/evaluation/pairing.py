@@ -20,10 +20,10 @@ def same_tick(log_ns: Integers, other_log_ns: Integers) -> Integers:
     """Partners of samples that one node publishes in pairs, tick by tick, without a common stamp.
 
     Partners are found by counting: the difference of both indices is constant until a message is lost. The difference
-    is certain if, for several samples in a row, the nearest sample in log time is far nearer than any other. Between
-    certain samples, a late recorder or network may have mixed the ticks. If the difference is equal before and after,
-    it is used in between too. If not, a message was lost in between. Then the running median of the difference to the
-    nearest sample is used; a median ignores bursts and keeps edges.
+    is certain if, for several samples in a row, the nearest sample in log time is far nearer than any other. Elsewhere
+    a late recorder or network may have changed the order of the ticks. If the difference before such a gap is equal to
+    the difference after it, it holds in the gap too. If not, a message was lost in the gap. There the running median
+    of the difference to the nearest sample is used; a median ignores bursts and keeps edges.
 
     Args:
         log_ns: Log times of one topic, shape (N,), in order, [ns].

@@ -246,7 +246,7 @@ def _speed(exercise: Exercise, seen: Seen, numbers: Numbers) -> Measured:
 
 
 def _goes_on(exercise: Exercise, seen: Seen, numbers: Numbers) -> Iterator[Measured]:
-    """Check that a moving arm follows the hand: no farther, no faster, and not much less."""
+    """Check that a moving arm follows the hand: at most as far and as fast as the hand, and nearly as far."""
     begin_ns, end_ns = seen.begin_ns, seen.end_ns
     yield _speed(exercise, seen, numbers)
     elapsed, stands = 1e-9 * (end_ns - begin_ns), exercise.stands(numbers)

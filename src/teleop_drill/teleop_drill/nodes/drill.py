@@ -36,7 +36,7 @@ _CIRCLE = (
     "operator.rotation=0.0",
 )
 _MEASURED = 2.0  # time in which the wake-up delay of this machine is measured [s]
-_STOOD_STILL = 0.5  # share of the command timeout; a result is invalid if the machine stands still for longer
+_STOOD_STILL = 0.5  # share of the command timeout; if this computer stalls for longer, the result is invalid
 _MORE = 2  # number of repetitions of an exercise whose result is not valid
 _STEADY = 4  # number of checks in a row, a tenth of a second apart, that must find that the arm follows
 Say = Callable[[str], None]

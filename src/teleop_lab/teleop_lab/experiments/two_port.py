@@ -85,7 +85,7 @@ class Ports:
             ParameterError: The measurements are shorter than one period.
         """
         if len(hand) < _TICKS:
-            raise ParameterError("ticks", len(hand), f"{_TICKS} or more, a whole period")
+            raise ParameterError("ticks", len(hand), f"at least {_TICKS}: one period of the excitation")
         places = [_spectrum(values) for values in (hand, tip)]
         forces = [-_spectrum(values) for values in (push, reaction)]
         fast, slow = (S * place[BINS] for place in places)

@@ -52,7 +52,7 @@ def numbers(p: PegTransferParameters) -> Array:
 
 @kernel
 def peg_transfer_judge(numbers: Array, memory: Array, scene: Array, state: Array) -> None:
-    """Set the goals of each hand step by step, and judge each block when it comes to rest; see :mod:`.transfer`."""
+    """Step by step, set the goals of each hand; judge each block when it comes to rest; see :mod:`.transfer`."""
     transfer.lead(numbers, memory, scene, state)
 
 

@@ -91,7 +91,7 @@ class Combined(Protocol):
 
     @property
     def parts(self) -> tuple[str, ...]:
-        """Texts of the shape's parts."""
+        """Option strings of the shapes that form this shape, such as ``sphere radius=0.01``."""
 
 
 def numbers_of_parts(parameters: Combined) -> Array:

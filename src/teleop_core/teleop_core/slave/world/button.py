@@ -89,8 +89,8 @@ def _spring(p: ButtonNumbers, depth: float) -> float:
 def _stiffness(p: ButtonNumbers) -> float:
     """Stiffness of the friction's spring [N/m].
 
-    The stiffness is larger than the slope of the bound. Otherwise the moving bound would move the spring and add
-    energy.
+    The stiffness is larger than the slope of the friction's bound over the travel. Otherwise the bound, which changes
+    with the travel, would move the spring and add energy.
     """
     return _STIFFER * p.click_force / min(p.click_travel, p.stroke - p.click_travel)
 
