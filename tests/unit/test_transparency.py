@@ -157,7 +157,7 @@ def test_worlds_that_do_not_differ_tell_no_matrix_and_less_than_a_period_no_port
         with pytest.raises(ParameterError, match="worlds differ") as caught:
             two_port.hybrid_matrix(ports)
         assert caught.value.value == len(ports)
-    with pytest.raises(ParameterError, match="whole period"):
+    with pytest.raises(ParameterError, match="one period"):
         two_port.Ports.of(*np.zeros((4, round(two_port.PERIOD * 1e3) - 1)))
 
 

@@ -14,7 +14,7 @@ class Drivers:
     The first page drives. Other pages watch until they take control. Taking control always succeeds, because two people
     at one arm talk to each other. A page that opens while no page drives gets control, so that a reloaded page
     continues to drive. A page that is already open gets control only on request. A page loses control when it closes,
-    and when it is silent while it holds the stylus; otherwise a page that hangs would hold the stylus for ever. Silence
+    and when it is silent while it holds the stylus; otherwise a page that hangs would keep the stylus. Silence
     with a free stylus is harmless and usual, because browsers slow hidden pages down.
 
     Methods may be called from any thread.
