@@ -169,6 +169,7 @@ def test_focus_is_seen_wherever_the_tab_key_leads_in_a_session(tab: Any) -> None
         tab.visit(server.url)
         tab.shows("ENABLED")
         tab.until("document.querySelector('#t-starting').hidden")
+        tab.until("document.querySelectorAll('button:not(:disabled)').length > 20")  # of the panel, once it is drawn
         seen = set()
         for _ in range(40):
             tab.key("Tab")

@@ -38,6 +38,12 @@ browser = pytest.mark.browser
 
 @pytest.fixture(scope="module", params=both())
 def tab(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Headless]:
+    if request.param == "Tab":  # the browser that tests of pages share
+        shared = request.getfixturevalue("_browser")
+        shared.clear()
+        shared.call("Emulation.setEmulatedMedia", features=[])
+        yield shared
+        return
     with opened(request.param, tmp_path_factory.mktemp("start")) as browser:
         yield browser
 

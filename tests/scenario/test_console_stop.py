@@ -33,6 +33,12 @@ DEAD = """[...document.querySelectorAll('button')].filter((b) =>
 
 @pytest.fixture(scope="module", params=both())
 def tab(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Headless]:
+    if request.param == "Tab":  # the browser that tests of pages share
+        shared = request.getfixturevalue("_browser")
+        shared.clear(390, 780)
+        shared.call("Emulation.setEmulatedMedia", features=[])
+        yield shared
+        return
     with opened(request.param, tmp_path_factory.mktemp("stop"), 390, 780) as browser:
         yield browser
 
