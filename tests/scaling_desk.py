@@ -11,9 +11,13 @@ from teleop_core.graph.signals import STATE, TICK_NS
 from teleop_core.hand.operators.rest import REST_POSITION
 from teleop_core.kernels import geometry
 from teleop_core.robots import load_robot
+from teleop_core.robots.selection import PUBLISHED
 
 ANY_HAND = PlausibilityParameters(speed=1000.0, acceleration=1e6, turn=1e4, reach=100.0, button_silence=0.0)
 """A hand that may jump, as tests have it do."""
+
+ALIGNED = {"tool_axes": PUBLISHED["rcrt1"]["motion_scaling"]["tool_axes"]}
+"""Stylus and tool are aligned, as published for the RCRT-1."""
 
 MM = 1e-3
 HOME = load_robot("rcrt1").fk(load_robot("rcrt1").home)

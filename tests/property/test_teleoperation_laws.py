@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 
 import scaling_desk
 from present import present
-from scaling_desk import ANY_HAND
+from scaling_desk import ALIGNED, ANY_HAND
 from teleop_core.coupling.mapping.gains import MotionScalingParameters
 from teleop_core.graph.signals import STATE, TICK_NS
 from teleop_core.kernels.axes import axis_map
@@ -53,8 +53,9 @@ class Sample:
 class Desk(scaling_desk.Desk):
     """Motion scaling between a hand and a slave that stands where it was told to; events between samples."""
 
-    def __init__(self) -> None:
-        super().__init__()
+    def __init__(self, **values: Any) -> None:
+        super().__init__(**values)
+        self.values = values
         self.row["slave_servo_cp"] = self.row["slave_setpoint_cp"]
         self.sample(np.zeros(3), np.zeros(3))
 
@@ -87,6 +88,7 @@ class Desk(scaling_desk.Desk):
                     fine_gain=fine,
                     tool_roll=3.0 * value,
                     mode="fine" if value > 0.5 else "coarse",
+                    **self.values,
                 )
             )
         return round(5e8 * value) + 1 if action == "gap" else TICK_NS
@@ -141,10 +143,10 @@ def test_scaling_is_linear_between_the_events(happened: list[tuple[str, float, A
 
 
 @given(events)
-def test_attitude_follows_the_stylus_in_its_own_frame_after_any_event(
+def test_attitude_of_an_aligned_tool_follows_the_stylus_in_its_own_frame_after_any_event(
     happened: list[tuple[str, float, Array, Array]],
 ) -> None:
-    desk = Desk()
+    desk = Desk(**ALIGNED)
     for action, value, step, turn in happened:
         desk.sample(step, turn, desk.act(action, value))
     desk.pressed[0] = 0.0
@@ -159,6 +161,21 @@ def test_attitude_follows_the_stylus_in_its_own_frame_after_any_event(
     in_stylus = stylus.inv() * Rotation.from_matrix(desk.turn)
     expected = stylus_tool.inv() * in_stylus * stylus_tool
     assert (expected.inv() * (before.inv() * after)).magnitude() < 1e-13
+
+
+@given(events, turns)
+def test_the_tool_turns_about_the_axis_about_which_the_hand_turns_after_any_event(
+    happened: list[tuple[str, float, Array, Array]], turn: Array
+) -> None:
+    desk = Desk()
+    for action, value, step, one in happened:
+        desk.sample(step, one, desk.act(action, value))
+    desk.pressed[0] = 0.0
+    desk.sample(np.zeros(3), np.zeros(3))
+    before = Rotation.from_quat(desk.row["slave_servo_cp"][3:], scalar_first=True)
+    desk.sample(np.zeros(3), turn)
+    after = Rotation.from_quat(desk.row["slave_servo_cp"][3:], scalar_first=True)
+    assert np.allclose((after * before.inv()).as_rotvec(), R_SLAVE_MASTER @ turn, rtol=0.0, atol=1e-12)
 
 
 @given(events, st.lists(st.tuples(triple, turns), min_size=1, max_size=10))

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from scaling_desk import ANY_HAND, HOME, MM, Desk
+from scaling_desk import ALIGNED, ANY_HAND, HOME, MM, Desk
 from teleop_core.base import build
 from teleop_core.coupling.mapping import gains, motion_scaling
 from teleop_core.graph import TICK_NS, topics
@@ -45,7 +45,7 @@ def test_the_wall_stands_around_the_stylus_and_the_slave_goes_by_what_is_left_of
 
 
 def mapped(stylus: Array, tool_roll: float) -> Array:
-    scaling = motion_scaling.MotionScaling(gains.MotionScalingParameters(tool_roll=tool_roll))
+    scaling = motion_scaling.MotionScaling(gains.MotionScalingParameters(tool_roll=tool_roll, **ALIGNED))
     quaternion, tool, out = np.empty(4), np.empty(4), np.empty((3, 3))
     quaternion_from_rotation(np.ascontiguousarray(stylus), quaternion)
     motion_scaling.mapped_orientation(scaling.parameters, quaternion, tool)
@@ -89,7 +89,7 @@ def test_home_offset_is_the_published_one_and_its_corrected_form() -> None:  # c
 
 
 def test_first_command_is_the_home_of_the_slave_and_moves_nothing() -> None:
-    desk = Desk()
+    desk = Desk(**ALIGNED)
     desk.turn = rotation("x", REST_TILT)
     assert np.array_equal(desk.step(), HOME[:3, 3])
     assert np.allclose(desk.attitude(), HOME[:3, :3], rtol=0, atol=ROUNDING)
@@ -132,7 +132,7 @@ def test_a_command_of_many_scaled_turns_stays_a_turn() -> None:
 
 
 def test_clutching_without_turning_keeps_the_attitude_absolute() -> None:
-    desk = Desk()
+    desk = Desk(**ALIGNED)
     desk.turn = rotation("x", REST_TILT)
     desk.step()
     desk.hold("clutch")

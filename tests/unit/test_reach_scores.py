@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from present import present
 from recipes import JOINTS, START_NS, Recipe, state, terminal
+from scaling_desk import ALIGNED
 from teleop_core.bags import reader, reports
 from teleop_core.bags.writer import BagWriter
 from teleop_core.coupling.mapping.gains import MotionScalingParameters
@@ -298,6 +299,7 @@ def test_an_error_against_the_setpoint_hides_what_the_asked_error_tells(path: Pa
 
 def turned_session(cut_from: int = COUNT, **parameters: Any) -> Any:
     """A session whose hand turns; from some tick on the tool no longer turns with it."""
+    parameters = ALIGNED | parameters
     rng = np.random.default_rng(9)
     session, scaling = Session(), MotionScaling(MotionScalingParameters(**parameters))
     row = scaling.signals
@@ -322,7 +324,14 @@ def turned_session(cut_from: int = COUNT, **parameters: Any) -> Any:
 
 
 @pytest.mark.parametrize(
-    "parameters", [{}, {"tool_roll": 0.4}, {"axes": ("+x", "+y", "+z"), "tool_axes": ("-x", "+y", "-z")}]
+    "parameters",
+    [
+        {},
+        {"tool_roll": 0.4},
+        {"axes": ("+x", "+y", "+z"), "tool_axes": ("-x", "+y", "-z")},
+        {"tool_axes": ()},
+        {"axes": ("+x", "+y", "+z"), "tool_axes": ()},
+    ],
 )
 def test_a_tool_that_turns_as_the_hand_is_where_it_was_asked_to_be(path: Path, parameters: Any) -> None:
     session, _ = turned_session(**parameters)

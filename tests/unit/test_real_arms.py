@@ -6,11 +6,17 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from present import present
 from real_arms import ARMS, urdf_of
+from teleop_core.coupling.mapping.motion_scaling import MotionScaling
+from teleop_core.graph import TICK_NS
+from teleop_core.kernels.axes import axis_map
+from teleop_core.kernels.geometry import pose_from_transform
+from teleop_core.kinematics import IkStatus
 from teleop_core.robots import load_robot
-from teleop_core.session.api import run
+from teleop_core.session.api import configuration, run
 
 sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))
 from sold_arms import lines, load, solved, wrists
@@ -103,3 +109,46 @@ def test_a_large_arm_whose_wrist_is_slower_than_the_noise_of_the_hand_keeps_its_
 
 def test_drives_of_links_that_weigh_some_grams_move_them(tmp_path: Path) -> None:
     assert followed("piper", tmp_path) > 0.95
+
+
+@pytest.mark.parametrize("name", ARMS)
+def test_an_arm_turns_its_tool_about_the_axis_about_which_the_hand_turns(name: str, tmp_path: Path) -> None:
+    """From any posture, as a session maps it; on arms that cannot turn so, the command does."""
+    path = tmp_path / f"{name}.urdf"
+    path.write_text(urdf_of(name))
+    made = configuration(robot=str(path), geometry=("tip=tip",))
+    scaling, robot = MotionScaling(made.group("motion_scaling")), load(name, tmp_path)
+    posture, angle = np.random.default_rng(3).uniform(robot.lower, robot.upper), 0.05
+    T = robot.fk(posture)
+    moves = axis_map("axes", made.group("motion_scaling").axes)
+    for axis in range(3):
+        commands = turned_about(scaling, T, np.eye(3)[axis] * angle)
+        told = commands[1] @ commands[0].T
+        assert np.allclose(log(told), moves[:, axis] * angle, rtol=0.0, atol=1e-9)
+        goal = T.copy()
+        goal[:3, :3] = commands[1]
+        answer = robot.ik(goal, posture)
+        if all(robot.task_mask) and answer.status is IkStatus.FOLLOWED:
+            reached = robot.fk(answer.q)[:3, :3] @ T[:3, :3].T
+            off = log(reached) - moves[:, axis] * angle
+            assert np.linalg.norm(off) <= answer.residual[1] + 1e-6
+
+
+def turned_about(scaling: MotionScaling, T: Any, turn: Any) -> list[Any]:
+    """Commanded orientations (3, 3) before and after the hand turned by a vector (3,) [rad] in the master's base."""
+    scaling.reset()
+    row, commands = scaling.signals, []
+    pose_from_transform(T, row["slave_setpoint_cp"])
+    attitude = Rotation.from_euler("xyz", [0.3, -0.2, 0.5])
+    for at in (attitude, attitude, Rotation.from_rotvec(turn) * attitude):
+        row["slave_setpoint_cp_ns"] = row["master_measured_cp_ns"] = row["master_measured_cp_ns"] + 100 * TICK_NS
+        row["master_buttons_ns"] = row["master_measured_cp_ns"]
+        row["master_measured_cp"][3:] = at.as_quat(scalar_first=True)
+        scaling.step()
+        commands.append(Rotation.from_quat(row["slave_servo_cp"][3:], scalar_first=True).as_matrix())
+    return commands[1:]
+
+
+def log(matrix: Any) -> Any:
+    """Rotation vector (3,) [rad]."""
+    return Rotation.from_matrix(matrix).as_rotvec()

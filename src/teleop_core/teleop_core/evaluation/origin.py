@@ -8,7 +8,7 @@ from typing import Any
 
 from teleop_core.bags import arms, reader
 from teleop_core.base import TeleopError, build, plain_yaml, shown, specs
-from teleop_core.coupling.mapping.gains import MotionScalingParameters, tool_maps
+from teleop_core.coupling.mapping.gains import MotionScalingParameters, ToolMap, tool_map
 from teleop_core.coupling.mapping.motion_scaling import MOTION_SCALING
 from teleop_core.graph import HAND, SESSION, STAGES, Graph, Layer, SessionParameters, build_graph, topics
 from teleop_core.graph.former_shapes import present_layer
@@ -44,15 +44,14 @@ class Origin:
         world: Stored parameters of the object that the slave touches, by names without ``world.``.
         missing: Parts that the recording names but that are unknown here, each as a text.
         begin: Last stage whose topics were taken from a file; empty if there is no such stage.
-        tool: Two quaternions (4,): the map from the master's base to the slave's axes, and the map from the stylus to
-            the tool. None if the tool does not rotate as much as the stylus.
+        tool: Map of the tool's orientation; None if the tool does not rotate as much as the stylus.
     """
 
     graph: Graph
     axes: Array
     operator: Mapping[str, object] = field(default_factory=dict)
     interpolation: str | None = None
-    tool: tuple[Array, Array] | None = None
+    tool: ToolMap | None = None
     plant: str | None = None
     controller: str | None = None
     geometry: tuple[str, ...] = ()
@@ -211,10 +210,10 @@ def _mapping(layer: Layer, arm: str, names: Iterable[str]) -> MotionScalingParam
         return MotionScalingParameters()
 
 
-def _tool(layer: Layer, arm: str) -> tuple[Array, Array] | None:
-    """Maps of the tool's orientation; None unless the tool rotates as far as the master."""
+def _tool(layer: Layer, arm: str) -> ToolMap | None:
+    """Map of the tool's orientation; None unless the tool rotates as far as the master."""
     parameters = _mapping(layer, arm, _TOOL)
-    return tool_maps(parameters) if parameters.rotation_gain == 1.0 else None
+    return tool_map(parameters) if parameters.rotation_gain == 1.0 else None
 
 
 def _axes(layer: Layer, arm: str) -> Array:

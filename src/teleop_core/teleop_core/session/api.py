@@ -27,7 +27,7 @@ from teleop_core.kernels.geometry import Array
 from teleop_core.robots import ROBOTS, Robot
 from teleop_core.robots.arms.dh import DhTable
 from teleop_core.session import length, notes, runner, virtual
-from teleop_core.session.configuration import Configuration
+from teleop_core.session.configuration import Configuration, with_changes
 from teleop_core.session.recording import Recording, open_recording
 from teleop_core.shapes import SHAPES, Shape
 from teleop_core.slave.controllers import CONTROLLERS, Controller
@@ -236,9 +236,8 @@ def replay(
     layer, scenario = runner.recorded_configuration(bag)
     named = {name.replace("__", "."): value for name, value in parameters.items()}
     changes = [setting(key, _plain(value)) for key, value in (named | dict(settings or {})).items()]
-    layers = [layer, *(load_file(Path(file)) for file in files), *changes]
-    layers += [parse_setting(text) for text in texts]
-    made = Configuration.from_layers(layers, scenario)
+    changes = [*(load_file(Path(file)) for file in files), *changes, *(parse_setting(text) for text in texts)]
+    made = Configuration.from_layers(with_changes(layer, changes), scenario)
     if begin not in _BEGINS:
         raise ParameterError("begin", begin, " or ".join(_BEGINS))
     session = virtual.VirtualTime(made, played=_BEGINS[begin])

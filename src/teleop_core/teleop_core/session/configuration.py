@@ -23,6 +23,7 @@ from teleop_core.graph.layers import (
     scenario_file,
 )
 from teleop_core.hand.operators import OPERATORS
+from teleop_core.robots.selection import PUBLISHED, RobotParameters
 
 
 @dataclass(frozen=True)
@@ -60,7 +61,7 @@ class Configuration:
         _check_names(merged, graph)
         groups: dict[str, Any] = {SESSION: session}
         for member in [Member(stage, arm) for arm in graph.namespaces for stage in graph.stages]:
-            values = _values_for(member, merged, graph)
+            values = _published(member, merged, graph) | _values_for(member, merged, graph)
             groups[member.name] = build(member.stage.parameters, values, f"{member.name}.")
         recorder = STAGES.find(RECORDER_NAME)
         groups[RECORDER_NAME] = build(recorder.parameters, merged.get(RECORDER_NAME, {}), f"{RECORDER_NAME}.")
@@ -117,6 +118,30 @@ def _values_for(member: Member, merged: Layer, graph: Graph) -> dict[str, object
         return own
     other = said(DEVICE if member.stage.name == HAND else HAND)
     return {name: other[name] for name in _SHARED if name in other} | own
+
+
+def _published(member: Member, merged: Layer, graph: Graph) -> dict[str, object]:
+    """Values that the source of the member's robot publishes for its stage."""
+    of_robot = next(stage for stage in graph.stages if issubclass(stage.parameters, RobotParameters))
+    robot = _values_for(Member(of_robot, member.arm), merged, graph).get("robot", RobotParameters().robot)
+    return dict(PUBLISHED.get(str(robot), {}).get(member.stage.name, {}))
+
+
+def with_changes(recorded: Layer, changes: Iterable[Layer]) -> list[Layer]:
+    """Layers of a recorded configuration with changes.
+
+    If the changes give an arm another robot, values that the source of the recorded robot publishes are left out.
+    """
+    changes, kept = list(changes), {name: dict(values) for name, values in recorded.items()}
+    for name, values in kept.items():
+        arm, slash, stage = name.rpartition("/")
+        robots = [layer.get(f"{arm}{slash}slave", {}).get("robot") for layer in (recorded, *changes)]
+        now = [robot for robot in robots if robot is not None]
+        if now and now[-1] != now[0]:
+            for key, value in PUBLISHED.get(str(now[0]), {}).get(stage, {}).items():
+                if values.get(key) in (value, list(value)):
+                    del values[key]
+    return [kept, *changes]
 
 
 def _check_names(merged: Layer, graph: Graph) -> None:

@@ -1,8 +1,8 @@
-"""Aim: let the tool turn about the axes about which the hand turns.
+"""Aim: let a tool that is aligned with the stylus turn about the axes about which the hand turns.
 
-``tool_axes`` and ``tool_roll`` map rotations of the stylus to rotations of the tool about the tool's own axes. In
-space, after the map of ``axes``, the tool turns about the axes of the hand's rotation only if these parameters fit the
-orientations of stylus and tool at engagement.
+Without ``tool_axes`` it always does. ``tool_axes`` and ``tool_roll`` map rotations of the stylus to rotations of the
+tool about the tool's own axes. In space, after the map of ``axes``, the tool turns about the axes of the hand's
+rotation only if these parameters fit the orientations of stylus and tool at engagement.
 """
 
 import math
@@ -41,15 +41,19 @@ class Aim:
         return np.asarray(self._stylus.T @ axis_map("axes", placement.axes).T @ tool)
 
     def misfit(self, placement: Placement) -> float:
-        """Angle [rad] between the rotation axes of the tool and those of the hand."""
+        """Angle [rad] between the rotation axes of the tool and those of the hand; 0 without ``tool_axes``."""
+        if not placement.tool_axes:
+            return 0.0
         given = axis_map("tool_axes", placement.tool_axes).T @ rotation("z", placement.tool_roll)
         return _angle(np.trace(given.T @ self.wanted(placement)))
 
     def aimed(self, placement: Placement) -> Placement:
         """Return the placement with the best tool axes and roll.
 
-        If the given axes and roll fit as well, they are preferred.
+        If the given axes and roll fit as well, they are preferred. A placement without ``tool_axes`` stays as it is.
         """
+        if not placement.tool_axes:
+            return placement
         left = _matrices() @ self.wanted(placement)
         rolls = np.arctan2(left[:, 1, 0] - left[:, 0, 1], left[:, 0, 0] + left[:, 1, 1])
         # Trace of Rz(-roll) times each of the matrices.

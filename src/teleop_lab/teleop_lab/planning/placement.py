@@ -21,7 +21,8 @@ class Placement:
         coarse_gain: Slave motion per hand motion in coarse mode.
         fine_gain: Slave motion per hand motion in fine mode.
         rotation_gain: Rotation of the tool divided by that of the stylus.
-        tool_axes: The tool's x, y, z as axes of the stylus: ``motion_scaling.tool_axes``.
+        tool_axes: The tool's x, y, z as axes of the stylus, ``motion_scaling.tool_axes``; empty: the tool turns about
+            the axes of the hand's turn.
         tool_roll: Turn [rad] of the tool about its axis, applied after ``tool_axes``.
     """
 

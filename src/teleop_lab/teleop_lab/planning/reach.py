@@ -104,7 +104,8 @@ def _configured(
         return made, api.run(made).bag
     bag = master_bag.as_master_bag(source.bag if isinstance(source, recording.Recording) else source)
     layer, scenario = runner.recorded_configuration(bag)
-    return configuration.Configuration.from_layers([layer, *changes], scenario), bag
+    layers = configuration.with_changes(layer, changes)
+    return configuration.Configuration.from_layers(layers, scenario), bag
 
 
 def _of_scenario(name: str, changes: list[Layer]) -> configuration.Configuration:

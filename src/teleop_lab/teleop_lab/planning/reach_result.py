@@ -18,6 +18,7 @@ LABELS = {
 }
 """Causes in words, by the names of :attr:`~teleop_lab.planning.walk.Walked.causes`."""
 _WIDTH = 38
+_NOTICED = 15.0  # angle between the axes of hand and tool that a person notices [deg]; assumed
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,8 +109,9 @@ def _rows(columns: list[Followed]) -> Iterator[tuple[str, list[str]]]:
     yield "gain, fine", [f"{p.fine_gain:.3g}" for p in placements]
     yield "share of the stylus' turn", [f"{p.rotation_gain:g}" for p in placements]
     yield "slave's x, y, z are the master's", [" ".join(p.axes) for p in placements]
-    yield "tool's x, y, z are the stylus'", [" ".join(p.tool_axes) for p in placements]
-    yield "then turned about z by", [f"{math.degrees(p.tool_roll):.0f}°" for p in placements]
+    if any(p.tool_axes for p in placements):
+        yield "tool's x, y, z are the stylus'", [" ".join(p.tool_axes) for p in placements]
+        yield "then turned about z by", [f"{math.degrees(p.tool_roll):.0f}°" for p in placements]
     yield "tool's turns off the hand's by", [f"{math.degrees(c.misfit):.0f}°" for c in columns]
 
 
@@ -122,9 +124,15 @@ def _start(placement: Placement) -> str:
 
 
 def _advice(reach: Reach) -> list[str]:
-    if reach.is_given:
-        return [f"The parameters as given reach {_percent(reach.goal)}: nothing to change."]
     lines = []
+    if (off := math.degrees(reach.proposed.misfit)) > _NOTICED:
+        lines.append(
+            f"The tool turns about axes {off:.0f}° away from those of the hand: --set motion_scaling.tool_axes=[] "
+            "turns it about the axes of the hand."
+        )
+    if reach.is_given:
+        parameters = "The parameters as given reach" if not lines else "All else as given reaches"
+        return [*lines, f"{parameters} {_percent(reach.goal)}: nothing to change."]
     if reach.proposed.share < reach.goal:
         lines.append(f"No placement was found that reaches {_percent(reach.goal)}; this is the best.")
     gain = reach.given.placement.coarse_gain

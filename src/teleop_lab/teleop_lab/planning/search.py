@@ -169,8 +169,11 @@ class Search:
         """Joints from which the whole path passes through the pose ``cut`` at sample ``at``."""
         pose, inverse, T = np.empty(7), whole[at, 3:] * (1.0, -1.0, -1.0, -1.0), np.empty((4, 4))
         pose[:3] = whole[0, :3] + cut[:3] - whole[at, :3]
-        multiply_quaternions(np.ascontiguousarray(cut[3:]), inverse, pose[3:])
-        multiply_quaternions(pose[3:], np.ascontiguousarray(whole[0, 3:]), pose[3:])
+        factors = [cut[3:], inverse, whole[0, 3:]]
+        if not self._given.tool_axes:  # turns of the hand are those of the tool in the base
+            factors.reverse()
+        multiply_quaternions(np.ascontiguousarray(factors[0]), np.ascontiguousarray(factors[1]), pose[3:])
+        multiply_quaternions(pose[3:], np.ascontiguousarray(factors[2]), pose[3:])
         pose[3:] /= np.linalg.norm(pose[3:])
         transform_from_pose(pose, T)
         answer = self._walker.robot.ik(T, np.array(start))

@@ -3,6 +3,7 @@
 import math
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -131,11 +132,6 @@ class MotionScalingParameters:
     )
     fine_gain: float = parameter(0.1, Within(1e-3, 10.0, "m/m"), "slave motion divided by master motion, in fine mode")
     mode: str = parameter("coarse", choices=MODES, doc="mode, coarse or fine; the mode button changes it too")
-    tool_roll: float = parameter(
-        math.pi / 2,
-        Within(-math.pi, math.pi, "rad"),
-        "turn of the slave's tool about its axis; π/2 aligns the tool with the home pose",
-    )
     axes: tuple[str, ...] = parameter(
         ("-z", "-x", "+y"),
         choices=AXES,
@@ -143,10 +139,17 @@ class MotionScalingParameters:
         doc="axes of the master's base along x, y, z of the slave's base; the default is published",
     )
     tool_axes: tuple[str, ...] = parameter(
-        ("+x", "-y", "-z"),
+        (),
         choices=AXES,
-        length=3,
-        doc="axes of the stylus along x, y, z of the tool, before tool_roll is applied",
+        doc="empty: the tool turns about the axis about which the hand turns, mapped by axes. Three axes align the "
+        "stylus with the tool: they lie along x, y, z of the tool before tool_roll is applied, and the tool turns "
+        "about its own axes. rcrt1 has the published +x, -y, -z",
+    )
+    tool_roll: float = parameter(
+        math.pi / 2,
+        Within(-math.pi, math.pi, "rad"),
+        "turn of an aligned tool about its axis; π/2 aligns the tool of rcrt1 with its home pose; no effect if "
+        "tool_axes is empty",
     )
     rotation_gain: float = parameter(
         1.0,
@@ -173,18 +176,41 @@ class MotionScalingParameters:
     def __post_init__(self) -> None:
         if self.fine_gain > self.coarse_gain:
             raise ParameterError("fine_gain", self.fine_gain, f"<= coarse_gain {self.coarse_gain}")
-        for name in ("axes", "tool_axes"):
-            axis_map(name, getattr(self, name))
+        axis_map("axes", self.axes)
+        if len(self.tool_axes) not in (0, 3):
+            raise ParameterError("tool_axes", self.tool_axes, "three axes, or empty")
+        if self.is_aligned:
+            axis_map("tool_axes", self.tool_axes)
+
+    @property
+    def is_aligned(self) -> bool:
+        """Whether the stylus is aligned with the tool; otherwise the tool turns about the axes of the hand's turn."""
+        return bool(self.tool_axes)
 
 
-def tool_maps(parameters: MotionScalingParameters) -> tuple[Array, Array]:
-    """Quaternions (4,) from the master's base to the slave's axes, and from the stylus to the tool.
+class ToolMap(NamedTuple):
+    """How orientations of the stylus become those of the tool.
+
+    Attributes:
+        slave_master: Quaternion (4,) from the master's base to the slave's axes.
+        stylus_tool: Quaternion (4,) from the stylus to an aligned tool.
+        is_aligned: Whether the stylus is aligned with the tool.
+    """
+
+    slave_master: Array
+    stylus_tool: Array
+    is_aligned: bool
+
+
+def tool_map(parameters: MotionScalingParameters) -> ToolMap:
+    """Map of orientations that parameters describe.
 
     Source:
-        Vongbunyong 2008, section 6.2.
+        Vongbunyong 2008, section 6.2, for the aligned tool.
     """
-    tool = product(axis_map("tool_axes", parameters.tool_axes).T, rotation("z", parameters.tool_roll))
-    found = np.empty(4), np.empty(4)
-    for matrix, quaternion in zip((axis_map("axes", parameters.axes), tool), found, strict=True):
-        quaternion_from_rotation(np.ascontiguousarray(matrix), quaternion)
-    return found
+    slave_master, stylus_tool = np.empty(4), np.array([1.0, 0.0, 0.0, 0.0])
+    quaternion_from_rotation(np.ascontiguousarray(axis_map("axes", parameters.axes)), slave_master)
+    if parameters.is_aligned:
+        tool = product(axis_map("tool_axes", parameters.tool_axes).T, rotation("z", parameters.tool_roll))
+        quaternion_from_rotation(np.ascontiguousarray(tool), stylus_tool)
+    return ToolMap(slave_master, stylus_tool, parameters.is_aligned)

@@ -24,11 +24,17 @@ class Sent(Fields):
     turned: Quaternion
 
 
+class TurnNumbers(Fields):
+    """Fields of a parameter record with the frame in which the tool repeats the hand's turns."""
+
+    is_aligned: int  # 1: the tool's own frame, as the stylus turns in its own; 0: the slave's base
+
+
 class LimitState(Fields):
     """Fields of a state record with the limit that hand and slave meet.
 
-    Positions [m] are in the slave's axes, rotations [rad] in those of the tool. The hand is beyond the limit while a
-    depth is positive.
+    Positions [m] are in the slave's axes, rotations [rad] in the frame of :class:`TurnNumbers`. The hand is beyond the
+    limit while a depth is positive.
     """
 
     command: PoseRow
@@ -96,12 +102,13 @@ def _found(s: LimitState, sent: Sequence[Sent], stamp_ns: int) -> int:
 
 
 @inner
-def draw_back(s: LimitState, sent: Sequence[Sent], gain: float, row: Row) -> None:
+def draw_back(p: TurnNumbers, s: LimitState, sent: Sequence[Sent], gain: float, row: Row) -> None:
     """Take the answer to an earlier command: draw the present command back by the cut of the earlier command.
 
     Cuts that were made since the earlier command was sent are not made again.
 
     Args:
+        p: Parameters.
         s: State record with ``command`` (7,), ``hand`` (3,) [m] in the slave's axes and ``tool``
             (4,), the orientation that the hand asks for before alignment, of the last sample, and
             :data:`LIMIT_FIELDS`; written.
@@ -122,7 +129,7 @@ def draw_back(s: LimitState, sent: Sequence[Sent], gain: float, row: Row) -> Non
     at = _found(s, sent, stamp_ns) if limit in (_AT_JOINT, _BEYOND) else -1
     if at >= 0:
         _move_back(s, sent[at], gain, reach)
-        _turn_back(s, sent[at], reach)
+        _turn_back(p, s, sent[at], reach)
 
 
 @inner
@@ -145,7 +152,7 @@ def _move_back(s: LimitState, entry: Sent, gain: float, reach: geometry.Array) -
 
 
 @inner
-def _turn_back(s: LimitState, entry: Sent, reach: geometry.Array) -> None:
+def _turn_back(p: TurnNumbers, s: LimitState, entry: Sent, reach: geometry.Array) -> None:
     wanted, cut = room(4), room(3)
     for i in range(4):
         wanted[i] = entry.turned[i]
@@ -161,34 +168,71 @@ def _turn_back(s: LimitState, entry: Sent, reach: geometry.Array) -> None:
     for i in range(4):
         before[i], s.turned[i] = s.command[3 + i], wanted[i]
     geometry.turn_by(cut, s.command[3:7])
-    align(s)
-    geometry.turn_within(before, s.command[3:7], cut)
+    align(p, s)
+    turn_from(p, before, s.command[3:7], cut)
     for i in range(3):
         s.turn_out[i] = -cut[i] / length
-    _anchor_turn(s)
+    _anchor_turn(p, s)
 
 
 @inner
-def align(s: LimitState) -> None:
+def align(p: TurnNumbers, s: LimitState) -> None:
     """Align: from now on the hand's present orientation corresponds to the orientation of the command."""
     inverse = room(4)
     geometry.invert_quaternion(s.tool, inverse)
-    geometry.multiply_quaternions(s.command[3:7], inverse, s.alignment)
+    if p.is_aligned:
+        geometry.multiply_quaternions(s.command[3:7], inverse, s.alignment)
+    else:
+        geometry.multiply_quaternions(inverse, s.command[3:7], s.alignment)
 
 
 @inner
-def _anchor_turn(s: LimitState) -> None:
+def follow_hand(p: TurnNumbers, s: LimitState) -> None:
+    """Turn the command as the hand has turned since the alignment."""
+    if p.is_aligned:
+        geometry.multiply_quaternions(s.alignment, s.tool, s.command[3:7])
+    else:
+        geometry.multiply_quaternions(s.tool, s.alignment, s.command[3:7])
+
+
+@inner
+def turn_from(p: TurnNumbers, a: geometry.Array, b: geometry.Array, vector: geometry.Array) -> None:
+    """Write the rotation vector (3,) [rad] from quaternion ``a`` to ``b``."""
+    if p.is_aligned:
+        geometry.turn_within(a, b, vector)
+    else:
+        geometry.turn_between(a, b, vector)
+
+
+@inner
+def turn_on(p: TurnNumbers, start: geometry.Array, vector: geometry.Array, end: geometry.Array) -> None:
+    """Write the quaternion ``start``, rotated by a vector (3,) [rad], into ``end``."""
+    if p.is_aligned:
+        geometry.rotate_by_vector(start, vector[0], vector[1], vector[2], end)
+        return
+    turned = room(4)
+    for i in range(4):
+        turned[i] = start[i]
+    geometry.turn_by(vector, turned)
+    for i in range(4):
+        end[i] = turned[i]
+
+
+@inner
+def _anchor_turn(p: TurnNumbers, s: LimitState) -> None:
     """Set the anchor to the hand's orientation, rotated back by the depth."""
-    x, y, z = s.turn_out[0], s.turn_out[1], s.turn_out[2]
-    back = -s.turn_depth
-    geometry.rotate_by_vector(s.tool, back * x, back * y, back * z, s.turn_anchor)
+    back = room(3)
+    for i in range(3):
+        back[i] = -s.turn_depth * s.turn_out[i]
+    turn_on(p, s.tool, back, s.turn_anchor)
 
 
 @inner
-def measure_depth(s: LimitState, most: float, now_ns: int) -> None:
+def measure_depth(p: TurnNumbers, s: LimitState, most: float, now_ns: int) -> None:
     """Measure how far the hand is now beyond the limit; a hand that has left the limit reports none.
 
     Args:
+        p: Parameters.
         s: State record.
         most: Depth [m] beyond which the anchor moves with the hand.
         now_ns: Time [ns].
@@ -205,12 +249,12 @@ def measure_depth(s: LimitState, most: float, now_ns: int) -> None:
                 s.anchor[i] = s.hand[i] - most * s.out[i]
     if s.turn_depth > 0.0:
         turn = room(3)
-        geometry.turn_within(s.turn_anchor, s.tool, turn)
+        turn_from(p, s.turn_anchor, s.tool, turn)
         s.turn_depth = turn[0] * s.turn_out[0] + turn[1] * s.turn_out[1] + turn[2] * s.turn_out[2]
         if s.turn_depth > s.turn_met + _TURN_PAST:
             s.turn_depth = 0.0
         if s.turn_depth > _MOST_TURN:
             s.turn_depth = _MOST_TURN
-            _anchor_turn(s)
+            _anchor_turn(p, s)
     if s.depth <= 0.0 and s.turn_depth <= 0.0 and now_ns > s.until_ns:
         s.limit, s.joint = _NONE, -1

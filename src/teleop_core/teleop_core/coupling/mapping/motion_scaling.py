@@ -22,12 +22,17 @@ from teleop_core.graph import DT, STATE, Row, RunningStage, Stage, assign, copy,
 from teleop_core.kernels import inner, kernel
 from teleop_core.kernels.axes import axis_map
 from teleop_core.kernels.fields import Integers, Quaternion, Vector3, record, record_array
-from teleop_core.kernels.geometry import Array, multiply_quaternions, rotate_by_vector, turn_within
+from teleop_core.kernels.geometry import Array, multiply_quaternions
 from teleop_core.kernels.room import room
 
 
 class ScalingNumbers(
-    walls.WallNumbers, side.SideNumbers, ReflectionNumbers, plausibility.PlausibilityNumbers, following.FollowingNumbers
+    walls.WallNumbers,
+    side.SideNumbers,
+    ReflectionNumbers,
+    plausibility.PlausibilityNumbers,
+    following.FollowingNumbers,
+    limits.TurnNumbers,
 ):
     """Parameter record of the motion scaling."""
 
@@ -93,7 +98,7 @@ def _take_tool(p: ScalingNumbers, s: ScalingState, pose: Array, turn: Array) -> 
         return
     tool = room(4)
     mapped_orientation(p, pose[3:7], tool)
-    turn_within(s.tool, tool, turn)
+    limits.turn_from(p, s.tool, tool, turn)
     for i in range(4):
         s.tool[i] = tool[i]
 
@@ -115,7 +120,7 @@ def _toggle_fixture(s: ScalingState, buttons: Array, position: Array) -> None:
 
 
 @inner
-def _latch(s: ScalingState, stylus: Array) -> None:
+def _latch(p: ScalingNumbers, s: ScalingState, stylus: Array) -> None:
     """Hold the command, and measure later motion from the present pose, so that the command never jumps.
 
     The fixture moves with the hand, so that it does not move relative to the slave.
@@ -123,13 +128,13 @@ def _latch(s: ScalingState, stylus: Array) -> None:
     if s.is_engaged:
         for i in range(3):
             s.center[i] += stylus[i] - s.stylus[i]
-    limits.align(s)
+    limits.align(p, s)
     limits.forget_limits(s)
 
 
 @inner
 def _move(p: ScalingNumbers, s: ScalingState, fixture: Held, gain: float, position: Array, turn: Array) -> None:
-    """Add the scaled step of the hand to the command; rotate the tool like the stylus."""
+    """Add the scaled step of the hand to the command; rotate the tool like the hand, or like the aligned stylus."""
     step = room(3)
     for i in range(3):
         step[i] = position[i] - s.master[i]
@@ -141,11 +146,12 @@ def _move(p: ScalingNumbers, s: ScalingState, fixture: Held, gain: float, positi
     for i in range(3):
         s.command[i] += gain * step[i]
     if p.rotation_gain == 1.0:
-        multiply_quaternions(s.alignment, s.tool, s.command[3:7])
+        limits.follow_hand(p, s)
     else:
-        x, y, z = turn[0] * p.rotation_gain, turn[1] * p.rotation_gain, turn[2] * p.rotation_gain
-        rotate_by_vector(s.command[3:7], x, y, z, s.command[3:7])
-        limits.align(s)
+        for i in range(3):
+            turn[i] *= p.rotation_gain
+        limits.turn_on(p, s.command[3:7], turn, s.command[3:7])
+        limits.align(p, s)
     # One Newton step keeps the product of many unit quaternions a unit quaternion.
     square = 0.0
     for i in range(3, 7):
@@ -242,8 +248,9 @@ def motion_scaling_step(
         row: Signals.
         dt: Tick [s].
 
-    Position is incremental (X_S += gain X_P), so a change of gain alone causes no motion. Orientation follows the
-    stylus absolutely, except for an alignment that is stored whenever the slave is engaged again. While clutched the
+    Position is incremental (X_S += gain X_P), so a change of gain alone causes no motion. The tool turns
+    about the axis about which the hand turns. With ``tool_axes`` its orientation is that of the stylus instead. An
+    alignment is stored whenever the slave is engaged again. While clutched the
     command is held. While the slave does not follow, the command is the slave's own setpoint. A command out of reach
     is cut, and motion continues from there: see :mod:`teleop_core.coupling.mapping.limits`. The slave follows the
     pose, which a tremor filter may have delayed. Forces on the hand use the unfiltered stylus. A fixture that confines
@@ -259,7 +266,7 @@ def motion_scaling_step(
     following.hear(s, row)
     is_following = following.follows(p, s, row)
     is_doubtful = following.is_in_doubt(p, s, is_following, row)
-    limits.draw_back(s, sent, p.gain[s.is_fine], row)
+    limits.draw_back(p, s, sent, p.gain[s.is_fine], row)
     if not plausibility.is_plausible(p, s, pose, row.master_measured_cp_ns):
         _refuse(p, s, sent, is_following, is_doubtful, stylus, row)
         return
@@ -277,10 +284,10 @@ def motion_scaling_step(
         s.aligned += 1
     s.has_led = 1 - s.must_latch
     if s.must_latch or clutch > 0.0 or s.buttons[0] > 0.0:
-        _latch(s, stylus)
+        _latch(p, s, stylus)
     else:
         _move(p, s, fixture, gain, pose, turn)
-        limits.measure_depth(s, p.reach_depth, row.master_measured_cp_ns)
+        limits.measure_depth(p, s, p.reach_depth, row.master_measured_cp_ns)
     _toggle_fixture(s, buttons, stylus)
     s.is_engaged, s.must_latch = 1, 0
     for i in range(3):
@@ -326,7 +333,7 @@ class MotionScaling(RunningStage):
         p, fixture = self.parameters, parameters.fixture
         p["gain"] = parameters.coarse_gain, parameters.fine_gain
         axes = axis_map("axes", parameters.axes)
-        p["slave_master"], p["stylus_tool"] = gains.tool_maps(parameters)
+        p["slave_master"], p["stylus_tool"], p["is_aligned"] = gains.tool_map(parameters)
         p["axis"], p["sign"] = np.abs(axes).argmax(axis=1), axes.sum(axis=1)
         self._take_fixture(fixture)
         wall = walls.WALLS[fixture.wall]

@@ -87,16 +87,17 @@ class Asked:
         return found
 
     def _turned(self, stylus: Array, commands: Array, begins: NDArray[np.bool_]) -> Array:
-        """Asked orientations (N, 4): from the moment at which it was engaged, the tool rotates like the stylus."""
+        """Asked orientations (N, 4): from the moment at which it was engaged, the tool rotates like the hand."""
         if self._origin.tool is None:
             return np.full((len(stylus), 4), np.nan)
-        slave_master, stylus_tool = self._origin.tool
+        slave_master, stylus_tool, is_aligned = self._origin.tool
         tools = quaternion_products(quaternion_products(slave_master, stylus), stylus_tool)
-        latched = quaternion_products(commands, tools * (1.0, -1.0, -1.0, -1.0))
+        inverse = tools * (1.0, -1.0, -1.0, -1.0)
+        latched = quaternion_products(commands, inverse) if is_aligned else quaternion_products(inverse, commands)
         last = _last(begins)
         alignment = np.where((last >= 0)[:, None], latched[last], self._alignment)
         self._alignment = alignment[-1]
-        return quaternion_products(alignment, tools)
+        return quaternion_products(alignment, tools) if is_aligned else quaternion_products(tools, alignment)
 
 
 def _last(begins: NDArray[np.bool_]) -> Integers:

@@ -13,14 +13,13 @@ import numpy as np
 from teleop_core.graph import STATE, topics
 from teleop_core.hand.operators import Operator, Setting
 from teleop_core.hand.operators.glances import STILL_TIME, Glance, Glances
-from teleop_core.hand.operators.hand_room import HandRoom, turned
+from teleop_core.hand.operators.hand_room import HandRoom, TurnsOfHand, turned
 from teleop_core.hand.operators.observer_parameters import ObserverParameters
 from teleop_core.hand.operators.shapes import minimum_jerk
 from teleop_core.hand.operators.submovement import Move, Way
 from teleop_core.hand.tasks import Act
 from teleop_core.kernels import Array, dot, length, product
 from teleop_core.kernels.axes import axis_map
-from teleop_core.kernels.geometry import turn_within
 
 AHEAD = 16
 """Number of ticks per request of the motion, about one frame; the delay of the eye is longer, so this adds no delay."""
@@ -48,7 +47,7 @@ class Observer:
         assert seen is not None
         self._p, self._seen = p, seen
         self._hand_of_slave = axis_map("operator.observer.axes", p.axes).T
-        self._stylus_of_tool = axis_map("operator.observer.tool_axes", p.tool_axes).T
+        self._turns_of_hand = TurnsOfHand(self._hand_of_slave, p.tool_axes)
         self._room = HandRoom(setting.common.device.corners, p.largest_turn)
         self._rng = np.random.default_rng((setting.seed, 3))
         self._glances = Glances(p.eye)
@@ -129,7 +128,7 @@ class Observer:
         if is_moving:
             step = step + self._glances.speed_of_goal(float(task[_WIDTH])) * (p.eye + p.least_time)
         if task[_TURN] > 0.0:
-            turn_within(glance.tip[3:], task[_ATTITUDE : _ATTITUDE + 4], turn)
+            turn = self._turns_of_hand.of_tip(glance.tip[3:], task[_ATTITUDE : _ATTITUDE + 4])
             lever = float(task[_WIDTH] / task[_TURN])
         felt = float(length(glance.force))
         if task[_FORCE] > 0.0 and felt >= _FELT:
@@ -202,7 +201,7 @@ class Observer:
         """Displacement and weighted rotation (6,) [m] between two glances, weighted as in the present submovement."""
         turn, lever = np.zeros(3), 0.0 if self._move is None else self._move.way.lever
         if lever > 0.0:
-            turn_within(a.tip[3:], b.tip[3:], turn)
+            turn = self._turns_of_hand.of_tip(a.tip[3:], b.tip[3:])
         return np.concatenate((b.tip[:3] - a.tip[:3], lever * turn))
 
     def _half_way(self, move: Move, until: float) -> float:
@@ -242,7 +241,7 @@ class Observer:
             duration = max(duration, p.least_time + bits, angle / p.fastest_turn)
         ended = Way(self._ended(way.step, duration), self._ended(way.turn, duration) if angle else way.turn, way.lever)
         step = product(self._hand_of_slave, ended.step) / gain
-        turn = product(self._stylus_of_tool, ended.turn) if angle else way.turn
+        turn = self._turns_of_hand.of_hand(ended.turn, self._hand[3:]) if angle else way.turn
         was_back, fits = self._move is not None and self._move.is_clutched, self._room.share(self._hand, step, turn)
         has_stopped = self._seen.state[STATE["limit"]] in _ENDS and self._move is not None
         if ((has_stopped and math.isinf(self._half_seen)) or fits < 1.0) and not was_back:

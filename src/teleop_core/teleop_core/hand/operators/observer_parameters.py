@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from teleop_core.base import Within, fixed
+from teleop_core.kernels.axes import AXES
 
 _FITTED = "fitted: to the four times of movement of MacKenzie and Ware 1993"
 
@@ -81,7 +82,8 @@ class ObserverParameters:
         ("-z", "-x", "+y"), length=3, doc="axes of the hand along x, y, z of the slave; the same as motion_scaling.axes"
     )
     tool_axes: tuple[str, ...] = fixed(
-        ("-y", "-x", "-z"),
-        length=3,
-        doc="axes of the stylus along x, y, z of the tool; motion_scaling.tool_axes after its tool_roll",
+        (),
+        choices=AXES,
+        doc="axes of the stylus along x, y, z of an aligned tool: motion_scaling.tool_axes after its tool_roll; empty, "
+        "as there, if the tool turns about the axes of the hand's turn; rcrt1 has -y, -x, -z",
     )
