@@ -268,7 +268,7 @@ class AnyPeer:
         what: str,
         fresh: Mapping[Topic, Any],
         still: Mapping[Topic, Any] = MappingProxyType({}),
-        after: int = 0,
+        after: int | None = None,
     ) -> int:
         """Send samples until something is so: fresh ones a millisecond after the last, still ones of time 0.
 
@@ -277,12 +277,12 @@ class AnyPeer:
             what: The same in words.
             fresh: Values by topic.
             still: Values by topic.
-            after: Stamp before the first [ns].
+            after: Stamp before the first [ns]; None: the present time, in whole milliseconds.
 
         Returns:
             Stamp of the last [ns].
         """
-        stamp = after
+        stamp = self.time_ns() // 1_000_000 * 1_000_000 if after is None else after
 
         def turn() -> Any:
             nonlocal stamp

@@ -16,7 +16,7 @@ from teleop_core.robots.selection import PUBLISHED
 ANY_HAND = PlausibilityParameters(speed=1000.0, acceleration=1e6, turn=1e4, reach=100.0, button_silence=0.0)
 """A hand that may jump, as tests have it do."""
 
-ALIGNED = {"tool_axes": PUBLISHED["rcrt1"]["motion_scaling"]["tool_axes"]}
+ALIGNED: Any = {"tool_axes": PUBLISHED["rcrt1"]["motion_scaling"]["tool_axes"]}
 """Stylus and tool are aligned, as published for the RCRT-1."""
 
 MM = 1e-3

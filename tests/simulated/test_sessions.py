@@ -58,9 +58,9 @@ def test_poses_that_are_not_unit_or_not_finite_are_refused(peer: "Peer") -> None
     assert answers.take() == 0
 
 
-def drive(peer: "Peer", topic: Topic, wanted: Any, listener: "Listener", start: int = 0) -> int:
+def drive(peer: "Peer", topic: Topic, wanted: Any, listener: "Listener", start: int | None = None) -> int:
     """Send a value until the slave's setpoints carry its stamp; returns that stamp."""
-    in_force = lambda: listener.take() and listener.stamps[-1] > start  # noqa: E731
+    in_force = lambda: listener.take() and listener.stamps[-1] > (start or topics.NO_COMMAND_NS)  # noqa: E731
     return peer.feed(in_force, "command in force", {topic: wanted}, after=start)
 
 
@@ -128,7 +128,7 @@ def test_another_frame_and_another_order_of_joints_give_the_same_motion(peer: "P
     publisher = peer.publisher(topics.SLAVE_SERVO_JP)
     wanted = HOME - 1e-4 * np.arange(1, 7)
     order = [3, 0, 5, 1, 4, 2]
-    stamp = 0
+    stamp = peer.time_ns()
 
     def followed() -> int | bool:
         nonlocal stamp

@@ -20,6 +20,7 @@ from teleop_core.robots import load_robot
 from teleop_core.robots.robot import Robot
 from teleop_core.slave import motion_commands, pair
 from teleop_core.slave.operation import OperationParameters
+from teleop_core.slave.operation.faults import Fault
 from teleop_core.slave.operation.states import Answer, State
 
 ARM = load_robot("rcrt1")
@@ -321,6 +322,7 @@ def test_steps_are_taken_after_references_of_the_topic(bench: Bench) -> None:
     for _ in range(20):
         bench.tick(MIDDLE)
     old_ns = int(bench.slave.signals["slave_servo_jp_ns"])
+    bench.run(TIMEOUT_TICKS + 1)  # the stream falls silent
     for _ in range(10):
         bench.motion.servo_by(0.001 * SMALL, bench.now_ns + TICK_NS // 2)
         bench.run(1)
@@ -367,13 +369,127 @@ def test_after_a_pause_the_arm_stays_where_it_came_to_rest(bench: Bench) -> None
     np.testing.assert_array_equal(bench.run(200)[-1], rest)
 
 
+STREAMS: dict[str, Callable[[Bench, Array], motion_commands.Told]] = {
+    "interpolate_jp": lambda bench, step: bench.motion.servo(bench.setpoint + step, bench.now_ns + TICK_NS),
+    "servo_jr": lambda bench, step: bench.motion.servo_by(step, bench.now_ns + TICK_NS),
+    "servo_jv": lambda bench, step: bench.motion.drive_joints(100.0 * step, bench.now_ns),
+    "servo_cv": lambda bench, step: bench.motion.drive_tip(10.0 * step, bench.now_ns),
+}
+
+
+@pytest.mark.parametrize("intruder", STREAMS)
+@pytest.mark.parametrize("owner", ["servo_jp", *STREAMS])
+def test_beside_a_stream_each_command_of_another_is_refused_and_moves_nothing(owner: str, intruder: str) -> None:
+    if owner == intruder:
+        return
+    alone, beside = Bench(), Bench()
+    for k in range(60):
+        for bench in (alone, beside):
+            if bench is beside and k >= 5:
+                told = STREAMS[intruder](bench, -1e-2 * SMALL)
+                assert told[0] is Answer.REFUSED
+                assert f"stream of {owner}" in told[1]
+            if owner == "servo_jp":
+                bench.tick(bench.setpoint + 1e-3 * SMALL)
+            else:
+                assert STREAMS[owner](bench, 1e-3 * SMALL)[0] is Answer.DONE
+                bench.run(1)
+    assert np.abs(alone.setpoint - MIDDLE).max() > 1e-5
+    np.testing.assert_array_equal(alone.setpoint, beside.setpoint)
+
+
+@pytest.mark.parametrize("owner", STREAMS)
+def test_beside_a_stream_of_commands_servo_jp_moves_nothing(owner: str) -> None:
+    alone, beside = Bench(), Bench()
+    for k in range(60):
+        for bench in (alone, beside):
+            assert STREAMS[owner](bench, 1e-3 * SMALL)[0] is Answer.DONE
+            bench.tick(MIDDLE - SMALL if bench is beside and k >= 5 else None)
+    np.testing.assert_array_equal(alone.setpoint, beside.setpoint)
+
+
+@pytest.mark.parametrize("age", [5.1, 60.0, 1000.0, -1.1])
+def test_a_command_of_a_wrong_age_moves_nothing_whether_first_or_later(bench: Bench, age: float) -> None:
+    late_ns, before = round(age * 1e9), bench.setpoint
+    bench.now_ns += 2000 * 10**9
+    bench.run(1)
+    answer, text = present(bench.motion.refusal_of_age(bench.now_ns - late_ns, bench.now_ns))
+    assert answer is Answer.REFUSED
+    assert f"{abs(age):.3g} s" in text
+    for _ in range(50):
+        bench.tick(MIDDLE + SMALL, bench.now_ns - late_ns)
+    assert bench.slave.server.refused >= 50
+    np.testing.assert_array_equal(bench.setpoint, before)
+
+
+def test_a_command_without_a_stamp_or_a_little_old_is_taken(bench: Bench) -> None:
+    assert bench.motion.refusal_of_age(0, bench.now_ns) is None
+    for age in (0.0, 3.0, -0.9):
+        assert bench.motion.refusal_of_age(bench.now_ns - round(age * 1e9), bench.now_ns) is None
+
+
+@pytest.mark.parametrize("size", [1e155, 1e307, np.finfo(float).max])
+def test_speeds_that_no_arm_has_are_refused_and_the_arm_goes_on(bench: Bench, size: float) -> None:
+    for axis in range(6):
+        wild = np.zeros(6)
+        wild[axis] = size
+        for drive in (bench.motion.drive_tip, bench.motion.drive_joints):
+            answer, text = drive(wild, bench.now_ns)
+            assert answer is Answer.REFUSED
+            assert "as fast as the arm can move" in text
+    assert np.isfinite(bench.run(200)).all()
+    assert bench.motion.drive_joints(SMALL, bench.now_ns)[0] is Answer.DONE
+
+
+def test_a_setpoint_that_is_no_number_is_neither_sent_nor_kept_and_reset_ends_the_fault(bench: Bench) -> None:
+    before = bench.setpoint
+    bench.motion.drive_joints(SMALL, bench.now_ns)
+    bench.slave.server.state["drive"] = np.nan
+    np.testing.assert_array_equal(bench.run(1)[-1], before)
+    bench.run(500)
+    assert bench.slave.server.operation["fault"] == Fault.SETPOINT
+    for cure in ("reset", "enable"):
+        assert bench.slave.server.request(cure)[0] is Answer.DONE
+    assert bench.motion.move(MIDDLE + SMALL)[0] is Answer.DONE
+    np.testing.assert_array_equal(bench.run(3000)[-1], MIDDLE + SMALL)
+
+
+def test_a_reset_takes_the_measured_position_within_the_limits_of_the_drives(bench: Bench) -> None:
+    server, row = bench.slave.server, bench.row
+    server.request("stop")
+    bench.run(300)
+    stands = row["slave_measured_js"].copy()
+    stands[0] += 0.02  # as an arm that is held by its brakes
+
+    def run(ticks: int) -> Array:
+        found = np.empty((ticks, 6))
+        for setpoint in found:
+            row["now_ns"] += TICK_NS
+            row["slave_measured_js"], row["slave_measured_js_ns"] = stands, row["now_ns"]
+            server.step()
+            setpoint[:] = row["slave_setpoint_js"]
+        return found
+
+    held = run(10)
+    assert abs(held[-1, 0] - stands[0]) > 0.01
+    server.request("reset")
+    path = np.vstack((held, run(500)))
+    assert (np.abs(np.diff(path, axis=0)) / DT <= present(ARM.drives).speed_limit * (1 + 1e-9)).all()
+    assert np.abs(path[-1] - stands[:6]).max() <= present(ARM.drives).encoder_step.max() + 1e-3
+
+
+MAGNITUDES = st.one_of(
+    st.just(1.0), st.floats(-3.0, 308.0).map(lambda power: 10.0**power), st.just(np.finfo(float).max)
+)
 COMMANDS = st.lists(
     st.tuples(
         st.sampled_from(
-            ["move", "pose", "joints", "tip", "step", "hold", "stream", "pause", "resume",
+            ["move", "move_by", "pose", "joints", "tip", "step", "reference", "hold", "stream", "pause", "resume",
              "stop", "reset", "enable", "home", "disable"]
         ),
-        st.lists(st.floats(-1.0, 1.0, width=32), min_size=6, max_size=6),
+        st.tuples(st.lists(st.floats(-1.0, 1.0, width=32), min_size=6, max_size=6), MAGNITUDES).map(
+            lambda drawn: [drawn[1] * number for number in drawn[0]]
+        ),
         st.integers(1, 120),
     ),
     min_size=1,
@@ -401,16 +517,19 @@ def test_whatever_is_commanded_no_step_exceeds_the_limits_of_the_drives(
         if name == "stream":
             bench.tick(bench.setpoint + 0.02 * wild)
             path.append(bench.setpoint[None])
-        elif name in {"move", "pose", "joints", "tip", "step", "hold"}:
+        elif name in {"move", "move_by", "pose", "joints", "tip", "step", "reference", "hold"}:
             acts: dict[str, Callable[[], object]] = {
                 "move": lambda: motion.move(bench.setpoint + wild),
+                "move_by": lambda: motion.move_by(wild),
+                "reference": lambda: motion.servo(bench.setpoint + 0.1 * wild, now_ns),
                 "pose": lambda: move_to_pose(motion, bench.tip @ transform(rotation("z", wild[3]), 0.1 * wild[:3])),
                 "joints": lambda: motion.drive_joints(20.0 * wild, now_ns),
                 "tip": lambda: motion.drive_tip(5.0 * wild, now_ns),
                 "step": lambda: motion.servo_by(0.1 * wild, now_ns),
                 "hold": motion.hold,
             }
-            acts[name]()
+            with np.errstate(over="ignore"):  # of the test's own products
+                acts[name]()
         else:
             bench.slave.server.request(name)
         path.append(bench.run(ticks))

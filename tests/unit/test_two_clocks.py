@@ -11,6 +11,7 @@ from teleop_core.bags.reader import Bag
 from teleop_core.graph.signals import TICK_NS
 from teleop_core.kernels.geometry import Array
 from teleop_core.session import configuration, virtual
+from teleop_core.slave.operation import OperationParameters
 from teleop_core.slave.pair import ArmParameters, SimulatedArm
 
 MS = 1_000_000
@@ -73,7 +74,8 @@ def test_a_slave_follows_commands_of_another_clock_as_those_of_its_own(ahead: fl
     """Up to a second ahead, from where on a stamp counts as wrong."""
 
     def setpoints(ahead_ns: int, drift: float) -> tuple[Array, Array]:
-        slave = SimulatedArm(ArmParameters(start_speed=1.0))
+        operation = OperationParameters(oldest_command=0.0)
+        slave = SimulatedArm(ArmParameters(start_speed=1.0, operation=operation))
         row, begin, found = slave.signals, 4_000 * 10**9, []
         slave.step()
         rest = place = np.array(row["slave_setpoint_js"])

@@ -16,9 +16,11 @@ from teleop_core.base.errors import TeleopError
 from teleop_core.graph.topics import SLAVE_MEASURED_CF, SLAVE_MEASURED_CP, Kind, Topic
 from teleop_core.kernels.geometry import Array, framed_wrenches, pose_from_transform, transform_from_pose
 from teleop_core.nodes.crtk import SINGLE, STREAMED, Condition, OperatingState, Refusals, is_installed
+from teleop_core.nodes.sender import SECOND_NS
 from teleop_core.nodes.streams import message_type, profile
 from teleop_core.slave.motion_commands import Told
 from teleop_core.slave.operation.states import Answer, State
+from teleop_core.slave.ownership import Leader
 
 _FRAME = SLAVE_MEASURED_CP.frame_id
 MEASURED_CV = Topic("slave/measured_cv", Kind.TWIST, frame_id=_FRAME)
@@ -113,7 +115,10 @@ class CrtkSlave:
             self._refusals.add(f"slave/{name}", "refused: the node is not active")
             return
         try:
-            answer, text = command(message)
+            stamp = message.header.stamp if hasattr(message, "header") else None
+            stamp_ns = 0 if stamp is None else stamp.sec * SECOND_NS + stamp.nanosec
+            refusal = self._locked(self._motion.refusal_of_age, stamp_ns, self._node.world.time_ns())
+            answer, text = refusal or command(message)
         except TeleopError as error:
             answer, text = Answer.REFUSED, f"refused: {error}"
         if answer not in {Answer.DONE, Answer.ALREADY}:
@@ -145,7 +150,7 @@ class CrtkSlave:
         found = self._motion.solve(_transform(message))
         if isinstance(found, tuple):
             return found
-        return self._locked(self._motion.servo, found, self._node.world.time_ns())
+        return self._locked(self._motion.servo, found, self._node.world.time_ns(), Leader.INTERPOLATE_CP)
 
 
 class CommandError(TeleopError):

@@ -199,7 +199,14 @@ class SlaveNode(TickingNode):
             return ["waits for slave/servo_jp and holds"]
         if status is CommandStatus.STALE:
             return [f"no slave/servo_jp for {servo_jp.age():.1f} s: holds"]
-        return ["slave/servo_jp jumped: holds"] if status is CommandStatus.REFUSED else []
+        if status is not CommandStatus.REFUSED:
+            return []
+        row, motion = self.row, self.stage.motion
+        aged = motion.refusal_of_age(int(row["slave_servo_jp_ns"]), int(row["now_ns"]))
+        if aged is not None:
+            return [f"slave/servo_jp {aged[1]}: holds"]
+        source = motion.source
+        return [f"slave/servo_jp is refused beside {source}" if source != "servo" else "slave/servo_jp jumped: holds"]
 
     def values(self) -> dict[str, str]:
         """State, the command that moves the arm, and the number of refused commands."""

@@ -6,6 +6,7 @@ from enum import IntEnum
 from teleop_core.graph import Row, copy
 from teleop_core.kernels import Array, PerJoint, Wrench, inner
 from teleop_core.kernels.filters import lag_step
+from teleop_core.slave import ownership
 from teleop_core.slave.arm import ArmModel
 from teleop_core.slave.interpolation import WayParameters, WayState, begin_way
 from teleop_core.slave.operation.faults import Fault
@@ -18,7 +19,7 @@ class CommandStatus(IntEnum):
 
     FRESH = 0  # the command is new and followed
     STALE = 1  # no command came for longer than the command timeout: the last command is held
-    REFUSED = 2  # too far from the present command to belong to one motion: the last command is held
+    REFUSED = 2  # a jump, of a wrong age, or of a stream beside the one that moves the arm: the last command is held
     MOVING = 3  # the arm moves to a goal, such as the start position, or at a wanted speed; servo_jp is ignored
     CLOSED = 4  # not enabled, or not homed: no command is followed
     BLIND = 5  # no recent measured position of the arm: the arm holds
@@ -30,7 +31,7 @@ class SlaveRow(Row):
     command_status: int
 
 
-class SlaveNumbers(ServerParameters, WayParameters):
+class SlaveNumbers(ServerParameters, WayParameters, ownership.OwnershipNumbers):
     """Parameter record of an arm's server."""
 
     start: PerJoint  # joint position at which the arm starts to follow commands [rad or m]
@@ -47,7 +48,7 @@ class SlaveNumbers(ServerParameters, WayParameters):
     is_filtered: int
 
 
-class SlaveState(ServerState, WayState):
+class SlaveState(ServerState, WayState, ownership.OwnershipState):
     """State record of an arm's server."""
 
     filtered: PerJoint
@@ -65,19 +66,18 @@ class SlaveState(ServerState, WayState):
     refused_before: int
     in_row: int
     is_stream: int
-    gap_ns: int
     moved_ticks: int
     move_ticks: int
     motion: int
     driven_ns: int  # when the wanted speed came
-    asked_ns: int
+    asked_ns: int  # stamp of the reference ``asked``, which came by a command; 0: none
+    asked_by: int  # its Leader
+    asked_seen_ns: int
 
 
 _FRESH, _STALE, _REFUSED, _MOVING, _CLOSED = (
     int(CommandStatus[name]) for name in ("FRESH", "STALE", "REFUSED", "MOVING", "CLOSED")
 )
-# Stamps this far ahead of the slave's clock are an error; smaller leads are a normal clock difference.
-_FUTURE_NS = 1_000_000_000
 # Commands farther apart than this do not count as a stream [ns].
 _SLOWEST_NS = 500_000_000
 AT_LIMITS, AT_ONCE, WITH_ARM = 0, 1, 2
@@ -85,6 +85,7 @@ AT_LIMITS, AT_ONCE, WITH_ARM = 0, 1, 2
 # Number of parts of a path in which the tip's speed is checked.
 _PARTS = 32
 _ENABLED, _SILENCE, _JUMP = int(State.ENABLED), int(Fault.SILENCE), int(Fault.JUMP)
+_SERVO_JP = int(ownership.Leader.SERVO_JP)
 
 
 @inner
@@ -174,9 +175,8 @@ def come_to_rest(p: SlaveNumbers, s: SlaveState, how: int, dt: float) -> None:
 
 
 @inner
-def _not_followed(s: SlaveState, row: SlaveRow) -> int:
-    """Status of an arm that follows no command. Commands that arrive now are ignored later as old."""
-    s.seen_ns = max(s.seen_ns, row.slave_servo_jp_ns)
+def _not_followed(s: SlaveState) -> int:
+    """Status of an arm that follows no command."""
     s.arrival_ns, s.in_row, s.is_stream = 0, 0, 0
     return _MOVING if s.is_busy or s.motion != 0 else _CLOSED
 
@@ -195,45 +195,69 @@ def _age_of_command(p: SlaveNumbers, s: SlaveState, now_ns: int) -> int:
 
 @inner
 def take_command(p: SlaveNumbers, s: SlaveState, row: SlaveRow, dt: float) -> int:
-    """Accept a new servo_jp unless it is a jump; return the :class:`CommandStatus`.
-
-    A jump is a command farther from the present command than a joint moves at full speed during a time T. T is the
-    command timeout or the time since the previous message, whichever is longer. The time since the previous message
-    counts as half a second at most; for the first message it counts as half a second.
-    """
-    stamp, now_ns = row.slave_servo_jp_ns, row.now_ns
-    if stamp > now_ns + _FUTURE_NS:  # if such a stamp were accepted, every later command would count as old
-        s.refused += 1
-        return _REFUSED
-    if stamp < s.seen_ns - _FUTURE_NS:  # stamps of another clock after a silence: a new stream
+    """Accept a new servo_jp, or a reference that came by another command; return the :class:`CommandStatus`."""
+    stamp_ns, asked_ns = row.slave_servo_jp_ns, s.asked_ns
+    if stamp_ns < s.seen_ns - ownership.AHEAD_NS:  # stamps of another clock after a silence: a new stream
         s.seen_ns = 0
+    is_new, last_ns = stamp_ns > s.seen_ns, s.seen_ns
+    if stamp_ns <= row.now_ns + ownership.AHEAD_NS:  # otherwise every later command would count as old
+        s.seen_ns = max(s.seen_ns, stamp_ns)
+    s.asked_ns = 0
     if s.state != _ENABLED or s.is_busy or s.motion != 0 or not s.is_homed:
-        return _not_followed(s, row)
-    if stamp > s.seen_ns:
-        is_first, period_ns = s.seen_ns == 0, min(stamp - s.seen_ns, _SLOWEST_NS)
-        s.seen_ns = stamp
-        far = max(p.timeout_ns, _SLOWEST_NS if is_first else period_ns) * 1e-9
-        for i in range(s.command.shape[0]):
-            near = abs(row.slave_servo_jp[i] - s.target[i]) <= p.speed_limit[i] * far
-            if not near:  # also for NaN
-                s.refused += 1
-                _age_of_command(p, s, now_ns)
-                return _REFUSED
-        # If stamps advance faster than our clock, the time between arrivals counts as the period.
-        period_ns = 0 if is_first else min(period_ns, now_ns - s.arrival_ns)
-        begin_way(p, s, row.slave_servo_jp, period_ns, dt)
-        is_next = s.arrival_ns > 0 and now_ns - s.arrival_ns <= _longest_gap(p, s)
-        s.gap_ns = period_ns
-        s.in_row = s.in_row + 1 if is_next else 0
-        s.is_stream = max(s.is_stream, s.in_row)  # a gap does not turn a stream into single commands
-        s.command_stamp_ns, s.arrival_ns, s.refused_before = stamp, now_ns, s.refused
-    return _age_of_command(p, s, now_ns)
+        return _not_followed(s)
+    status = _FRESH
+    if is_new:
+        status = _take_reference(p, s, row.slave_servo_jp, stamp_ns, last_ns, _SERVO_JP, row.now_ns, dt)
+    if asked_ns != 0:
+        status = _take_reference(p, s, s.asked, asked_ns, s.asked_seen_ns, s.asked_by, row.now_ns, dt)
+        s.asked_seen_ns = asked_ns
+    age = _age_of_command(p, s, row.now_ns)
+    return status if status == _REFUSED else age
 
 
 @inner
-def _longest_gap(p: SlaveNumbers, s: SlaveState) -> int:
-    """Silence [ns] after which a stream counts as broken; for a slow stream twice its period."""
-    return max(p.timeout_ns, 2 * s.gap_ns)
+def _take_reference(
+    p: SlaveNumbers, s: SlaveState, wanted: Array, stamp_ns: int, last_ns: int, leader: int, now_ns: int, dt: float
+) -> int:
+    """Accept a joint reference, unless it is a jump, of a wrong age, or of a stream that may not move the arm.
+
+    A jump is a reference farther from the present command than a joint moves at full speed during a time T. T is the
+    command timeout or the time since the previous message, whichever is longer. The time since the previous message
+    counts as half a second at most; for the first message it counts as half a second.
+
+    Args:
+        p: Parameters.
+        s: State; written.
+        wanted: Joints (n,) [rad or m].
+        stamp_ns: Its stamp [ns].
+        last_ns: Stamp of the previous reference of this stream [ns]; 0 for the first.
+        leader: The stream, a :class:`~teleop_core.slave.ownership.Leader`.
+        now_ns: Time of the tick [ns].
+        dt: Tick [s].
+
+    Returns:
+        FRESH or REFUSED.
+    """
+    is_first, period_ns = last_ns == 0, min(stamp_ns - last_ns, _SLOWEST_NS)
+    is_wrong = ownership.has_wrong_age(p, stamp_ns, now_ns) or ownership.is_led_by_another(p, s, leader, now_ns)
+    far = max(p.timeout_ns, _SLOWEST_NS if is_first else period_ns) * 1e-9
+    for i in range(s.command.shape[0]):
+        near = abs(wanted[i] - s.target[i]) <= p.speed_limit[i] * far
+        if not near:  # also for NaN
+            is_wrong = True
+    if is_wrong:
+        s.refused += 1
+        return _REFUSED
+    # If stamps advance faster than our clock, the time between arrivals counts as the period.
+    period_ns = 0 if is_first else min(period_ns, now_ns - s.arrival_ns)
+    begin_way(p, s, wanted, period_ns, dt)
+    is_next = s.arrival_ns > 0 and now_ns - s.arrival_ns <= ownership.longest_gap(p, s)
+    ownership.lead(s, leader, now_ns)
+    s.gap_ns = period_ns
+    s.in_row = s.in_row + 1 if is_next else 0
+    s.is_stream = max(s.is_stream, s.in_row)  # a gap does not turn a stream into single commands
+    s.command_stamp_ns, s.arrival_ns, s.refused_before = stamp_ns, now_ns, s.refused
+    return _FRESH
 
 
 @inner
@@ -245,7 +269,7 @@ def follows(p: SlaveNumbers, s: SlaveState, now_ns: int) -> bool:
     """
     if s.state != _ENABLED or s.is_busy or not s.is_homed:
         return False
-    return bool(now_ns - s.arrival_ns <= _longest_gap(p, s) or s.in_row == 0)
+    return bool(now_ns - s.arrival_ns <= ownership.longest_gap(p, s) or s.in_row == 0)
 
 
 @inner

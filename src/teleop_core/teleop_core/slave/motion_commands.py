@@ -4,8 +4,10 @@ The commands are those of CRTK (Collaborative Robotics Toolkit): moves to a goal
 relative to the last command, and hold. The limits, states and faults of the slave's step apply to all of them. Only one
 command moves the arm at a time:
 
-- a move replaces any other motion, and only another move or a hold replaces a move; - of several streams the first one
-moves the arm, until it is silent for the command timeout; - hold ends a move, a speed command, and a single reference.
+- a move replaces any other motion, and only another move or a hold replaces a move;
+- of several streams the first one moves the arm, until it is silent for the command timeout
+  (:mod:`teleop_core.slave.ownership`);
+- hold ends a move, a speed command, and a single reference.
 """
 
 from typing import Any, Protocol
@@ -14,15 +16,21 @@ import numpy as np
 
 from teleop_core.base.errors import ShapeError
 from teleop_core.graph.topics import NO_COMMAND_NS
-from teleop_core.kernels.geometry import Array
+from teleop_core.kernels import Array, length, records
 from teleop_core.kinematics import IkStatus
 from teleop_core.robots.robot import Robot
+from teleop_core.slave import ownership
 from teleop_core.slave.operation.states import Answer, Event, State
+from teleop_core.slave.ownership import Leader
 from teleop_core.slave.velocity import Motion
 
 _REACHED = (IkStatus.FOLLOWED, IkStatus.NEAR_SINGULAR)
 # A goal may exceed a limit by this much [rad or m], because a setpoint at the limit is rounded.
 _SLACK = 1e-6
+# A speed more than this many times as fast as the arm could ever move is refused; a smaller one is reduced.
+_BEYOND = 100.0
+# Least lever between a joint and the tip for the bound of a twist [m].
+_LEVER = 1.0
 Told = tuple[Answer, str]
 """Answer to a command, and its text."""
 
@@ -49,7 +57,10 @@ class MotionCommands:
     """
 
     def __init__(self, slave: Commanded) -> None:
-        self._slave = slave
+        self._slave, robot = slave, slave.robot
+        levers = np.maximum(length(robot.jacobian(robot.home)[:3].T), _LEVER)
+        fastest = np.array([np.sum(levers * robot.speed_limit), np.sum(robot.speed_limit)])
+        self._fastest_twist = np.repeat(fastest, 3)  # (6,) [m/s, rad/s]
 
     # -- what it does ----------------------------------------------------------------------------
 
@@ -114,9 +125,28 @@ class MotionCommands:
         return Answer.REFUSED, f"refused: out of reach, {short}"
 
     def load(self) -> None:
-        """Compile what :meth:`solve` calls, since compiling during a session would make the ticks late."""
-        robot = self._slave.robot
+        """Compile what commands call, since compiling during a session would make the ticks late."""
+        robot, now_ns = self._slave.robot, 0
         self.solve(robot.fk(robot.home))
+        self.refusal_of_age(now_ns, now_ns)
+        self._refusal_beside(Leader.SERVO_JP, now_ns)
+        ownership.lead(records(self._slave.state.dtype)[0], 0, now_ns)
+
+    def refusal_of_age(self, stamp_ns: int, now_ns: int) -> Told | None:
+        """Why a command is refused for its age; None if it is not.
+
+        Args:
+            stamp_ns: Stamp of the command [ns]; 0 for a command without a stamp, which has no age.
+            now_ns: Time of arrival, on the clock of the ticks [ns].
+        """
+        p = self._slave.parameters
+        if stamp_ns == 0 or not ownership.has_wrong_age(p, stamp_ns, now_ns):
+            return None
+        age, most = 1e-9 * (now_ns - stamp_ns), 1e-9 * int(p["oldest_ns"])
+        if age < 0.0:
+            return Answer.REFUSED, f"refused: its stamp is {-age:.3g} s ahead of this clock; set the clocks"
+        needed = f"at most {most:g} s (slave.operation.oldest_command)"
+        return Answer.REFUSED, f"refused: it is {age:.3g} s old, {needed}"
 
     # -- streams ---------------------------------------------------------------------------------
 
@@ -130,7 +160,8 @@ class MotionCommands:
         Raises:
             ShapeError: The length of ``speed`` is not the number of joints.
         """
-        return self._drive(Motion.JOINTS, self._joints(speed), "drive", now_ns)
+        wanted, most = self._joints(speed), _BEYOND * self._slave.robot.speed_limit
+        return self._drive(Leader.SERVO_JV, wanted, most, now_ns)
 
     def drive_tip(self, twist: object, now_ns: int) -> Told:
         """Drive the tip at the given twist until the command timeout is over; then brake to rest.
@@ -144,26 +175,31 @@ class MotionCommands:
         Raises:
             ShapeError: ``twist`` does not have the shape (6,).
         """
-        return self._drive(Motion.TIP, _row(twist, 6), "twist", now_ns)
+        return self._drive(Leader.SERVO_CV, _row(twist, 6), _BEYOND * self._fastest_twist, now_ns)
 
-    def servo(self, joints: object, now_ns: int) -> Told:
+    def servo(self, joints: object, now_ns: int, leader: Leader = Leader.INTERPOLATE_JP) -> Told:
         """Follow a joint reference (n,) [rad or m], like one of ``slave/servo_jp``.
+
+        Args:
+            joints: Reference (n,) [rad or m].
+            now_ns: Time of arrival, on the clock of the ticks [ns].
+            leader: Command by which the reference came.
 
         Raises:
             ShapeError: The length of ``joints`` is not the number of joints.
         """
         wanted = self._joints(joints)
-        if refusal := self._unfit(wanted) or self._refusal():
+        if refusal := self._unfit(wanted) or self._refusal() or self._refusal_beside(leader, now_ns):
             return refusal
         s = self._slave.state
-        s["asked"], s["asked_ns"] = wanted, now_ns
+        s["asked"], s["asked_ns"], s["asked_by"] = wanted, now_ns, leader
         return Answer.DONE, "servo: taken"
 
     def servo_by(self, step: object, now_ns: int) -> Told:
         """Follow a step of joints (n,) [rad or m], relative to the last command."""
         s = self._slave.state
         last = s["asked"] if s["asked_ns"] else s["target"]
-        return self.servo(last + self._joints(step), now_ns)
+        return self.servo(last + self._joints(step), now_ns, Leader.SERVO_JR)
 
     def hold(self) -> Told:
         """Brake to rest and stay there until the next command; an active stream continues to move the arm.
@@ -179,19 +215,31 @@ class MotionCommands:
         s["motion"], s["drive"], s["driven_ns"] = Motion.JOINTS, 0.0, 0
         return Answer.DONE, "hold: done"
 
-    def _drive(self, motion: Motion, wanted: Array, field: str, now_ns: int) -> Told:
+    def _drive(self, leader: Leader, wanted: Array, most: Array, now_ns: int) -> Told:
         if not np.isfinite(wanted).all():
             return Answer.REFUSED, "velocity refused: it holds NaN or infinite numbers"
-        if refusal := self._refusal():
+        if (np.abs(wanted) > most).any():
+            i = int(np.flatnonzero(np.abs(wanted) > most)[0])
+            return (
+                Answer.REFUSED,
+                f"velocity refused: {wanted[i]:.3g} is over {_BEYOND:g} times as fast as the arm can move",
+            )
+        if refusal := self._refusal() or self._refusal_beside(leader, now_ns):
             return refusal
-        s = self._slave.state
-        is_streamed = s["arrival_ns"] > 0 and s["in_row"] > 0
-        if is_streamed and now_ns - s["arrival_ns"] <= self._slave.parameters["timeout_ns"]:
-            return Answer.REFUSED, "velocity refused: the arm follows a stream of servo_jp"
+        s, is_joints = self._slave.state, leader is Leader.SERVO_JV
         if s["motion"] == Motion.FOLLOWING:
             s["command_stamp_ns"] = NO_COMMAND_NS
-        s[field], s["motion"], s["driven_ns"] = wanted, motion, now_ns
+        s["drive" if is_joints else "twist"], s["driven_ns"] = wanted, now_ns
+        s["motion"] = Motion.JOINTS if is_joints else Motion.TIP
+        ownership.lead(s, int(leader), now_ns)
         return Answer.DONE, "velocity: taken"
+
+    def _refusal_beside(self, leader: Leader, now_ns: int) -> Told | None:
+        """Why a stream does not move the arm beside another one; None if it does."""
+        s = self._slave.state
+        if not ownership.is_led_by_another(self._slave.parameters, s, int(leader), now_ns):
+            return None
+        return Answer.REFUSED, f"refused: the arm follows a stream of {Leader(int(s['leader'])).command}"
 
     def _refusal(self) -> Told | None:
         """Why the arm does not follow streams now; None if it follows them."""

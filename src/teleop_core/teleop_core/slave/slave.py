@@ -23,6 +23,7 @@ from teleop_core.slave.operation.watch import fail
 
 _TIMES = {
     "heartbeat": "heartbeat_ns",
+    "oldest_command": "oldest_ns",
     "longest_outage": "outage_ns",
     "longest_silence": "silence_ns",
     "effort_time": "effort_ns",

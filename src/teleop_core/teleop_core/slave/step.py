@@ -1,13 +1,17 @@
 """Step of the slave: one tick of the arm's server, on records of parameters, state and signals."""
 
+import math
+
 from teleop_core.graph import copy, topics
 from teleop_core.kernels import Array, inner, kernel, pose_from_transform
 from teleop_core.slave import commands, interpolation, velocity
 from teleop_core.slave.arm import ArmModel
 from teleop_core.slave.operation import watch
+from teleop_core.slave.operation.faults import Fault
 from teleop_core.slave.operation.states import Event, State, change
 
 _ENABLED, _FAULT = int(State.ENABLED), int(State.FAULT)
+_PAUSED, _SETPOINT = int(State.PAUSED), int(Fault.SETPOINT)
 _ARRIVED, _HOME, _BLIND = int(Event.ARRIVED), int(Event.HOME), int(commands.CommandStatus.BLIND)
 
 
@@ -90,7 +94,7 @@ def _go_on(
     p: commands.SlaveNumbers, s: commands.SlaveState, arm: ArmModel, row: commands.SlaveRow, before: Array, dt: float
 ) -> None:
     """Move the setpoint: to a goal, at a speed, after the command, or to rest."""
-    if s.state != _FAULT:
+    if s.state in (_ENABLED, _PAUSED):
         s.must_join = 0
     if s.state == _ENABLED and s.is_busy and not s.must_plan:
         commands.advance_move(s)
@@ -103,9 +107,29 @@ def _go_on(
         commands.advance_setpoint(p, s, before, dt)
     elif watch.is_braked(p, s) or s.must_join:
         commands.come_to_rest(p, s, commands.WITH_ARM, dt)
-        s.must_join = s.must_join and not (_is_near(p, s) or _is_still(s))
+        if s.must_join and (_is_near(p, s) or _is_still(s)):
+            s.must_join = 0
+            for i in range(s.step.shape[0]):
+                s.step[i] = 0.0
     else:
         commands.come_to_rest(p, s, commands.AT_ONCE if s.state == _FAULT else commands.AT_LIMITS, dt)
+
+
+@inner
+def _insist_on_numbers(p: commands.SlaveNumbers, s: commands.SlaveState, arm: ArmModel, row: commands.SlaveRow) -> None:
+    """Hold the last setpoint, and report the fault, if the new setpoint is not finite."""
+    for i in range(s.setpoint.shape[0]):
+        if not math.isfinite(s.setpoint[i]):
+            break
+    else:
+        return
+    for i in range(s.setpoint.shape[0]):
+        s.setpoint[i], s.step[i], s.drive[i] = row.slave_setpoint_js[i], 0.0, 0.0
+    commands.forget_way(s)
+    s.motion, s.tool_step = 0, 0.0
+    copy(s.setpoint, arm.setpoint)
+    arm.fk(arm.setpoint, arm.geometry, arm.T)
+    watch.fail(p, s, _SETPOINT, -1, 0.0, 0.0)
 
 
 @kernel
@@ -126,9 +150,6 @@ def slave_step(
     joints = arm.joints
     _take_measured(p, s, arm, row)
     watch.begin_tick(p, s, row.now_ns)
-    if s.asked_ns != 0:  # works as a message of servo_jp
-        copy(s.asked, row.slave_servo_jp)
-        row.slave_servo_jp_ns, s.asked_ns = s.asked_ns, 0
     row.command_status = commands.take_command(p, s, row, dt)
     if s.state != _ENABLED:
         s.motion = 0
@@ -142,6 +163,7 @@ def slave_step(
     copy(s.command, joints)
     _go_on(p, s, arm, row, joints, dt)
     commands.limit_tool(p, s, arm, row.slave_setpoint_cp, dt)
+    _insist_on_numbers(p, s, arm, row)
     if s.is_busy and not s.must_plan and s.moved_ticks >= s.move_ticks:
         change(s, _ARRIVED)
     pose_from_transform(arm.T, row.slave_setpoint_cp)

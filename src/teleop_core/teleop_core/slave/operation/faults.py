@@ -23,6 +23,7 @@ class Fault(IntEnum):
     FLOOD = 12
     STALL = 13
     FEEDBACK = 14
+    SETPOINT = 15
 
     @property
     def word(self) -> str:
@@ -65,9 +66,10 @@ FAULTS: Mapping[Fault, FaultKind] = {
     Fault.FEEDBACK: FaultKind(
         Reaction.HOLD, "no slave/measured_js; its sender, such as arm_bridge, says why in its log", "s"
     ),
+    Fault.SETPOINT: FaultKind(Reaction.HOLD, "a command led to a setpoint that is no number; the last one is held"),
 }
 """All faults with their reactions; faults that a session lists in ``reported`` are only reported."""
-ALWAYS = (Fault.STOP, Fault.HEARTBEAT)
+ALWAYS = (Fault.STOP, Fault.HEARTBEAT, Fault.SETPOINT)
 """Faults that always stop the arm; ``reported`` cannot demote them to a message."""
 NAMES = tuple(fault.word for fault in Fault if fault and fault not in ALWAYS)
 """Names of the faults that a session can list in ``reported``."""

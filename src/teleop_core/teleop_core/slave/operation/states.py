@@ -90,6 +90,7 @@ class OperatingState(Fields):
     is_stopped: int  # an emergency stop is latched
     is_pressed: int  # the cause of the stop still exists
     is_moving: int  # the arm is not at rest
+    must_join: int  # the setpoint goes to the measured position, after a reset or after lost feedback
     must_home: int  # a pause interrupted homing; resume restarts homing
     fault: int
     fault_joint: int
@@ -138,7 +139,7 @@ def _take(s: OperatingState, event: int, answer: int) -> int:
         s.is_stopped = 1
         return _ALREADY if was else _DONE
     if event == _RESET:
-        s.is_stopped = 0
+        s.is_stopped, s.must_join = 0, 1
     if event == _MOVE:
         s.is_busy, s.must_plan = 1, 1
         return _DONE

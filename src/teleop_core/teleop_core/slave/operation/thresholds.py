@@ -38,6 +38,13 @@ class OperationParameters:
         off=0.0,
         source="assumed: longer than short interruptions of a node, and shorter than a person looks away",
     )
+    oldest_command: float = parameter(
+        5.0,
+        Within(0.01, 3600.0, "s"),
+        "a command whose stamp is older than this is refused; 0: never, for a sender with another clock",
+        off=0.0,
+        source="assumed: longer than the delays over which people steer an arm, 3 s (Ferrell 1965)",
+    )
     longest_silence: float = parameter(
         2.0,
         Within(0.01, 60.0, "s"),

@@ -56,7 +56,6 @@ class ServerState(OperatingState):
     travel: float
     sampled_ns: int
     heard_of_ns: int
-    must_join: int  # the setpoint goes to the measured position of an arm whose feedback was lost
 
 
 _REACTIONS = {Reaction.HOLD: 0, Reaction.BRAKE: 1, Reaction.PAUSE: 2, Reaction.REPORT: 3}
