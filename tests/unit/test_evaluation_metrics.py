@@ -23,6 +23,7 @@ from teleop_core.evaluation.figure import Figure, line, time_axis
 from teleop_core.evaluation.metrics.clutches import ClutchesMetric
 from teleop_core.evaluation.metrics.economy import EconomyMetric
 from teleop_core.evaluation.metrics.looks import LooksMetric
+from teleop_core.evaluation.metrics.steps import StepsMetric
 from teleop_core.evaluation.score_table import score_tables
 from teleop_core.graph.signals import TICK_NS
 from teleop_core.graph.topics import (
@@ -435,3 +436,16 @@ def test_a_measure_takes_fifteen_lines_beside_its_docstrings(name: str) -> None:
             node.body = node.body[1:] if ast.get_docstring(node) else node.body
     text = {line for node in ast.walk(module) if isinstance(node, ast.stmt | ast.expr) for line in (node.lineno,)}
     assert len(text) <= 15
+
+
+def test_a_step_has_the_mean_time_of_its_completed_runs_and_none_if_never_completed() -> None:
+    step = TASK_STATE.columns.index("step")
+    begins = [(0.0, 1), (1.0, 2), (3.0, 1), (4.5, 2), (8.5, 1)]  # reach, grasp, reach, grasp; the last is cut off
+    times = np.arange(0.0, 10.0, 0.5)
+    told = np.zeros((len(times), len(TASK_STATE.columns)))
+    for begin, number in begins:
+        told[times >= begin, step] = number
+    found = scored(StepsMetric, task__state=(times, told))
+    assert found["reach"] == pytest.approx((1.0 + 1.5) / 2.0, abs=1e-6)
+    assert found["grasp"] == pytest.approx((2.0 + 4.0) / 2.0, abs=1e-6)
+    assert all(found[name] is None for name in ("lift", "meet", "take", "release", "retreat", "carry", "place"))

@@ -216,3 +216,10 @@ def test_share_of_power_is_that_of_the_waves_in_it() -> None:
     velocity = np.column_stack((np.sin(2.0 * math.pi * 0.5 * times), np.sin(2.0 * math.pi * 2.0 * times)))
     frequency, density = motion_measures.velocity_spectrum([velocity])
     assert motion_measures.share_between(1.0, 3.0, frequency, density) == pytest.approx(0.5, abs=0.01)
+
+
+def test_the_path_of_a_zigzag_is_not_shortened_at_its_corners() -> None:
+    times = np.arange(0.0, 20.0, 1e-3)
+    zigzag = 0.01 * np.abs(2.0 * (times * 3.0 % 1.0) - 1.0)  # 0.06 m/s, with corners six times a second
+    place = np.column_stack((zigzag, 0.0 * times, 0.0 * times))
+    assert motion_figures(times, place).path_mm == pytest.approx(20.0 * 60.0, rel=0.01)

@@ -20,7 +20,7 @@ class MotionFigures:
     """Values that describe a motion; a value is None if there is too little motion for it."""
 
     time_s: float = figure("s", "duration without the approach; in_fixture: duration with a fixture on")
-    path_mm: float = figure("mm", "length of the tip's path")
+    path_mm: float = figure("mm", "length of the tip's path through the samples at 30 Hz")
     speed_median_mm_s: float | None = figure(
         "mm/s", "median speed; like all figures but the tremor it comes from samples at 30 Hz", default=None
     )
@@ -121,7 +121,7 @@ class Kinematics:
         tremor, at_rest = self._tremor.between(self._times_of(parts))
         return MotionFigures(
             time_s=time,
-            path_mm=float(speed.sum() / motion_measures.RATE * 1e3),
+            path_mm=1e3 * sum(motion_measures.path_length(self.position[part]) for part in parts),
             speed_median_mm_s=float(np.median(speed) * 1e3),
             speed_p95_mm_s=float(np.quantile(speed, 0.95) * 1e3),
             acceleration_p95_m_s2=float(np.quantile(acceleration, 0.95)),

@@ -71,6 +71,11 @@ def velocities(position: Array) -> Array:
     return found
 
 
+def path_length(position: Array) -> float:
+    """Length [m] of the path through positions (N, 3) [m]; sums of :func:`velocities` would cut its corners."""
+    return float(np.linalg.norm(np.diff(position, axis=0), axis=1).sum())
+
+
 def turn_rates(attitude: Array) -> Array:
     """Angular speed (N - 1,) [rad/s] between unit quaternions (N, 4), w first, of any sign."""
     # The chord between two quaternions gives exact small angles; their product does not.
