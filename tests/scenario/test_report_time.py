@@ -23,7 +23,7 @@ LARGEST_PAGE = 20_000_000
 ROUNDING_MM, ROUNDING_N = 1e-3, 1e-3
 LIMITED = ((4.0, 6.5, topics.Limit.JOINT), (9.0, 9.25, topics.Limit.SPEED), (12.0, 15.0, topics.Limit.JOINT))
 # Plots of a recording with a time axis, by their titles.
-POSITION, ERROR, FORCE = "Position against time", "Position error", "Force on the hand"
+POSITION, ERROR, FORCE = "Position against time", "Tracking error", "Force on the hand"
 PLOTS = """
 ((hasTraces) => {
   const isTime = ([key, axis]) => /^xaxis/.test(key) && axis.uirevision === 'time';

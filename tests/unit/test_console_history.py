@@ -20,7 +20,7 @@ def seen(
     """A view of an arm whose tip is wanted in one place and is in another [m]."""
     turn = [1.0, 0.0, 0.0, 0.0]
     streams = {
-        topics.SLAVE_SERVO_CP.name: np.array([*reference, *turn]),
+        topics.SLAVE_SETPOINT_CP.name: np.array([*reference, *turn]),
         topics.SLAVE_MEASURED_CP.name: np.array([*place, *turn]),
         topics.MASTER_MEASURED_CF.name: np.array([*force, 0.0, 0.0, 0.0]),
     }

@@ -190,13 +190,15 @@ def test_every_recorded_number_can_be_drawn_as_it_was_recorded(session: tc.Recor
     assert gain[-1] > 0.0
 
 
-def test_the_tracking_error_is_the_distance_that_numpy_finds(session: tc.Recording, link: RecordedLink) -> None:
-    _, error = read(lambda: link.past.samples(ERROR))
-    wanted, found = session["slave/servo_cp"], session["slave/measured_cp"]
-    at = np.searchsorted(wanted.log_ns, found.log_ns, side="right") - 1
-    away = np.linalg.norm(found[["x", "y", "z"]] - wanted[["x", "y", "z"]][np.maximum(at, 0)], axis=1)
-    np.testing.assert_allclose(error[at >= 0], away[at >= 0], atol=1e-7)
-    assert np.isnan(error[at < 0]).all()
+def test_the_tracking_error_is_that_of_the_score(session: tc.Recording, link: RecordedLink) -> None:
+    times, error = read(lambda: link.past.samples(ERROR))
+    spread = session.score().position_error_mm
+    begins = session["slave/setpoint_js"]
+    led_ns = begins.log_ns[np.flatnonzero(begins.stamp_ns > topics.NO_COMMAND_NS)[0]]
+    is_led = (times >= (led_ns - session.bag.start_ns) * 1e-9) & ~np.isnan(error)
+    led = 1e3 * error[is_led]
+    assert np.sqrt(np.mean(led**2)) == pytest.approx(spread.rms, rel=1e-3)
+    assert led.max() == pytest.approx(spread.max, rel=1e-5)  # drawn as float32
 
 
 def test_columns_are_found_by_words_and_by_units(strip: StripPage) -> None:
@@ -330,7 +332,7 @@ def test_a_second_recording_lies_over_the_first_from_its_start_or_from_where_it_
 def view(time: float, x: float = 0.0, *, is_fresh: bool = True) -> View:
     """What is known of an arm whose tip is wanted at 0 and is at x [m]."""
     turn = [1.0, 0.0, 0.0, 0.0]
-    poses = {topics.SLAVE_SERVO_CP.name: [0.0, 0.0, 0.0, *turn], topics.SLAVE_MEASURED_CP.name: [x, 0.0, 0.0, *turn]}
+    poses = {topics.SLAVE_SETPOINT_CP.name: [0.0, 0.0, 0.0, *turn], topics.SLAVE_MEASURED_CP.name: [x, 0.0, 0.0, *turn]}
     arm = ArmView(
         {name: np.array(pose) for name, pose in poses.items()}, operation=dict.fromkeys(topics.OPERATION, 0.0)
     )

@@ -8,7 +8,7 @@ from teleop_core.graph.signals import DT
 from teleop_lab.experiments.bench import Bench
 from teleop_lab.experiments.one_axis import Grip, exact_boundary, found_boundary, growth
 from teleop_lab.experiments.sampled_wall import Wall, wall_growth
-from teleop_lab.experiments.stability import DELAYS, GRIPS, STIFFEST, calm_speed, chain_boundary, fastest
+from teleop_lab.experiments.stability import DELAYS, GRIPS, STIFFEST, _note, calm_speed, chain_boundary, fastest
 from teleop_lab.experiments.zwidth import BARE
 
 MEDIUM = GRIPS["medium"]
@@ -84,3 +84,9 @@ def test_force_throws_a_hand_above_its_boundary_but_not_with_a_tank_or_by_a_soft
         assert chain_boundary(bench, MEDIUM, 0.05, way, calm) == STIFFEST
     below, above = (fastest(bench, MEDIUM, 0.05, share * found, force) for share in (0.5, 2.0))
     assert above > 2.0 * below
+
+
+def test_a_boundary_above_that_of_a_shorter_delay_is_marked_as_not_found() -> None:
+    found = {("firm", 0.0): (9000.0,), ("firm", 0.02): (700.0,), ("firm", 0.05): (2000.0,), ("firm", 0.1): (50_000.0,)}
+    notes = [_note(found, "firm", delay, 0) for delay in DELAYS[:4]]
+    assert notes == ["", "", "no boundary: session too short", "stiffest tried"]

@@ -12,7 +12,10 @@ import pytest
 from rich.console import Console
 
 import teleop_core as tc
+from teleop_core.bags.memory import MemoryBag
+from teleop_core.bags.series import Series
 from teleop_core.base import NoParameters, Registry
+from teleop_core.base.errors import EvaluationError
 from teleop_core.evaluation.command import evaluate_bags
 from teleop_core.evaluation.rows import fixed, number
 from teleop_core.evaluation.verdict import verdict_of
@@ -57,6 +60,17 @@ def test_a_drift_is_named_before_the_share_that_was_followed() -> None:
             "latency_ms.total.p99",
             "delay p99 130 ms, hand to setpoint, 100 ms of it asked for",
         ),
+        (
+            {"gap.longest_s": 0.3, "gap.at_s": 10.0, "ticks.dropped": 300, "reach.followed_share": 0.985},
+            "gap.longest_s",
+            "the recording has a gap of 0.3 s, at 10 s; ",
+        ),
+        (
+            {"halt.share": 0.3, "halt.at_s": 4.0, "halt.reason": "FAULT: emergency stop", "reach.followed_share": 0.7},
+            "halt.share",
+            "the arm was stopped for 30 % of the time, from 4 s on: FAULT: emergency stop; followed 70 %",
+        ),
+        ({"halt.share": 0.009, "halt.at_s": 4.0, "halt.reason": "PAUSED"}, None, "nothing"),
         ({"topics.network/servo_cp.gaps": 1000}, None, "nothing"),  # losses that were asked for
         ({"task.attempts": 5, "task.successes": 0}, "task.successes", "no success in 5 attempts at the task"),
         ({"task.attempts": 5, "task.successes": 1}, None, "nothing"),
@@ -240,3 +254,48 @@ def test_a_fixture_that_is_not_scored_comes_before_whatever_else_is_wrong() -> N
 def test_numbers_have_four_digits_and_no_minus_before_nothing(value: float | None, text: str) -> None:
     assert number(value) == text
     assert fixed(-0.04, 1) == "0.0"
+
+
+@pytest.fixture(scope="module")
+def session() -> MemoryBag:
+    bag = tc.run("coarse_box", duration=4.0).bag
+    assert isinstance(bag, MemoryBag)
+    return bag
+
+
+def kept(bag: MemoryBag, keep: Callable[[Any], Any], only: str = "") -> MemoryBag:
+    """The recording with the messages of some times [s], and of the topics whose names begin with a text."""
+
+    def part(series: Series) -> Series:
+        at = keep((series.log_ns - bag.start_ns) * 1e-9)
+        return Series(series.stamp_ns[at], series.log_ns[at], series.values[at], series.names, series.frame_id)
+
+    streams = {topic: part(one) for topic, one in bag.streams.items() if topic.name.startswith(only)}
+    states = {topics.TELEOP_STATE: bag._reports[topics.TELEOP_STATE.name]}
+    return MemoryBag("part", streams, {} if only else states, bag.metadata)
+
+
+@pytest.mark.parametrize("length", [0.15, 0.4, 1.0])
+def test_a_gap_of_the_file_stands_before_what_it_is_blamed_on(session: MemoryBag, length: float) -> None:
+    score = tc.Recording(kept(session, lambda time: (time < 2.0) | (time > 2.0 + length))).score()
+    assert score.verdict.worst == "gap.longest_s"
+    assert score.verdict.text.startswith(f"the recording has a gap of {length:g} s, at 2 s")
+    assert tc.Recording(kept(session, lambda time: time >= 0.0)).score().value("gap.longest_s") is None
+
+
+def test_a_hand_without_a_slave_is_told_so_with_what_to_do(session: MemoryBag) -> None:
+    with pytest.raises(EvaluationError, match=r"motion of a hand and no slave.*teleop replay"):
+        tc.Recording(kept(session, lambda time: time >= 0.0, "master/")).score()
+
+
+@pytest.mark.parametrize(("event", "reason"), [("stop@0", "FAULT.*emergency stop")])
+def test_an_arm_that_was_stopped_throughout_is_told_with_the_reason(event: str, reason: str) -> None:
+    recording = tc.run("coarse_box", duration=1.0, settings={"operation.events": (event,)})
+    with pytest.raises(EvaluationError, match=reason):
+        recording.score()
+
+
+def test_an_arm_that_is_stopped_on_the_way_is_told_first_with_time_and_reason() -> None:
+    score = tc.run("coarse_box", duration=4.0, settings={"operation.events": ("stop@3",)}).score()
+    assert score.verdict.worst == "halt.share"
+    assert "from 3 s on: FAULT, homed: emergency stop" in score.verdict.text

@@ -18,8 +18,8 @@ class LiveScores:
     Attributes:
         time: Time for which the arm has followed the hand [s], without clutched time.
         way: Length of the tip's path [m].
-        rms: RMS distance between wanted and measured position [m].
-        largest: Largest distance between wanted and measured position [m].
+        rms: RMS distance between setpoint and measured position [m].
+        largest: Largest distance between setpoint and measured position [m].
         force: Largest force at the stylus [N].
     """
 
@@ -33,7 +33,7 @@ class LiveScores:
 
     def add(self, time: float, view: ArmView) -> None:
         """Add the view of a time [s]; only samples while the slave follows the hand count."""
-        reference, place = view.get(topics.SLAVE_SERVO_CP), view.get(topics.SLAVE_MEASURED_CP)
+        reference, place = view.get(topics.SLAVE_SETPOINT_CP), view.get(topics.SLAVE_MEASURED_CP)
         force = view.get(topics.MASTER_MEASURED_CF)
         is_led = view.state.get("is_following") and not view.state.get("is_clutched")
         if reference is None or place is None or not is_led:

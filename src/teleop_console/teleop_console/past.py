@@ -15,7 +15,8 @@ from teleop_core.kernels.geometry import Array
 from teleop_core.robots.robot import Robot
 
 ERROR = "tracking error"
-"""Name of the column with the distance between wanted and measured tip [m]; no topic contains this distance."""
+"""Name of the column with the distance between setpoint and measured tip [m], as in the score ``position_error_mm``; no
+topic contains this distance."""
 DELAY = "session command_delay"
 """Name of the column with the median delay from master sample to slave command [s]; only live sessions have it."""
 ROWS = 4000
@@ -64,6 +65,7 @@ Rows = tuple[Array, Array]
 """Times (N,) [s], ascending, and values (N, width) or (N,)."""
 NOTHING: Rows = (np.empty(0), np.empty((0, 3)))
 """Rows of an unknown topic."""
+_ROUNDING = 1e-7  # of times [s]
 _NO_SAMPLES: Rows = (np.empty(0), np.empty(0))
 
 
@@ -81,6 +83,7 @@ class Past(ABC):
 
     def __init__(self) -> None:
         self.columns = {}
+        self._lag = 0.0  # time between a setpoint and the measured pose that was sampled with it [s]
         # tracking errors by arm, with the rows from which the errors were computed
         self._errors: dict[str, tuple[Rows, Rows, Rows]] = {}
 
@@ -101,13 +104,13 @@ class Past(ABC):
                 return None if found is None else _NO_SAMPLES
             return found[0], found[1][:, column.index]
         arm = name.removesuffix(ERROR)
-        wanted, found = self.rows(arm + topics.SLAVE_SERVO_CP.name), self.rows(arm + topics.SLAVE_MEASURED_CP.name)
+        wanted, found = self.rows(arm + topics.SLAVE_SETPOINT_CP.name), self.rows(arm + topics.SLAVE_MEASURED_CP.name)
         if wanted is None or found is None:
             return None
         known = self._errors.get(arm)
         if known is not None and known[0] is wanted and known[1] is found:
             return known[2]
-        at = np.searchsorted(wanted[0], found[0], side="right") - 1
+        at = np.searchsorted(wanted[0], found[0] - self._lag + _ROUNDING, side="right") - 1
         if not len(wanted[0]):
             return found[0], np.full(len(at), np.nan)
         away = np.linalg.norm(found[1][:, :3] - wanted[1][np.maximum(at, 0), :3], axis=1)

@@ -15,7 +15,9 @@ from teleop_core.bags.reader import Bag
 from teleop_core.bags.recording import MARKS
 from teleop_core.bags.series import kind_of
 from teleop_core.base.errors import TeleopError
+from teleop_core.evaluation.origin import read_origin
 from teleop_core.evaluation.traces import Envelope
+from teleop_core.graph import DT
 from teleop_core.graph.topics import BY_NAME, REPORTS, Kind
 from teleop_core.robots.robot import Robot
 
@@ -42,6 +44,7 @@ class Recorded(Past):
         self._bags = {name: of_arm(bag, arm) for name, arm in namespaces(bag).items()}
         self.joints = {name: robot.joint_names for name, robot in robots.items()}
         self._end_ns = bag.end_ns
+        self._lag = DT * read_origin(bag).lag
         self._marks: tuple[tuple[float, str], ...] | None = None
         self._read: dict[str, Rows] = {}
         self._wanted, self._is_reading = set[str](), False

@@ -87,6 +87,8 @@ METRICS: Registry[type[Metric]] = Registry(
     "metrics",
     {
         "samples": f"{_FOLDER}.counts:SamplesMetric",
+        "gap": f"{_FOLDER}.breaks:GapMetric",
+        "halt": f"{_FOLDER}.breaks:HaltMetric",
         "path": f"{_FOLDER}.path:PathMetric",
         "reach": f"{_FOLDER}.reach:ReachMetric",
         "asked_error_mm": f"{_FOLDER}.asked_error:AskedErrorMetric",

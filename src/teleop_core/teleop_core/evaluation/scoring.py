@@ -15,6 +15,7 @@ from teleop_core.evaluation.bands import Band, bands_of
 from teleop_core.evaluation.context import Accumulator, Context
 from teleop_core.evaluation.figure import Figure
 from teleop_core.evaluation.metric import Metric
+from teleop_core.evaluation.metrics.breaks import HaltMetric
 from teleop_core.evaluation.metrics.reach import COMPARABLE, ReachScore
 from teleop_core.evaluation.metrics.reach import GROUP as REACH_GROUP
 from teleop_core.evaluation.origin import read_origin
@@ -25,7 +26,14 @@ from teleop_core.evaluation.rows import TableRow
 from teleop_core.evaluation.score import Result, Score, Session
 from teleop_core.evaluation.state_history import StateHistory, read_history
 from teleop_core.evaluation.windows import DisorderError, Seconds, Span, Window, span_of, whole, windows
-from teleop_core.graph.topics import SLAVE_MEASURED_CP, SLAVE_SERVO_CP, SLAVE_SETPOINT_CP, TELEOP_STATE, Topic
+from teleop_core.graph.topics import (
+    MASTER_MEASURED_CP,
+    SLAVE_MEASURED_CP,
+    SLAVE_SERVO_CP,
+    SLAVE_SETPOINT_CP,
+    TELEOP_STATE,
+    Topic,
+)
 
 REQUIRED = (SLAVE_MEASURED_CP, SLAVE_SETPOINT_CP, SLAVE_SERVO_CP)
 """Topics that every score requires. Values that need other topics are None if those topics are missing."""
@@ -130,17 +138,34 @@ def study(bag: Bag, arm: str = "", further: Sequence[type[Metric]] = (), span: S
     """Score of one arm with its metrics. Raises the same errors as :func:`evaluate`."""
     makers = all_metrics(further)
     view = of_arm(bag, arm)
-    view.require(REQUIRED)
+    _insist_on_a_slave(view)
     context, metrics = _run(view, arm or arm_names(bag)[0], makers, span_of(bag, span))
     results = tuple(_result(context, metric) for metric in metrics)
     score = Score(_session(context), _compared(results))
     if not score.samples.scored:
+        halt = next(metric.values() for metric in metrics if isinstance(metric, HaltMetric))
+        if halt["reason"] is not None:
+            raise EvaluationError(f"{bag.path}: the arm followed nothing that could be scored: {halt['reason']}")
         whose = f" of arm {arm}" * bool(arm) + " in the span" * (span is not None)
         raise EvaluationError(
             f"{bag.path}: no {SLAVE_MEASURED_CP.name}{whose} has a valid "
             f"{SLAVE_SETPOINT_CP.name} of the same tick; they must be recorded together"
         )
     return Study(score, tuple(metrics), bands_of(context))
+
+
+def _insist_on_a_slave(bag: Bag) -> None:
+    """Refuse a recording without the slave's streams; a hand without a slave can be replayed.
+
+    Raises:
+        EvaluationError: The recording has the motion of a hand alone.
+        RecordingError: It lacks one of :data:`REQUIRED` for another reason.
+    """
+    recorded = {name for name, info in bag.topics.items() if info.count}
+    if MASTER_MEASURED_CP.name in recorded and recorded.isdisjoint(topic.name for topic in REQUIRED):
+        told = "has the motion of a hand and no slave, so there is nothing to score"
+        raise EvaluationError(f"{bag.path}: {told}; let a slave follow it: teleop replay {bag.path} --out OUT")
+    bag.require(REQUIRED)
 
 
 def studies(bag: Bag, further: Sequence[type[Metric]] = (), span: Seconds | None = None) -> list[Study]:

@@ -28,7 +28,13 @@ _CAUSES = {
     "aligning": "aligned anew",
 }
 _BUSY = "the machine was busy: close other programs, or give the session real-time priority"
+_FIRST = 1e6  # weight of concerns that explain others
 _ADVICE = {
+    "gap.longest_s": (
+        "nothing was recorded there, so what hand and arm did is unknown: the recorder or the machine stood still, or "
+        "the file was cut; score the parts before and after the gap"
+    ),
+    "halt.share": "a fault or a stop kept the arm from following: its reason stands in slave/operation",
     SHARE: "the slave could not follow the hand: stay within its reach, or move the hand more slowly",
     "task.successes": (
         "the task's goals are out of reach, too small or too short in time for the operator: see `task.errors`"
@@ -113,6 +119,22 @@ def _missing(values: Values) -> Iterator[Concern]:
             text = f"{what}: {told}; give the file that has it: teleop evaluate --parts FILE.py"
             yield Concern(math.inf, key, text)
             return
+
+
+def _gap(values: Values) -> Iterator[Concern]:
+    """Concern about a time without messages, which other values would blame on the hand or on the machine."""
+    if (gap := _number(values, "gap.longest_s")) is not None:
+        at = _number(values, "gap.at_s") or 0.0
+        yield Concern(_FIRST, "gap.longest_s", f"the recording has a gap of {gap:.3g} s, at {at:.3g} s")
+
+
+def _halt(values: Values) -> Iterator[Concern]:
+    """Concern about the time in which a fault or a stop kept the arm from following."""
+    share, reason = _number(values, "halt.share") or 0.0, values.get("halt.reason")
+    if share > 1.0 - _FOLLOWED:
+        at = _number(values, "halt.at_s") or 0.0
+        text = f"the arm was stopped for {100.0 * share:.3g} % of the time, from {at:.3g} s on: {reason}"
+        yield Concern(_FIRST * 10.0, "halt.share", text)
 
 
 def _drift(values: Values) -> Iterator[Concern]:
@@ -210,6 +232,8 @@ _UNTIMELY = {
 }
 _CONCERNS: tuple[Callable[[Values], Iterator[Concern]], ...] = (
     _missing,
+    _gap,
+    _halt,
     _drift,
     _following,
     _in_vain,

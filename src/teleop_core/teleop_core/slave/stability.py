@@ -13,9 +13,10 @@ from teleop_core.base import ParameterError
 from teleop_core.graph import Row
 from teleop_core.kernels import IS_COMPILED, Array, bound, records
 from teleop_core.kernels.callables import raise_pending
+from teleop_core.robots.drives import independent_acceleration
 from teleop_core.robots.robot import Robot
 from teleop_core.slave.arm import Arm
-from teleop_core.slave.controllers import Controller
+from teleop_core.slave.controllers import CONTROLLERS, Controller
 from teleop_core.slave.plants import PER_JOINT
 from teleop_core.slave.simulation import SimulationNumbers, SimulationState, simulation_step
 
@@ -142,13 +143,13 @@ def check_stable(law: Controller, robot: Robot, loop: ClosedLoop, *, are_large_t
     tried = (law.control, robot.kernels, loop.dt, *place, are_large_tried, *key)
     if tried in _passed:
         return
-    _check_small(law.name, loop)
+    _check_small(law, robot, loop)
     if IS_COMPILED and are_large_tried:  # dashes take seconds if the law is plain Python
         _check_large(law.name, robot, loop)
     _passed.add(tried)
 
 
-def _check_small(name: str, loop: ClosedLoop) -> None:
+def _check_small(law: Controller, robot: Robot, loop: ClosedLoop) -> None:
     error, dt = _ERROR * np.array(loop.p.encoder_step), loop.dt
     calm, shaken = (_held(loop, by) for by in (0.0 * error, error))
     with np.errstate(all="ignore"):
@@ -158,9 +159,18 @@ def _check_small(name: str, loop: ClosedLoop) -> None:
         fold = f"{growth[joint]:.1g}-fold" if np.isfinite(growth[joint]) else "without bound"
         needed = (
             f"stable at {1.0 / dt:g} Hz: an error of joint {joint + 1} grows {fold} in "
-            f"{_TICKS * dt:g} s; lower its gains or friction, or raise integration_steps"
+            f"{_TICKS * dt:g} s; {_advice(law, robot)}lower its gains or friction, or raise integration_steps"
         )
-        raise ParameterError("slave_sim.controller.kind", name, needed)
+        raise ParameterError("slave_sim.controller.kind", law.name, needed)
+
+
+def _advice(law: Controller, robot: Robot) -> str:
+    """Laws that know how the links of a robot act on each other, for a law that does not."""
+    is_coupled = robot.dynamics is not None and robot.dynamics.acceleration is not independent_acceleration
+    if law.uses_model or not is_coupled:
+        return ""
+    knowing = [name for name in CONTROLLERS if CONTROLLERS.find(name).uses_model]
+    return f"the links act on each other: choose controller={' or '.join(knowing)}, which knows how; or "
 
 
 def _held(loop: ClosedLoop, by: Array) -> Array:

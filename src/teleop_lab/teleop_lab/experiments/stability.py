@@ -143,12 +143,26 @@ def _measure(bench: Bench) -> Findings:
                 unit="N/m",
                 predicted=found[name, delay][k],
                 group=f"whole chain, {name} grip, {architecture}, passivity {passivity}",
-                note="stiffest tried" if found[name, delay][k] == STIFFEST else "",
+                note=_note(found, name, delay, k),
             )
             for name in GRIPS
             for delay in DELAYS
         ]
     return Findings(tuple(rows), (_figure(found),), _NOTES)
+
+
+def _note(found: Mapping[tuple[str, float], tuple[float, ...]], grip: str, delay: float, way: int) -> str:
+    """What limits a boundary of the whole chain: the range of the search, or the length of a session."""
+    here = found[grip, delay][way]
+    if here == STIFFEST:
+        return "stiffest tried"
+    sooner = [found[grip, other][way] for other in DELAYS if other < delay]
+    return "no boundary: session too short" if any(here > one for one in sooner) else ""
+
+
+def _judged(found: Mapping[tuple[str, float], tuple[float, ...]], grip: str, delay: float, way: int) -> float:
+    """Boundary of the whole chain; NaN if the session was too short to find it."""
+    return math.nan if _note(found, grip, delay, way).startswith("no boundary") else found[grip, delay][way]
 
 
 _NOTES = (
@@ -157,7 +171,8 @@ _NOTES = (
     "hand, device without friction or steps, and mapping.",
     f"Whole chain: stiffness up to which the hand in palpation gets no more than {_THROWN:g} times "
     "as fast as where force comes from the softest object without delay. Slow swinging takes "
-    f"longer to grow than the {_SECONDS:g} s of a session, so long delays read high.",
+    f"longer to grow than the {_SECONDS:g} s of a session, so long delays read high. A stiffness above that of a "
+    "shorter delay is marked: more delay makes no hand more stable, so the session was too short to show the growth.",
     "The object is a spring alone. Grips are assumed.",
 )
 
@@ -168,7 +183,8 @@ def _figure(found: Mapping[tuple[str, float], tuple[float, ...]]) -> Figure:
     traces = []
     for (name, grip), color in zip(GRIPS.items(), _COLORS, strict=True):
         exact = np.array([one_axis.exact_boundary(grip, delay + DT) for delay in smooth])
-        whole, tank, spring, tdpa = np.array([found[name, delay] for delay in DELAYS]).T
+        judged = [[_judged(found, name, delay, k) for k in range(len(_WAYS))] for delay in DELAYS]
+        whole, tank, spring, tdpa = np.array(judged).T
         traces += [
             {
                 **line(1e3 * smooth, exact, f"{name}, one exact axis", color, 1.2, "N/m"),

@@ -88,5 +88,5 @@ class PositionErrorMetric(SpreadMetric):
             f"{number(spread.max)} mm at most. Against the unfiltered command (click the legend) "
             f"it is {number(behind.rms)} mm RMS, with the lag of the low-pass in it."
         )
-        layout = {"xaxis": time_axis(), "yaxis": {"title": {"text": "position error [mm]"}, "rangemode": "tozero"}}
-        return [Figure("Position error", sentence, traces, layout, 340)]
+        layout = {"xaxis": time_axis(), "yaxis": {"title": {"text": "tracking error [mm]"}, "rangemode": "tozero"}}
+        return [Figure("Tracking error", sentence, traces, layout, 340)]
