@@ -125,7 +125,7 @@ def _gap(values: Values) -> Iterator[Concern]:
     """Concern about a time without messages, which other values would blame on the hand or on the machine."""
     if (gap := _number(values, "gap.longest_s")) is not None:
         at = _number(values, "gap.at_s") or 0.0
-        yield Concern(_FIRST, "gap.longest_s", f"the recording has a gap of {gap:.3g} s, at {at:.3g} s")
+        yield Concern(_FIRST, "gap.longest_s", f"the recording has a gap of {gap:.2g} s, at {at:.3g} s")
 
 
 def _halt(values: Values) -> Iterator[Concern]:
