@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
-from geometry_msgs.msg import PoseStamped, WrenchStamped
+from geometry_msgs.msg import PoseStamped, TwistStamped, WrenchStamped
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Empty
 
@@ -135,3 +135,47 @@ def test_speeds_end_with_the_messages_and_hold_ends_a_move(client: StockClient) 
     client.send("hold", Empty())
     client.reaches(("ENABLED", True, False))
     assert client.joints()[2] > goal[2] + 0.001
+
+
+HUGE = (1e155, 1e307, float(np.finfo(float).max), float("inf"), float("nan"))
+
+
+def messages_of(size: float) -> list[tuple[str, Any]]:
+    """Every motion command with numbers of a size."""
+    joints, pose, twist = [size, 0.0, -size, 0.0, size, 0.0], PoseStamped(), TwistStamped()
+    pose.pose.position.x, pose.pose.position.z, pose.pose.orientation.w = size, -size, 1.0
+    twist.twist.linear.x, twist.twist.angular.z = size, size
+    named = ("move_jp", "move_jr", "interpolate_jp", "servo_jr", "servo_jp")
+    speeds = [("servo_jv", JointState(velocity=joints)), ("servo_cv", twist)]
+    poses = [("move_cp", pose), ("interpolate_cp", pose)]
+    return [*((name, JointState(position=joints)) for name in named), *speeds, *poses]
+
+
+def test_no_command_of_any_size_poisons_the_arm(client: StockClient) -> None:
+    before = client.joints()
+    for size in HUGE:
+        for name, message in messages_of(size):
+            client.send(name, message)
+            client.spin()
+            assert np.isfinite(client.joints()).all(), (name, size)
+    client.peer.wait_value("slave", "refused.slave/servo_cv", lambda count: count >= 1)
+    assert np.abs(client.joints() - before).max() < 1e-3
+    client.reaches(("ENABLED", True, False))
+    client.send("move_jp", JointState(position=[a + 0.01 for a in MIDDLE]))
+    client.wait(lambda: np.allclose(client.joints(), np.array(MIDDLE) + 0.01, atol=1e-9), "the goal")
+
+
+def test_a_speed_that_is_a_minute_old_moves_nothing_and_is_counted(client: StockClient) -> None:
+    before = client.joints()
+    message = JointState(velocity=[0.05, 0.0, 0.0, 0.0, 0.0, 0.0])
+
+    def refused() -> Any:
+        publisher = client.commands["servo_jv"]
+        message.header.stamp.sec, message.header.stamp.nanosec = divmod(client.peer.time_ns() - 60 * 10**9, 10**9)
+        publisher.publish(message)
+        status = client.peer.status("slave")
+        return status and float(status.values.get("refused.slave/servo_jv", 0)) >= 20
+
+    client.send("servo_jv", JointState(velocity=[0.0] * 6))
+    client.wait(refused, "twenty refused")
+    assert np.array_equal(client.joints(), before)
