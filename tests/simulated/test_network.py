@@ -8,6 +8,7 @@ from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import SetParameters
 
 from teleop_core.graph.topics import (
+    DISPLAY_MEASURED_CP,
     NETWORK_SERVO_CP,
     NETWORK_SETPOINT_CP,
     SLAVE_SERVO_CP,
@@ -98,3 +99,15 @@ def test_a_slave_is_led_across_a_network_and_the_recording_tells_the_age(peer: A
     assert len(pairs) > 0.5 * len(series.stamp_ns)
     for own, arrived in pairs:
         np.testing.assert_array_equal(own, arrived)
+
+
+def test_a_frame_that_a_display_shows_again_is_not_refused(peer: Any) -> None:
+    peer.start("motion_scaling", links=["slave/measured_cp=display/measured_cp"])
+    received, name = 0.0, "received.display/measured_cp"
+    stamp = peer.time_ns()
+    while received < 30:  # the same frame, shown in many ticks
+        peer.send(DISPLAY_MEASURED_CP, stamp, [0.4, 0.0, -0.2, 1.0, 0.0, 0.0, 0.0])
+        received = peer.status("motion_scaling").number(name) if peer.status("motion_scaling") else 0.0
+        peer.spin()
+    status = peer.status("motion_scaling")
+    assert status.values["refused"] == "0"

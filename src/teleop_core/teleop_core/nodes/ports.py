@@ -12,7 +12,7 @@ from teleop_core.base.parameters import NoParameters
 from teleop_core.graph.graph import BUILT_IN
 from teleop_core.graph.signals import make_signals
 from teleop_core.graph.stage import Stage
-from teleop_core.graph.topics import PORTS_BETWEEN_ARMS, SELDOM_NS, Kind, Topic
+from teleop_core.graph.topics import BY_NAME, PORTS_BETWEEN_ARMS, SELDOM_NS, Kind, Topic
 from teleop_core.kernels.fields import Cells
 from teleop_core.kernels.geometry import Array
 from teleop_core.middleware.world import Publisher
@@ -61,10 +61,10 @@ class Ports:
         self._summed: list[tuple[str, list[Array]]] = []
         for port in stage.reads:
             given = feeds(port.name)
-            own = signals[port.field]
+            own, heard = signals[port.field], _heard if port == stage.trigger else _seen
             targets = [own] if len(given) == 1 else [own.copy() for _ in given]
             self.inputs[port.name] = [
-                Input(owner, _heard(port, name, arm), _name_for(owner, name), joint_names, target, delay, buttons)
+                Input(owner, heard(port, name, arm), _name_for(owner, name), joint_names, target, delay, buttons)
                 for (name, delay), target in zip(given, targets, strict=True)
             ]
             if len(targets) > 1:
@@ -168,6 +168,15 @@ def _heard(port: Topic, name: str, arm: str) -> Topic:
     if port not in PORTS_BETWEEN_ARMS or not name.endswith(plain) or name.startswith(way):
         return replace(port, name=name).of_arm(arm)
     return replace(port, name=plain).of_arm(name.removesuffix(plain).strip("./"))
+
+
+def _seen(port: Topic, name: str, arm: str) -> Topic:
+    """As :func:`_heard`, with the rule of the feeding topic's stamps: a display shows the same frame several times.
+
+    The trigger of a stage keeps its own rule, because a repeated stamp must not trigger a step.
+    """
+    found, feeding = _heard(port, name, arm), BY_NAME.get(name)
+    return found if feeding is None else replace(found, stamp=feeding.stamp)
 
 
 def _name_for(owner: Any, name: str) -> str:
