@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from mcap.reader import NonSeekingReader
 from mcap.writer import Writer as McapWriter
 from numpy.typing import ArrayLike, NDArray
 from rosbags.highlevel import AnyReader
@@ -17,6 +18,7 @@ from scipy.spatial.transform import Rotation
 import teleop_core as tc
 import teleop_exchange
 from foreign_bags import Maker, types_of, write1, write2
+from teleop_core.bags.reader import Bag
 from teleop_core.kernels.geometry import Array
 
 START_NS = 1_700_000_000_000_000_000
@@ -186,6 +188,103 @@ def test_messages_of_ros_1_in_mcap_are_read(kind: str, tmp_path: Path) -> None:
         writer.finish()
     _, stream = imported(path, tmp_path)
     assert_same(stream, LOGS if kind in {"Pose", "Transform"} else STAMPS)
+
+
+def written_beside_chunks(path: Path, is_beside: Callable[[int], bool]) -> Path:
+    """MCAP whose index is whole, and of which some messages are between the chunks, as the format allows."""
+    types, name = types_of(True), "geometry_msgs/msg/PoseStamped"
+    with path.open("wb") as file:
+        writer = McapWriter(file)
+        writer.start(profile="ros2", library="")
+        text, _ = types.generate_msgdef(name)
+        builder = writer._Writer__chunk_builder  # type: ignore[attr-defined]
+        writer._Writer__chunk_builder = None  # type: ignore[attr-defined]
+        schema = writer.register_schema(name, "ros2msg", text.encode())
+        channel = writer.register_channel("/hand/pose", "cdr", schema)
+        for i, (_, log_ns, message) in enumerate(poses()):
+            if is_beside(i):
+                writer._Writer__finalize_chunk()  # type: ignore[attr-defined]
+            writer._Writer__chunk_builder = None if is_beside(i) else builder  # type: ignore[attr-defined]
+            writer.add_message(channel, int(log_ns), bytes(types.serialize_cdr(message, name)), int(log_ns))
+        writer._Writer__chunk_builder = builder  # type: ignore[attr-defined]
+        writer.finish()
+    return path
+
+
+BESIDE: dict[str, Callable[[int], bool]] = {
+    "before the first chunk": lambda i: i < 100,
+    "between the chunks": lambda i: 100 <= i < 200,
+    "after the last chunk": lambda i: i >= 250,
+    "every third": lambda i: i % 3 == 1,
+    "one": lambda i: i == 150,
+}
+
+
+@pytest.mark.parametrize("case", BESIDE)
+def test_messages_beside_the_chunks_are_read_too(case: str, tmp_path: Path) -> None:
+    path = written_beside_chunks(tmp_path / "hand.mcap", BESIDE[case])
+    with path.open("rb") as file:
+        assert sum(1 for _ in NonSeekingReader(file).iter_messages()) == COUNT
+    assert_same(imported(path, tmp_path)[1])
+    assert [log for _, _, log, _ in Bag(path).raw()] == LOGS.tolist()
+    assert np.array_equal(Bag(path).read("hand/pose").log_ns, LOGS)
+
+
+# Which time.
+
+
+def batched(size: int, child: str = "tool", rows: range = range(COUNT)) -> list[tuple[str, int, Any]]:
+    """Messages of several samples each, as a tracker sends them."""
+    messages = poses("TFMessage", "/tf", child=child)
+    out = []
+    for begin in range(rows.start, rows.stop, size):
+        own = messages[begin : begin + size]
+        message = own[-1][2]
+        message.transforms[:0] = [one.transforms[0] for _, _, one in own[:-1]]
+        out.append(("/tf", own[-1][1], message))
+    return out
+
+
+@pytest.mark.parametrize("version", ["mcap", "db3", "ros1"])
+@pytest.mark.parametrize("size", [2, 7])
+def test_every_sample_of_a_message_of_transforms_is_read(version: str, size: int, tmp_path: Path) -> None:
+    if version == "ros1":
+        messages = poses("TFMessage", "/tf", is_ros2=False)
+        for i in range(0, COUNT - 1, 2):
+            messages[i + 1][2].transforms.insert(0, messages[i][2].transforms[0])
+        path = write1(tmp_path / "user.bag", messages[1::2])
+    else:
+        path = write2(tmp_path / "bag", batched(size), StoragePlugin[{"db3": "SQLITE3"}.get(version, "MCAP")])
+    report, stream = imported(path, tmp_path)
+    assert_same(stream)
+    assert report.counts.rows == COUNT
+
+
+@pytest.mark.parametrize("offset", [1_699_999_988, -1_600_000_000, 3600, -20])
+@pytest.mark.parametrize("topics", [("/hand/pose", "/joy"), ("/master/measured_cp", "/master/buttons")])
+def test_buttons_of_another_clock_come_at_the_time_of_their_recording(
+    offset: int, topics: tuple[str, str], tmp_path: Path
+) -> None:
+    earlier = STAMPS - abs(offset) * 1_000_000_000
+    stamps, others = (earlier, STAMPS) if offset > 0 else (STAMPS, earlier)
+    pressed = presses(lambda i: [int(100 <= i < 200), 0, 0], topics[1], others)
+    path = write2(tmp_path / "bag", in_order(poses(topic=topics[0], stamps=stamps), pressed))
+    report, stream = imported(path, tmp_path)
+    begin = stream.stamp_ns[0]
+    buttons = report.recording["master/buttons"]
+    assert (buttons.stamp_ns - begin).tolist() == [0, 1_000_000_000, 2_000_000_000]
+    assert buttons["clutch"].tolist() == [0.0, 1.0, 0.0]
+    assert any("another clock" in text for text in report.told)
+    with pytest.warns(UserWarning, match="another clock"):
+        answer = tc.replay(path)
+    assert answer["master/buttons"]["clutch"].max() == 1.0
+
+
+def test_buttons_that_no_clock_brings_to_the_poses_are_told(tmp_path: Path) -> None:
+    late = 3600 * 1_000_000_000
+    pressed = [(t, log + late, m) for t, log, m in presses(lambda i: [i % 2], stamps=STAMPS + late)]
+    report, _ = imported(write2(tmp_path / "bag", in_order(poses(), pressed)), tmp_path)
+    assert any("buttons are outside" in text for text in report.warnings)
 
 
 # Which topic.

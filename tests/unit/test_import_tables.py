@@ -521,20 +521,24 @@ def test_what_looks_wrong_is_told(options: Mapping[str, str | float], text: str,
 )  # fmt: skip
 def test_names_of_many_recorders_are_understood(head: str, time: str, place: str, turn: str) -> None:
     columns = head.split()
-    places = names.find_positions(columns)[:1]
+    quaternions = names.quaternions(columns)
+    parts = {column for group in quaternions for column in group.columns}
+    places = names.positions(columns, [one for one in names.triples(columns) if not parts & set(one.columns)])
     for found, expected in (
         (names.find_time(columns), time),
-        (places[0] if places else (), place),
-        (names.find_quaternion(columns), turn),
+        (places[0].columns if places else (), place),
+        (quaternions[0].columns if quaternions else (), turn),
     ):
         assert [columns[i] for i in found] == expected.split()
 
 
-def test_other_positions_beside_the_one_taken_are_told(tmp_path: Path) -> None:
+def test_of_several_positions_none_is_taken_until_one_is_chosen(tmp_path: Path) -> None:
     head = ["t", *(f"{hand}.{axis}" for hand in ("left", "right") for axis in "xyz")]
-    report, stream = brought(tmp_path, frame(head, np.column_stack((TIMES, PLACES, 2.0 * PLACES))))
-    assert np.allclose(stream[["x", "y", "z"]], PLACES, rtol=0, atol=1e-15)
-    assert any("right.x" in text for text in report.told)
+    table = frame(head, np.column_stack((TIMES, PLACES, 2.0 * PLACES)))
+    with pytest.raises(tc.RecordingError, match=r"left.x left.y left.z; right.x right.y right.z.*--position"):
+        brought(tmp_path, table)
+    _, stream = brought(tmp_path, table, position=head[4:])
+    assert np.allclose(stream[["x", "y", "z"]], 2.0 * PLACES, rtol=0, atol=1e-15)
 
 
 @pytest.mark.parametrize(

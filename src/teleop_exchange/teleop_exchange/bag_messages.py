@@ -74,39 +74,30 @@ class PoseReader:
         """
         stream = iter(messages)
         while batch := list(islice(stream, BATCH)):
-            found = [row for row in (self._one(*raw) for raw in batch) if row is not None]
+            found = [row for raw in batch for row in self._rows(*raw)]
             times = np.array([row[:2] for row in found], np.int64).reshape(-1, 2)
             poses = np.array([row[2] for row in found], np.float64).reshape(-1, 7)
             yield Rows(times[:, 0], times[:, 1], poses)
 
-    def _one(self, log_ns: int, data: bytes) -> tuple[int, int, tuple[float, ...]] | None:
-        """Stamp, time of recording [ns] and pose of a message; None if it lacks the frame."""
-        part = self._part(self.message(data))
-        if part is None:
-            return None
-        header, place, turn = part
-        stamp = log_ns if header is None else _stamp(header)
-        return stamp, log_ns, (place.x, place.y, place.z, turn.w, turn.x, turn.y, turn.z)
+    def _rows(self, log_ns: int, data: bytes) -> Iterator[tuple[int, int, tuple[float, ...]]]:
+        """Stamp, time of recording [ns] and pose, of each pose of the frame in a message.
 
-    def _part(self, message: Any) -> tuple[Any, Any, Any] | None:
-        """Header (or None), position and rotation in a message; None if the message lacks the frame.
+        Trackers may send several samples in a message, each with its own stamp.
 
         Raises:
             UnknownNameError: The pose has another child or parent frame than earlier poses.
         """
-        chosen = None
-        for part in self._parts(message):
+        for part in self._parts(self.message(data)):
             parent, child = named = names_of(part)
             if self._frame not in {"", child} or self._parent not in {"", parent}:
                 continue
             if self.taken not in {None, named}:
                 self._refuse(named)
-            self.taken, chosen = named, part
-        if chosen is None:
-            return None
-        if hasattr(chosen.pose, "translation"):
-            return chosen.header, chosen.pose.translation, chosen.pose.rotation
-        return chosen.header, chosen.pose.position, chosen.pose.orientation
+            self.taken, pose = named, part.pose
+            is_transform = hasattr(pose, "translation")
+            place, turn = (pose.translation, pose.rotation) if is_transform else (pose.position, pose.orientation)
+            stamp = log_ns if part.header is None else _stamp(part.header)
+            yield stamp, log_ns, (place.x, place.y, place.z, turn.w, turn.x, turn.y, turn.z)
 
     def _parts(self, message: Any) -> list["_Part"]:
         if self._type in TRANSFORMS:

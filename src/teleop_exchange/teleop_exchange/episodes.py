@@ -1,14 +1,22 @@
-"""Episodes: a table that contains several recordings, as in data sets; an import reads one of them."""
+"""Episodes: a table that contains several recordings, as in data sets; an import reads one of them.
+
+One column numbers them, such as ``episode_index``; or several columns do, such as ``stage`` and ``trial``. The rows of
+an episode stand together in the file: rows in several places are several recordings, which nothing may join.
+"""
 
 from collections.abc import Iterator
 
 import numpy as np
+from numpy.typing import NDArray
 
 from teleop_core.base.errors import ParameterError, RecordingError, UnknownNameError
 from teleop_exchange import names, tables
+from teleop_exchange.options import ImportOptions, option
 
 _LISTED = 8
-_NEEDED = "left out: no column is called episode_index or the like"
+_NEEDED = "left out: no column is called episode_index or the like; --numbered-by COL names one"
+_NONE = -1.0
+"""Number of rows without an episode."""
 
 
 class Episodes:
@@ -16,67 +24,146 @@ class Episodes:
 
     Args:
         table: The table.
-        wanted: Number of the episode; None if the table must contain only one.
+        options: Import options: ``episode`` is the number of the wanted episode; None if the table must contain only
+            one.
 
     Raises:
         ParameterError: A number of an episode is given, but no column contains the episode numbers.
+        UnknownNameError: A column does not exist.
     """
 
-    def __init__(self, table: tables.Table, wanted: int | None) -> None:
-        self._table, self._wanted, self._found = table, wanted, set[float]()
-        self._column = _column(table)
-        if wanted is not None and self._column is None:
-            raise ParameterError("--episode", wanted, _NEEDED)
+    def __init__(self, table: tables.Table, options: ImportOptions) -> None:
+        self._table, self._wanted = table, options.episode
+        self._columns = _columns(table, options)
+        self._beside = [] if options.numbered_by or not self._columns else _beside(table, self._columns)
+        self._numbering = _Numbering(len(self._columns))
+        self._finer = _Numbering(len(self._columns) + len(self._beside))
+        if self._wanted is not None and not self._columns:
+            raise ParameterError("--episode", self._wanted, _NEEDED)
 
     def blocks(self, columns: list[int]) -> Iterator[list[tables.Numbers]]:
         """Some columns of the table, block by block.
 
         Raises:
-            RecordingError: The table contains several episodes and no number is given, or the file is damaged.
+            RecordingError: The table contains several episodes and no number is given, or the rows of an episode are
+                not together, or the file is damaged.
             UnknownNameError: No episode has the given number.
         """
-        if self._column is None:
+        if not self._columns:
             yield from self._table.blocks(columns)
             return
-        for *block, episode in self._table.blocks([*columns, self._column]):
-            self._found |= set(np.unique(episode[np.isfinite(episode)]).tolist())
-            if self._wanted is None:
-                yield block
-            else:
-                yield [column[episode == self._wanted] for column in block]
-        self._check(self._column)
+        first = len(columns) + len(self._columns)
+        for block in self._table.blocks([*columns, *self._columns, *self._beside]):
+            episode = self._numbering.numbers(block[len(columns) : first])
+            is_own = np.ones(len(episode), np.bool_) if self._wanted is None else episode == self._wanted
+            self._finer.numbers([column[is_own] for column in block[len(columns) :]])
+            yield [column[is_own] for column in block[: len(columns)]]
+        self._check()
 
-    def _check(self, column: int) -> None:
-        listed = [f"{number:g}" for number in sorted(self._found)]
-        if self._wanted is not None and self._wanted not in self._found:
+    def _check(self) -> None:
+        found = self._numbering.begins
+        listed = [f"{number:g}" for number in sorted(found)]
+        if self._wanted is not None and self._wanted not in found:
             raise UnknownNameError("--episode", self._wanted, listed)
+        named = " and ".join(repr(self._table.names[column]) for column in self._columns)
         if self._wanted is None and len(listed) > 1:
             few = ", ".join(listed) if len(listed) < _LISTED else f"{listed[0]} to {listed[-1]}"
-            reason = f"holds {len(listed)} episodes (column {self._table.names[column]!r}: {few})"
+            reason = f"holds {len(listed)} episodes (column {named}: {few})"
             hint = "take one by --episode N, or each by --episode all"
             raise RecordingError(self._table.path, f"{reason}; {hint}")
+        begins = next(iter(found.values()), []) if self._wanted is None else found[self._wanted]
+        if len(begins) > 1:
+            rows = ", ".join(str(row + 1) for row in begins[:_LISTED])
+            which = "its only episode" if self._wanted is None else f"episode {self._wanted}"
+            reason = f"has the rows of {which} in {len(begins)} places, from the rows {rows} on: {named} alone does not"
+            hint = f"number its recordings; name all columns that do: --numbered-by {self._told_columns()}"
+            raise RecordingError(self._table.path, f"{reason} {hint}")
+
+    def _told_columns(self) -> str:
+        """Columns that may number the recordings, for a message."""
+        listed = [self._table.names[column] for column in (*self._beside, *self._columns)]
+        return " ".join(listed if self._beside else ["COL", *listed])
 
     def told(self) -> list[str]:
         """Texts about the imported episode."""
-        return [f"episode {self._wanted} of {len(self._found)}"] * (self._wanted is not None)
+        changes = len(self._finer.begins) - 1
+        finer = f"{self._told_columns()} change together {changes} times in it: --numbered-by takes them all"
+        return self._told_episode() + [finer] * (bool(self._beside) and changes > 0)
+
+    def _told_episode(self) -> list[str]:
+        if self._wanted is None:
+            return []
+        numbers = self._numbering.values_of(self._wanted)
+        named = ", ".join(
+            f"{self._table.names[column]} {value:g}" for column, value in zip(self._columns, numbers, strict=True)
+        )
+        more = f" ({named})" * (len(self._columns) > 1)
+        return [f"episode {self._wanted} of {len(self._numbering.begins)}{more}"]
 
 
-def numbers_of(table: tables.Table) -> list[int]:
+class _Numbering:
+    """Numbers of the episodes of a table, block by block.
+
+    One column has these numbers itself; the combinations of several columns are numbered from 0 in their order.
+
+    Attributes:
+        begins: Row at which each stretch of an episode begins, by the number of the episode.
+    """
+
+    def __init__(self, count: int) -> None:
+        self._count, self._known = count, dict[tuple[float, ...], float]()
+        self._last, self._rows, self.begins = _NONE, 0, dict[float, list[int]]()
+
+    def numbers(self, columns: list[tables.Numbers]) -> NDArray[np.float64]:
+        """Number of the episode of each row of the next block."""
+        rows = np.column_stack(columns).astype(np.float64)
+        found = np.full(len(rows), _NONE)
+        is_known = np.isfinite(rows).all(axis=1)
+        changes = np.ones(len(rows), np.bool_)
+        changes[1:] = (rows[1:] != rows[:-1]).any(axis=1)
+        starts = np.flatnonzero(is_known & changes)
+        for start, end in zip(starts, np.append(starts, len(rows))[1:], strict=True):
+            number = self._number(tuple(rows[start].tolist()))
+            found[start:end] = number
+            if number != self._last:
+                self.begins.setdefault(number, []).append(self._rows + int(start))
+                self._last = number
+        found[~is_known] = _NONE
+        self._rows += len(rows)
+        return found
+
+    def _number(self, values: tuple[float, ...]) -> float:
+        return values[0] if self._count == 1 else self._known.setdefault(values, float(len(self._known)))
+
+    def values_of(self, number: float) -> tuple[float, ...]:
+        """Values of the columns of an episode."""
+        return next((values for values, one in self._known.items() if one == number), (float(number),))
+
+
+def numbers_of(table: tables.Table, options: ImportOptions) -> list[int]:
     """Numbers of the episodes of a table.
 
     Raises:
         ParameterError: No column contains the episode numbers.
     """
-    column = _column(table)
-    if column is None:
+    columns = _columns(table, options)
+    if not columns:
         raise ParameterError("--episode", "all", _NEEDED)
-    found: set[int] = set()
-    for (block,) in table.blocks([column]):
-        found |= set(np.unique(block[np.isfinite(block)]).astype(int).tolist())
-    return sorted(found)
+    numbering = _Numbering(len(columns))
+    for block in table.blocks(columns):
+        numbering.numbers(block)
+    return sorted(map(int, numbering.begins))
 
 
-def _column(table: tables.Table) -> int | None:
+def _beside(table: tables.Table, columns: list[int]) -> list[int]:
+    """Further columns of numbers that may number recordings too."""
+    found = [column for column in names.find_numberings(table.names) if column not in columns]
+    return [column for column in found if np.isfinite(table.sample(column)).all()]
+
+
+def _columns(table: tables.Table, options: ImportOptions) -> list[int]:
+    """Columns that number the episodes; empty if there are none."""
+    if options.numbered_by:
+        return [tables.column_of(table, name, option("numbered_by")) for name in options.numbered_by]
     column = names.find_episode(table.names) if table.is_named else None
-    is_number = column is not None and np.isfinite(table.sample(column)).all()
-    return column if is_number else None
+    return [column] if column is not None and np.isfinite(table.sample(column)).all() else []

@@ -11,7 +11,7 @@ from teleop_core.base.ranges import check
 from teleop_core.kernels.geometry import Array
 from teleop_exchange.options import LENGTHS, ImportOptions
 from teleop_exchange.source import Presses, Source
-from teleop_exchange.times import SECOND_NS, Stamps, guessed_unit, is_constant, joined_ns
+from teleop_exchange.times import LARGEST_LAG_NS, SECOND_NS, Stamps, clock_offset, guessed_unit, is_constant, joined_ns
 
 SAMPLE = 1000
 """Largest number of times per block, and largest number of blocks, from which the unit is guessed."""
@@ -97,12 +97,39 @@ def gather(source: Source, options: ImportOptions) -> Gathered:
     order = _recorded_order(parts.logs)
     stamps, usable, is_log = _stamps(source, options, parts, told)
     presses = source.presses()
-    if presses is not None and (is_log or is_constant(presses.stamp_ns)):
-        presses = Presses(presses.log_ns, presses.log_ns, presses.pressed)
+    if presses is not None and parts.logs:
+        presses = _of_one_clock(presses, stamps[usable], np.concatenate(parts.logs)[usable], is_log, told)
     buttons = np.concatenate(parts.buttons) if parts.buttons else None
     strange = source.attitudes.strange
     rows = np.concatenate(parts.rows)
     return Gathered(rows, stamps, usable, buttons, presses, told, source.bad_rows, strange, order)
+
+
+def _of_one_clock(presses: Presses, stamps: Stamps, logs: Stamps, is_log: bool, told: list[str]) -> Presses:
+    """Buttons at times of the clock that stamped the poses.
+
+    Args:
+        presses: The buttons.
+        stamps: Times of the poses (n,) [ns].
+        logs: Times of recording of the poses (n,) [ns].
+        is_log: Whether the times of the poses are those of recording.
+        told: Texts, to which a text is added if the buttons have another clock.
+    """
+    if is_log or is_constant(presses.stamp_ns):
+        offset = 0 if is_log else clock_offset(stamps, logs)
+    else:
+        offset = clock_offset(stamps, logs)
+        apart = abs(offset - clock_offset(presses.stamp_ns, presses.log_ns))
+        if apart < LARGEST_LAG_NS or is_constant(logs) or not _overlap(presses.log_ns, logs):
+            return presses
+        what = f"buttons are stamped by another clock, {apart / SECOND_NS:.4g} s apart"
+        told.append(f"{what}: their times of recording are taken, and brought to the clock of the poses")
+    return Presses(presses.log_ns + offset, presses.log_ns, presses.pressed)
+
+
+def _overlap(one: Stamps, other: Stamps) -> bool:
+    """Whether the spans of some times overlap."""
+    return len(one) > 0 and len(other) > 0 and one.min() <= other.max() and other.min() <= one.max()
 
 
 def _recorded_order(logs: list[Stamps]) -> NDArray[np.int32] | None:
@@ -175,11 +202,13 @@ def _stamps(
     unit = source.time_unit
     if unit == "auto":
         unit, reason = guessed_unit(_few(known))
+        if not unit:
+            raise RecordingError(source.path, f"has times of an unknown unit: {reason}; give --time-unit, or --rate HZ")
         told.append(f"times in {unit}" + (f" ({reason})" if reason else ""))
     del known
     stamps = joined_ns(parts.times, unit, _NO_TIME)
     if (stamps == _NO_TIME).all():
-        reason = f"its times are {first:g} {unit} and so on, after 2096; give another --time-unit"
+        reason = f"its times are {first:g} {unit} and so on, after 2038; give another --time-unit, or --rate HZ"
         raise RecordingError(source.path, reason)
     usable &= (stamps != _NO_TIME) & ((stamps != 0) | (not is_bag))
     return stamps, usable, False
