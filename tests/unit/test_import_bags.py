@@ -1,5 +1,6 @@
 """Importing bags of others: any pose, any storage, ROS 1 and 2, read beside the rosbags library."""
 
+import gzip
 import sqlite3
 from collections.abc import Callable
 from pathlib import Path
@@ -7,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import zstandard
 from mcap.reader import NonSeekingReader
 from mcap.writer import Writer as McapWriter
 from numpy.typing import ArrayLike, NDArray
@@ -287,6 +289,75 @@ def test_buttons_that_no_clock_brings_to_the_poses_are_told(tmp_path: Path) -> N
     assert any("buttons are outside" in text for text in report.warnings)
 
 
+# What is missing.
+
+
+@pytest.mark.parametrize("value", [0.0, np.nan, 3.0])
+@pytest.mark.parametrize("storage", list(StoragePlugin))
+def test_positions_without_an_orientation_come_on_request(value: float, storage: StoragePlugin, tmp_path: Path) -> None:
+    messages = poses()
+    for _, _, message in messages:
+        turn = message.pose.orientation
+        turn.w = turn.x = turn.y = turn.z = value
+    path = write2(tmp_path / "bag", messages, storage)
+    with pytest.raises(tc.RecordingError, match="--orientation none") as error:
+        teleop_exchange.import_recording(path, tmp_path / "other")
+    assert "--quaternion" not in str(error.value)
+    report, stream = imported(path, tmp_path, orientation="none")
+    assert_same(stream, rows=np.column_stack((PLACES, np.tile([1.0, 0.0, 0.0, 0.0], (COUNT, 1)))))
+    assert "orientation: constant" in report.told
+
+
+@pytest.mark.parametrize(
+    "options", [{"quaternion_order": "xyzw"}, {"time_unit": "ms"}, {"angles": "deg"}, {"episode": 3}, {"skip": 1}]
+)
+def test_an_option_of_tables_is_refused_for_a_bag(options: dict[str, Any], tmp_path: Path) -> None:
+    path = write2(tmp_path / "bag", poses())
+    with pytest.raises(tc.ParameterError, match="--topic"):
+        teleop_exchange.import_recording(path, tmp_path / "out", **options)
+
+
+def refused(path: Path, tmp_path: Path) -> str:
+    with pytest.raises(tc.RecordingError) as error:
+        teleop_exchange.import_recording(path, tmp_path / "refused")
+    assert not (tmp_path / "refused").exists()
+    return str(error.value)
+
+
+@pytest.mark.parametrize(("pack", "name"), [(zstandard.compress, "zstd -d"), (gzip.compress, "gzip -d")])
+@pytest.mark.parametrize("storage", list(StoragePlugin))
+def test_a_packed_file_of_a_recording_says_how_it_is_read(
+    pack: Callable[[bytes], bytes], name: str, storage: StoragePlugin, tmp_path: Path
+) -> None:
+    folder = write2(tmp_path / "bag", poses(), storage)
+    (file,) = [path for path in folder.iterdir() if path.suffix != ".yaml"]
+    packed = tmp_path / f"{file.name}.packed"
+    packed.write_bytes(pack(file.read_bytes()))
+    text = refused(packed, tmp_path)
+    assert name in text
+    assert "metadata.yaml" in text
+    assert str(folder) in refused(packed.rename(folder / packed.name), tmp_path)
+
+
+def test_a_recording_is_known_by_its_first_bytes(tmp_path: Path) -> None:
+    folder = write2(tmp_path / "bag", poses())
+    (file,) = folder.glob("*.mcap")
+    assert "must end in .mcap" in refused(file.rename(tmp_path / "hand.mcap.backup"), tmp_path)
+    bag = write1(tmp_path / "user.bag", poses(is_ros2=False))
+    assert "rosbag reindex" in refused(bag.rename(tmp_path / "user.bag.active"), tmp_path)
+
+
+@pytest.mark.parametrize("mode", [CompressionMode.NONE, CompressionMode.FILE])
+def test_a_folder_without_its_list_of_files_says_what_to_give(mode: CompressionMode, tmp_path: Path) -> None:
+    folder = write2(tmp_path / "bag", poses(), StoragePlugin.SQLITE3, mode)
+    (folder / "metadata.yaml").unlink()
+    (folder / "._metadata.yaml").write_bytes(b"")
+    text = refused(folder, tmp_path)
+    assert "lacks metadata.yaml" in text
+    assert "ros2 bag reindex" in text
+    assert next(folder.glob("bag*.db3*")).name in text
+
+
 # Which topic.
 
 
@@ -345,6 +416,19 @@ def test_poses_of_two_frames_on_one_topic_are_never_mixed(tmp_path: Path) -> Non
     with pytest.raises(tc.UnknownNameError, match=r"--frame.*probe, tool"):
         teleop_exchange.import_recording(path, tmp_path / "out")
     assert_same(imported(path, tmp_path, frame="probe")[1], STAMPS[200:], POSES[200:])
+
+
+@pytest.mark.parametrize("version", ["mcap", "db3", "ros1"])
+def test_a_frame_may_appear_after_any_number_of_messages(version: str, tmp_path: Path) -> None:
+    maker, late = Maker(version != "ros1"), 1500
+    often = [("/tf", int(STAMPS[0] + i), maker.pose(POSES[0], "TFMessage", STAMPS[0] + i)) for i in range(late)]
+    messages = often + poses("TFMessage", "/tf", is_ros2=version != "ros1", child="camera")[1:]
+    storage = StoragePlugin.SQLITE3 if version == "db3" else StoragePlugin.MCAP
+    bag = tmp_path / "user.bag"
+    path = write1(bag, messages) if version == "ros1" else write2(tmp_path / "bag", messages, storage)
+    with pytest.raises(tc.UnknownNameError, match="camera, tool"):
+        teleop_exchange.import_recording(path, tmp_path / "other")
+    assert_same(imported(path, tmp_path, frame="camera")[1], STAMPS[1:], POSES[1:])
 
 
 def carried(parent: str, child: str, rows: range | None = None) -> list[tuple[str, int, Any]]:

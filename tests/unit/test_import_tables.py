@@ -65,6 +65,12 @@ FORMS: dict[str, dict[str, Any]] = {
     "quoted.csv": {"quoting": 2},
     "windows.csv": {"lineterminator": "\r\n"},
     "marked.csv": {"encoding": "utf-8-sig"},
+    "wide.csv": {"encoding": "utf-16"},
+    "wide_little.csv": {"encoding": "utf-16-le", "lineterminator": "\r\n"},
+    "wide_big.csv": {"encoding": "utf-16-be"},
+    "wide_blank.txt": {"encoding": "utf-16", "sep": " "},
+    "wide_tab.tsv": {"encoding": "utf-16", "sep": "\t", "decimal": ","},
+    "wider.csv": {"encoding": "utf-32"},
 }
 
 
@@ -429,6 +435,66 @@ def test_dates_keep_to_their_zone(ending: str, sep: str, tmp_path: Path) -> None
     _, stream = imported(tmp_path / "a.csv", tmp_path)
     assert stream.stamp_ns[0] == zone.value
     assert_same_motion(stream)
+
+
+DATES = {
+    "slashes": "%Y/%m/%d %H:%M:%S.%f",
+    "dots": "%Y.%m.%dT%H:%M:%S.%f",
+    "days first between dots": "%d.%m.%Y %H:%M:%S,%f",
+    "hours of a zone": "%Y-%m-%d %H:%M:%S.%f+00",
+    "another zone": "%Y/%m/%d %H:%M:%S.%f-0000",
+    "a named zone": "%Y-%m-%d %H:%M:%S.%f UTC",
+    "decimal commas": "%Y-%m-%dT%H:%M:%S,%fZ",
+    "underscores": "%Y-%m-%d_%H:%M:%S.%f",
+    "usual": "%Y-%m-%d %H:%M:%S.%f",
+}
+
+
+@pytest.mark.parametrize("form", DATES)
+@pytest.mark.parametrize("sep", [";", "\t"])
+def test_dates_of_every_unambiguous_form_are_times(form: str, sep: str, tmp_path: Path) -> None:
+    at = pd.date_range("2025-04-02T09:59:58.250", periods=COUNT, freq="10ms")  # beyond a full hour
+    table = frame()
+    table["t"] = at.strftime(DATES[form])
+    table.to_csv(tmp_path / "a.csv", index=False, sep=sep)
+    report, stream = imported(tmp_path / "a.csv", tmp_path)
+    assert np.array_equal(stream.stamp_ns, at.as_unit("ns").astype("int64"))
+    assert report.counts.samples == COUNT
+
+
+def test_times_of_a_day_and_short_dates_are_times(tmp_path: Path) -> None:
+    at = pd.date_range("2025-04-02T09:30:00", periods=COUNT, freq="250ms")
+    table = frame()
+    table["t"] = [f"{one.hour}:{one.minute:02}:{one.second:02}.{one.microsecond // 1000:03}" for one in at]
+    _, stream = brought(tmp_path, table)
+    assert np.array_equal(stream.stamp_ns, (at - at[0].normalize()).astype("timedelta64[ns]").astype(np.int64))
+    table["t"] = [f"2025/4/2 {one.hour}:{one.minute:02}:{one.second}.{one.microsecond // 1000:03}" for one in at]
+    table.loc[7, "t"] = ""
+    report, stream = brought(tmp_path, table)
+    assert report.counts.missing == 1
+    assert abs(stream.stamp_ns[-1] - at[-1].as_unit("ns").value) < 256  # a column with holes has floats
+
+
+@pytest.mark.parametrize("cell", ["04/02/2025 09:30:00", "Apr 2, 2025 9:30:00 AM", "2025-04-02"])
+def test_a_date_that_may_mean_two_days_says_which_are_read(cell: str, tmp_path: Path) -> None:
+    with pytest.raises(tc.RecordingError, match=r"2025-04-02T09:30:00"):
+        brought(tmp_path, frame().assign(t=cell))
+
+
+@pytest.mark.parametrize("empty", [["x", "y", "z"], ["qw", "qx", "qy", "qz"], ["t"]])
+def test_rows_that_are_never_whole_say_what_is_missing_in_which_share(empty: list[str], tmp_path: Path) -> None:
+    table = pd.concat([frame(), frame()]).sort_values("t", kind="stable").reset_index(drop=True)
+    others = [name for name in HEAD[1:] if name not in empty] if empty != ["t"] else ["y"]
+    table.loc[::2, empty] = np.nan
+    table.loc[1::2, others] = np.nan
+    with pytest.raises(tc.RecordingError, match=rf"0 usable rows of {2 * COUNT}") as error:
+        brought(tmp_path, table)
+    text = str(error.value)
+    assert "in 50 %" in text
+    assert all(name in text for name in empty)
+    if empty != ["t"]:
+        assert "--orientation none" in text
+        assert brought(tmp_path, table, orientation="none")[0].counts.samples == COUNT
 
 
 def test_our_own_export_comes_back(tmp_path: Path) -> None:

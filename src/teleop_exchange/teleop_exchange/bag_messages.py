@@ -28,6 +28,7 @@ POSES = {
 TRANSFORMS = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")
 JOY = "sensor_msgs/msg/Joy"
 BATCH = 8192
+_MOST_KNOWN = 4096  # number of different messages that are kept to be recognised
 Raw = tuple[int, bytes]
 """Time of recording [ns] and bytes of a message."""
 Frames = tuple[str, str]
@@ -65,6 +66,22 @@ class PoseReader:
         """Message with the attributes of its type."""
         read = self._types.deserialize_cdr if self._is_ros2 else self._types.deserialize_ros1
         return read(data, self._type)
+
+    def frames(self, messages: Iterable[Raw]) -> list[Frames]:
+        """All parent and child frames in messages of transforms, in the order of their appearance."""
+        found: dict[Frames, None] = {}
+        known: set[bytes] = set()
+        for _, data in messages:
+            # Messages of one transform begin with 16 bytes that vary and end with seven numbers; the bytes between them
+            # hold the names, and repeat.
+            middle = data[16:-56]
+            if middle in known:
+                continue
+            parts = self._parts(self.message(data))
+            found |= dict.fromkeys(map(names_of, parts))
+            if len(parts) == 1 and len(known) < _MOST_KNOWN:
+                known.add(middle)
+        return list(found)
 
     def blocks(self, messages: Iterable[Raw]) -> Iterator[Rows]:
         """Poses, in blocks of some messages.
@@ -140,11 +157,6 @@ def names_of(part: _Part) -> Frames:
     return "" if part.header is None else plain(part.header.frame_id), plain(part.child)
 
 
-def frames(message: Any) -> list[Frames]:
-    """Parent and child frames in a message of transforms."""
-    return [(plain(t.header.frame_id), plain(t.child_frame_id)) for t in message.transforms]
-
-
 class JoyReader:
     """Reader of the buttons of a topic of Joy messages.
 
@@ -181,6 +193,6 @@ class JoyReader:
     def _row(self, data: bytes) -> list[int]:
         buttons = self.message(data).buttons
         row = [int(0 <= n < len(buttons) and buttons[n] != 0) for n in self._numbers]
-        if len(self._known) < 4096:
+        if len(self._known) < _MOST_KNOWN:
             self._known[data[12:]] = row
         return row

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from typing import NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
@@ -102,7 +103,23 @@ def gather(source: Source, options: ImportOptions) -> Gathered:
     buttons = np.concatenate(parts.buttons) if parts.buttons else None
     strange = source.attitudes.strange
     rows = np.concatenate(parts.rows)
+    if count > 1 and not usable.any():
+        _refuse_broken_rows(source, rows, stamps)
     return Gathered(rows, stamps, usable, buttons, presses, told, source.bad_rows, strange, order)
+
+
+def _refuse_broken_rows(source: Source, rows: Array, stamps: Stamps) -> NoReturn:
+    """Refuse rows of which none is whole, and tell what is missing in which share of them."""
+    is_number = np.isfinite(rows)
+    known = (stamps != _NO_TIME, is_number[:, :3].all(axis=1), is_number[:, 3:].all(axis=1))
+    missing = [
+        f"{label} in {100.0 * (1.0 - own.mean()):.3g} %"
+        for label, own in zip(source.labels, known, strict=True)
+        if not own.all()
+    ]
+    hint = "--orientation none takes the others alone" if (known[0] & known[1]).any() else "choose other columns"
+    what = f"holds 0 usable rows of {len(rows)}: numbers are missing of {', of '.join(missing)} of them"
+    raise RecordingError(source.path, f"{what}, and of something in each; {hint}")
 
 
 def _of_one_clock(presses: Presses, stamps: Stamps, logs: Stamps, is_log: bool, told: list[str]) -> Presses:
@@ -152,10 +169,8 @@ def _check(source: Source, parts: _Parts, count: int) -> None:
     attitudes = source.attitudes
     if attitudes.strange > MOST_STRANGE * count:
         share = 100.0 * attitudes.strange / count
-        raise RecordingError(
-            source.path,
-            f"{_strange(attitudes.kind)} in {share:.3g} % of the rows{_hint(attitudes.kind, attitudes.mirrored)}",
-        )
+        hint = "give --orientation none" if parts.logs else _hint(attitudes.kind, attitudes.mirrored)
+        raise RecordingError(source.path, f"{_strange(attitudes.kind)} in {share:.3g} % of the rows: {hint}")
     source.check(parts.finite)
     check("farthest place from the origin", parts.farthest, "m")
     if parts.farthest > FARTHEST and not source.is_unit_said:
@@ -174,9 +189,9 @@ def _strange(kind: str) -> str:
 
 def _hint(kind: str, mirrored: int) -> str:
     if kind == "matrix" and mirrored:
-        return ": are the columns of --matrix in order, row by row? A mirror changes handedness"
+        return "are the columns of --matrix in order, row by row? A mirror changes handedness"
     name = "--matrix" if kind == "matrix" else "--quaternion and their order"
-    return f": check the columns of {name}, or give --orientation none"
+    return f"check the columns of {name}, or give --orientation none"
 
 
 def _stamps(

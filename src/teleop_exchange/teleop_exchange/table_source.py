@@ -55,6 +55,10 @@ class TableSource:
         self.has_time = bool(time)
         self.time_unit = self._time_unit(time)
         self.unit, self.is_unit_said = self._unit(position)
+        time_label, place_label, turn_label = (
+            ", ".join(table.names[column] for column in group) for group in (time, position, orientation)
+        )
+        self.labels = (time_label, place_label, turn_label)
         self._tell_unused({*taken, *self._columns.buttons.values()})
 
     # -- which columns ---------------------------------------------------------------------------
