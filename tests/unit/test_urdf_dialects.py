@@ -9,6 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import teleop_core as tc
+from present import present
 from teleop_core.robots.bodies.looks import looks_of
 
 LIMIT = '<limit lower="-2" upper="2" effort="60" velocity="2.5"/>'
@@ -123,8 +124,9 @@ def test_efforts_and_speeds_beyond_any_drive_are_unknown(most: str, tmp_path: Pa
     free = f'<limit lower="-2" upper="2" effort="{most}" velocity="{most}"/>'
     robot = loaded(tmp_path, (LIMIT, free))
     unknown = loaded(tmp_path, (LIMIT, '<limit lower="-2" upper="2" effort="0" velocity="0"/>'))
-    np.testing.assert_array_equal(robot.drives.speed_limit, unknown.drives.speed_limit)
-    np.testing.assert_array_equal(robot.drives.effort_limit, unknown.drives.effort_limit)
+    own, others = present(robot.drives), present(unknown.drives)
+    np.testing.assert_array_equal(own.speed_limit, others.speed_limit)
+    np.testing.assert_array_equal(own.effort_limit, others.effort_limit)
     assert sum("turn: " in note and "unknown" in note for note in robot.notes) == 2
 
 
