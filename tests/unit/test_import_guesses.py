@@ -120,9 +120,17 @@ def test_a_turn_of_another_body_alone_is_asked_for(tmp_path: Path) -> None:
     assert imported(path, tmp_path, orientation="none")[0].rotation == 0.0
 
 
-def test_left_and_right_of_one_letter_are_two_places(tmp_path: Path) -> None:
-    path = written(tmp_path, "t lx ly lz rx ry rz", T, PLACES, OTHER_PLACES)
-    assert "rx ry rz" in refusal(path, tmp_path)
+@pytest.mark.parametrize("head", ["lx ly lz rx ry rz", "a_x a_y a_z b_x b_y b_z"])
+def test_bodies_of_one_letter_are_two_places(head: str, tmp_path: Path) -> None:
+    path = written(tmp_path, f"t {head}", T, PLACES, OTHER_PLACES)
+    assert all(name in refusal(path, tmp_path) for name in head.split())
+
+
+@pytest.mark.parametrize("other", ["hand_v{}", "hand_vel_{}", "hand_f{}", "hand_acc_{}", "a{}"])
+def test_speeds_and_forces_of_a_hand_are_no_places(other: str, tmp_path: Path) -> None:
+    head = " ".join(["t hand_tx hand_ty hand_tz", *(other.format(axis) for axis in "xyz")])
+    stream = imported(written(tmp_path, head, T, PLACES, OTHER_PLACES), tmp_path)[1]
+    assert_motion(stream, PLACES, Rotation.identity(COUNT))
 
 
 @pytest.mark.parametrize("name", ["r{}", "rot_{}", "Rot{}", "angle_{}", "r{} [deg]", "tool.rotation.{}"])
@@ -194,6 +202,12 @@ def test_clocks_of_other_epochs_are_known_by_their_size(clock: str, date: str, n
         assert options or any(f"times in {clock}" in text for text in report.told)
 
 
+def test_ticks_of_an_unknown_clock_are_asked_for(tmp_path: Path) -> None:
+    path = written(tmp_path, "ticks x y z", 81_234_567_890 + np.round(1e7 * T), PLACES)
+    assert "--time-unit" in refusal(path, tmp_path)
+    assert imported(path, tmp_path, rate=RATE)[0].duration == pytest.approx(T[-1], abs=1e-6)
+
+
 def test_times_whose_unit_no_rate_explains_are_asked_for(tmp_path: Path) -> None:
     path = written(tmp_path, "time x y z", 1e-5 * np.arange(COUNT, dtype=np.float64), PLACES)
     text = refusal(path, tmp_path)
@@ -229,7 +243,17 @@ def test_an_episode_whose_rows_are_apart_is_not_one_recording(head: str, tmp_pat
         assert report.duration == pytest.approx(T[99], abs=1e-6)
 
 
-def test_recordings_that_stand_together_and_differ_in_another_number_are_told(tmp_path: Path) -> None:
+@pytest.mark.parametrize("head", ["trial stage", "episode take", "demo_id repetition"])
+def test_an_episode_in_which_another_number_changes_where_the_time_jumps_is_not_one(head: str, tmp_path: Path) -> None:
     order = [(trial, stage) for trial in (1, 2, 3) for stage in (1, 2)]
-    report, _ = imported(numbered(tmp_path, "trial stage", order), tmp_path, episode=2)
-    assert any("--numbered-by" in text for text in report.told)
+    path = numbered(tmp_path, head, order)
+    assert f"--numbered-by {' '.join(reversed(head.split()))}" in refusal(path, tmp_path, episode=2)
+    found = teleop_exchange.import_episodes(path, tmp_path / "all", numbered_by=head.split())
+    assert sorted(found.made) == list(range(6))
+
+
+def test_parts_of_one_recording_are_told_and_stay_together(tmp_path: Path) -> None:
+    rows = np.column_stack((np.ones(COUNT), np.arange(COUNT) // 100, T, PLACES))
+    report, stream = imported(written(tmp_path, "episode_index phase time x y z", rows), tmp_path, episode=1)
+    assert_motion(stream, PLACES, Rotation.identity(COUNT))
+    assert any("--numbered-by phase episode_index" in text for text in report.told)

@@ -447,6 +447,11 @@ DATES = {
     "decimal commas": "%Y-%m-%dT%H:%M:%S,%fZ",
     "underscores": "%Y-%m-%d_%H:%M:%S.%f",
     "usual": "%Y-%m-%d %H:%M:%S.%f",
+    "names of months": "%d-%b-%Y %H:%M:%S.%f",
+    "colons before the fraction": "%Y-%m-%d %H:%M:%S:%f",
+    "a dash before the time": "%Y/%m/%d-%H:%M:%S.%f",
+    "without signs": "%Y%m%dT%H%M%S.%fZ",
+    "a day without signs": "%Y%m%d %H:%M:%S.%f",
 }
 
 

@@ -8,23 +8,28 @@ import numpy as np
 from numpy.typing import NDArray
 
 FORMS = (
-    "read are 2025-04-02T09:30:00.5, with / or . between the numbers, 02.04.2025 09:30:00,5 and 09:30:00.5, with a "
-    "zone such as Z, +02 or +02:00"
+    "read are 2025-04-02T09:30:00.5, with / or . between the numbers, 02.04.2025 09:30:00,5, 02-Apr-2025 09:30:00, "
+    "20250402T093000 and 09:30:00.5, with a zone such as Z, +02 or +02:00"
 )
 """The forms of dates that are read, for messages."""
-_TIME = r"(?P<h>\d\d?):(?P<min>\d\d)(?::(?P<s>\d\d?))?(?:[.,](?P<part>\d+))?"
+_MONTHS = ("jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec")
+_TIME = r"(?P<h>\d\d?):(?P<min>\d\d)(?::(?P<s>\d\d?))?(?:[.,:](?P<part>\d+))?"
+_SHORT_TIME = r"(?P<h>\d\d)(?P<min>\d\d)(?P<s>\d\d)(?:[.,](?P<part>\d+))?"
 _ZONE = r"\s*(?P<zone>Z|UTC|GMT|[+-]\d\d(?::?\d\d)?)?"
 _DATES = [
-    re.compile(rf"\s*{date}{_TIME}{_ZONE}\s*", re.I)
-    for date in (
-        r"(?P<y>\d{4})(?P<gap>[-/.])(?P<m>\d\d?)(?P=gap)(?P<d>\d\d?)[T _]\s*",
-        r"(?P<d>\d\d?)\.(?P<m>\d\d?)\.(?P<y>\d{4})[T _]\s*",
-        r"()",
+    re.compile(rf"\s*{form}{_ZONE}\s*", re.I)
+    for form in (
+        rf"(?P<y>\d{{4}})(?P<gap>[-/.])(?P<m>\d\d?)(?P=gap)(?P<d>\d\d?)[-T _]\s*{_TIME}",
+        rf"(?P<d>\d\d?)\.(?P<m>\d\d?)\.(?P<y>\d{{4}})[T _]\s*{_TIME}",
+        rf"(?P<d>\d\d?)(?P<gap>[- ])(?P<name>{'|'.join(_MONTHS)})(?P=gap)(?P<y>\d{{4}})\s+{_TIME}",
+        rf"(?P<y>\d{{4}})(?P<m>\d\d)(?P<d>\d\d)[T _](?:{_TIME})",
+        rf"(?P<y>\d{{4}})(?P<m>\d\d)(?P<d>\d\d)[T _]{_SHORT_TIME}",
+        _TIME,
     )
 ]
-"""Years first, or days first between dots, or times of the day; in other forms days and months could be mixed up."""
+"""Years first, days first between dots or before a name, times of the day. Others could mix up days and months."""
 _PLAIN = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d:\d\d(?:\.\d{1,9})?(Z|[+-]\d\d:\d\d)?")
-_LIKE = re.compile(r"\d\d?:\d\d|\d[-/.]\d\d?[-/.]\d")
+_LIKE = re.compile(r"\d\d?:\d\d|\d[-/.]\d\d?[-/.]\d|\d{8}T?\d{6}")
 _MINUTE_NS = 60_000_000_000
 
 
@@ -73,7 +78,10 @@ def _nanoseconds(text: str) -> int:
         raise ValueError(f"holds {text!r}, which is no date; {FORMS}")
     parts = found.groupdict()
     minute = f"{parts['h']:0>2}:{parts['min']}{(parts['zone'] or 'Z').upper()}"
-    day = f"{parts['y']}-{parts['m']:0>2}-{parts['d']:0>2}" if parts.get("y") else "1970-01-01"
+    day = "1970-01-01"
+    if parts.get("y"):
+        month = 1 + _MONTHS.index(parts["name"].lower()) if parts.get("name") else parts["m"]
+        day = f"{parts['y']}-{month:0>2}-{parts['d']:0>2}"
     return _minute_ns(day, minute) + int(parts["s"] or 0) * 1_000_000_000 + int(f"{parts['part'] or 0:0<9}"[:9])
 
 

@@ -15,6 +15,7 @@ from teleop_exchange.options import ImportOptions, option
 
 _LISTED = 8
 _NEEDED = "left out: no column is called episode_index or the like; --numbered-by COL names one"
+_JUMP = 10.0  # a step of this many usual ones is a jump of the time
 _NONE = -1.0
 """Number of rows without an episode."""
 
@@ -38,15 +39,20 @@ class Episodes:
         self._beside = [] if options.numbered_by or not self._columns else _beside(table, self._columns)
         self._numbering = _Numbering(len(self._columns))
         self._finer = _Numbering(len(self._columns) + len(self._beside))
+        self._times: list[NDArray[np.float64]] = []
         if self._wanted is not None and not self._columns:
             raise ParameterError("--episode", self._wanted, _NEEDED)
 
-    def blocks(self, columns: list[int]) -> Iterator[list[tables.Numbers]]:
+    def blocks(self, columns: list[int], has_time: bool = False) -> Iterator[list[tables.Numbers]]:
         """Some columns of the table, block by block.
 
+        Args:
+            columns: The columns.
+            has_time: Whether the first column is the time.
+
         Raises:
-            RecordingError: The table contains several episodes and no number is given, or the rows of an episode are
-                not together, or the file is damaged.
+            RecordingError: The table contains several episodes and no number is given, or an episode is several
+                recordings, or the file is damaged.
             UnknownNameError: No episode has the given number.
         """
         if not self._columns:
@@ -57,8 +63,11 @@ class Episodes:
             episode = self._numbering.numbers(block[len(columns) : first])
             is_own = np.ones(len(episode), np.bool_) if self._wanted is None else episode == self._wanted
             self._finer.numbers([column[is_own] for column in block[len(columns) :]])
-            yield [column[is_own] for column in block[: len(columns)]]
+            own = [column[is_own] for column in block[: len(columns)]]
+            self._times += [own[0].astype(np.float64)] * (has_time and bool(self._beside))
+            yield own
         self._check()
+        self._refuse_breaks()
 
     def _check(self) -> None:
         found = self._numbering.begins
@@ -79,6 +88,25 @@ class Episodes:
             hint = f"number its recordings; name all columns that do: --numbered-by {self._told_columns()}"
             raise RecordingError(self._table.path, f"{reason} {hint}")
 
+    def _refuse_breaks(self) -> None:
+        """Refuse an episode in which another column changes where the time jumps.
+
+        Raises:
+            RecordingError: The time jumps there.
+        """
+        times = np.concatenate(self._times) if self._times else np.zeros(0)
+        steps, begins = np.diff(times), [row for rows in self._finer.begins.values() for row in rows]
+        rising = steps[steps > 0.0]
+        usual = float(np.median(rising)) if len(rising) else 0.0
+        broken = sorted(row for row in begins if 0 < row < len(times) and not 0.0 <= steps[row - 1] <= _JUMP * usual)
+        if broken:
+            listed = ", ".join(str(row + 1) for row in broken[:_LISTED])
+            reason = (
+                f"holds {len(broken) + 1} recordings in an episode: {self._told_columns()} change together where the"
+            )
+            hint = f"--numbered-by {self._told_columns()}"
+            raise RecordingError(self._table.path, f"{reason} time jumps, in its row {listed}; give {hint}")
+
     def _told_columns(self) -> str:
         """Columns that may number the recordings, for a message."""
         listed = [self._table.names[column] for column in (*self._beside, *self._columns)]
@@ -87,7 +115,8 @@ class Episodes:
     def told(self) -> list[str]:
         """Texts about the imported episode."""
         changes = len(self._finer.begins) - 1
-        finer = f"{self._told_columns()} change together {changes} times in it: --numbered-by takes them all"
+        finer = f"another number changes {changes} times in it (recordings of their own: --numbered-by "
+        finer += f"{self._told_columns()})"
         return self._told_episode() + [finer] * (bool(self._beside) and changes > 0)
 
     def _told_episode(self) -> list[str]:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from teleop_core.base.errors import RecordingError
 from teleop_core.base.ranges import check
 from teleop_core.kernels.geometry import Array
-from teleop_exchange.options import LENGTHS, ImportOptions
+from teleop_exchange.options import LENGTHS, TIMES_NS, ImportOptions
 from teleop_exchange.source import Presses, Source
 from teleop_exchange.times import LARGEST_LAG_NS, SECOND_NS, Stamps, clock_offset, guessed_unit, is_constant, joined_ns
 
@@ -217,6 +217,8 @@ def _stamps(
     unit = source.time_unit
     if unit == "auto":
         unit, reason = guessed_unit(_few(known))
+        if "tick" in source.labels[0].lower() and unit in TIMES_NS:
+            unit, reason = "", "ticks may be of any length"
         if not unit:
             raise RecordingError(source.path, f"has times of an unknown unit: {reason}; give --time-unit, or --rate HZ")
         told.append(f"times in {unit}" + (f" ({reason})" if reason else ""))

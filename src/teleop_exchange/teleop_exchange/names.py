@@ -18,16 +18,20 @@ _UNITS = {
 _TIMES = ("time", "t", "timestamp", "stamp", "times", "timestamps", "clock", "seconds", "secs", "elapsed",
           "ros_time", "rostime", "datetime", "date_time", "ticks", "filetime", "datenum", "date")  # fmt: skip
 _COUNTERS = re.compile(
-    r"(^|_)(frames?|ind(ex|ices)|idx|i|n|no|nr|num|number|count(er)?|samples?|seq(uence)?|id|ids|rows?|steps?)(_|$)"
+    r"(^|_)(frames?|ind(ex|ices)|idx|i|n|no|nr|num|number|count(er)?|samples?|seq(uence)?|id|ids|rows?|steps?|images?|img|picture)(_|$)"
 )
 _NOT_PLACES = re.compile(
     r"(^|_)(q|quat\w*|orient\w*|rot\w*|r|euler|angles?|ang\w*|omega|w|vel\w*|v|acc\w*|a|lin\w*"
     r"|twist|force|f|torque|wrench|t|gyro|mag\w*|cov\w*|fixed|dir\w*|forward|axis|scale|gravity)"
     r"(_|$)"
 )
-_PLACES = re.compile(r"(^|_)(pos\w*|trans\w*|place|p|loc\w*|xyz|point|tip|hand|t)(_|$)")
+_PLACES = re.compile(r"(^|_)(pos\w*|trans\w*|place|p|loc\w*|xyz|point|t)(_|$)")
+_HANDS = re.compile(r"(^|_)(tip|hand)(_|$)")
+_SIDES = {"r": ("l", "right"), "a": ("b", "first")}
+"""Letters that name a body if another body has the counterpart, with a word for them; alone they mean a rotation, an
+acceleration."""
 _TURNS = re.compile(r"(^|_)(q|quat\w*|orient\w*|rot\w*|attitude|r|o)(_|$)")
-_ANGLES = re.compile(r"(^|_)(r|rot\w*|orient\w*|attitude|euler|angles?|rpy)(_|$)")
+_ANGLES = re.compile(r"(^|_)(r|rot\w*|orient\w*|attitude|euler|angles?|rpy|theta)(_|$)")
 _NO_ANGLES = re.compile(r"vel|acc|rate|speed|omega|torque|force|cov|noise|std|error")
 _OF_ANY_BODY = re.compile(
     r"pos\w*|trans\w*|place|loc\w*|xyz|point|pose|q|quat\w*|orient\w*|rot\w*|attitude|euler|angles?|rpy|rvec|vec\w*|axis"
@@ -103,9 +107,10 @@ def triples(names: Sequence[str]) -> list[Group]:
 def positions(names: Sequence[str], groups: Sequence[Group]) -> list[Group]:
     """Those of the groups x, y, z that the names suggest equally well as a position, in the order of the file."""
     good = [group for group in groups if not _NOT_PLACES.search(group.stem)]
-    named = [group for group in groups if _PLACES.search(group.stem)]
     bare = [group for group in good if not group.stem.strip("_0123456789")]
-    return bare or named or good or _after_a_name(names)
+    hands = [group for group in good if _PLACES.search(group.stem) or _HANDS.search(group.stem)]
+    named = [group for group in groups if _PLACES.search(group.stem)]
+    return bare or hands or named or good or _after_a_name(names)
 
 
 def _after_a_name(names: Sequence[str]) -> list[Group]:
@@ -218,20 +223,32 @@ def _series(names: Sequence[str], letters: str) -> list[Group]:
     whole = {
         stem: tuple(hits[letter] for letter in letters) for stem, hits in found.items() if set(letters) <= set(hits)
     }
-    sided = {(_sided(begin, whole, end), end): columns for (begin, end), columns in whole.items()}
-    return [Group(begin + end, columns, _body(begin, end)) for (begin, end), columns in sided.items()]
+    groups = []
+    for (begin, end), columns in whole.items():
+        sided = _sided(begin, end, whole)
+        groups.append(Group(sided + end, columns, _body(begin, end, is_sided=sided != begin)))
+    return groups
 
 
-def _sided(begin: str, stems: Collection[tuple[str, str]], end: str) -> str:
-    """Begin of a name in which ``r`` means the right hand if there is a left one, as in ``lx`` and ``rx``."""
-    other = re.sub(r"(^|_)r_", r"\1l_", begin)
-    return re.sub(r"(^|_)r_", r"\1right_", begin) if other != begin and (other, end) in stems else begin
+def _sided(begin: str, end: str, stems: Collection[tuple[str, str]]) -> str:
+    """Begin of a name with a word for a letter that names a body, because another body has its counterpart."""
+    for letter, (counterpart, word) in _SIDES.items():
+        other = re.sub(rf"(^|_){letter}_", rf"\1{counterpart}_", begin)
+        if other != begin and (other, end) in stems:
+            return re.sub(rf"(^|_){letter}_", rf"\1{word}_", begin)
+    return begin
 
 
-def _body(before: str, after: str) -> tuple[str, ...]:
-    """Words before and after the axis in a name, without those that only say what the quantity is."""
+def _body(before: str, after: str, *, is_sided: bool = False) -> tuple[str, ...]:
+    """Words before and after the axis in a name, without those that only say what the quantity is.
+
+    Args:
+        before: Text before the axis.
+        after: Text after the axis.
+        is_sided: Whether a single letter before the axis names the body.
+    """
     words = before.strip("_").split("_")
-    if words[-1] in _BEFORE_AXIS:
+    if words[-1] in _BEFORE_AXIS and not is_sided:
         words.pop()
     words += after.strip("_").split("_")
     return tuple(word for word in words if word and not _OF_ANY_BODY.fullmatch(word))

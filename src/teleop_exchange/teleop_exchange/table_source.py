@@ -293,7 +293,7 @@ class TableSource:
         c = self._columns
         order = [*c.time, *c.position, *c.orientation, *c.buttons.values()]
         first, second = len(c.time), len(c.time) + 3
-        for columns in self._episodes.blocks(order):
+        for columns in self._episodes.blocks(order, self.has_time):
             turned = columns[second : second + len(c.orientation)]
             count = len(columns[first])
             rows = np.column_stack(turned) if turned else np.empty((count, 0))
