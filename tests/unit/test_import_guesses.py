@@ -152,8 +152,12 @@ def test_three_angles_that_do_not_say_their_kind_are_asked_for(name: str, is_deg
 @pytest.mark.parametrize("head", ["time x y z rotvec_x rotvec_y rotvec_z", "t x y z rx ry rz"])
 def test_rotation_vectors_are_taken_in_radians_and_asked_for_in_degrees(head: str, tmp_path: Path) -> None:
     assert_motion(imported(written(tmp_path, head, T, PLACES, TURNS.as_rotvec()), tmp_path)[1])
+    with pytest.warns(tc.TeleopWarning, match="rotation vector"):
+        assert tc.replay(tmp_path / "hand.csv")["master/measured_cp"].values.any()
     path = written(tmp_path, head, T, PLACES, TURNS.as_rotvec(degrees=True))
     assert "--euler" in refusal(path, tmp_path)
+    with pytest.raises(tc.TeleopError, match=r"--euler.*an option of `teleop import"):
+        tc.replay(path)
 
 
 # Which times.
@@ -252,8 +256,25 @@ def test_an_episode_in_which_another_number_changes_where_the_time_jumps_is_not_
     assert sorted(found.made) == list(range(6))
 
 
+@pytest.mark.parametrize("ending", ["csv", "parquet"])
+@pytest.mark.parametrize("head", ["session take", "subject trial"])
+def test_recordings_that_nothing_called_an_episode_numbers_are_not_one(head: str, ending: str, tmp_path: Path) -> None:
+    first, second = head.split()
+    table = pd.read_csv(numbered(tmp_path, head, [(1, 1), (1, 2), (2, 1), (2, 2)]))
+    if first == "subject":
+        table["subject"] = table["subject"].map({1: "Anna", 2: "Ben"})
+    path = tmp_path / f"more.{ending}"
+    table.to_csv(path, index=False) if ending == "csv" else table.to_parquet(path)
+    assert f"--numbered-by {head}" in refusal(path, tmp_path, **({"episode": 1} if second == "trial" else {}))
+    assert imported(path, tmp_path, numbered_by="none")[0].counts.samples == 400
+    found = teleop_exchange.import_episodes(path, tmp_path / "all", numbered_by=head.split())
+    assert sorted(found.made) == list(range(4))
+    name = "Ben" if first == "subject" else "2"
+    assert f"episode 2 of 4 ({first} {name}, {second} 1)" in found.made[2].told
+
+
 def test_parts_of_one_recording_are_told_and_stay_together(tmp_path: Path) -> None:
-    rows = np.column_stack((np.ones(COUNT), np.arange(COUNT) // 100, T, PLACES))
+    rows = np.column_stack((np.ones(COUNT), np.floor(T), T, PLACES))
     report, stream = imported(written(tmp_path, "episode_index phase time x y z", rows), tmp_path, episode=1)
     assert_motion(stream, PLACES, Rotation.identity(COUNT))
     assert any("--numbered-by phase episode_index" in text for text in report.told)

@@ -480,6 +480,19 @@ def test_times_of_a_day_and_short_dates_are_times(tmp_path: Path) -> None:
     assert abs(stream.stamp_ns[-1] - at[-1].as_unit("ns").value) < 256  # a column with holes has floats
 
 
+@pytest.mark.parametrize("kind", ["text", "time of the day", "since the start"])
+def test_times_of_every_type_of_parquet_are_times(kind: str, tmp_path: Path) -> None:
+    at = pd.date_range("2025-04-02T09:59:58.250", periods=COUNT, freq="10ms")
+    own: dict[str, Any] = {"text": at.strftime("%Y/%m/%d %H:%M:%S.%f"), "time of the day": at.time}
+    frame().assign(t=own.get(kind, at - at[0])).to_parquet(tmp_path / "a.parquet")
+    report, stream = imported(tmp_path / "a.parquet", tmp_path)
+    assert_same_motion(stream)
+    assert stream.stamp_ns[0] == {
+        "text": at[0].as_unit("ns").value, "time of the day": (at[0] - at[0].normalize()).as_unit("ns").value,
+    }.get(kind, 1_000_000_000)  # fmt: skip
+    assert report.counts.samples == COUNT
+
+
 @pytest.mark.parametrize("cell", ["04/02/2025 09:30:00", "Apr 2, 2025 9:30:00 AM", "2025-04-02"])
 def test_a_date_that_may_mean_two_days_says_which_are_read(cell: str, tmp_path: Path) -> None:
     with pytest.raises(tc.RecordingError, match=r"2025-04-02T09:30:00"):

@@ -159,7 +159,7 @@ def _damage(group: Any) -> None:
         nargs="+",
         metavar="COL",
         help="columns that number the episodes; combinations of several are numbered from 0 in the order of the file "
-        "(default: the column called episode_index or the like)",
+        "(default: the column called episode_index or the like); none: the file is one recording",
     )
     group.add_argument(
         "--backwards",

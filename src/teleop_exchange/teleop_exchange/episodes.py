@@ -36,7 +36,12 @@ class Episodes:
     def __init__(self, table: tables.Table, options: ImportOptions) -> None:
         self._table, self._wanted = table, options.episode
         self._columns = _columns(table, options)
-        self._beside = [] if options.numbered_by or not self._columns else _beside(table, self._columns)
+        self._beside = [] if options.numbered_by or not table.is_named else _beside(table, self._columns)
+        self._texts = {
+            column: table.number_texts(column)
+            for column in (*self._columns, *self._beside)
+            if not np.isfinite(table.sample(column)).any()
+        }
         self._numbering = _Numbering(len(self._columns))
         self._finer = _Numbering(len(self._columns) + len(self._beside))
         self._times: list[NDArray[np.float64]] = []
@@ -55,18 +60,21 @@ class Episodes:
                 recordings, or the file is damaged.
             UnknownNameError: No episode has the given number.
         """
-        if not self._columns:
+        if not self._columns and not self._beside:
             yield from self._table.blocks(columns)
             return
         first = len(columns) + len(self._columns)
         for block in self._table.blocks([*columns, *self._columns, *self._beside]):
-            episode = self._numbering.numbers(block[len(columns) : first])
-            is_own = np.ones(len(episode), np.bool_) if self._wanted is None else episode == self._wanted
+            is_own = np.ones(len(block[-1]), np.bool_)
+            if self._columns:
+                episode = self._numbering.numbers(block[len(columns) : first])
+                is_own = is_own if self._wanted is None else episode == self._wanted
             self._finer.numbers([column[is_own] for column in block[len(columns) :]])
             own = [column[is_own] for column in block[: len(columns)]]
             self._times += [own[0].astype(np.float64)] * (has_time and bool(self._beside))
             yield own
-        self._check()
+        if self._columns:
+            self._check()
         self._refuse_breaks()
 
     def _check(self) -> None:
@@ -117,17 +125,18 @@ class Episodes:
         changes = len(self._finer.begins) - 1
         finer = f"another number changes {changes} times in it (recordings of their own: --numbered-by "
         finer += f"{self._told_columns()})"
-        return self._told_episode() + [finer] * (bool(self._beside) and changes > 0)
+        return self._told_episode() + [finer] * (bool(self._columns and self._beside) and changes > 0)
 
     def _told_episode(self) -> list[str]:
         if self._wanted is None:
             return []
-        numbers = self._numbering.values_of(self._wanted)
-        named = ", ".join(
-            f"{self._table.names[column]} {value:g}" for column, value in zip(self._columns, numbers, strict=True)
-        )
+        values = zip(self._columns, self._numbering.values_of(self._wanted), strict=True)
+        named = ", ".join(f"{self._table.names[column]} {self._value(column, value)}" for column, value in values)
         more = f" ({named})" * (len(self._columns) > 1)
         return [f"episode {self._wanted} of {len(self._numbering.begins)}{more}"]
+
+    def _value(self, column: int, number: float) -> str:
+        return self._texts[column].text(number) if column in self._texts else f"{number:g}"
 
 
 class _Numbering:
@@ -179,19 +188,25 @@ def numbers_of(table: tables.Table, options: ImportOptions) -> list[int]:
     if not columns:
         raise ParameterError("--episode", "all", _NEEDED)
     numbering = _Numbering(len(columns))
+    for column in columns:
+        if not np.isfinite(table.sample(column)).any():
+            table.number_texts(column)
     for block in table.blocks(columns):
         numbering.numbers(block)
     return sorted(map(int, numbering.begins))
 
 
 def _beside(table: tables.Table, columns: list[int]) -> list[int]:
-    """Further columns of numbers that may number recordings too."""
+    """Further columns of numbers or names that may number recordings too."""
     found = [column for column in names.find_numberings(table.names) if column not in columns]
-    return [column for column in found if np.isfinite(table.sample(column)).all()]
+    known = [np.isfinite(table.sample(column)) for column in found]
+    return [column for column, own in zip(found, known, strict=True) if own.all() or not own.any()]
 
 
 def _columns(table: tables.Table, options: ImportOptions) -> list[int]:
     """Columns that number the episodes; empty if there are none."""
+    if options.numbered_by == ("none",):
+        return []
     if options.numbered_by:
         return [tables.column_of(table, name, option("numbered_by")) for name in options.numbered_by]
     column = names.find_episode(table.names) if table.is_named else None

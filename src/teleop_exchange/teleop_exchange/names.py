@@ -40,7 +40,7 @@ _BEFORE_AXIS = {"t", "p", "q", "r", "o"}
 _EPISODES = re.compile(r"(episode|trial|demo)(_(index|id|number|nr))?")
 _NUMBERINGS = re.compile(
     r"(^|_)(episode|trial|demo\w*|stage|session|run|take|block|subject|participant|person|user|recording|part|phase|set"
-    r"|round|repetition|rep|attempt|try|condition|group|lap|day|level|game|match|motion|task)(_(index|id|number|nr))?$"
+    r"|round|repetition|rep|attempt|try|condition|group|lap|game|match|task)(_(index|id|number|nr))?$"
 )
 _VECTORS = re.compile(r"(^|_)(rotvec|rot_vec\w*|rotation_vec\w*|rvec|axis_angle)(_|$)")
 

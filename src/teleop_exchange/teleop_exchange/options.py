@@ -89,7 +89,7 @@ class ImportOptions:
         skip: Number of lines to leave out at the beginning of a text file.
         episode: Number of the recording in a table of several recordings; None for a table of one recording.
         numbered_by: Columns that number the recordings of a table; the combinations of several columns are numbered
-            from 0. Empty for the column called ``episode_index`` or the like.
+            from 0. Empty for the column called ``episode_index`` or the like, ``none`` for a single recording.
         topic: Topic of the poses in a bag, or the end of its name; empty if only one topic contains poses.
         frame: Child frame of the poses; needed if the topic contains several child frames.
         parent: Parent frame of the poses; needed if the topic contains several parent frames.

@@ -10,6 +10,7 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from teleop_core.base import RecordingError, UnknownNameError, damage_told
+from teleop_exchange import dates
 
 Numbers = NDArray[np.float64] | NDArray[np.int64]
 """Values of a column; they are integers if the file contains integers, such as times in nanoseconds."""
@@ -40,12 +41,31 @@ class Table(Protocol):
     def is_clock(self, column: int) -> bool:
         """Whether a column contains dates, which are read as nanoseconds since 1970."""
 
+    def number_texts(self, column: int) -> "Texts":
+        """Make :meth:`blocks` read a column as texts, numbered in the order of their appearance."""
+
     def blocks(self, columns: Sequence[int]) -> Iterator[list[Numbers]]:
         """Some columns, block by block.
 
         Raises:
             RecordingError: A cell is not a number, or the file is damaged.
         """
+
+
+class Texts:
+    """Numbers of texts, in the order of their appearance."""
+
+    def __init__(self) -> None:
+        self._known: dict[str | None, int] = {None: -1}
+
+    def numbers(self, texts: "pa.Array") -> Numbers:
+        """Number of each text; NaN for missing ones."""
+        found = [self._known.setdefault(text, len(self._known) - 1) for text in texts.cast(pa.string()).to_pylist()]
+        return np.where(np.array(found, np.int64) < 0, np.nan, np.array(found, np.float64))
+
+    def text(self, number: float) -> str:
+        """Text of a number."""
+        return str(list(self._known)[int(number) + 1])
 
 
 def column_of(table: Table, name: str, option: str) -> int:
@@ -76,6 +96,14 @@ def unique(names: Sequence[str]) -> tuple[str, ...]:
     return tuple(out)
 
 
+def _has_dates(column: "pa.ChunkedArray | pa.Array") -> bool:
+    """Whether a column contains texts, of which the first is a date."""
+    if not (pa.types.is_string(column.type) or pa.types.is_large_string(column.type)):
+        return False
+    first = column.drop_null()
+    return len(first) > 0 and dates.is_date(first[0].as_py())
+
+
 def numbers(column: "pa.ChunkedArray | pa.Array") -> Numbers:
     """Convert a column of Arrow to numbers; missing values become NaN."""
     kind = column.type
@@ -83,6 +111,12 @@ def numbers(column: "pa.ChunkedArray | pa.Array") -> Numbers:
         column = column.cast(pa.timestamp("ns", tz=kind.tz)).cast(pa.int64())
     elif pa.types.is_boolean(kind):
         column = column.cast(pa.int8())
+    elif pa.types.is_time(kind):
+        column = column.cast(pa.time64("ns")).cast(pa.int64())
+    elif pa.types.is_duration(kind):
+        column = column.cast(pa.duration("ns")).cast(pa.int64())
+    elif _has_dates(column):
+        return dates.nanoseconds(column.to_pylist())
     elif pa.types.is_decimal(kind) or pa.types.is_string(kind) or pa.types.is_large_string(kind):
         column = column.cast(pa.float64())
     is_whole = pa.types.is_integer(column.type) and not column.null_count
@@ -105,6 +139,7 @@ class ParquetTable:
             # Read on demand, because a file may consist of one single group of rows.
             self._file = pq.ParquetFile(path, pre_buffer=False, buffer_size=1 << 20)
             self._columns = self._found()
+            self._texts: dict[str, Texts] = {}
             self.names = unique([column.name for column in self._columns])
 
     def _found(self) -> list["_Column"]:
@@ -133,7 +168,13 @@ class ParquetTable:
 
     def is_clock(self, column: int) -> bool:
         """Whether a column contains dates, which are read as nanoseconds since 1970."""
-        return bool(pa.types.is_timestamp(self._columns[column].first.type))
+        first = self._columns[column].first
+        kinds = (pa.types.is_timestamp, pa.types.is_time, pa.types.is_duration)
+        return any(is_kind(first.type) for is_kind in kinds) or _has_dates(first)
+
+    def number_texts(self, column: int) -> Texts:
+        """Make :meth:`blocks` read a column as texts, numbered in the order of their appearance."""
+        return self._texts.setdefault(self._columns[column].name, Texts())
 
     def blocks(self, columns: Sequence[int]) -> Iterator[list[Numbers]]:
         """Some columns, block by block."""
@@ -144,7 +185,10 @@ class ParquetTable:
         with damage_told(self.path):
             for batch in self._file.iter_batches(batch_size=ROWS, columns=paths):
                 whole = flat(batch)
-                yield [numbers(whole.column(whole.schema.names.index(column.name))) for column in wanted]
+                yield [self._numbers(whole.column(whole.schema.names.index(one.name)), one.name) for one in wanted]
+
+    def _numbers(self, values: pa.Array, name: str) -> Numbers:
+        return self._texts[name].numbers(values) if name in self._texts else numbers(values)
 
 
 class _Column(NamedTuple):

@@ -14,7 +14,7 @@ import pyarrow.csv as pc
 from teleop_core.bags.finding import METADATA
 from teleop_core.base import RecordingError, damage_told
 from teleop_exchange import dates
-from teleop_exchange.tables import SAMPLE, Numbers, numbers, unique
+from teleop_exchange.tables import SAMPLE, Numbers, Texts, numbers, unique
 
 _HEAD_BYTES = 1 << 18
 _PACKED = {b"\x1f\x8b": "gzip", b"BZh": "bz2", b"\x28\xb5\x2f\xfd": "zstd"}
@@ -64,7 +64,7 @@ class TextTable:
     """
 
     def __init__(self, path: Path, skip: int = 0) -> None:
-        self.path, self.bad_rows = path, 0
+        self.path, self.bad_rows, self._texts = path, 0, dict[int, Texts]()
         with damage_told(path):
             with path.open("rb") as file:
                 magic = file.read(4)
@@ -133,6 +133,10 @@ class TextTable:
         """Whether a column contains dates, which are read as nanoseconds since 1970."""
         return any(dates.is_date(cell) for cell in self._filled(column)[:1])
 
+    def number_texts(self, column: int) -> Texts:
+        """Make :meth:`blocks` read a column as texts, numbered in the order of their appearance."""
+        return self._texts.setdefault(column, Texts())
+
     def _filled(self, column: int) -> list[str]:
         """The first cells of a column, without those that mark a missing value."""
         cells = [row[column].strip() for row in self._form.rows if column < len(row)]
@@ -173,9 +177,11 @@ class TextTable:
                 yield [self._numbers(batch.column(names[column]), column) for column in columns]
 
     def _numbers(self, values: pa.Array, column: int) -> Numbers:
-        return dates.nanoseconds(values.to_pylist()) if pa.types.is_string(values.type) else numbers(values)
+        return self._texts[column].numbers(values) if column in self._texts else numbers(values)
 
     def _type(self, column: int) -> pa.DataType:
+        if column in self._texts:
+            return pa.string()
         if self.is_clock(column):
             has_zone = dates.has_zone(self._filled(column))
             return pa.string() if has_zone is None else pa.timestamp("ns", tz="UTC" if has_zone else None)
