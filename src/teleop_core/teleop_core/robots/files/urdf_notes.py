@@ -17,25 +17,11 @@ def notes_on(chain: Sequence[urdf_tree.UrdfJoint], links: urdf_tree.Links) -> It
         links: Elements of the links by their names.
     """
     moving = [joint for joint in chain if joint.axis is not None]
-    bounded = [joint for joint in moving if joint.kind != "continuous"]
     yield from _listed("narrowed to the soft limits of its safety_controller", moving, _is_narrowed)
     endless = [joint for joint in moving if joint.kind == "continuous"]
     yield from _listed("lower and upper are ignored: the joint is continuous", endless, _has_limits)
     for kind, unit in urdf_tree.UNITS.items():
-        own = [joint for joint in bounded if urdf_tree.KINDS[joint.kind] == kind]
-        what = (
-            f"limits beyond {MOST_OF_ARM:g} {unit} count as no limits; {urdf_tree.ASSUMED[kind]:.3g} {unit} are assumed"
-        )
-        yield from _listed(what, own, lambda joint: _widest(joint) > MOST_OF_ARM)
-        near = [joint for joint in own if _widest(joint) <= MOST_OF_ARM]
-        yield from _told("limits", near, list(map(_widest, near)), unit)
-        driven = [joint for joint in moving if urdf_tree.KINDS[joint.kind] == kind]
-        for key in urdf_tree.DRIVE_UNITS:
-            unknown = f"{key} is beyond that of any drive and counts as unknown"
-            yield from _listed(unknown, driven, partial(_is_beyond, key))
-        fast = [joint for joint in own if urdf_tree.drive_limit_of(joint, "velocity") < math.inf]
-        speeds = [urdf_tree.drive_limit_of(joint, "velocity") for joint in fast]
-        yield from _told("speeds", fast, speeds, f"{unit}/s")
+        yield from _of_kind([joint for joint in moving if urdf_tree.KINDS[joint.kind] == kind], kind, unit)
     yield from _told("origins", chain, [float(length(j.origin[:3, 3])) for j in chain], "m")
     turned = [*((f"joint {j.name}", j.element) for j in chain), *((f"link {name}", e) for name, e in links.items())]
     if ignored := [name for name, element in turned if urdf_tree.has_ignored_quaternion(element)]:
@@ -45,6 +31,20 @@ def notes_on(chain: Sequence[urdf_tree.UrdfJoint], links: urdf_tree.Links) -> It
         keys = ("ixx", "iyy", "izz")
         if min(float(urdf_tree.numbers_of(name, tensor, key, (0.0,), "kg·m²")[0]) for key in keys) < 0.0:
             yield f"link {name} has a negative inertia, which no body has"
+
+
+def _of_kind(moving: Sequence[urdf_tree.UrdfJoint], kind: str, unit: str) -> Iterator[str]:
+    """Lines on the limits of the joints of one kind of motion."""
+    bounded = [joint for joint in moving if joint.kind != "continuous"]
+    what = f"limits beyond {MOST_OF_ARM:g} {unit} count as no limits; {urdf_tree.ASSUMED[kind]:.3g} {unit} are assumed"
+    yield from _listed(what, bounded, lambda joint: _widest(joint) > MOST_OF_ARM)
+    near = [joint for joint in bounded if _widest(joint) <= MOST_OF_ARM]
+    yield from _told("limits", near, list(map(_widest, near)), unit)
+    for key in urdf_tree.DRIVE_UNITS:
+        unknown = f"{key} is beyond that of any drive and counts as unknown"
+        yield from _listed(unknown, moving, partial(_is_beyond, key))
+    driven = [joint for joint in bounded if not _is_beyond("velocity", joint)]
+    yield from _told("speeds", driven, [urdf_tree.drive_limit_of(j, "velocity") for j in driven], f"{unit}/s")
 
 
 def _listed(
