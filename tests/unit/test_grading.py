@@ -92,6 +92,20 @@ def test_the_only_episode_that_does_not_share_a_figure_with_all_others_is_odd(
     assert found.iloc[0][WORST] == "time_s"
 
 
+def test_the_command_takes_what_a_refusal_asks_for(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = lasting(tmp_path, [5.0, 5.0, 5.0, 5.0])
+    table = pd.read_csv(path).drop(columns="timestamp").rename(columns={"episode_index": "take"})
+    table["set"], table["take"], table["rx"] = table["take"] // 2, table["take"] % 2, 0.0
+    for axis in "yz":
+        table[f"r{axis}"] = 0.0
+    table.to_csv(path, index=False)
+    words = ["grade", str(path), "--rate", str(RATE), "--numbered-by", "set", "take"]
+    assert main(words[:4]) == 2
+    assert "--episode" in capsys.readouterr().err
+    assert main(words) == 0
+    assert "4 of 4 episodes" in capsys.readouterr().out
+
+
 def test_a_frame_more_or_less_than_most_others_have_is_usual(tmp_path: Path) -> None:
     found = grade(lasting(tmp_path, [5.0, 5.0, 5.0, 5.02, 5.0, 5.0, 4.98, 5.0]), figures=("time_s", "reversals"))
     assert len(usual(found)) == 8

@@ -117,7 +117,7 @@ def _refuse_broken_rows(source: Source, rows: Array, stamps: Stamps) -> NoReturn
         for label, own in zip(source.labels, known, strict=True)
         if not own.all()
     ]
-    hint = "--orientation none takes the others alone" if (known[0] & known[1]).any() else "choose other columns"
+    hint = "--orientation none imports the positions alone" if (known[0] & known[1]).any() else "choose other columns"
     what = f"holds 0 usable rows of {len(rows)}: numbers are missing of {', of '.join(missing)} of them"
     raise RecordingError(source.path, f"{what}, and of something in each; {hint}")
 

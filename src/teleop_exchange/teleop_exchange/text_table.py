@@ -109,11 +109,12 @@ class TextTable:
         if not ending:
             return "is no text; give CSV, TSV, Parquet, a ROS 2 recording or a ROS 1 .bag"
         folder = self.path.resolve().parent
-        if self._packed and ending != ".bag":
-            where = f"give its folder {folder}" if (folder / METADATA).exists() else f"give its folder with {METADATA}"
-            return f"is a packed {ending} of a recording: {where}, or unpack it by `{_UNPACKERS[self._packed]}`"
         if self._packed:
-            return f"is a packed {ending} of a recording: unpack it by `{_UNPACKERS[self._packed]}`"
+            where = f"its folder {folder}" if (folder / METADATA).exists() else f"its folder with {METADATA}"
+            instead = f"give {where}, or " * (ending != ".bag")
+            return (
+                f"is a packed {ending} of a recording: {instead}unpack it by `{_UNPACKERS[self._packed]} {self.path}`"
+            )
         if self.path.name.endswith(".active"):
             return "was not closed by its recorder: make its index by `rosbag reindex`, and give the .bag"
         return f"is a recording whose name must end in {ending}; rename it"
