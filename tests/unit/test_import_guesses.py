@@ -69,9 +69,13 @@ def test_of_the_columns_x_y_z_those_of_unit_length_with_w_are_the_quaternion(
 def test_a_quaternion_that_two_sets_of_columns_could_be_is_asked_for(tmp_path: Path) -> None:
     small = 1e-3 * PLACES
     still = np.tile([0.0, 0.0, 0.0, 1.0], (COUNT, 1))
-    text = refusal(written(tmp_path, "time x y z x.1 y.1 z.1 w", T, small, still), tmp_path)
+    path = written(tmp_path, "time x y z x.1 y.1 z.1 w", T, small, still)
+    text = refusal(path, tmp_path)
     assert "--quaternion" in text
     assert "x.1 y.1 z.1" in text
+    position, quaternion = ("x", "y", "z"), ("w", "x.1", "y.1", "z.1")
+    for said in ({"position": position}, {"position": position, "quaternion": quaternion}, {"quaternion": quaternion}):
+        assert_motion(imported(path, tmp_path, **said)[1], small, Rotation.identity(COUNT))
 
 
 @pytest.mark.parametrize("head", ["time x y z w", "time qx qy qz qw"])
@@ -265,7 +269,9 @@ def test_recordings_that_nothing_called_an_episode_numbers_are_not_one(head: str
         table["subject"] = table["subject"].map({1: "Anna", 2: "Ben"})
     path = tmp_path / f"more.{ending}"
     table.to_csv(path, index=False) if ending == "csv" else table.to_parquet(path)
-    assert f"--numbered-by {head}" in refusal(path, tmp_path, **({"episode": 1} if second == "trial" else {}))
+    text = refusal(path, tmp_path, **({"episode": 1} if second == "trial" else {}))
+    assert f"--numbered-by {head}" in text
+    assert second == "trial" or "--numbered-by none" in text
     assert imported(path, tmp_path, numbered_by="none")[0].counts.samples == 400
     found = teleop_exchange.import_episodes(path, tmp_path / "all", numbered_by=head.split())
     assert sorted(found.made) == list(range(4))

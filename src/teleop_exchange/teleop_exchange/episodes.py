@@ -109,11 +109,12 @@ class Episodes:
         broken = sorted(row for row in begins if 0 < row < len(times) and not 0.0 <= steps[row - 1] <= _JUMP * usual)
         if broken:
             listed = ", ".join(str(row + 1) for row in broken[:_LISTED])
+            where = " in an episode" if self._columns else ""
             reason = (
-                f"holds {len(broken) + 1} recordings in an episode: {self._told_columns()} change together where the"
+                f"holds {len(broken) + 1} recordings{where}: the time jumps where another number changes, in its row"
             )
-            hint = f"--numbered-by {self._told_columns()}"
-            raise RecordingError(self._table.path, f"{reason} time jumps, in its row {listed}; give {hint}")
+            hint = f"give --numbered-by {self._told_columns()}, or --numbered-by none if it is one recording"
+            raise RecordingError(self._table.path, f"{reason} {listed}; {hint}")
 
     def _told_columns(self) -> str:
         """Columns that may number the recordings, for a message."""

@@ -4,8 +4,9 @@ Position and orientation belong to the same body: the words of their names that 
 as in ``left_pos_x`` and ``left_rot_w``.
 """
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NoReturn
 
 import numpy as np
@@ -49,45 +50,49 @@ class Turn:
 
 
 class Guesses:
-    """Columns of position and orientation of a table with names.
+    """Columns of position and orientation of a table with names; they are looked for when they are asked for.
 
     Args:
         table: The table.
+        given: Columns that options name; they are no candidates.
     """
 
-    def __init__(self, table: tables.Table) -> None:
-        self._table = table
-        triples = names.triples(table.names)
-        self._quaternions = self._chosen_quaternions(triples)
-        vectors = {column for group in self._quaternions for column in group.columns}
-        self._triples = [group for group in triples if not vectors & set(group.columns)]
+    def __init__(self, table: tables.Table, given: Collection[int] = ()) -> None:
+        self._table, self._given = table, set(given)
 
     # -- quaternions -----------------------------------------------------------------------------
 
-    def _chosen_quaternions(self, triples: Sequence[names.Group]) -> list[names.Group]:
-        """Quaternions by their names; where the names do not tell it, those of unit length."""
-        return [one for group in names.quaternions(self._table.names) for one in self._by_length(group, triples)]
+    @cached_property
+    def _triples(self) -> list[names.Group]:
+        """Columns x, y, z that are not those of a quaternion."""
+        vectors = {column for group in self._quaternions for column in group.columns}
+        return [group for group in self._free_triples() if not vectors & set(group.columns)]
 
-    def _by_length(self, group: names.Group, triples: Sequence[names.Group]) -> list[names.Group]:
-        """The group, or the same w with other columns x, y, z, or nothing if the group is no quaternion.
+    def _free_triples(self) -> list[names.Group]:
+        return [group for group in names.triples(self._table.names) if not self._given & set(group.columns)]
+
+    @cached_property
+    def _quaternions(self) -> list[names.Group]:
+        """Quaternions by their names; where the names do not tell it, those of unit length."""
+        found = names.quaternions(self._table.names)
+        named = [group for group in found if names.is_turn(group) and not self._given & set(group.columns)]
+        bare = [group for group in found if not names.is_turn(group) and group.columns[0] not in self._given]
+        return named + [one for group in bare for one in self._by_length(group)]
+
+    def _by_length(self, group: names.Group) -> list[names.Group]:
+        """The same w with the columns x, y, z that make the length 1; nothing if there are none.
 
         Raises:
             RecordingError: Several columns x, y, z fit equally well.
         """
-        if names.is_turn(group):
-            return [group]
-        w = group.columns[0]
-        if len(triples) == 1:
-            return [] if off_unit(self._table, group.columns) > orientation.TOLERANCE else [group]
+        w, triples = group.columns[0], self._free_triples()
         tried = sorted(((off_unit(self._table, (w, *one.columns)), one) for one in triples), key=lambda one: one[0])
-        (best, chosen), (_, second) = tried[:2]
-        if best > orientation.TOLERANCE:
-            return []
-        if not are_clearly_unit(self._table, (w, *chosen.columns), (w, *second.columns)):
-            listed = ", or ".join(self.listed(one.columns) for _, one in tried)
+        fitting = [one for off, one in tried if not off > orientation.TOLERANCE]
+        if len(fitting) > 1 and not are_clearly_unit(self._table, (w, *fitting[0].columns), (w, *fitting[1].columns)):
+            listed = ", or ".join(self.listed(one.columns) for one in fitting)
             reason = f"may hold a quaternion of {self._table.names[w]!r} and {listed}; "
             raise RecordingError(self._table.path, f"{reason}say which: --quaternion W X Y Z and --position X Y Z")
-        return [names.Group(chosen.stem, (w, *chosen.columns), chosen.body)]
+        return [names.Group(one.stem, (w, *one.columns), one.body) for one in fitting[:1]]
 
     # -- position --------------------------------------------------------------------------------
 

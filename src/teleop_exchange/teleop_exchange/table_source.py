@@ -45,7 +45,8 @@ class TableSource:
         for name in ("topic", "buttons_topic", "frame", "parent"):
             if given := getattr(options, name):
                 raise ParameterError(option(name), given, "left out: this file has columns")
-        self._guesses = guessing.Guesses(table) if table.is_named else None
+        given = [column for name in ("time", "position", *ORIENTATIONS) for column in self._given(name)]
+        self._guesses = guessing.Guesses(table, given) if table.is_named else None
         position = self._position()
         time = self._time(position)
         self.attitudes, orientation = self._orientation(position)
