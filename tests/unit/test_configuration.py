@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 import yaml
 
-from teleop_core.base import ParameterError, TeleopError, UnknownNameError
+from teleop_core.base import ParameterError, TeleopError, TeleopWarning, UnknownNameError
 from teleop_core.graph import BUILT_IN, RECORDER_NAME, layers
 from teleop_core.session.configuration import Configuration, configure
 
@@ -182,6 +182,35 @@ def test_what_stands_under_every_node_holds_for_those_that_have_it_and_say_nothi
     wrong = write(tmp_path / "wrong.yaml", {"/**": {"ros__parameters": {"robto": "mma"}}})
     with pytest.raises(UnknownNameError, match=r"/\*\* is 'robto'.*robot"):
         configure(files=[wrong])
+
+
+OF_OTHERS: dict[str, tuple[dict[str, Any], str]] = {
+    "of a stage that the session leaves out": ({"force_gain": 2.0}, "no stage of this session has force_gain"),
+    "of every node of ROS": ({"use_sim_time": True, "qos_overrides": {"/tf": {"depth": 5}}}, "without effect"),
+    "of the nodes of others": ({"publish_every": 50.0}, "no stage has the parameter 'publish_every'"),
+}
+
+
+@pytest.mark.parametrize("case", OF_OTHERS)
+def test_what_stands_under_every_node_and_concerns_none_of_the_session_is_told(case: str, tmp_path: Path) -> None:
+    values, said = OF_OTHERS[case]
+    path = write(tmp_path / "mine.yaml", {"/**": {"ros__parameters": {**values, "command_timeout": 0.3}}})
+    with pytest.warns(TeleopWarning, match=said):
+        made = configure(files=[path])
+    assert made.group("slave").command_timeout == 0.3
+    assert made.text() == configure(settings=["slave.command_timeout=0.3"]).text()
+
+
+def test_a_stage_that_the_session_leaves_out_is_still_refused_by_its_own_name(tmp_path: Path) -> None:
+    path = write(tmp_path / "mine.yaml", {"impedance": {"ros__parameters": {"force_gain": 2.0}}})
+    with pytest.raises(ParameterError, match=r"impedance.force_gain is 2.0, must be left out"):
+        configure(files=[path])
+
+
+def test_sim_time_of_one_node_is_told_too(tmp_path: Path) -> None:
+    path = write(tmp_path / "mine.yaml", {"slave": {"ros__parameters": {"use_sim_time": False}}})
+    with pytest.warns(TeleopWarning, match="use_sim_time"):
+        configure(files=[path])
 
 
 def test_groups_of_a_configuration_cannot_be_changed_behind_its_back() -> None:

@@ -68,6 +68,49 @@ def test_all_alike_nothing_is_odd(table: Path, tmp_path: Path) -> None:
     assert (found[ODD] == 0.0).all()
 
 
+def lasting(tmp_path: Path, seconds: list[float]) -> Path:
+    """Episodes of nearly the same motion that last some times."""
+    frames = []
+    for episode, duration in enumerate(seconds):
+        t = np.arange(round(duration * RATE)) / RATE
+        rate = 2.0 * np.pi * 0.4 * (1.0 + 0.02 * np.cos(7.0 * episode))
+        frame = pd.DataFrame(0.03 * np.sin(np.outer(t, [1.0, 0.7, 0.5]) * rate), columns=["x", "y", "z"])
+        frames.append(frame.assign(timestamp=t, episode_index=episode))
+    pd.concat(frames).to_csv(tmp_path / "set.csv", index=False)
+    return tmp_path / "set.csv"
+
+
+@pytest.mark.parametrize("count", [4, 5, 12])
+@pytest.mark.parametrize("duration", [2.0, 9.0])
+def test_the_only_episode_that_does_not_share_a_figure_with_all_others_is_odd(
+    count: int, duration: float, tmp_path: Path
+) -> None:
+    path = lasting(tmp_path, [*[5.0] * (count - 2), duration, 5.0])
+    assert count - 2 not in usual(grade(path))
+    found = grade(path, figures=("time_s", "speed_median_mm_s"))
+    assert usual(found) == [number for number in range(count) if number != count - 2]
+    assert found.iloc[0][WORST] == "time_s"
+
+
+def test_the_command_takes_what_a_refusal_asks_for(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = lasting(tmp_path, [5.0, 5.0, 5.0, 5.0])
+    table = pd.read_csv(path).drop(columns="timestamp").rename(columns={"episode_index": "take"})
+    table["set"], table["take"], table["rx"] = table["take"] // 2, table["take"] % 2, 0.0
+    for axis in "yz":
+        table[f"r{axis}"] = 0.0
+    table.to_csv(path, index=False)
+    words = ["grade", str(path), "--rate", str(RATE), "--numbered-by", "set", "take"]
+    assert main(words[:4]) == 2
+    assert "--episode" in capsys.readouterr().err
+    assert main(words) == 0
+    assert "4 of 4 episodes" in capsys.readouterr().out
+
+
+def test_a_frame_more_or_less_than_most_others_have_is_usual(tmp_path: Path) -> None:
+    found = grade(lasting(tmp_path, [5.0, 5.0, 5.0, 5.02, 5.0, 5.0, 4.98, 5.0]), figures=("time_s", "reversals"))
+    assert len(usual(found)) == 8
+
+
 @pytest.mark.parametrize(("figures", "said"), [((), "at least one"), (("speed",), "motion.hand")])
 def test_wrong_figures_are_refused(table: Path, figures: tuple[str, ...], said: str) -> None:
     with pytest.raises(tc.TeleopError, match=said):

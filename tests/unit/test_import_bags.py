@@ -1,5 +1,6 @@
 """Importing bags of others: any pose, any storage, ROS 1 and 2, read beside the rosbags library."""
 
+import gzip
 import sqlite3
 from collections.abc import Callable
 from pathlib import Path
@@ -7,6 +8,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+import zstandard
+from mcap.reader import NonSeekingReader
 from mcap.writer import Writer as McapWriter
 from numpy.typing import ArrayLike, NDArray
 from rosbags.highlevel import AnyReader
@@ -17,6 +20,7 @@ from scipy.spatial.transform import Rotation
 import teleop_core as tc
 import teleop_exchange
 from foreign_bags import Maker, types_of, write1, write2
+from teleop_core.bags.reader import Bag
 from teleop_core.kernels.geometry import Array
 
 START_NS = 1_700_000_000_000_000_000
@@ -188,6 +192,172 @@ def test_messages_of_ros_1_in_mcap_are_read(kind: str, tmp_path: Path) -> None:
     assert_same(stream, LOGS if kind in {"Pose", "Transform"} else STAMPS)
 
 
+def written_beside_chunks(path: Path, is_beside: Callable[[int], bool]) -> Path:
+    """MCAP whose index is whole, and of which some messages are between the chunks, as the format allows."""
+    types, name = types_of(True), "geometry_msgs/msg/PoseStamped"
+    with path.open("wb") as file:
+        writer = McapWriter(file)
+        writer.start(profile="ros2", library="")
+        text, _ = types.generate_msgdef(name)
+        builder = writer._Writer__chunk_builder  # type: ignore[attr-defined]
+        writer._Writer__chunk_builder = None  # type: ignore[attr-defined]
+        schema = writer.register_schema(name, "ros2msg", text.encode())
+        channel = writer.register_channel("/hand/pose", "cdr", schema)
+        for i, (_, log_ns, message) in enumerate(poses()):
+            if is_beside(i):
+                writer._Writer__finalize_chunk()  # type: ignore[attr-defined]
+            writer._Writer__chunk_builder = None if is_beside(i) else builder  # type: ignore[attr-defined]
+            writer.add_message(channel, int(log_ns), bytes(types.serialize_cdr(message, name)), int(log_ns))
+        writer._Writer__chunk_builder = builder  # type: ignore[attr-defined]
+        writer.finish()
+    return path
+
+
+BESIDE: dict[str, Callable[[int], bool]] = {
+    "before the first chunk": lambda i: i < 100,
+    "between the chunks": lambda i: 100 <= i < 200,
+    "after the last chunk": lambda i: i >= 250,
+    "every third": lambda i: i % 3 == 1,
+    "one": lambda i: i == 150,
+}
+
+
+@pytest.mark.parametrize("case", BESIDE)
+def test_messages_beside_the_chunks_are_read_too(case: str, tmp_path: Path) -> None:
+    path = written_beside_chunks(tmp_path / "hand.mcap", BESIDE[case])
+    with path.open("rb") as file:
+        assert sum(1 for _ in NonSeekingReader(file).iter_messages()) == COUNT
+    assert_same(imported(path, tmp_path)[1])
+    assert [log for _, _, log, _ in Bag(path).raw()] == LOGS.tolist()
+    assert np.array_equal(Bag(path).read("hand/pose").log_ns, LOGS)
+
+
+# Which time.
+
+
+def batched(size: int, child: str = "tool", rows: range = range(COUNT)) -> list[tuple[str, int, Any]]:
+    """Messages of several samples each, as a tracker sends them."""
+    messages = poses("TFMessage", "/tf", child=child)
+    out = []
+    for begin in range(rows.start, rows.stop, size):
+        own = messages[begin : begin + size]
+        message = own[-1][2]
+        message.transforms[:0] = [one.transforms[0] for _, _, one in own[:-1]]
+        out.append(("/tf", own[-1][1], message))
+    return out
+
+
+@pytest.mark.parametrize("version", ["mcap", "db3", "ros1"])
+@pytest.mark.parametrize("size", [2, 7])
+def test_every_sample_of_a_message_of_transforms_is_read(version: str, size: int, tmp_path: Path) -> None:
+    if version == "ros1":
+        messages = poses("TFMessage", "/tf", is_ros2=False)
+        for i in range(0, COUNT - 1, 2):
+            messages[i + 1][2].transforms.insert(0, messages[i][2].transforms[0])
+        path = write1(tmp_path / "user.bag", messages[1::2])
+    else:
+        path = write2(tmp_path / "bag", batched(size), StoragePlugin[{"db3": "SQLITE3"}.get(version, "MCAP")])
+    report, stream = imported(path, tmp_path)
+    assert_same(stream)
+    assert report.counts.rows == COUNT
+
+
+@pytest.mark.parametrize("offset", [1_699_999_988, -1_600_000_000, 3600, -20])
+@pytest.mark.parametrize("topics", [("/hand/pose", "/joy"), ("/master/measured_cp", "/master/buttons")])
+def test_buttons_of_another_clock_come_at_the_time_of_their_recording(
+    offset: int, topics: tuple[str, str], tmp_path: Path
+) -> None:
+    earlier = STAMPS - abs(offset) * 1_000_000_000
+    stamps, others = (earlier, STAMPS) if offset > 0 else (STAMPS, earlier)
+    pressed = presses(lambda i: [int(100 <= i < 200), 0, 0], topics[1], others)
+    path = write2(tmp_path / "bag", in_order(poses(topic=topics[0], stamps=stamps), pressed))
+    report, stream = imported(path, tmp_path)
+    begin = stream.stamp_ns[0]
+    buttons = report.recording["master/buttons"]
+    assert (buttons.stamp_ns - begin).tolist() == [0, 1_000_000_000, 2_000_000_000]
+    assert buttons["clutch"].tolist() == [0.0, 1.0, 0.0]
+    assert any("another clock" in text for text in report.told)
+    with pytest.warns(UserWarning, match="another clock"):
+        answer = tc.replay(path)
+    assert answer["master/buttons"]["clutch"].max() == 1.0
+
+
+def test_buttons_that_no_clock_brings_to_the_poses_are_told(tmp_path: Path) -> None:
+    late = 3600 * 1_000_000_000
+    pressed = [(t, log + late, m) for t, log, m in presses(lambda i: [i % 2], stamps=STAMPS + late)]
+    report, _ = imported(write2(tmp_path / "bag", in_order(poses(), pressed)), tmp_path)
+    assert any("buttons are outside" in text for text in report.warnings)
+
+
+# What is missing.
+
+
+@pytest.mark.parametrize("value", [0.0, np.nan, 3.0])
+@pytest.mark.parametrize("storage", list(StoragePlugin))
+def test_positions_without_an_orientation_come_on_request(value: float, storage: StoragePlugin, tmp_path: Path) -> None:
+    messages = poses()
+    for _, _, message in messages:
+        turn = message.pose.orientation
+        turn.w = turn.x = turn.y = turn.z = value
+    path = write2(tmp_path / "bag", messages, storage)
+    with pytest.raises(tc.RecordingError, match="--orientation none") as error:
+        teleop_exchange.import_recording(path, tmp_path / "other")
+    assert "--quaternion" not in str(error.value)
+    report, stream = imported(path, tmp_path, orientation="none")
+    assert_same(stream, rows=np.column_stack((PLACES, np.tile([1.0, 0.0, 0.0, 0.0], (COUNT, 1)))))
+    assert "orientation: constant" in report.told
+
+
+@pytest.mark.parametrize(
+    "options", [{"quaternion_order": "xyzw"}, {"time_unit": "ms"}, {"angles": "deg"}, {"episode": 3}, {"skip": 1}]
+)
+def test_an_option_of_tables_is_refused_for_a_bag(options: dict[str, Any], tmp_path: Path) -> None:
+    path = write2(tmp_path / "bag", poses())
+    with pytest.raises(tc.ParameterError, match="--topic"):
+        teleop_exchange.import_recording(path, tmp_path / "out", **options)
+
+
+def refused(path: Path, tmp_path: Path) -> str:
+    with pytest.raises(tc.RecordingError) as error:
+        teleop_exchange.import_recording(path, tmp_path / "refused")
+    assert not (tmp_path / "refused").exists()
+    return str(error.value)
+
+
+@pytest.mark.parametrize(("pack", "name"), [(zstandard.compress, "zstd -d"), (gzip.compress, "gzip -d")])
+@pytest.mark.parametrize("storage", list(StoragePlugin))
+def test_a_packed_file_of_a_recording_says_how_it_is_read(
+    pack: Callable[[bytes], bytes], name: str, storage: StoragePlugin, tmp_path: Path
+) -> None:
+    folder = write2(tmp_path / "bag", poses(), storage)
+    (file,) = [path for path in folder.iterdir() if path.suffix != ".yaml"]
+    packed = tmp_path / f"{file.name}.packed"
+    packed.write_bytes(pack(file.read_bytes()))
+    text = refused(packed, tmp_path)
+    assert name in text
+    assert "metadata.yaml" in text
+    assert str(folder) in refused(packed.rename(folder / packed.name), tmp_path)
+
+
+def test_a_recording_is_known_by_its_first_bytes(tmp_path: Path) -> None:
+    folder = write2(tmp_path / "bag", poses())
+    (file,) = folder.glob("*.mcap")
+    assert "must end in .mcap" in refused(file.rename(tmp_path / "hand.mcap.backup"), tmp_path)
+    bag = write1(tmp_path / "user.bag", poses(is_ros2=False))
+    assert "rosbag reindex" in refused(bag.rename(tmp_path / "user.bag.active"), tmp_path)
+
+
+@pytest.mark.parametrize("mode", [CompressionMode.NONE, CompressionMode.FILE])
+def test_a_folder_without_its_list_of_files_says_what_to_give(mode: CompressionMode, tmp_path: Path) -> None:
+    folder = write2(tmp_path / "bag", poses(), StoragePlugin.SQLITE3, mode)
+    (folder / "metadata.yaml").unlink()
+    (folder / "._metadata.yaml").write_bytes(b"")
+    text = refused(folder, tmp_path)
+    assert "lacks metadata.yaml" in text
+    assert "ros2 bag reindex" in text
+    assert next(folder.glob("bag*.db3*")).name in text
+
+
 # Which topic.
 
 
@@ -246,6 +416,19 @@ def test_poses_of_two_frames_on_one_topic_are_never_mixed(tmp_path: Path) -> Non
     with pytest.raises(tc.UnknownNameError, match=r"--frame.*probe, tool"):
         teleop_exchange.import_recording(path, tmp_path / "out")
     assert_same(imported(path, tmp_path, frame="probe")[1], STAMPS[200:], POSES[200:])
+
+
+@pytest.mark.parametrize("version", ["mcap", "db3", "ros1"])
+def test_a_frame_may_appear_after_any_number_of_messages(version: str, tmp_path: Path) -> None:
+    maker, late = Maker(version != "ros1"), 1500
+    often = [("/tf", int(STAMPS[0] + i), maker.pose(POSES[0], "TFMessage", STAMPS[0] + i)) for i in range(late)]
+    messages = often + poses("TFMessage", "/tf", is_ros2=version != "ros1", child="camera")[1:]
+    storage = StoragePlugin.SQLITE3 if version == "db3" else StoragePlugin.MCAP
+    bag = tmp_path / "user.bag"
+    path = write1(bag, messages) if version == "ros1" else write2(tmp_path / "bag", messages, storage)
+    with pytest.raises(tc.UnknownNameError, match="camera, tool"):
+        teleop_exchange.import_recording(path, tmp_path / "other")
+    assert_same(imported(path, tmp_path, frame="camera")[1], STAMPS[1:], POSES[1:])
 
 
 def carried(parent: str, child: str, rows: range | None = None) -> list[tuple[str, int, Any]]:

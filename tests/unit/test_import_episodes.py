@@ -5,6 +5,8 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 
 import teleop_core as tc
@@ -53,6 +55,45 @@ def test_each_recording_is_that_of_its_episode_alone(kind: str, tmp_path: Path) 
         assert len(one.stamp_ns) == rows
         np.testing.assert_array_equal(one.stamp_ns, other.stamp_ns)
         np.testing.assert_array_equal(one.values, other.values)
+
+
+@pytest.mark.parametrize(
+    "name", ["chunk-000/._file-000.parquet", ".ipynb_checkpoints/file-000.parquet", ".x/y/a.parquet"]
+)
+def test_files_that_a_system_hides_do_not_belong_to_a_data_set(name: str, tmp_path: Path) -> None:
+    hidden = data_set(tmp_path / ".cache/set") / "data" / name  # the set itself may be in a hidden folder
+    hidden.parent.mkdir(parents=True, exist_ok=True)
+    hidden.write_bytes(b"\x00\x05\x16\x07 attributes of a file")
+    report = teleop_exchange.import_episodes(tmp_path / ".cache/set", tmp_path / "out")
+    assert (tuple(report.made), dict(report.refused)) == (NUMBERS, {})
+
+
+def test_pictures_beside_the_wanted_numbers_are_not_even_read(tmp_path: Path) -> None:
+    count, path = sum(ROWS), tmp_path / "a.parquet"
+    rng, states = np.random.default_rng(1), table()
+    picture = pa.StructArray.from_arrays(
+        [pa.array([rng.bytes(5000) for _ in range(count)]), pa.array(["a.png"] * count)], ["bytes", "path"]
+    )
+    pixels = pa.array([list(rng.bytes(20)) for _ in range(count)], pa.list_(pa.uint8()))
+    place = pa.FixedSizeListArray.from_arrays(pa.array(states[["x", "y", "z"]].to_numpy().ravel()), 3)
+    columns = {"observation.state": place, "observation.images.top": picture, "observation.pixels": pixels}
+    whole = pa.table({**columns, "t": states["t"], "episode": states["episode"]})
+    pq.write_table(whole, path, compression="none", use_dictionary=False)
+    data = bytearray(path.read_bytes())
+    group = pq.ParquetFile(path).metadata.row_group(0)
+    for column in map(group.column, range(group.num_columns)):
+        if column.path_in_schema.endswith(".bytes") or "pixels" in column.path_in_schema:
+            begin = column.data_page_offset
+            data[begin : begin + column.total_compressed_size] = b"\xff" * column.total_compressed_size
+    path.write_bytes(data)
+    names = [f"observation.state.{i}" for i in range(3)]
+    report = teleop_exchange.import_episodes(path, tmp_path / "out", position=names)
+    assert (tuple(report.made), dict(report.refused)) == (NUMBERS, {})
+    places = report.made[5].recording["master/measured_cp"][["x", "y", "z"]]
+    np.testing.assert_array_equal(places, table((5,))[["x", "y", "z"]])
+    assert any("observation.images.top.bytes" in text for text in report.made[5].told)
+    with pytest.raises(tc.RecordingError, match=r"observation\.pixels holds no numbers"):
+        teleop_exchange.import_recording(path, tmp_path / "x", episode=5, position=[*names[:2], "observation.pixels"])
 
 
 def test_an_import_goes_on_where_it_was_interrupted(tmp_path: Path) -> None:

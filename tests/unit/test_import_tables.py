@@ -65,6 +65,12 @@ FORMS: dict[str, dict[str, Any]] = {
     "quoted.csv": {"quoting": 2},
     "windows.csv": {"lineterminator": "\r\n"},
     "marked.csv": {"encoding": "utf-8-sig"},
+    "wide.csv": {"encoding": "utf-16"},
+    "wide_little.csv": {"encoding": "utf-16-le", "lineterminator": "\r\n"},
+    "wide_big.csv": {"encoding": "utf-16-be"},
+    "wide_blank.txt": {"encoding": "utf-16", "sep": " "},
+    "wide_tab.tsv": {"encoding": "utf-16", "sep": "\t", "decimal": ","},
+    "wider.csv": {"encoding": "utf-32"},
 }
 
 
@@ -431,6 +437,84 @@ def test_dates_keep_to_their_zone(ending: str, sep: str, tmp_path: Path) -> None
     assert_same_motion(stream)
 
 
+DATES = {
+    "slashes": "%Y/%m/%d %H:%M:%S.%f",
+    "dots": "%Y.%m.%dT%H:%M:%S.%f",
+    "days first between dots": "%d.%m.%Y %H:%M:%S,%f",
+    "hours of a zone": "%Y-%m-%d %H:%M:%S.%f+00",
+    "another zone": "%Y/%m/%d %H:%M:%S.%f-0000",
+    "a named zone": "%Y-%m-%d %H:%M:%S.%f UTC",
+    "decimal commas": "%Y-%m-%dT%H:%M:%S,%fZ",
+    "underscores": "%Y-%m-%d_%H:%M:%S.%f",
+    "usual": "%Y-%m-%d %H:%M:%S.%f",
+    "names of months": "%d-%b-%Y %H:%M:%S.%f",
+    "colons before the fraction": "%Y-%m-%d %H:%M:%S:%f",
+    "a dash before the time": "%Y/%m/%d-%H:%M:%S.%f",
+    "without signs": "%Y%m%dT%H%M%S.%fZ",
+    "a day without signs": "%Y%m%d %H:%M:%S.%f",
+}
+
+
+@pytest.mark.parametrize("form", DATES)
+@pytest.mark.parametrize("sep", [";", "\t"])
+def test_dates_of_every_unambiguous_form_are_times(form: str, sep: str, tmp_path: Path) -> None:
+    at = pd.date_range("2025-04-02T09:59:58.250", periods=COUNT, freq="10ms")  # beyond a full hour
+    table = frame()
+    table["t"] = at.strftime(DATES[form])
+    table.to_csv(tmp_path / "a.csv", index=False, sep=sep)
+    report, stream = imported(tmp_path / "a.csv", tmp_path)
+    assert np.array_equal(stream.stamp_ns, at.as_unit("ns").astype("int64"))
+    assert report.counts.samples == COUNT
+
+
+def test_times_of_a_day_and_short_dates_are_times(tmp_path: Path) -> None:
+    at = pd.date_range("2025-04-02T09:30:00", periods=COUNT, freq="250ms")
+    table = frame()
+    table["t"] = [f"{one.hour}:{one.minute:02}:{one.second:02}.{one.microsecond // 1000:03}" for one in at]
+    _, stream = brought(tmp_path, table)
+    assert np.array_equal(stream.stamp_ns, (at - at[0].normalize()).astype("timedelta64[ns]").astype(np.int64))
+    table["t"] = [f"2025/4/2 {one.hour}:{one.minute:02}:{one.second}.{one.microsecond // 1000:03}" for one in at]
+    table.loc[7, "t"] = ""
+    report, stream = brought(tmp_path, table)
+    assert report.counts.missing == 1
+    assert abs(stream.stamp_ns[-1] - at[-1].as_unit("ns").value) < 256  # a column with holes has floats
+
+
+@pytest.mark.parametrize("kind", ["text", "time of the day", "since the start"])
+def test_times_of_every_type_of_parquet_are_times(kind: str, tmp_path: Path) -> None:
+    at = pd.date_range("2025-04-02T09:59:58.250", periods=COUNT, freq="10ms")
+    own: dict[str, Any] = {"text": at.strftime("%Y/%m/%d %H:%M:%S.%f"), "time of the day": at.time}
+    frame().assign(t=own.get(kind, at - at[0])).to_parquet(tmp_path / "a.parquet")
+    report, stream = imported(tmp_path / "a.parquet", tmp_path)
+    assert_same_motion(stream)
+    assert stream.stamp_ns[0] == {
+        "text": at[0].as_unit("ns").value, "time of the day": (at[0] - at[0].normalize()).as_unit("ns").value,
+    }.get(kind, 1_000_000_000)  # fmt: skip
+    assert report.counts.samples == COUNT
+
+
+@pytest.mark.parametrize("cell", ["04/02/2025 09:30:00", "Apr 2, 2025 9:30:00 AM", "2025-04-02"])
+def test_a_date_that_may_mean_two_days_says_which_are_read(cell: str, tmp_path: Path) -> None:
+    with pytest.raises(tc.RecordingError, match=r"2025-04-02T09:30:00"):
+        brought(tmp_path, frame().assign(t=cell))
+
+
+@pytest.mark.parametrize("empty", [["x", "y", "z"], ["qw", "qx", "qy", "qz"], ["t"]])
+def test_rows_that_are_never_whole_say_what_is_missing_in_which_share(empty: list[str], tmp_path: Path) -> None:
+    table = pd.concat([frame(), frame()]).sort_values("t", kind="stable").reset_index(drop=True)
+    others = [name for name in HEAD[1:] if name not in empty] if empty != ["t"] else ["y"]
+    table.loc[::2, empty] = np.nan
+    table.loc[1::2, others] = np.nan
+    with pytest.raises(tc.RecordingError, match=rf"0 usable rows of {2 * COUNT}") as error:
+        brought(tmp_path, table)
+    text = str(error.value)
+    assert "in 50 %" in text
+    assert all(name in text for name in empty)
+    if empty != ["t"]:
+        assert "--orientation none" in text
+        assert brought(tmp_path, table, orientation="none")[0].counts.samples == COUNT
+
+
 def test_our_own_export_comes_back(tmp_path: Path) -> None:
     recording = tc.run("coarse_box", duration=3.0)
     teleop_exchange.export_recording(recording, tmp_path / "bag.csv")
@@ -521,20 +605,24 @@ def test_what_looks_wrong_is_told(options: Mapping[str, str | float], text: str,
 )  # fmt: skip
 def test_names_of_many_recorders_are_understood(head: str, time: str, place: str, turn: str) -> None:
     columns = head.split()
-    places = names.find_positions(columns)[:1]
+    quaternions = names.quaternions(columns)
+    parts = {column for group in quaternions for column in group.columns}
+    places = names.positions(columns, [one for one in names.triples(columns) if not parts & set(one.columns)])
     for found, expected in (
         (names.find_time(columns), time),
-        (places[0] if places else (), place),
-        (names.find_quaternion(columns), turn),
+        (places[0].columns if places else (), place),
+        (quaternions[0].columns if quaternions else (), turn),
     ):
         assert [columns[i] for i in found] == expected.split()
 
 
-def test_other_positions_beside_the_one_taken_are_told(tmp_path: Path) -> None:
+def test_of_several_positions_none_is_taken_until_one_is_chosen(tmp_path: Path) -> None:
     head = ["t", *(f"{hand}.{axis}" for hand in ("left", "right") for axis in "xyz")]
-    report, stream = brought(tmp_path, frame(head, np.column_stack((TIMES, PLACES, 2.0 * PLACES))))
-    assert np.allclose(stream[["x", "y", "z"]], PLACES, rtol=0, atol=1e-15)
-    assert any("right.x" in text for text in report.told)
+    table = frame(head, np.column_stack((TIMES, PLACES, 2.0 * PLACES)))
+    with pytest.raises(tc.RecordingError, match=r"left.x left.y left.z; right.x right.y right.z.*--position"):
+        brought(tmp_path, table)
+    _, stream = brought(tmp_path, table, position=head[4:])
+    assert np.allclose(stream[["x", "y", "z"]], 2.0 * PLACES, rtol=0, atol=1e-15)
 
 
 @pytest.mark.parametrize(

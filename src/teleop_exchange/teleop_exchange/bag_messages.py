@@ -28,6 +28,7 @@ POSES = {
 TRANSFORMS = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")
 JOY = "sensor_msgs/msg/Joy"
 BATCH = 8192
+_MOST_KNOWN = 4096  # number of different messages that are kept to be recognised
 Raw = tuple[int, bytes]
 """Time of recording [ns] and bytes of a message."""
 Frames = tuple[str, str]
@@ -66,6 +67,22 @@ class PoseReader:
         read = self._types.deserialize_cdr if self._is_ros2 else self._types.deserialize_ros1
         return read(data, self._type)
 
+    def frames(self, messages: Iterable[Raw]) -> list[Frames]:
+        """All parent and child frames in messages of transforms, in the order of their appearance."""
+        found: dict[Frames, None] = {}
+        known: set[bytes] = set()
+        for _, data in messages:
+            # Messages of one transform begin with 16 bytes that vary and end with seven numbers; the bytes between them
+            # hold the names, and repeat.
+            middle = data[16:-56]
+            if middle in known:
+                continue
+            parts = self._parts(self.message(data))
+            found |= dict.fromkeys(map(names_of, parts))
+            if len(parts) == 1 and len(known) < _MOST_KNOWN:
+                known.add(middle)
+        return list(found)
+
     def blocks(self, messages: Iterable[Raw]) -> Iterator[Rows]:
         """Poses, in blocks of some messages.
 
@@ -74,39 +91,30 @@ class PoseReader:
         """
         stream = iter(messages)
         while batch := list(islice(stream, BATCH)):
-            found = [row for row in (self._one(*raw) for raw in batch) if row is not None]
+            found = [row for raw in batch for row in self._rows(*raw)]
             times = np.array([row[:2] for row in found], np.int64).reshape(-1, 2)
             poses = np.array([row[2] for row in found], np.float64).reshape(-1, 7)
             yield Rows(times[:, 0], times[:, 1], poses)
 
-    def _one(self, log_ns: int, data: bytes) -> tuple[int, int, tuple[float, ...]] | None:
-        """Stamp, time of recording [ns] and pose of a message; None if it lacks the frame."""
-        part = self._part(self.message(data))
-        if part is None:
-            return None
-        header, place, turn = part
-        stamp = log_ns if header is None else _stamp(header)
-        return stamp, log_ns, (place.x, place.y, place.z, turn.w, turn.x, turn.y, turn.z)
+    def _rows(self, log_ns: int, data: bytes) -> Iterator[tuple[int, int, tuple[float, ...]]]:
+        """Stamp, time of recording [ns] and pose, of each pose of the frame in a message.
 
-    def _part(self, message: Any) -> tuple[Any, Any, Any] | None:
-        """Header (or None), position and rotation in a message; None if the message lacks the frame.
+        Trackers may send several samples in a message, each with its own stamp.
 
         Raises:
             UnknownNameError: The pose has another child or parent frame than earlier poses.
         """
-        chosen = None
-        for part in self._parts(message):
+        for part in self._parts(self.message(data)):
             parent, child = named = names_of(part)
             if self._frame not in {"", child} or self._parent not in {"", parent}:
                 continue
             if self.taken not in {None, named}:
                 self._refuse(named)
-            self.taken, chosen = named, part
-        if chosen is None:
-            return None
-        if hasattr(chosen.pose, "translation"):
-            return chosen.header, chosen.pose.translation, chosen.pose.rotation
-        return chosen.header, chosen.pose.position, chosen.pose.orientation
+            self.taken, pose = named, part.pose
+            is_transform = hasattr(pose, "translation")
+            place, turn = (pose.translation, pose.rotation) if is_transform else (pose.position, pose.orientation)
+            stamp = log_ns if part.header is None else _stamp(part.header)
+            yield stamp, log_ns, (place.x, place.y, place.z, turn.w, turn.x, turn.y, turn.z)
 
     def _parts(self, message: Any) -> list["_Part"]:
         if self._type in TRANSFORMS:
@@ -149,11 +157,6 @@ def names_of(part: _Part) -> Frames:
     return "" if part.header is None else plain(part.header.frame_id), plain(part.child)
 
 
-def frames(message: Any) -> list[Frames]:
-    """Parent and child frames in a message of transforms."""
-    return [(plain(t.header.frame_id), plain(t.child_frame_id)) for t in message.transforms]
-
-
 class JoyReader:
     """Reader of the buttons of a topic of Joy messages.
 
@@ -190,6 +193,6 @@ class JoyReader:
     def _row(self, data: bytes) -> list[int]:
         buttons = self.message(data).buttons
         row = [int(0 <= n < len(buttons) and buttons[n] != 0) for n in self._numbers]
-        if len(self._known) < 4096:
+        if len(self._known) < _MOST_KNOWN:
             self._known[data[12:]] = row
         return row

@@ -2,24 +2,23 @@
 
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
-from itertools import islice
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from teleop_core.bags.finding import METADATA
 from teleop_core.bags.reader import Bag
 from teleop_core.base import ParameterError, RecordingError, UnknownNameError, damage_told
 from teleop_core.graph import topics
 from teleop_core.kernels.geometry import Array
 from teleop_exchange import orientation, ros_bags, source
-from teleop_exchange.bag_messages import JOY, POSES, TRANSFORMS, Frames, JoyReader, PoseReader, Rows, frames, plain
-from teleop_exchange.options import BUTTONS, ORIENTATIONS, ImportOptions, button_map
+from teleop_exchange.bag_messages import JOY, POSES, TRANSFORMS, Frames, JoyReader, PoseReader, Rows, plain
+from teleop_exchange.options import BUTTONS, ORIENTATIONS, ImportOptions, button_map, option
 from teleop_exchange.transform_chain import chain_to, composed
 
-_LOOKED_AT = 1000
-"""Number of transform messages that are read to list their frames."""
-_TABLE_OPTIONS = (*ORIENTATIONS, "time", "rate", "position", *BUTTONS)
+_TABLE_OPTIONS = (*ORIENTATIONS, "time", "rate", "position", *BUTTONS, "episode", "numbered_by", "skip")
+_TABLE_CHOICES = ("time_unit", "quaternion_order", "matrix_order", "angles")
 
 
 class BagSource:
@@ -36,15 +35,19 @@ class BagSource:
     """
 
     has_time, time_unit, bad_rows, is_unit_said = True, "ns", 0, True
+    labels = ("stamps", "positions", "orientations")
 
     def __init__(self, path: Path, options: ImportOptions) -> None:
         self.path, self._options = path, options
         self.unit = "m" if options.unit == "auto" else options.unit
-        self.attitudes = orientation.Attitudes("quaternion", "wxyz")
-        self.told: list[str] = []
-        if given := [name for name in _TABLE_OPTIONS if getattr(options, name)]:
+        is_constant = options.orientation == "none"
+        self.attitudes = orientation.Attitudes("none" if is_constant else "quaternion", "wxyz")
+        self.told: list[str] = ["orientation: constant"] * is_constant
+        given = [name for name in _TABLE_OPTIONS if getattr(options, name) not in {None, (), "", 0}]
+        given += [name for name in _TABLE_CHOICES if getattr(options, name) != getattr(ImportOptions, name)]
+        if given:
             text = "left out: a recording of ROS has topics, not columns (--topic, --buttons)"
-            raise ParameterError(f"--{given[0].replace('_', '-')}", "given", text)
+            raise ParameterError(option(given[0]), "given", text)
         self._bag = Bag(path) if ros_bags.is_plain_mcap(path) else None
         with self._opened() as bag:
             self._types = bag.types
@@ -67,9 +70,8 @@ class BagSource:
             if self._bag is not None:
                 yield ros_bags.OurBag(self._bag)
                 return
-            if self.path.is_dir() and not _holds(self.path, ".db3", ".mcap", ".zstd"):
-                reason = "is no recording: it holds no .mcap and no .db3; of ROS 1 give the .bag"
-                raise RecordingError(self.path, f"{reason} file")
+            if self.path.is_dir():
+                _refuse_folder(self.path)
             with ros_bags.opened_by_rosbags(self.path) as bag:
                 yield bag
 
@@ -111,9 +113,7 @@ class BagSource:
             return []
         known: dict[Frames, str] = {}
         for topic in (*self._static, self._topic):
-            reader = self._pose_reader(bag, topic)
-            for _, data in islice(bag.raw(topic), _LOOKED_AT):
-                known |= dict.fromkeys(frames(reader.message(data)), topic)
+            known |= dict.fromkeys(self._pose_reader(bag, topic).frames(bag.raw(topic)), topic)
         parents: dict[str, set[str]] = {}
         for parent, child in known:
             parents.setdefault(child, set()).add(parent)
@@ -223,7 +223,8 @@ class BagSource:
         """Raise an error if a column contains no number."""
         if not finite.all():
             names = np.array(["x", "y", "z", "orientation"])[finite == 0]
-            raise RecordingError(self.path, f"{self._topic}: {', '.join(names)} holds no numbers")
+            hint = "; give --orientation none" * (list(names) == ["orientation"])
+            raise RecordingError(self.path, f"{self._topic}: {', '.join(names)} holds no numbers{hint}")
 
 
 def _named(wanted: str, names: Iterable[str]) -> str | None:
@@ -239,5 +240,19 @@ def _named(wanted: str, names: Iterable[str]) -> str | None:
     return None
 
 
-def _holds(path: Path, *ends: str) -> bool:
-    return any(file.suffix in ends for file in path.iterdir())
+def _refuse_folder(path: Path) -> None:
+    """Refuse a folder that is no recording of ROS 2, with what to give instead.
+
+    Raises:
+        RecordingError: The folder holds no files of messages, or no ``metadata.yaml`` that lists them.
+    """
+    files = sorted(file.name for file in path.iterdir() if not file.name.startswith("."))
+    messages = [name for name in files if Path(name.removesuffix(".zstd")).suffix in {".db3", ".mcap"}]
+    if not messages:
+        hint = "of ROS 1 give the .bag file; of a data set give --episode all"
+        raise RecordingError(path, f"is no recording: it holds no .mcap and no .db3; {hint}")
+    if METADATA not in files:
+        packed = [name for name in messages if name.endswith(".zstd")]
+        first = f"unpack its files by `zstd -d {packed[0]}`, " if packed else f"give one of its files ({messages[0]}), "
+        remedy = f"{first}or have the list made by `ros2 bag reindex {path}`"
+        raise RecordingError(path, f"lacks {METADATA}, which lists its files: {remedy}")

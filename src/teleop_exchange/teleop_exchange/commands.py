@@ -8,7 +8,7 @@ from typing import Any, NoReturn
 
 from teleop_core.base import ParameterError, printable
 from teleop_core.commands.arguments import command, out_argument
-from teleop_exchange.options import BUTTONS, LENGTHS, TIMES_NS, ImportOptions
+from teleop_exchange.options import BUTTONS, CHOICES, LENGTHS, ImportOptions
 
 _IMPORT = """\
 Make a recording of a hand's motion from a file of others: CSV, TSV or blanks (also .gz), Parquet,
@@ -72,7 +72,12 @@ def _time(group: Any) -> None:
         "--time", nargs="+", metavar="COL", help="column of the time, or the two columns of seconds and nanoseconds"
     )
     group.add_argument("--rate", type=float, metavar="HZ", help="samples per second, for a file without times")
-    group.add_argument("--time-unit", choices=("auto", *TIMES_NS), help="unit of the time (default: guessed)")
+    group.add_argument(
+        "--time-unit",
+        choices=CHOICES["time_unit"],
+        help="unit of the time (default: guessed); dotnet and filetime: 100 ns since the years 1 and 1601; excel and "
+        "matlab: days since 1900 and the year 0",
+    )
 
 
 def _place(group: Any) -> None:
@@ -148,6 +153,13 @@ def _damage(group: Any) -> None:
         metavar="N|all",
         help="number of the episode, if the file contains several; all: import each into a directory "
         "of recordings, also for the directory of a LeRobot data set",
+    )
+    group.add_argument(
+        "--numbered-by",
+        nargs="+",
+        metavar="COL",
+        help="columns that number the episodes; combinations of several are numbered from 0 in the order of the file "
+        "(default: the column called episode_index or the like); none: the file is one recording",
     )
     group.add_argument(
         "--backwards",

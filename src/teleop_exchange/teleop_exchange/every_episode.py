@@ -94,17 +94,23 @@ def files_of(path: Path, options: ImportOptions) -> dict[int, Path]:
         RecordingError: The folder contains no data file, a file is damaged, or two files contain the same episode.
         ParameterError: A file contains no column of episode numbers.
     """
-    files = sorted((path / "data").rglob("*.parquet")) if path.is_dir() else [path]
+    files = _data_files(path / "data") if path.is_dir() else [path]
     if not files or not path.exists():
         reason = "holds no data/**/*.parquet" if path.exists() else "does not exist"
         raise RecordingError(path, reason)
     found: dict[int, Path] = {}
     for file in files:
-        for number in episodes.numbers_of(imported_motion.open_table(file, options)):
+        for number in episodes.numbers_of(imported_motion.open_table(file, options), options):
             if number in found:
                 raise RecordingError(path, f"contains episode {number} twice, in {found[number]} and {file}")
             found[number] = file
     return found
+
+
+def _data_files(folder: Path) -> list[Path]:
+    """Parquet files below a folder, without those that a system hides there, such as ``._file-000.parquet``."""
+    found = {file.relative_to(folder): file for file in folder.rglob("*.parquet")}
+    return sorted(file for own, file in found.items() if not any(part.startswith(".") for part in own.parts))
 
 
 def _is_there(target: Path, command: str) -> bool:

@@ -56,15 +56,9 @@ def columns_of(path: Path) -> ImportOptions:
         return ImportOptions()
     if not set(COLUMNS[:4]) <= set(head) <= set(COLUMNS):
         return ImportOptions()
-    turn = COLUMNS[4:7] if set(COLUMNS[4:7]) <= set(head) else ()
+    is_turned = set(COLUMNS[4:7]) <= set(head)  # read as a rotation vector, unless it is in degrees by its size
     return ImportOptions(
-        time=COLUMNS[:1],
-        time_unit="s",
-        position=COLUMNS[1:4],
-        unit="m",
-        rotation_vector=turn,
-        angles="rad",
-        orientation="none",
+        time=COLUMNS[:1], time_unit="s", position=COLUMNS[1:4], unit="m", orientation="auto" if is_turned else "none"
     ).changed(**{name: name for name in COLUMNS[7:] if name in head})
 
 

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from typing import NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,9 +10,9 @@ from numpy.typing import NDArray
 from teleop_core.base.errors import RecordingError
 from teleop_core.base.ranges import check
 from teleop_core.kernels.geometry import Array
-from teleop_exchange.options import LENGTHS, ImportOptions
+from teleop_exchange.options import LENGTHS, TIMES_NS, ImportOptions
 from teleop_exchange.source import Presses, Source
-from teleop_exchange.times import SECOND_NS, Stamps, guessed_unit, is_constant, joined_ns
+from teleop_exchange.times import LARGEST_LAG_NS, SECOND_NS, Stamps, clock_offset, guessed_unit, is_constant, joined_ns
 
 SAMPLE = 1000
 """Largest number of times per block, and largest number of blocks, from which the unit is guessed."""
@@ -97,12 +98,55 @@ def gather(source: Source, options: ImportOptions) -> Gathered:
     order = _recorded_order(parts.logs)
     stamps, usable, is_log = _stamps(source, options, parts, told)
     presses = source.presses()
-    if presses is not None and (is_log or is_constant(presses.stamp_ns)):
-        presses = Presses(presses.log_ns, presses.log_ns, presses.pressed)
+    if presses is not None and parts.logs:
+        presses = _of_one_clock(presses, stamps[usable], np.concatenate(parts.logs)[usable], is_log, told)
     buttons = np.concatenate(parts.buttons) if parts.buttons else None
     strange = source.attitudes.strange
     rows = np.concatenate(parts.rows)
+    if count > 1 and not usable.any():
+        _refuse_broken_rows(source, rows, stamps)
     return Gathered(rows, stamps, usable, buttons, presses, told, source.bad_rows, strange, order)
+
+
+def _refuse_broken_rows(source: Source, rows: Array, stamps: Stamps) -> NoReturn:
+    """Refuse rows of which none is whole, and tell what is missing in which share of them."""
+    is_number = np.isfinite(rows)
+    known = (stamps != _NO_TIME, is_number[:, :3].all(axis=1), is_number[:, 3:].all(axis=1))
+    missing = [
+        f"{label} in {100.0 * (1.0 - own.mean()):.3g} %"
+        for label, own in zip(source.labels, known, strict=True)
+        if not own.all()
+    ]
+    hint = "--orientation none imports the positions alone" if (known[0] & known[1]).any() else "choose other columns"
+    what = f"holds 0 usable rows of {len(rows)}: numbers are missing of {', of '.join(missing)} of them"
+    raise RecordingError(source.path, f"{what}, and of something in each; {hint}")
+
+
+def _of_one_clock(presses: Presses, stamps: Stamps, logs: Stamps, is_log: bool, told: list[str]) -> Presses:
+    """Buttons at times of the clock that stamped the poses.
+
+    Args:
+        presses: The buttons.
+        stamps: Times of the poses (n,) [ns].
+        logs: Times of recording of the poses (n,) [ns].
+        is_log: Whether the times of the poses are those of recording.
+        told: Texts, to which a text is added if the buttons have another clock.
+    """
+    if is_log or is_constant(presses.stamp_ns):
+        offset = 0 if is_log else clock_offset(stamps, logs)
+    else:
+        offset = clock_offset(stamps, logs)
+        apart = abs(offset - clock_offset(presses.stamp_ns, presses.log_ns))
+        if apart < LARGEST_LAG_NS or is_constant(logs) or not _overlap(presses.log_ns, logs):
+            return presses
+        what = f"buttons are stamped by another clock, {apart / SECOND_NS:.4g} s apart"
+        told.append(f"{what}: their times of recording are taken, and brought to the clock of the poses")
+    return Presses(presses.log_ns + offset, presses.log_ns, presses.pressed)
+
+
+def _overlap(one: Stamps, other: Stamps) -> bool:
+    """Whether the spans of some times overlap."""
+    return len(one) > 0 and len(other) > 0 and one.min() <= other.max() and other.min() <= one.max()
 
 
 def _recorded_order(logs: list[Stamps]) -> NDArray[np.int32] | None:
@@ -125,10 +169,8 @@ def _check(source: Source, parts: _Parts, count: int) -> None:
     attitudes = source.attitudes
     if attitudes.strange > MOST_STRANGE * count:
         share = 100.0 * attitudes.strange / count
-        raise RecordingError(
-            source.path,
-            f"{_strange(attitudes.kind)} in {share:.3g} % of the rows{_hint(attitudes.kind, attitudes.mirrored)}",
-        )
+        hint = "give --orientation none" if parts.logs else _hint(attitudes.kind, attitudes.mirrored)
+        raise RecordingError(source.path, f"{_strange(attitudes.kind)} in {share:.3g} % of the rows: {hint}")
     source.check(parts.finite)
     check("farthest place from the origin", parts.farthest, "m")
     if parts.farthest > FARTHEST and not source.is_unit_said:
@@ -147,9 +189,9 @@ def _strange(kind: str) -> str:
 
 def _hint(kind: str, mirrored: int) -> str:
     if kind == "matrix" and mirrored:
-        return ": are the columns of --matrix in order, row by row? A mirror changes handedness"
+        return "are the columns of --matrix in order, row by row? A mirror changes handedness"
     name = "--matrix" if kind == "matrix" else "--quaternion and their order"
-    return f": check the columns of {name}, or give --orientation none"
+    return f"check the columns of {name}, or give --orientation none"
 
 
 def _stamps(
@@ -175,11 +217,15 @@ def _stamps(
     unit = source.time_unit
     if unit == "auto":
         unit, reason = guessed_unit(_few(known))
+        if "tick" in source.labels[0].lower() and unit in TIMES_NS:
+            unit, reason = "", "ticks may be of any length"
+        if not unit:
+            raise RecordingError(source.path, f"has times of an unknown unit: {reason}; give --time-unit, or --rate HZ")
         told.append(f"times in {unit}" + (f" ({reason})" if reason else ""))
     del known
     stamps = joined_ns(parts.times, unit, _NO_TIME)
     if (stamps == _NO_TIME).all():
-        reason = f"its times are {first:g} {unit} and so on, after 2096; give another --time-unit"
+        reason = f"its times are {first:g} {unit} and so on, after 2038; give another --time-unit, or --rate HZ"
         raise RecordingError(source.path, reason)
     usable &= (stamps != _NO_TIME) & ((stamps != 0) | (not is_bag))
     return stamps, usable, False

@@ -156,6 +156,10 @@ def _warnings(motion: Motion, steps: Array, largest: float, rate: float) -> list
         out.append(f"{100.0 * c.missing / c.rows:.3g} % of the rows lack numbers")
     if c.doubled > 0.1 * c.rows:
         out.append(f"{100.0 * c.doubled / c.rows:.3g} % of the times are doubled: are they too coarse? (else --rate)")
+    changes = motion.presses()
+    pressed = motion.stamp_ns[:0] if changes is None else changes[0]
+    if len(pressed) > 1 and (pressed[-1] < motion.stamp_ns[0] or pressed[0] > motion.stamp_ns[-1]):
+        out.append("the buttons are outside of the time of the poses, so that none of their changes has an effect")
     if motion.strange:
         out.append(f"{motion.strange} rows have an orientation that is none; they are left out")
     return out

@@ -6,6 +6,7 @@ import shlex
 import shutil
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, replace
+from functools import lru_cache
 from pathlib import Path
 from types import MappingProxyType
 
@@ -131,8 +132,15 @@ def checksum(path: Path) -> str:
     files = [path]
     if path.is_dir():
         files = sorted(f for f in path.iterdir() if f.is_file() and f.suffix != ".yaml")
+    stats = [file.stat() for file in files]
+    return _checksum(tuple((file, stat.st_size, stat.st_mtime_ns) for file, stat in zip(files, stats, strict=True)))
+
+
+@lru_cache(1)  # the episodes of a data set share its file
+def _checksum(files: tuple[tuple[Path, int, int], ...]) -> str:
+    """SHA-256 of files with their sizes and times of change."""
     found = hashlib.sha256()
-    for file in files:
+    for file, _, _ in files:
         with file.open("rb") as stream:
             while data := stream.read(1 << 20):
                 found.update(data)

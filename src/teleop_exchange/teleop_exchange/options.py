@@ -21,12 +21,21 @@ LENGTHS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "in": 0.0254}
 """Units of length [m]."""
 TIMES_NS = {"s": 1_000_000_000, "ms": 1_000_000, "us": 1000, "ns": 1}
 """Units of time [ns]."""
+DAY_NS = 86_400 * TIMES_NS["s"]
+CLOCKS = {
+    "dotnet": (100, 621_355_968_000_000_000),
+    "filetime": (100, 116_444_736_000_000_000),
+    "excel": (DAY_NS, 25_569),
+    "matlab": (DAY_NS, 719_529),
+}
+"""Clocks of other epochs: unit [ns], and the value at the beginning of 1970. ``dotnet`` and ``filetime`` count 100 ns
+since the years 1 and 1601, ``excel`` and ``matlab`` count days since 1900 and the year 0."""
 BUTTONS = ("clutch", "fixture", "mode")
 AXES = ("+x", "-x", "+y", "-y", "+z", "-z")
 ORIENTATIONS = ("quaternion", "matrix", "euler", "rotation_vector")
 """Options that name the columns of the orientation."""
 CHOICES = {
-    "time_unit": ("auto", *TIMES_NS),
+    "time_unit": ("auto", *TIMES_NS, *CLOCKS),
     "stamps": ("header", "log"),
     "unit": ("auto", *LENGTHS),
     "quaternion_order": ("auto", "wxyz", "xyzw"),
@@ -45,7 +54,7 @@ _COUNTS = {
     "euler": (0, 4),
     "rotation_vector": (0, 3),
 }
-_TUPLES = (*_COUNTS, "axes")
+_TUPLES = (*_COUNTS, "axes", "numbered_by")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,7 +67,8 @@ class ImportOptions:
     Attributes:
         time: Column of the time, or two columns with whole seconds and nanoseconds.
         rate: Samples per second [Hz], for tables without a time.
-        time_unit: ``auto``, ``s``, ``ms``, ``us`` or ``ns``.
+        time_unit: ``auto``, ``s``, ``ms``, ``us`` or ``ns``, or a clock: ``dotnet``, ``filetime``, ``excel`` or
+            ``matlab``.
         stamps: Source of the times of a bag's messages: ``header`` for their stamps, ``log`` for their times of
             recording.
         position: Three columns.
@@ -78,6 +88,8 @@ class ImportOptions:
         threshold: Value above which a button counts as pressed.
         skip: Number of lines to leave out at the beginning of a text file.
         episode: Number of the recording in a table of several recordings; None for a table of one recording.
+        numbered_by: Columns that number the recordings of a table; the combinations of several columns are numbered
+            from 0. Empty for the column called ``episode_index`` or the like, ``none`` for a single recording.
         topic: Topic of the poses in a bag, or the end of its name; empty if only one topic contains poses.
         frame: Child frame of the poses; needed if the topic contains several child frames.
         parent: Parent frame of the poses; needed if the topic contains several parent frames.
@@ -116,6 +128,7 @@ class ImportOptions:
     threshold: float = 0.5
     skip: int = 0
     episode: int | None = None
+    numbered_by: Columns = ()
     topic: str = ""
     frame: str = ""
     parent: str = ""

@@ -57,6 +57,7 @@ class Source(Protocol):
         is_unit_said: Whether the file or an option states the unit; if not, metres are assumed.
         attitudes: Converter of the orientations, which also counts invalid orientations.
         has_time: Whether the blocks contain times.
+        labels: Names of time, position and orientation in the file, for messages.
     """
 
     path: Path
@@ -66,6 +67,7 @@ class Source(Protocol):
     is_unit_said: bool
     attitudes: orientation.Attitudes
     has_time: bool
+    labels: tuple[str, str, str]
 
     def blocks(self) -> Iterator[Block]:
         """All rows in the order of the file."""

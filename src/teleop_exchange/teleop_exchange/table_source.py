@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from teleop_core.base import ParameterError, RecordingError
 from teleop_core.kernels import Array, length
-from teleop_exchange import episodes, names, source, tables, times
-from teleop_exchange.options import BUTTONS, CHOICES, ImportOptions, option
+from teleop_exchange import episodes, guessing, names, source, tables, times
+from teleop_exchange.options import BUTTONS, CHOICES, ORIENTATIONS, ImportOptions, option
 from teleop_exchange.orientation import TOLERANCE, Attitudes
 
 _TOLD = 8  # largest number of columns that a message lists by name
@@ -45,15 +45,21 @@ class TableSource:
         for name in ("topic", "buttons_topic", "frame", "parent"):
             if given := getattr(options, name):
                 raise ParameterError(option(name), given, "left out: this file has columns")
+        given = [column for name in ("time", "position", *ORIENTATIONS) for column in self._given(name)]
+        self._guesses = guessing.Guesses(table, given) if table.is_named else None
         position = self._position()
         time = self._time(position)
-        self.attitudes, orientation = self._orientation({*position, *time})
+        self.attitudes, orientation = self._orientation(position)
         taken = {*position, *time, *orientation}
         self._columns = Columns(time, position, orientation, self._buttons(taken))
-        self._episodes = episodes.Episodes(table, options.episode)
+        self._episodes = episodes.Episodes(table, options)
         self.has_time = bool(time)
         self.time_unit = self._time_unit(time)
         self.unit, self.is_unit_said = self._unit(position)
+        time_label, place_label, turn_label = (
+            ", ".join(table.names[column] for column in group) for group in (time, position, orientation)
+        )
+        self.labels = (time_label, place_label, turn_label)
         self._tell_unused({*taken, *self._columns.buttons.values()})
 
     # -- which columns ---------------------------------------------------------------------------
@@ -63,24 +69,20 @@ class TableSource:
         wanted = wanted[1:] if name == "euler" else wanted
         return tuple(tables.column_of(self._table, one, option(name)) for one in wanted)
 
-    def _told(self, what: str, columns: Sequence[int], more: str = "") -> tuple[int, ...]:
+    def _told(self, what: str, columns: Sequence[int]) -> tuple[int, ...]:
         listed = ", ".join(repr(self._table.names[column]) for column in columns)
-        self.told.append(f"{what} = {listed}{more}")
+        self.told.append(f"{what} = {listed}")
         return tuple(columns)
 
     def _position(self) -> tuple[int, ...]:
         if given := self._given("position"):
             return given
-        several = names.find_positions(self._table.names) if self._table.is_named else []
-        found = several[0] if several else ()
-        if not found and not self._table.is_named:
-            found = self._position_by_place()
+        turned = next(filter(None, map(self._given, ORIENTATIONS)), ())
+        found = self._guesses.position(turned) if self._guesses else self._position_by_place()
         if not found:
             reason = "has no columns that look like x, y, z: give --position X Y Z; "
             raise RecordingError(self.path, f"{reason}there are {self._listed()}")
-        others = ", ".join(repr(self._table.names[columns[0]]) for columns in several[1:])
-        more = f" (--position could also take {others}, …)" if others else ""
-        return self._told("x, y, z", found, more)
+        return self._told("x, y, z", found)
 
     def _position_by_place(self) -> tuple[int, ...]:
         """Columns of a table without names, chosen by the usual layout for its number of columns.
@@ -89,9 +91,14 @@ class TableSource:
         columns are time, x, y, z and a quaternion, as in the benchmark of Sturm and others 2012.
         """
         width = len(self._table.names)
-        if width in {3, 7}:
-            return (0, 1, 2)
-        return (1, 2, 3) if width in {4, 8} and self._is_rising(0) else ()
+        first = 1 if width in {4, 8} and self._is_rising(0) else 0
+        if width - first not in {3, 7}:
+            return ()
+        front, back = range(first, first + 4), range(width - 4, width)
+        if width - first == 7 and guessing.are_clearly_unit(self._table, front, back):
+            reason = f"has a quaternion in the columns {front[0] + 1} to {front[-1] + 1}, by their length"
+            raise RecordingError(self.path, f"{reason}: give --position and --quaternion, with --quaternion-order")
+        return (first, first + 1, first + 2)
 
     def _is_rising(self, column: int) -> bool:
         numbers = self._table.sample(column).astype(np.float64)
@@ -110,13 +117,28 @@ class TableSource:
             return ()
         found = names.find_time(self._table.names) if self._table.is_named else ()
         if not found and 0 not in position and self._is_rising(0):
+            self._refuse_counter()
             found = (0,)
         if not found:
             reason = "has no column that looks like a time: give --time COL, or --rate HZ; there are "
             raise RecordingError(self.path, reason + self._listed())
         return self._told("time", found)
 
-    def _orientation(self, taken: set[int]) -> tuple[Attitudes, tuple[int, ...]]:
+    def _refuse_counter(self) -> None:
+        """Refuse a first column that numbers the rows: its name says so, or its whole numbers rise by one.
+
+        Raises:
+            RecordingError: The first column is no time.
+        """
+        name, rows = self._table.names[0], self._table.sample(0).astype(np.float64)
+        steps = np.diff(rows[np.isfinite(rows)])
+        is_whole = len(steps) > 0 and bool((rows[np.isfinite(rows)] % 1.0 == 0.0).all())
+        is_named_counter = self._table.is_named and names.is_counter(name)
+        if is_whole and (is_named_counter or float(np.median(steps)) == 1.0) and not names.unit_of((name,), (0,)):
+            reason = f"has no time: its first column {name!r} counts the rows; give --rate HZ, or --time COL"
+            raise RecordingError(self.path, f"{reason} if it is one; there are {self._listed()}")
+
+    def _orientation(self, position: tuple[int, ...]) -> tuple[Attitudes, tuple[int, ...]]:
         o = self._options
         orders = {"matrix": o.matrix_order, "euler": o.euler[0] if o.euler else "xyz"}
         for kind in ("quaternion", "matrix", "euler", "rotation_vector"):
@@ -127,7 +149,7 @@ class TableSource:
                 return Attitudes(kind, orders.get(kind, ""), degrees), columns
         if o.orientation == "none":
             return Attitudes("none"), ()
-        return self._guessed_orientation(taken)
+        return self._guessed_orientation(position)
 
     def _quaternion_order(self, columns: Sequence[int]) -> str:
         """Order of the columns of a quaternion.
@@ -148,23 +170,17 @@ class TableSource:
             return "wxyz"
         return wanted
 
-    def _guessed_orientation(self, taken: set[int]) -> tuple[Attitudes, tuple[int, ...]]:
-        known = self._table.names
-        if not self._table.is_named:
+    def _guessed_orientation(self, position: tuple[int, ...]) -> tuple[Attitudes, tuple[int, ...]]:
+        if self._guesses is None:
             return self._orientation_by_place()
-        finders = {
-            "quaternion": (names.find_quaternion, "wxyz", "w, x, y, z of a quaternion"),
-            "matrix": (names.find_matrix, "row", "rotation matrix, row by row,"),
-            "rotation_vector": (names.find_rotation_vector, "", "rotation vector"),
-            "euler": (names.find_euler, "xyz", "roll, pitch, yaw about fixed x, y, z"),
-        }
-        for kind, (find, order, text) in finders.items():
-            columns = find(known)
-            if columns and not taken & set(columns):
-                self._told(text, columns)
-                return Attitudes(kind, order, self._in_degrees(kind, columns)), columns
-        self.told.append("orientation: none found, constant")
-        return Attitudes("none"), ()
+        if (turn := self._guesses.turn(position)) is None:
+            self.told.append("orientation: none found, constant")
+            return Attitudes("none"), ()
+        columns = self._told(turn.text, turn.group.columns)
+        is_degrees = self._in_degrees(turn.kind, columns)
+        if turn.kind == "rotation_vector" and is_degrees and self._agreed("angles", columns) != "deg":
+            self._guesses.refuse_angles(columns)
+        return Attitudes(turn.kind, turn.order, is_degrees), columns
 
     def _orientation_by_place(self) -> tuple[Attitudes, tuple[int, ...]]:
         width = len(self._table.names)
@@ -278,7 +294,7 @@ class TableSource:
         c = self._columns
         order = [*c.time, *c.position, *c.orientation, *c.buttons.values()]
         first, second = len(c.time), len(c.time) + 3
-        for columns in self._episodes.blocks(order):
+        for columns in self._episodes.blocks(order, self.has_time):
             turned = columns[second : second + len(c.orientation)]
             count = len(columns[first])
             rows = np.column_stack(turned) if turned else np.empty((count, 0))

@@ -8,12 +8,13 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-import pandas as pd
 import pyarrow as pa
 import pyarrow.csv as pc
 
+from teleop_core.bags.finding import METADATA
 from teleop_core.base import RecordingError, damage_told
-from teleop_exchange.tables import SAMPLE, Numbers, numbers, unique
+from teleop_exchange import dates
+from teleop_exchange.tables import SAMPLE, Numbers, Texts, numbers, unique
 
 _HEAD_BYTES = 1 << 18
 _PACKED = {b"\x1f\x8b": "gzip", b"BZh": "bz2", b"\x28\xb5\x2f\xfd": "zstd"}
@@ -22,7 +23,11 @@ _MISSING = ("", "nan", "NaN", "NAN", "-nan", "NA", "N/A", "n/a", "null", "NULL",
             "inf", "-inf", "Inf", "-Inf")  # fmt: skip
 _NUMBER = re.compile(r"[+-]?(\d+[.,]?\d*|[.,]\d+)([eE][+-]?\d+)?")
 _NAN = re.compile(r"[+-]?(nan|inf|infinity|null|none|n/?a)", re.I)
-_CLOCK = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d[\d:.]*\s?(Z|[+-]\d\d:?\d\d)?")
+_RECORDINGS = {b"\x89MCAP": ".mcap", b"SQLite format 3": ".db3", b"#ROSBAG": ".bag"}
+"""First bytes of files of recordings, and their endings."""
+_UNPACKERS = {"gzip": "gzip -d", "bz2": "bzip2 -d", "zstd": "zstd -d"}
+_MARKS = {b"\xff\xfe\x00\x00": "utf-32", b"\x00\x00\xfe\xff": "utf-32", b"\xff\xfe": "utf-16", b"\xfe\xff": "utf-16"}
+"""Byte order marks of encodings with several bytes a character."""
 _EXACT = 1 << 53  # largest integer up to which floating-point numbers are exact
 _BLANK = r"\s+"
 
@@ -59,7 +64,7 @@ class TextTable:
     """
 
     def __init__(self, path: Path, skip: int = 0) -> None:
-        self.path, self.bad_rows = path, 0
+        self.path, self.bad_rows, self._texts = path, 0, dict[int, Texts]()
         with damage_told(path):
             with path.open("rb") as file:
                 magic = file.read(4)
@@ -69,13 +74,15 @@ class TextTable:
         self.is_named = bool(self._form.names)
         self.names = unique(self._form.names or [""] * self._form.width)
 
-    def _stream(self) -> pa.NativeFile:
-        return pa.input_stream(str(self.path), compression=self._packed)
+    def _stream(self, encoding: str = "utf8") -> pa.NativeFile:
+        """The text in UTF-8, if it has the given encoding."""
+        stream = pa.input_stream(str(self.path), compression=self._packed)
+        return stream if encoding == "utf8" else pa.transcoding_input_stream(stream, encoding, "utf8")
 
     def _rows(self) -> pa.NativeFile:
         if self._form.separator != _BLANK:
-            return self._stream()
-        with self._stream() as stream:
+            return self._stream(self._encoding)
+        with self._stream(self._encoding) as stream:
             lines = stream.read().splitlines()
         return pa.BufferReader(b"\n".join(b" ".join(line.split()) for line in lines))
 
@@ -85,14 +92,32 @@ class TextTable:
             data = stream.read(_HEAD_BYTES)
         if not data.strip():
             raise RecordingError(self.path, "is empty")
+        if encoding := _wide_encoding(data):
+            with self._stream(encoding) as stream:
+                data = stream.read(_HEAD_BYTES)
         if b"\x00" in data:
-            reason = "is no text; give CSV, TSV, Parquet, a ROS 2 recording or a ROS 1 .bag"
-            raise RecordingError(self.path, reason)
+            raise RecordingError(self.path, self._no_text(data))
         data = data if len(data) < _HEAD_BYTES else data[: data.rfind(b"\n") + 1] or data
         try:
-            return data.decode("utf-8-sig"), "utf8"
+            return data.decode("utf-8-sig"), encoding or "utf8"
         except UnicodeDecodeError:
             return data.decode("latin-1"), "latin-1"
+
+    def _no_text(self, data: bytes) -> str:
+        """Why a file that begins with some bytes is no table, and what to give instead."""
+        ending = next((end for sign, end in _RECORDINGS.items() if data.startswith(sign)), "")
+        if not ending:
+            return "is no text; give CSV, TSV, Parquet, a ROS 2 recording or a ROS 1 .bag"
+        folder = self.path.resolve().parent
+        if self._packed:
+            where = f"its folder {folder}" if (folder / METADATA).exists() else f"its folder with {METADATA}"
+            instead = f"give {where}, or " * (ending != ".bag")
+            return (
+                f"is a packed {ending} of a recording: {instead}unpack it by `{_UNPACKERS[self._packed]} {self.path}`"
+            )
+        if self.path.name.endswith(".active"):
+            return "was not closed by its recorder: make its index by `rosbag reindex`, and give the .bag"
+        return f"is a recording whose name must end in {ending}; rename it"
 
     def sample(self, column: int) -> Numbers:
         """The first values of a column; NaN for values that are not numbers."""
@@ -100,19 +125,23 @@ class TextTable:
         if self._is_truth(column):
             return np.array([cell.strip().lower() == "true" for cell in cells], np.int64)
         if self.is_clock(column):
-            return _clock_ns(pd.Series(cells))
+            return dates.nanoseconds(["" if cell.strip() in _MISSING else cell for cell in cells])
         if cells and all(re.fullmatch(r"[+-]?\d{1,18}", cell.strip()) for cell in cells):
             return np.array([int(cell) for cell in cells], np.int64)
         return np.array([number(cell, self._form.decimal) for cell in cells], np.float64)
 
     def is_clock(self, column: int) -> bool:
         """Whether a column contains dates, which are read as nanoseconds since 1970."""
-        return self._clock(column) is not None
+        return any(dates.is_date(cell) for cell in self._filled(column)[:1])
 
-    def _clock(self, column: int) -> re.Match[str] | None:
-        """Date format of the first cell of a column, and its time zone; None if the cell is not a date."""
-        rows = self._form.rows
-        return _CLOCK.match(rows[0][column].strip()) if rows and column < len(rows[0]) else None
+    def number_texts(self, column: int) -> Texts:
+        """Make :meth:`blocks` read a column as texts, numbered in the order of their appearance."""
+        return self._texts.setdefault(column, Texts())
+
+    def _filled(self, column: int) -> list[str]:
+        """The first cells of a column, without those that mark a missing value."""
+        cells = [row[column].strip() for row in self._form.rows if column < len(row)]
+        return [cell for cell in cells if cell not in _MISSING]
 
     def _is_truth(self, column: int) -> bool:
         """Whether a column contains ``True`` and ``False``, as pandas and Unity write them."""
@@ -132,7 +161,7 @@ class TextTable:
     def _read(self, columns: Sequence[int]) -> Iterator[list[Numbers]]:
         form = self._form
         names = [f"c{i}" for i in range(form.width)]
-        read = pc.ReadOptions(column_names=names, skip_rows=form.head, encoding=self._encoding, block_size=1 << 20)
+        read = pc.ReadOptions(column_names=names, skip_rows=form.head, block_size=1 << 20)
         separator = " " if form.separator == _BLANK else form.separator
         parse = pc.ParseOptions(delimiter=separator, invalid_row_handler=self._bad_row)
         wanted = list(dict.fromkeys(names[column] for column in columns))
@@ -146,11 +175,17 @@ class TextTable:
         )
         with self._rows() as stream, pc.open_csv(stream, read, parse, convert) as reader:
             for batch in reader:
-                yield [numbers(batch.column(names[column])) for column in columns]
+                yield [self._numbers(batch.column(names[column]), column) for column in columns]
+
+    def _numbers(self, values: pa.Array, column: int) -> Numbers:
+        return self._texts[column].numbers(values) if column in self._texts else numbers(values)
 
     def _type(self, column: int) -> pa.DataType:
-        if clock := self._clock(column):
-            return pa.timestamp("ns", tz="UTC" if clock[1] else None)
+        if column in self._texts:
+            return pa.string()
+        if self.is_clock(column):
+            has_zone = dates.has_zone(self._filled(column))
+            return pa.string() if has_zone is None else pa.timestamp("ns", tz="UTC" if has_zone else None)
         if self._is_truth(column):
             return pa.bool_()
         # If a column begins with integers, later numbers may have decimals. Only integers that need all digits are
@@ -174,15 +209,22 @@ class TextTable:
             if found := re.search(pattern, text):
                 name = f"column {self.names[int(found[1])]!r}" if found[1] else "a column"
                 needed = "which is no number; choose other columns, or mark it as NaN"
+                if dates.looks_like_date(found[2]):
+                    needed = f"a date of another form; {dates.FORMS}"
                 reason = f"{name} holds {found[2]!r}, {needed}"
                 raise RecordingError(self.path, reason) from error
 
 
-def _clock_ns(column: "pd.Series[str]") -> Numbers:
-    """Convert dates to times since 1970 [ns]; dates without a time zone are UTC."""
-    clock = pd.to_datetime(column, format="ISO8601", utc=True).dt.as_unit("ns")
-    stamps = np.asarray(clock.astype("int64"), np.int64)
-    return np.where(clock.isna(), np.nan, stamps) if clock.hasnans else stamps
+def _wide_encoding(data: bytes) -> str:
+    """Encoding with several bytes a character, by its mark or, without one, by its zeros; empty for another."""
+    for mark, encoding in _MARKS.items():
+        if data.startswith(mark):
+            return encoding
+    for encoding, first in (("utf-16-le", 1), ("utf-16-be", 0)):
+        high, low = data[first:1024:2], data[1 - first : 1024 : 2]
+        if len(high) > 8 and high.count(0) > 0.9 * len(high) and not low.count(0):
+            return encoding
+    return ""
 
 
 def recognised(path: Path, text: str, skip: int = 0) -> Form:

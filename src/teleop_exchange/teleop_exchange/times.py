@@ -8,16 +8,22 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
-from teleop_core.base.ranges import LATEST_S
 from teleop_core.kernels.geometry import Array
-from teleop_exchange.options import TIMES_NS
+from teleop_exchange.options import CLOCKS, TIMES_NS
 
 Stamps = NDArray[np.int64]
 SECOND_NS = 1_000_000_000
+LARGEST_LAG_NS = SECOND_NS
+"""Largest plausible difference between topics in the time from the stamp of a message to its recording [ns]. Topics
+with a larger difference were stamped by different clocks."""
 RATES_HZ = (5.0, 3000.0)
 """Smallest and largest plausible rate of a hand's recording [Hz]; the guess of the time unit uses them."""
 _EPOCH_S = 3e8  # a time in 1979 [s]; larger times are seconds since 1970
+_LATEST_S = 2.0**31  # a time in 2038 [s], the first that does not fit into a stamp of ROS
+_NEAREST_S = 9.4e8  # a time in 1999 [s]; earlier dates are not those of clocks with another epoch
 _LONGEST_S = 60.0  # longest plausible time between two samples [s]
+_LONGEST_OF_OTHERS_S = 10.0  # the same for clocks of another epoch, whose days could be seconds
+_FAR_OFF = 1.5  # a rate this many times beyond RATES_HZ is not plausible
 _STRETCH = 10  # smallest number of rows of a separate recording
 
 
@@ -33,6 +39,9 @@ def guessed_unit(raw: NDArray[np.float64] | Stamps) -> Unit:
 
     Args:
         raw: Times (N,) in the file's unit, finite.
+
+    Returns:
+        The unit; its name is empty if no unit gives a plausible rate.
     """
     middle = float(np.median(raw)) if len(raw) else 0.0
     steps = np.diff(np.sort(raw))
@@ -40,31 +49,37 @@ def guessed_unit(raw: NDArray[np.float64] | Stamps) -> Unit:
     step = float(np.median(steps)) if len(steps) else 0.0
     if step <= 0.0:
         return Unit("s", "")
-    for name, nanoseconds in TIMES_NS.items():
-        seconds, period = (value * nanoseconds / SECOND_NS for value in (middle, step))
-        if _EPOCH_S < seconds < LATEST_S and period < _LONGEST_S:
+    for name in (*CLOCKS, *TIMES_NS):
+        nanoseconds, epoch = _scale(name)
+        seconds, period = (middle - epoch) * nanoseconds / SECOND_NS, step * nanoseconds / SECOND_NS
+        first, longest = (_NEAREST_S, _LONGEST_OF_OTHERS_S) if name in CLOCKS else (_EPOCH_S, _LONGEST_S)
+        if first < seconds < _LATEST_S and period < longest:
             return Unit(name, "they are times of the clock")
-    best, distance = "s", float("inf")
-    for name, nanoseconds in TIMES_NS.items():
-        rate = SECOND_NS / (step * nanoseconds)
-        low, high = RATES_HZ
-        off = max(low / rate, rate / high, 1.0)
-        if off < distance:
-            best, distance = name, off
-    rate = SECOND_NS / (step * TIMES_NS[best])
-    return Unit(best, f"that makes {rate:.4g} Hz")
+    low, high = RATES_HZ
+    rates = {name: SECOND_NS / (step * nanoseconds) for name, nanoseconds in TIMES_NS.items()}
+    off = {name: max(low / rate, rate / high, 1.0) for name, rate in rates.items()}
+    best = min(off, key=lambda name: off[name])
+    if off[best] > _FAR_OFF:
+        return Unit("", f"no unit makes a rate of {low:g} to {high:g} Hz of their steps of {step:.4g}")
+    return Unit(best, f"that makes {rates[best]:.4g} Hz")
+
+
+def _scale(unit: str) -> tuple[int, int]:
+    """Length of a unit or of a clock's unit [ns], and the value at the beginning of 1970; 0 for a unit."""
+    return CLOCKS[unit] if unit in CLOCKS else (TIMES_NS[unit], 0)
 
 
 def joined_ns(parts: list[NDArray[np.float64] | Stamps], unit: str, without: int) -> Stamps:
     """Times of all blocks [ns], with the number ``without`` for invalid times. This empties the list ``parts``.
 
-    Times later than 2096 are invalid, because their nanoseconds may not fit into 64 bits.
+    Times later than 2038 are invalid, because stamps of ROS cannot hold them.
     """
-    latest = LATEST_S * SECOND_NS / TIMES_NS[unit]
+    nanoseconds_of_unit, epoch = _scale(unit)
+    latest = _LATEST_S * SECOND_NS / nanoseconds_of_unit
     out = np.empty(sum(map(len, parts)), np.int64)
     end = len(out)
     while parts:
-        raw = parts.pop()
+        raw = parts.pop() - epoch
         begin = end - len(raw)
         known = np.abs(raw) <= latest  # NaN is not
         out[begin:end] = nanoseconds(np.where(known, raw, 0), unit)
@@ -74,12 +89,13 @@ def joined_ns(parts: list[NDArray[np.float64] | Stamps], unit: str, without: int
 
 
 def nanoseconds(raw: NDArray[np.float64] | Stamps, unit: str) -> Stamps:
-    """Times in nanoseconds; whole numbers keep all digits."""
+    """Times since the epoch of a unit in nanoseconds; whole numbers keep all digits."""
+    factor, _ = _scale(unit)
     if raw.dtype.kind == "i":
-        return np.asarray(raw, np.int64) * TIMES_NS[unit]
+        return np.asarray(raw, np.int64) * factor
     whole = np.floor(raw)
-    rest = np.rint((raw - whole) * TIMES_NS[unit]).astype(np.int64)
-    stamps: Stamps = whole.astype(np.int64) * TIMES_NS[unit] + rest
+    rest = np.rint((raw - whole) * factor).astype(np.int64)
+    stamps: Stamps = whole.astype(np.int64) * factor + rest
     return stamps
 
 
@@ -184,3 +200,9 @@ def spread_ms(stamps: Stamps) -> tuple[float, float, float]:
 def is_constant(stamps: Array | Stamps) -> bool:
     """Whether all stamps are equal, such as zero, so that they contain no information."""
     return len(stamps) > 1 and bool((stamps == stamps[0]).all())
+
+
+def clock_offset(stamps: Stamps, logs: Stamps) -> int:
+    """Median of the stamps minus the times of recording [ns]; 0 without stamps."""
+    middle = len(stamps) // 2
+    return int(np.partition(stamps - logs, middle)[middle]) if len(stamps) else 0  # a float would be too coarse

@@ -8,7 +8,7 @@ from teleop_core.base.errors import ParameterError, UnknownNameError
 from teleop_core.kernels.geometry import Array, quaternion_products, rotations_from_quaternions
 from teleop_core.kernels.portable import length
 from teleop_exchange.bag_messages import Frames, Rows
-from teleop_exchange.times import Stamps
+from teleop_exchange.times import LARGEST_LAG_NS, Stamps, clock_offset
 
 
 def chain_to(top: str, frame: str, parents: Mapping[str, Collection[str]]) -> list[Frames]:
@@ -49,11 +49,13 @@ def composed(edges: Sequence[Rows], *, by_log: bool) -> Rows:
     Args:
         edges: Poses of each transform, the transform of the frame itself first; the child of each transform is the
             parent of the previous one.
-        by_log: Whether the time of recording is used as the time of a pose. It is always used for a transform whose
-            stamps never change.
+        by_log: Whether the time of recording is used as the time of a pose. It is always used if the stamps of a
+            transform never change, or if the transforms are stamped by different clocks.
     """
     moving = [edge for edge in edges if len(edge.poses) > 1]
+    offsets = [clock_offset(edge.stamp_ns, edge.log_ns) for edge in moving]
     is_log = by_log or any((edge.stamp_ns == edge.stamp_ns[0]).all() for edge in moving)
+    is_log |= bool(offsets) and max(offsets) - min(offsets) > LARGEST_LAG_NS
     fastest = max(edges, key=lambda edge: len(edge.poses))
     times, is_there = _times(fastest, is_log), np.ones(len(fastest.poses), np.bool_)
     product = np.zeros((len(times), 7))

@@ -23,8 +23,14 @@ FIGURES = (
     "idle_share", "peaks_per_s", "reversals", "sparc",
 )  # fmt: skip
 """Scores (see :doc:`scores`, keys below ``motion.hand``) by which an episode is graded."""
+_TINY = 1e-9  # avoids a division by zero
+_ROUNDING = 1e-6  # a median absolute deviation below this share of the median counts as 0
 ODD, WORST, REASON = "odd", "most_odd", "reason"
 _NORMAL = 1.4826  # standard deviation of a normal distribution, divided by its median absolute deviation
+_NORMAL_MEAN = 1.2533  # the same for the mean absolute deviation
+_LEAST_SHARE = 0.01  # smallest spread of a score, as a share of its median
+_LEAST_SPREAD = {"reversals": 1.0, "peaks_per_s": 0.1, "idle_share": 0.01}
+"""Smallest spread of scores that have few values or are often 0."""
 
 
 def grade(
@@ -38,8 +44,9 @@ def grade(
     """Return the scores of every episode, the oddest episode first.
 
     The oddness of a score is its deviation from the median of all episodes, in robust standard deviations (1.4826 times
-    the median absolute deviation). The oddness of an episode is that of its oddest score. A large oddness means that an
-    episode should be inspected, not that it is wrong.
+    the median absolute deviation). If more than half of the episodes share a value, this is 0; then it is 1.2533 times
+    the mean absolute deviation of the others, at least 1 % of the median. The oddness of an episode is that of its
+    oddest score. A large oddness means that an episode should be inspected, not that it is wrong.
 
     Args:
         data: Folder of a LeRobot data set, or a table with a column of episodes.
@@ -79,13 +86,26 @@ def grade(
     table[REASON] = table[REASON].fillna("")
     values = table[list(figures)].astype(float)
     table[list(figures)] = values
-    off = (values - values.median()).abs()
-    spread = _NORMAL * off.median()
-    # If all values are equal, none is odd.
-    shares = (off / spread.where(spread > 0.0, np.inf)).fillna(0.0)
+    shares = _shares(values)
     table.insert(0, ODD, shares.max(axis=1).where(table[REASON] == "", np.inf))
     table.insert(1, WORST, shares.idxmax(axis=1).where(shares.max(axis=1) > 0.0, ""))
     return table.sort_values([ODD], ascending=False, kind="stable")
+
+
+def _shares(values: "pandas.DataFrame") -> "pandas.DataFrame":
+    """Deviation of each score from the median of its column, in robust standard deviations; 0 for a missing score.
+
+    If more than half of the episodes share a value, the median absolute deviation is 0. The spread is then the mean
+    absolute deviation of the other episodes (Iglewicz and Hoaglin 1993), so that the only episode that differs is odd.
+    """
+    median = values.median()
+    off = (values - median).abs()
+    spread = off * 0.0 + _NORMAL * off.median()
+    for name in off.columns[off.median() <= _ROUNDING * median.abs()]:
+        others = (off[name].sum() - off[name]) / max(1, off[name].count() - 1)
+        least = max(_LEAST_SHARE * abs(median[name]), _LEAST_SPREAD.get(name, _TINY))
+        spread[name] = (_NORMAL_MEAN * others).clip(lower=least)
+    return (off / spread).fillna(0.0)
 
 
 def usual(table: "pandas.DataFrame", most: float = 3.5) -> list[int]:

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, field
 from io import BytesIO
+from itertools import pairwise
 from pathlib import Path
 from typing import BinaryIO, NamedTuple
 
@@ -103,17 +104,19 @@ class McapSource:
         rows, end = walk.walk(data, start, footer)
         if end != footer:
             raise ValueError(f"it ends at byte {end}, must end at {footer}")
-        found, statistics = Contents(), None
+        found, statistics, spans = Contents(), None, [(len(mcap_file.MAGIC), len(mcap_file.MAGIC))]
         _note_cold(found, data, rows)
         for opcode, begin, size in rows[:, :3].tolist():
             if opcode == Opcode.STATISTICS:
                 statistics = Statistics.read(_stream(data, begin, size))
             elif opcode == Opcode.CHUNK_INDEX:
-                found.places.append(_place(ChunkIndex.read(_stream(data, begin, size))))
+                index = ChunkIndex.read(_stream(data, begin, size))
+                found.places.append(_place(index))
+                spans.append((index.chunk_start_offset, index.chunk_start_offset + index.chunk_length))
             elif opcode == Opcode.METADATA_INDEX:
-                index = MetadataIndex.read(_stream(data, begin, size))
-                found.metadata.append(Metadata.read(_stream(data, index.offset + 9, index.length)))
-        if statistics is None or not found.places:
+                entry = MetadataIndex.read(_stream(data, begin, size))
+                found.metadata.append(Metadata.read(_stream(data, entry.offset + 9, entry.length)))
+        if statistics is None or not found.places or _has_messages_between(data, [*spans, (start, start)]):
             return None
         found.counts = Counter(statistics.channel_message_counts)
         return found if found.counts.total() == statistics.message_count else None
@@ -169,6 +172,20 @@ class McapSource:
             return self.mapped()
         with damage_told(self.path, _UNREAD.format(f"the chunk at byte {place.offset}")):
             return _uncompressed(_chunk_at(file, place.offset))
+
+
+def _has_messages_between(data: layouts.Bytes, spans: list[tuple[int, int]]) -> bool:
+    """Whether messages, or chunks without an entry in the index, are between the indexed chunks.
+
+    Args:
+        data: The whole file.
+        spans: Begin and end of each chunk, of the file's start, and of its index.
+    """
+    for (_, begin), (end, _) in pairwise(sorted(spans)):
+        rows, _ = walk.walk(data, min(begin, end, len(data)), min(end, len(data)))
+        if np.isin(rows[:, walk.OPCODE], (Opcode.MESSAGE, Opcode.CHUNK)).any():
+            return True
+    return False
 
 
 def _stream(data: layouts.Bytes, begin: int, size: int) -> ReadDataStream:

@@ -2,12 +2,24 @@
 
 import difflib
 import math
+import warnings
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from teleop_core.base import Spec, TeleopError, UnknownNameError, Within, fixed, parameter, plain_yaml, shown, specs
+from teleop_core.base import (
+    Spec,
+    TeleopError,
+    TeleopWarning,
+    UnknownNameError,
+    Within,
+    fixed,
+    parameter,
+    plain_yaml,
+    shown,
+    specs,
+)
 from teleop_core.base.texts import LONGEST_VALUE
 from teleop_core.graph.stage import STAGES
 
@@ -56,7 +68,11 @@ class SessionParameters:
 
 SESSION = "teleop"
 """Name of the group of the session as a whole."""
-_EVERY = "/**"  # name for every node in ROS 2 parameter files
+EVERY = "/**"
+"""Name for every node in ROS 2 parameter files. A layer keeps the values of this group, beside those of the stages."""
+_OF_ROS = ("use_sim_time", "start_type_description_service", "qos_overrides")
+"""Parameters that every node of ROS 2 has. They do not concern the stages, which take their time from the session."""
+_LIKE = 0.8  # similarity of a parameter to a known one, from which it is a mistyped name and not of another node
 RENAMED = {
     "haptic_master.path.": "operator.",
     "haptic_master.operator.": "operator.",
@@ -148,30 +164,32 @@ def parse_text(text: str, where: str) -> Layer:
 def parse_layer(content: object, where: str) -> Layer:
     """Values of a parsed ROS 2 parameter file.
 
-    A value under ``/**`` applies to every stage that has the parameter, unless the stage's own group sets it.
+    A value under ``/**`` applies to every stage that has the parameter, unless the stage's own group sets it. A
+    parameter under ``/**`` that no stage has belongs to nodes of others: a warning tells it.
 
     Raises:
         TeleopError: The structure is not stage / ros__parameters / name / value.
-        UnknownNameError: There is no such stage, or no stage has a parameter under ``/**``.
+        UnknownNameError: There is no such stage, or a parameter under ``/**`` has a name like that of a known one.
     """
     layer: Layer = {}
     if not isinstance(content, Mapping):
         raise TeleopError(f"{where}: must contain stages, each with ros__parameters")
-    for key, inner in sorted(content.items(), key=lambda item: item[0] != _EVERY):
+    for key, inner in sorted(content.items(), key=lambda item: item[0] != EVERY):
         name = str(key).removeprefix("/").removeprefix("**/")
         stage = name.rpartition("/")[2]
-        if key != _EVERY and stage != SESSION and stage not in STAGES.names():
+        if key != EVERY and stage != SESSION and stage not in STAGES.names():
             raise UnknownNameError(f"{where}: stage", key, (SESSION, *STAGES))
         if not isinstance(inner, Mapping) or not isinstance(inner.get("ros__parameters"), Mapping):
             raise TeleopError(f"{where}: {key} must contain ros__parameters with names and values")
-        if key == _EVERY:
-            for own, value in _flat(inner["ros__parameters"]):
+        values = _without_those_of_ros(inner["ros__parameters"], f"{where}: {key}")
+        if key == EVERY:
+            for own, value in values:
                 for stage in _owners(own, where):
-                    layer.setdefault(stage, {})[own] = value
+                    layer.setdefault(stage, {})[own] = layer.setdefault(EVERY, {})[own] = value
             continue
         arm = name.removesuffix(stage)
         layer.setdefault(name, {})
-        for own, value in _flat(inner["ros__parameters"]):
+        for own, value in values:
             owner, _, present = _current(f"{stage}.{own}").partition(".")
             layer.setdefault(arm + owner, {})[present] = value
     _share_robot(layer)
@@ -180,16 +198,26 @@ def parse_layer(content: object, where: str) -> Layer:
     return layer
 
 
+def _without_those_of_ros(values: Mapping[str, Any], where: str) -> list[tuple[str, object]]:
+    """Names and values without the parameters of every node of ROS, which have no effect here."""
+    every = list(_flat(values))
+    if said := [name for name, _ in every if name.partition(".")[0] in _OF_ROS]:
+        warnings.warn(f"{where}: without effect on a session: {', '.join(said)}", TeleopWarning, stacklevel=4)
+    return [(name, value) for name, value in every if name not in said]
+
+
 def _owners(name: str, where: str) -> list[str]:
-    """Stages that have a parameter of this name.
+    """Stages that have a parameter of this name; a warning tells if there are none, as other nodes may have it.
 
     Raises:
-        UnknownNameError: No stage has this parameter.
+        UnknownNameError: No stage has this parameter, and its name is like that of a known one.
     """
     names = {stage: {spec.name for spec in specs(group)} for stage, group in declared_groups().items()}
     if not (owners := [stage for stage, own in names.items() if name in own]):
         known = sorted(set[str]().union(*names.values()))
-        raise UnknownNameError(f"{where}: parameter of {_EVERY}", name, known)
+        if near := difflib.get_close_matches(name[:LONGEST_VALUE], known, cutoff=_LIKE):
+            raise UnknownNameError(f"{where}: parameter of {EVERY}", name, near)
+        warnings.warn(f"{where}: {EVERY}: no stage has the parameter {shown(name)}", TeleopWarning, stacklevel=5)
     return owners
 
 

@@ -1,11 +1,12 @@
 """Configuration: layers of files and settings become one checked parameter group per stage of the graph."""
 
+import warnings
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from teleop_core.base import ParameterError, PartError, UnknownNameError, build, specs, values_of
+from teleop_core.base import ParameterError, PartError, TeleopWarning, UnknownNameError, build, specs, values_of
 from teleop_core.base.plain_yaml import written
 from teleop_core.coupling.architectures import ARCHITECTURES, impedance
 from teleop_core.coupling.passivity import PASSIVITIES
@@ -13,6 +14,7 @@ from teleop_core.coupling.passivity.slave_side import PASSIVITY
 from teleop_core.graph import HAND, RECORDER_NAME, STAGES, Graph, Member, build_graph
 from teleop_core.graph.graph import DEVICE
 from teleop_core.graph.layers import (
+    EVERY,
     SESSION,
     Layer,
     SessionParameters,
@@ -55,10 +57,11 @@ class Configuration:
         for layer in layers:
             for name, values in layer.items():
                 merged.setdefault(name, {}).update(values)
+        every = merged.pop(EVERY, {})
         session = build(SessionParameters, merged.get(SESSION, {}), f"{SESSION}.")
         _check_order(session.stages)
         graph = build_graph(session.arms, session.stages, session.delays)
-        _check_names(merged, graph)
+        _check_names(merged, graph, every)
         groups: dict[str, Any] = {SESSION: session}
         for member in [Member(stage, arm) for arm in graph.namespaces for stage in graph.stages]:
             values = _published(member, merged, graph) | _values_for(member, merged, graph)
@@ -144,10 +147,16 @@ def with_changes(recorded: Layer, changes: Iterable[Layer]) -> list[Layer]:
     return [kept, *changes]
 
 
-def _check_names(merged: Layer, graph: Graph) -> None:
+def _check_names(merged: Layer, graph: Graph, every: Mapping[str, object]) -> None:
     """Refuse groups of unknown arms and stages, except stages that replace a stage of the session.
 
     The file of a whole machine also contains the parameters of its bridge, which is a separate node.
+
+    Args:
+        merged: Values by group.
+        graph: Graph of the session.
+        every: Values that a file sets for every stage that has them; a warning tells those that no stage of the session
+            has.
 
     Raises:
         UnknownNameError: A group names an arm or stage that is not in the graph.
@@ -159,14 +168,19 @@ def _check_names(merged: Layer, graph: Graph) -> None:
         if arm and arm not in graph.arms:
             raise UnknownNameError(f"arm of {name}", arm, [a for a in graph.arms if a] or ["none"])
         if stage not in {SESSION, RECORDER_NAME, *stages} and stage in STAGES.names():
-            own = {key: v for key, v in merged[name].items() if key not in _SAID_TO_ALL}
+            own = {k: v for k, v in merged[name].items() if k not in _SAID_TO_ALL and (k, v) not in every.items()}
             if not own or not written.isdisjoint(STAGES.find(stage).writes):
                 continue
             keys = ", ".join(f"{name}.{key}" for key in own)
             needed = f"left out: this session has no stage {stage}; add stages=[{stage}]"
-            raise ParameterError(keys, tuple(own.values()), needed)
+            raise ParameterError(keys, next(iter(own.values())) if len(own) == 1 else tuple(own.values()), needed)
         if stage not in {SESSION, RECORDER_NAME, *stages}:
             raise UnknownNameError("stage of teleop.stages", stage, (*stages, RECORDER_NAME))
+    groups = (SessionParameters, STAGES.find(RECORDER_NAME).parameters, *(stage.parameters for stage in graph.stages))
+    had = {spec.name for group in groups for spec in specs(group)}
+    if unused := [name for name in every if name not in had and name not in _SAID_TO_ALL]:
+        text = f"{EVERY}: no stage of this session has {', '.join(unused)}"
+        warnings.warn(f"{text}; the values have no effect", TeleopWarning, stacklevel=4)
 
 
 def _check_robots(graph: Graph, groups: Mapping[str, Any], arm: str) -> None:

@@ -83,11 +83,14 @@ def is_sound(bag: reader.Bag, prefix: str) -> bool:
             return False
         last = int(series.stamp_ns[-1])
     is_one = bag.topics[name].count == 1
-    return (last > first or is_one) and _are_sound(bag, prefix + MASTER_BUTTONS.name)
+    return (last > first or is_one) and _are_sound(bag, prefix + MASTER_BUTTONS.name, first, last)
 
 
-def _are_sound(bag: reader.Bag, name: str) -> bool:
-    """Whether buttons can be used unchanged; True if there are no buttons."""
+def _are_sound(bag: reader.Bag, name: str, first: int, last: int) -> bool:
+    """Whether buttons can be used unchanged with poses from ``first`` to ``last`` [ns]; True if there are no buttons.
+
+    Buttons whose stamps are all outside of this time were stamped by another clock.
+    """
     info = bag.topics.get(name)
     if info is None or not info.count:
         return True
@@ -97,4 +100,6 @@ def _are_sound(bag: reader.Bag, name: str) -> bool:
         stamps = bag.read(name).stamp_ns
     except RecordingError:  # the messages do not have three buttons
         return False
-    return not (len(stamps) > 1 and (stamps == stamps[0]).all()) and bool((np.diff(stamps) >= 0).all())
+    if len(stamps) > 1 and (stamps[0] == stamps[-1] or stamps[-1] < first or stamps[0] > last):
+        return False
+    return bool((np.diff(stamps) >= 0).all())

@@ -27,6 +27,9 @@ def add(commands: Any) -> None:
         "--position", nargs=3, metavar=("X", "Y", "Z"), help="columns of the position, if they are not x, y, z"
     )
     parser.add_argument("--unit", default="auto", help="unit of the position: m, cm, mm, in, or auto (default: auto)")
+    parser.add_argument("--time", nargs="+", metavar="COL", help="column of the time, if its name does not say it")
+    parser.add_argument("--rate", type=float, metavar="HZ", help="samples per second, for a table without times")
+    parser.add_argument("--numbered-by", nargs="+", metavar="COL", help="columns that number the episodes")
     add_files(parser, "episode")
     parser.add_argument("--usual", type=Path, metavar="FILE", help="write a list of the episodes that are not outliers")
     parser.add_argument(
@@ -49,7 +52,15 @@ def _run(arguments: argparse.Namespace) -> int:
     if not arguments.most >= 0.0:
         raise ParameterError("--most", arguments.most, "0 or more standard deviations")
     check_places(arguments.csv, arguments.html, arguments.usual)
-    options = ImportOptions(position=tuple(arguments.position or ()), unit=arguments.unit)
+    options = ImportOptions(
+        position=tuple(arguments.position or ()),
+        unit=arguments.unit,
+        time=tuple(arguments.time or ()),
+        rate=arguments.rate,
+        numbered_by=tuple(arguments.numbered_by or ()),
+        # The figures are those of the position; only recordings that are kept need an orientation.
+        orientation="none" if arguments.recordings is None else "auto",
+    )
     table = grade(arguments.data, options=options, recordings=arguments.recordings)
     shown = table.drop(columns=REASON).head(20)
     print(shown.to_string(float_format="{:.4g}".format, na_rep="–"))

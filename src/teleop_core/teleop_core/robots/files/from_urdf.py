@@ -90,10 +90,14 @@ def load_urdf(
     ]
     by_child = urdf_tree.joints_by_child(joints)
     base = urdf_tree.root_link(links, by_child)
-    chain = urdf_tree.chain_to(urdf_tree.tip_of(tip, links, joints), by_child)
+    end = urdf_tree.tip_of(tip, links, joints)
+    chain = urdf_tree.chain_to(end, by_child)
     moving = [joint for joint in chain if joint.axis is not None]
     if not moving:
-        raise ParameterError("tip", tip or chain, "a link that moves: a joint must lie between this link and the root")
+        movable = ", ".join(joint.child for joint in joints if joint.axis is not None)
+        others = f"joints move {movable}" if movable else "no joint of the file moves"
+        needed = f"a link that moves: a joint must lie between it and the root {base!r}; {others}"
+        raise ParameterError("tip", end, needed)
     trains, followers = _trains(moving, {joint.name: joint for joint in joints})
     leaders = [train[0].joint for train in trains]
     limits = [_narrowed(train) for train in trains]
@@ -120,10 +124,10 @@ def load_urdf(
     solution = solution_of(kinds, fixed, reach, controlled) if followers.is_plain else SEARCH
     robot = make(task=controlled, solution=solution)
     coordinates = dict(zip((j.name for j in moving), followers.of(home).tolist(), strict=True))
-    visuals = tuple(visuals_of(coordinates, links, by_child, Path(path)))
+    visuals, undrawn = visuals_of(coordinates, links, by_child, Path(path))
     # The start posture is not computed here, because its search takes about one second. It is computed at its first
     # use.
-    notes = tuple(urdf_notes.notes_on(chain, links))
+    notes = (*urdf_notes.notes_on(chain, links), *undrawn)
     robot = replace(robot, visuals=visuals, notes=notes, home_is_assumed=True, start=None)
     if dynamics == "independent":
         return robot
@@ -276,20 +280,17 @@ def _drives(trains: list[list[_Geared]], inertias: list[float], file: str) -> Dr
 
 
 def _drive_entries(joint: urdf_tree.UrdfJoint) -> dict[str, float]:
-    where, found, is_turn = f"joint {joint.name}", {}, urdf_tree.KINDS[joint.kind] == "turn"
-    for tag, key, entry, units in (
-        ("limit", "effort", "effort_limit", ("N·m", "N")),
-        ("limit", "velocity", "speed_limit", ("rad/s", "m/s")),
-        ("dynamics", "damping", "viscous", ("N·m·s/rad", "N·s/m")),
-        ("dynamics", "friction", "coulomb", ("N·m", "N")),
-    ):
-        element, unit = joint.element.find(tag), units[0 if is_turn else 1]
-        value = float(urdf_tree.numbers_of(where, element, key, (0.0,), unit)[0])
-        if value < 0.0:
-            raise ParameterError(f"{key} of {where}", value, ">= 0")
-        if value > 0.0:  # files with an unknown limit contain 0
-            found[entry] = value
-    return found
+    place, element = list(urdf_tree.UNITS).index(urdf_tree.KINDS[joint.kind]), joint.element.find("dynamics")
+    found = {}
+    for key, entry in (("effort", "effort_limit"), ("velocity", "speed_limit")):
+        found[entry] = urdf_tree.drive_limit_of(joint, key)
+    for key, entry, units in (("damping", "viscous", ("N·m·s/rad", "N·s/m")), ("friction", "coulomb", ("N·m", "N"))):
+        where = f"joint {joint.name}"
+        found[entry] = float(urdf_tree.numbers_of(where, element, key, (0.0,), units[place])[0])
+        if found[entry] < 0.0:
+            raise ParameterError(f"{key} of {where}", found[entry], ">= 0")
+    # Files with an unknown limit contain 0 or a huge number.
+    return {entry: value for entry, value in found.items() if 0.0 < value < math.inf}
 
 
 def _bodies(

@@ -9,19 +9,25 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from xml.etree import ElementTree as Xml
+from xml.parsers import expat
 
 import numpy as np
 
 from teleop_core.base import ParameterError, UnknownNameError, damage_told
-from teleop_core.base.ranges import MOST_OF_ARM, RANGES, check
-from teleop_core.kernels import Array, length, product, rotation, transform
+from teleop_core.base.ranges import MOST_OF_ARM, RANGES, check, range_of
+from teleop_core.kernels import Array, length, product, rotation, rotations_from_quaternions, transform
 
 KINDS = {"revolute": "turn", "continuous": "turn", "prismatic": "slide"}
 """Motion of each movable type of joint."""
 UNITS = {"turn": "rad", "slide": "m"}
 """Unit of the coordinate of such a joint."""
 _READ = ("link", "joint", "inertial")  # elements in which an unexpanded macro must be reported
-_XACRO = "{http://www.ros.org/wiki/xacro}"
+_XACRO = "http://www.ros.org/wiki/xacro"
+_IGNORED = "ignored_quat_xyzw"  # attribute to which that of a file is renamed whose version does not know it
+_UNIT_LENGTH = 0.01  # largest difference of the length of a quaternion from 1, because files have few digits
+_ANY = "any size"  # unit of numbers that may be infinite
+DRIVE_UNITS = {"effort": {"turn": "N·m", "slide": "N"}, "velocity": {"turn": "rad/s", "slide": "m/s"}}
+"""Units of the attributes of a limit that concern the drive."""
 Links = Mapping[str, Xml.Element]
 ASSUMED = {"turn": 2.0 * math.pi, "slide": RANGES["m"].usual}
 """Assumed limit [rad, m] in both directions for a joint without limits."""
@@ -40,14 +46,6 @@ class UrdfJoint:
     element: Xml.Element
 
 
-class _NoDoctype(Xml.TreeBuilder):
-    """Builder of XML trees that refuses a document type, so that no entity can expand."""
-
-    def doctype(self, name: str, pubid: str | None, system: str | None) -> None:
-        """Refuse the declaration before anything it declares is used."""
-        raise ParameterError("<!DOCTYPE>", name, "left out: a URDF declares no entities")
-
-
 def root_of(path: Path, data: bytes) -> Xml.Element:
     """Root of a URDF.
 
@@ -64,23 +62,43 @@ def root_of(path: Path, data: bytes) -> Xml.Element:
     if root.tag != "robot":
         raise ParameterError(str(path), f"<{root.tag}>", "a <robot>")
     elements = (*root, *(inner for kind in _READ for element in root.iter(kind) for inner in element))
-    if macros := [element.tag for element in elements if element.tag.startswith(_XACRO)]:
-        found = f"<xacro:{macros[0].removeprefix(_XACRO)}>"
-        raise ParameterError(str(path), found, "without macros; call it .xacro to have it expanded")
+    named = {name.removeprefix("xmlns:") for name, value in root.attrib.items() if value == _XACRO} | {"xacro"}
+    if macros := [element.tag for element in elements if element.tag.partition(":")[0] in named]:
+        raise ParameterError(str(path), f"<{macros[0]}>", "without macros; call it .xacro to have it expanded")
+    if root.get("version", "1.0").strip() in {"1", "1.0"}:
+        for origin in root.iter("origin"):
+            if (quaternion := origin.attrib.pop("quat_xyzw", None)) is not None:
+                origin.set(_IGNORED, quaternion)
     return root
+
+
+def has_ignored_quaternion(element: Xml.Element) -> bool:
+    """Whether an element has an origin with ``quat_xyzw``, which only files of version 1.1 and later may have."""
+    return any(origin.get(_IGNORED) is not None for origin in element.iter("origin"))
 
 
 def tree_of(data: bytes) -> Xml.Element:
-    """Root of an XML file.
+    """Root of an XML file, with the names of its tags as they are written.
+
+    Namespaces are not resolved, as in the reader of ROS: extensions for simulators use prefixes that no file declares.
 
     Raises:
         ParseError: ``data`` is not XML.
-        ParameterError: ``data`` declares a document type.
+        ParameterError: ``data`` declares a document type; it is refused, so that no entity can expand.
     """
-    builder = Xml.XMLParser(target=_NoDoctype())
-    builder.feed(data)
-    root: Xml.Element = builder.close()
-    return root
+    builder, parser = Xml.TreeBuilder(), expat.ParserCreate()
+    parser.StartElementHandler, parser.EndElementHandler = builder.start, builder.end
+    parser.CharacterDataHandler, parser.StartDoctypeDeclHandler = builder.data, _refuse_doctype
+    try:
+        parser.Parse(data, True)
+    except expat.ExpatError as error:
+        raise Xml.ParseError(str(error)) from error
+    return builder.close()
+
+
+def _refuse_doctype(name: str, *_: object) -> None:
+    """Refuse a document type before anything it declares is used."""
+    raise ParameterError("<!DOCTYPE>", name, "left out: a URDF declares no entities")
 
 
 def elements_of(root: Xml.Element, tag: str) -> dict[str, Xml.Element]:
@@ -208,10 +226,26 @@ def soft_limits_of(joint: UrdfJoint) -> tuple[float, float] | None:
 
 def ends_of(joint: UrdfJoint, tag: str, lower: str, upper: str) -> tuple[float, float]:
     """Two coordinates [rad, m] from the attributes of a joint's element; 0 for a missing attribute."""
-    where, unit = f"joint {joint.name}", UNITS[KINDS[joint.kind]]
     element = joint.element.find(tag)
-    first, second = (float(numbers_of(where, element, k, (0.0,), unit)[0]) for k in (lower, upper))
+    first, second = (float(numbers_of(f"joint {joint.name}", element, k, (0.0,), _ANY)[0]) for k in (lower, upper))
     return first, second
+
+
+def drive_limit_of(joint: UrdfJoint, key: str) -> float:
+    """Effort or speed limit of a joint from its element ``limit``; infinite if it is larger than that of any drive.
+
+    Args:
+        joint: The joint.
+        key: ``effort`` [N·m, N] or ``velocity`` [rad/s, m/s]; 0 if the file does not contain it.
+
+    Raises:
+        ParameterError: The limit is not a number, or negative.
+    """
+    where, unit = f"joint {joint.name}", DRIVE_UNITS[key][KINDS[joint.kind]]
+    value = float(numbers_of(where, joint.element.find("limit"), key, (0.0,), _ANY)[0])
+    if value < 0.0:
+        raise ParameterError(f"{key} of {where}", value, ">= 0")
+    return value if value <= range_of(unit).most else math.inf
 
 
 def turn_of_z(axis: Array) -> tuple[float, Array]:
@@ -230,13 +264,26 @@ def _turned_z(axis: Array) -> Array:
 def origin_of(where: str, element: Xml.Element) -> Array:
     """Transform (4, 4) of the origin of an element; ``where`` is the name of the element in an error message."""
     found = element.find("origin")
-    roll, pitch, yaw = numbers_of(where, found, "rpy", (0.0, 0.0, 0.0), "rad").tolist()
-    turn = product(product(rotation("z", yaw), rotation("y", pitch)), rotation("x", roll))
+    turn = _turn_of(where, found)
     place = numbers_of(where, found, "xyz", (0.0, 0.0, 0.0), "m")
     if max(map(abs, place.tolist())) > MOST_OF_ARM:
         needed = f"within {MOST_OF_ARM:g} m in each direction; put the arm near its root"
         raise ParameterError(f"origin of {where}", place.tolist(), needed)
     return transform(turn, place)
+
+
+def _turn_of(where: str, origin: Xml.Element | None) -> Array:
+    """Rotation (3, 3) of an origin, from its ``rpy`` or its ``quat_xyzw``."""
+    roll, pitch, yaw = numbers_of(where, origin, "rpy", (0.0, 0.0, 0.0), "rad").tolist()
+    if origin is None or origin.get("quat_xyzw") is None:
+        return product(product(rotation("z", yaw), rotation("y", pitch)), rotation("x", roll))
+    if origin.get("rpy") is not None:
+        raise ParameterError(f"quat_xyzw of {where}", origin.get("quat_xyzw"), "the only rotation; it has rpy too")
+    quaternion = numbers_of(where, origin, "quat_xyzw", (0.0, 0.0, 0.0, 1.0))
+    size = float(length(quaternion))
+    if abs(size - 1.0) > _UNIT_LENGTH:
+        raise ParameterError(f"quat_xyzw of {where}", origin.get("quat_xyzw"), "a quaternion x y z w of length 1")
+    return rotations_from_quaternions(quaternion[[3, 0, 1, 2]] / size)
 
 
 def numbers_of(where: str, element: Xml.Element | None, key: str, default: tuple[float, ...], unit: str = "") -> Array:
@@ -256,10 +303,11 @@ def numbers_of(where: str, element: Xml.Element | None, key: str, default: tuple
     if text is None:
         return np.array(default)
     found = np.array([_number(word) for word in text.split()])
-    if len(found) != len(default) or not np.isfinite(found).all():
+    is_number = ~np.isnan(found) if unit == _ANY else np.isfinite(found)
+    if len(found) != len(default) or not is_number.all():
         wanted = f"{len(default)} finite numbers" if len(default) > 1 else "a finite number"
         raise ParameterError(f"{key} of {where}", text, wanted)
-    for value in found.tolist():
+    for value in found.tolist() if unit != _ANY else ():
         check(f"{key} of {where}", value, unit)
     return found
 

@@ -21,6 +21,7 @@ _SHAPES: dict[VisualKind, tuple[tuple[str, tuple[float, ...]], ...]] = {
     "mesh": (("scale", (1.0, 1.0, 1.0)),),
     "box": (("size", (0.0, 0.0, 0.0)),),
     "cylinder": (("radius", (0.0,)), ("length", (0.0,))),
+    "capsule": (("radius", (0.0,)), ("length", (0.0,))),
     "sphere": (("radius", (0.0,)),),
 }
 """Attributes in the URDF of each kind of shape [m], in the order of the sizes of :class:`Visual`."""
@@ -114,8 +115,8 @@ def _above(folder: Path) -> list[Path]:
 
 def visuals_of(
     home: Mapping[str, float], links: Links, by_child: Mapping[str, UrdfJoint], urdf: Path
-) -> Iterator[Visual]:
-    """Shapes of all links, in the order of the file.
+) -> tuple[tuple[Visual, ...], list[str]]:
+    """Shapes of all links, in the order of the file, and a note on each visual that cannot be drawn.
 
     Args:
         home: Coordinate at home of each moving joint on the path to the tip [rad, m], by joint name; all other joints
@@ -123,10 +124,8 @@ def visuals_of(
         links: Elements of the links by their names.
         by_child: The joint that carries each link.
         urdf: Path of the URDF.
-
-    Raises:
-        ParameterError: A position or a size is not a number.
     """
+    found, notes = list[Visual](), list[str]()
     for link, element in links.items():
         T, moved = np.eye(4), 0
         shapes = element.findall("visual")
@@ -135,15 +134,38 @@ def visuals_of(
             if joint.name in home and joint.axis is not None:
                 T, moved = product(T, _motion(joint, home[joint.name])), moved + 1
         for shape in shapes:
-            place, where = product(T, origin_of(f"visual of link {link}", shape)), f"link {link}"
-            for kind, keys in _SHAPES.items():
-                found = shape.find(f"geometry/{kind}")
-                if found is not None:
-                    unit = "" if kind == "mesh" else "m"
-                    sizes = (numbers_of(where, found, key, one, unit) for key, one in keys)
-                    size = [float(x) for each in sizes for x in each]
-                    file = found.get("filename", "")
-                    yield Visual(link, moved, place, kind, tuple(size), file, urdf)
+            try:
+                kind, size, file = _shape(f"link {link}", shape)
+                place = product(T, origin_of(f"visual of link {link}", shape))
+            except ParameterError as error:  # no picture is worth an arm
+                notes.append(f"link {link} is drawn without: {error}")
+            else:
+                found.append(Visual(link, moved, place, kind, size, file, urdf))
+    return tuple(found), notes
+
+
+def _shape(where: str, visual: Xml.Element) -> tuple[VisualKind, tuple[float, ...], str]:
+    """Kind, sizes and mesh file of a visual.
+
+    Raises:
+        ParameterError: The shape is unknown, or a size is not a number.
+    """
+    for kind, keys in _SHAPES.items():
+        if (shape := visual.find(f"geometry/{kind}")) is not None:
+            return kind, _sizes(where, shape, kind, keys), shape.get("filename", "")
+    inner = [element.tag for geometry in visual.findall("geometry") for element in geometry]
+    raise ParameterError(f"geometry of {where}", ", ".join(inner) or "missing", f"one of {', '.join(_SHAPES)}")
+
+
+def _sizes(
+    where: str, shape: Xml.Element, kind: VisualKind, keys: tuple[tuple[str, tuple[float, ...]], ...]
+) -> tuple[float, ...]:
+    """Sizes of a shape; a single scale factor of a mesh applies to all three axes."""
+    if kind == "mesh" and len(shape.get("scale", "").split()) == 1:
+        return (float(numbers_of(where, shape, "scale", (1.0,))[0]),) * 3
+    unit = "" if kind == "mesh" else "m"
+    sizes = (numbers_of(where, shape, key, default, unit) for key, default in keys)
+    return tuple(float(number) for size in sizes for number in size)
 
 
 def _motion(joint: UrdfJoint, value: float) -> Array:
