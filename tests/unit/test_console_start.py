@@ -217,7 +217,7 @@ def test_several_recordings_are_compared_and_one_is_exported_beside_itself(tmp_p
     for name in ("a", "b"):
         shutil.copytree(EXAMPLE, tmp_path / name)
     recordings, (a, b) = Recordings(tmp_path), (str(tmp_path / "a"), str(tmp_path / "b"))
-    assert recordings.words("score", ["a", "b"]) == ["evaluate", a, b]
+    assert recordings.words("score", ["a", "b"]) == ["evaluate", a, b, "--differences"]
     assert recordings.words("export", ["a"]) == ["export", a, "--out", f"{a}.csv"]
 
 

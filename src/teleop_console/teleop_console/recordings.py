@@ -91,7 +91,8 @@ class Recordings:
         out = ["--out", f"{paths[0]}.csv"] if kind == "export" else []
         if out and Path(out[1]).is_symlink():
             raise ParameterError("export", out[1], "no symbolic link: remove it, or export with `teleop export`")
-        return [_KIND[kind], *(paths[:1] if kind == "export" else paths), *out]
+        more = ["--differences"] if kind == "score" and len(paths) > 1 else out
+        return [_KIND[kind], *(paths[:1] if kind == "export" else paths), *more]
 
     def run(self, kind: str, names: Sequence[str]) -> str:
         """Run the command of :meth:`words` at low priority, and return its output."""

@@ -7,7 +7,7 @@
   page.hidden = true;
   page.innerHTML = `
     <h1>Teleoperation console</h1>
-    <p class="t-watch" role="status"></p>
+    <p class="t-watch" role="status"></p><p class="t-loads" role="status">Loading the form …</p>
     <section aria-labelledby="t-choose"><h2 id="t-choose">New session</h2><div class="t-fields"></div></section>
     <section aria-labelledby="t-recorded"><h2 id="t-recorded">Recordings</h2>
       <p class="t-muted t-none"></p><ul class="t-list"></ul>
@@ -84,6 +84,7 @@
   function show(told) {
     if (!chosen || !drives) chosen = told.chosen; // words count only from the page that drives
     if (document.activeElement !== tip?.input && tip) tip.input.value = chosen.tip || '';
+    one('.t-loads').hidden = true;
     for (const given of told.fields) {
       const { name, options } = given, known = fields[name] || field(given), said = JSON.stringify(options);
       if (known.known !== said) {

@@ -196,6 +196,9 @@ def _add_evaluate(commands: Any) -> None:
     score.add_argument("--json", type=Path, metavar="FILE", help="write the scores as JSON")
     score.add_argument("--html", type=Path, metavar="FILE", help="write one page with plots")
     score.add_argument(
+        "--differences", action="store_true", help="show only rows that differ between recordings, largest change first"
+    )
+    score.add_argument(
         "--span",
         type=float,
         nargs=2,
@@ -299,7 +302,7 @@ def _evaluate(arguments: argparse.Namespace) -> int:
     from teleop_core.evaluation.command import evaluate_bags
 
     span = tuple(arguments.span) if arguments.span else None
-    evaluate_bags(arguments.bags, arguments.json, arguments.html, Console(), span)
+    evaluate_bags(arguments.bags, arguments.json, arguments.html, Console(), span, differences=arguments.differences)
     return 0
 
 
