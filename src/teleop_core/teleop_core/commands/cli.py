@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from teleop_core.base import SessionError, TeleopError, TeleopWarning, one_line
-from teleop_core.commands import compiling, devices, installed, operate
+from teleop_core.commands import compiling, devices, installed, look, operate
 from teleop_core.commands.arguments import (
     command,
     configured,
@@ -139,7 +139,7 @@ def _core() -> tuple[argparse.ArgumentParser, Any]:
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     for add in (_add_sim, _add_live, _add_replay, _add_play, _add_evaluate, _add_lookups):
         add(commands)
-    for module in (operate, devices, compiling):
+    for module in (operate, look, devices, compiling):
         module.add(commands)
     return parser, commands
 
