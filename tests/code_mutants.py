@@ -636,6 +636,8 @@ CODE_MUTANTS = (
     _mutant("xacro_quotes", "an error of a xacro quotes a file that it loads", "robots/files/xacro_process.py",
             'raise ParameterError("load_yaml", name, f"a file of YAML{line}") from None', "raise",
             "xacro_files"),
+    _mutant("order_undoubted", "a wrong order of a quaternion is not noticed", "teleop_exchange/orientation.py",
+            "if self.kind != \"quaternion\" or as_read > _OVER or other < _UPRIGHT:", "if True:", "import_given"),
     _mutant("goal_unframed", "the view of the work leaves a goal far away out", "teleop_console/arm_nodes.py",
             "            points.append(np.asarray(self._goal.position))\n", "            pass\n", "console_scene"),
     _mutant("ghost_still", "the ghost of the commanded posture stands still", "teleop_console/arm_nodes.py",

@@ -39,6 +39,7 @@ class Gathered:
         bad_rows: Number of damaged rows that the source left out.
         strange: Number of orientations that are not valid rotations.
         order: Indices of the rows in the order of recording (N,); None if this is the order of the file.
+        doubt: Text if another order of a quaternion's columns is more plausible; empty otherwise.
     """
 
     rows: Array
@@ -50,6 +51,7 @@ class Gathered:
     bad_rows: int
     strange: int
     order: NDArray[np.int32] | None = None
+    doubt: str = ""
 
 
 @dataclass(eq=False)
@@ -102,7 +104,9 @@ def gather(source: Source, options: ImportOptions) -> Gathered:
     buttons = np.concatenate(parts.buttons) if parts.buttons else None
     strange = source.attitudes.strange
     rows = np.concatenate(parts.rows)
-    return Gathered(rows, stamps, usable, buttons, presses, told, source.bad_rows, strange, order)
+    return Gathered(
+        rows, stamps, usable, buttons, presses, told, source.bad_rows, strange, order, source.attitudes.doubt
+    )
 
 
 def _recorded_order(logs: list[Stamps]) -> NDArray[np.int32] | None:

@@ -56,6 +56,7 @@ class Motion:
         counts: Counts of the rows.
         told: Texts about what was used, guessed and changed.
         strange: Number of rows that were left out because their orientation is invalid.
+        doubt: Text if another order of a quaternion's columns is more plausible; empty otherwise.
         gaps: Begin and length [s] of each gap, the longest first.
 
     Raises:
@@ -67,7 +68,7 @@ class Motion:
     def __init__(self, path: Path, options: ImportOptions) -> None:
         gathered = gathering.gather(open_source(path, options), options)
         self._path, self._gathered, self._options = path, gathered, options
-        self.told, self.strange = list(gathered.told), gathered.strange
+        self.told, self.strange, self.doubt = list(gathered.told), gathered.strange, gathered.doubt
         usable: NDArray[np.integer] = np.flatnonzero(gathered.is_usable)
         if gathered.order is not None:
             usable = gathered.order[gathered.is_usable[gathered.order]]

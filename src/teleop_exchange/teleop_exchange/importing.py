@@ -63,7 +63,9 @@ def import_recording(
     first_ns = min(int(motion.stamp_ns[0]) for motion in motions.values())
     for motion in motions.values():
         motion.begin(first_ns)
-    found = [summary(path.name, out, motion, arm) for arm, motion in motions.items()]
+    found = [
+        summary(path.name, out, motion, arm, shlex.join(wanted[arm].as_arguments())) for arm, motion in motions.items()
+    ]
     report = replace(found[0], others=tuple(found[1:]))
     write(motions, out, _about(path, out, wanted, report))
     return report
