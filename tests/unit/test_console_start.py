@@ -11,7 +11,6 @@ from pathlib import Path
 import pytest
 
 from patience import wait_until
-from present import present
 from teleop_console.drivers import Drivers
 from teleop_console.recordings import Recordings
 from teleop_console.start import StartPage, Wish
@@ -134,7 +133,7 @@ def test_form_reads_no_file_outside_of_its_folders_before_start(
     with opened(tmp_path / "bags") as (start, _):
         _, told = start.answer("/start", asked, page)
         if page != DRIVES:
-            assert present(told)["chosen"] == {"operator": "remote"}
+            assert "'chosen': {'operator': 'remote'}" in str(told)
             assert start.answer("/begin", asked, page)[0] == HTTPStatus.CONFLICT
     watches.clear()
     assert SECRET not in str(told)

@@ -65,8 +65,10 @@ def test_hand_that_turns_faster_than_a_wrist_can_is_told(tmp_path: Path) -> None
 
 def test_options_that_were_given_stand_in_the_report(tmp_path: Path) -> None:
     path = file_of(tmp_path / "hand.txt", turns(0.3))
-    options = {"rate": RATE, "axes": ("+y", "-x", "+z"), "scale": 2.0, "unit": "cm", "center": "mean", "gap": 9.0}
-    text = str(teleop_exchange.import_recording(path, tmp_path / "out", **options))
+    report = teleop_exchange.import_recording(
+        path, tmp_path / "out", rate=RATE, axes=("+y", "-x", "+z"), scale=2.0, unit="cm", center="mean", gap=9.0
+    )
+    text = str(report)
     (given,) = [line for line in text.splitlines() if line.startswith("given")]
     for words in ("--rate 100.0", "--axes +y -x +z", "--scale 2.0", "--unit cm", "--center mean", "--gap 9.0"):
         assert words in given

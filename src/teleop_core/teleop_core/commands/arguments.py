@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from teleop_core.session.configuration import Configuration
 
 
-def geometry_argument(parser: argparse.ArgumentParser, action: type[argparse.Action] | None = None) -> None:
+def geometry_argument(parser: argparse.ArgumentParser, action: str | type[argparse.Action] = "store") -> None:
     """Add an argument to a command: lengths that replace the published lengths of the robot."""
     parser.add_argument(
         "--geometry",
@@ -20,7 +20,7 @@ def geometry_argument(parser: argparse.ArgumentParser, action: type[argparse.Act
         default=[],
         metavar="SYMBOL=VALUE",
         help="lengths and options that replace the published ones [m, rad], such as tip=tool0 of a URDF",
-        **({} if action is None else {"action": action}),
+        action=action,
     )
 
 
