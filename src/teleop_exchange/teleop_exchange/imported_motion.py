@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from teleop_core.base import RecordingError, damage_told
+from teleop_core.base import ParameterError, RecordingError, damage_told
 from teleop_core.kernels import geometry, product
 from teleop_exchange import gathering, source, times
 from teleop_exchange.options import ImportOptions
@@ -175,6 +175,11 @@ class Motion:
         # A rotation in the file about an axis is the opposite rotation about the mirrored axis.
         return np.column_stack((quaternions[:, 0], -product(quaternions[:, 1:], axes.T)))
 
+    def closings(self) -> tuple[times.Stamps, geometry.Array] | None:
+        """Stamps (n,) [ns] and how far the jaw is closed (n, 1), 0 to 1; None without such a column."""
+        closing = self._gathered.closing
+        return None if closing is None else (self.stamp_ns, closing[self._rows, None])
+
     def presses(self) -> tuple[times.Stamps, NDArray[np.uint8]] | None:
         """Stamps (n,) [ns] and buttons (n, 3) at the first sample and at each change; None without buttons."""
         g = self._gathered
@@ -212,6 +217,8 @@ def open_source(path: Path, options: ImportOptions) -> source.Source:
     if not path.exists():
         raise RecordingError(path, "does not exist")
     if is_bag(path):
+        if options.jaw:
+            raise ParameterError("--jaw", options.jaw, "left out for a recording of ROS: only a table has columns")
         from teleop_exchange.bag_source import BagSource
 
         return BagSource(path, options)

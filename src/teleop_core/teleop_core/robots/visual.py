@@ -25,8 +25,8 @@ class Visual:
         file: Name of the mesh as written in the URDF; empty for other kinds.
         urdf: Path of the URDF.
         color: Colour of the material; None if the file states none.
-        travel: Poses (K, 4, 4) of the shape in the base [m], from the closed to the open jaw, with the arm at home; None
-            for a shape that the jaw does not move.
+        travel: Poses (K, 4, 4) of the shape in the base [m], from the closed to the open jaw, with the arm at home.
+            None for a shape that the jaw does not move.
     """
 
     link: str
