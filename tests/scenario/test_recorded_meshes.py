@@ -130,7 +130,7 @@ def test_two_arms_with_the_same_meshes_keep_them_once_and_each_is_drawn_with_its
         looks = drawn(present(recording.path))
         one.rename(one.with_suffix(".moved"))
         assert_same_looks(drawn(present(recording.path)), looks)
-        assert np.abs(looks[1][1][0] / looks[0][1][0]).max() == pytest.approx(distinct / 4)
+        assert np.abs(looks[1][1][0].mesh[0] / looks[0][1][0].mesh[0]).max() == pytest.approx(distinct / 4)
 
 
 def test_a_mesh_that_is_touched_is_kept_before_those_that_are_only_looked_at(
