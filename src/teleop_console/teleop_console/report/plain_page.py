@@ -55,6 +55,7 @@ class Figures:
 
         self.count += 1
         name, made = f"figure-{self.count}", plots.Figure(traces, layout).to_plotly_json()
+        made["layout"].setdefault("margin", {"t": 20, "b": 50, "l": 70, "r": 20})
         told = json.dumps(made, cls=_encoder()).replace("</", "<\\/")
         height = made["layout"].get("height", 340)
         head = f"<figcaption>{escape(caption)}</figcaption>" if caption else ""
