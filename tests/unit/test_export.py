@@ -273,9 +273,10 @@ def test_goal_and_object_are_the_state_of_the_environment_if_every_recording_has
         found = vectors(frames_of(folder)[key])
         assert found.shape[1] == len(info["features"][key]["names"]) >= 7
         stream = recording[topic]
-        last = [stream.values[-1, list(stream.columns).index(name.removeprefix("object."))] for name in names]
+        at = [list(stream.columns).index(name.removeprefix("object.")) for name in names]
+        last = stream.values[-1, at]
         assert np.abs(last).max() > 1e-3
-        assert np.allclose(found[-1, :3], np.float32(last))
+        assert np.allclose(found[-1, :3], last.astype(np.float32))
     for recordings in (session, [picked, session]):
         folder = tmp_path / f"without_{isinstance(recordings, list)}"
         teleop_exchange.export_recording(recordings, folder, "lerobot")

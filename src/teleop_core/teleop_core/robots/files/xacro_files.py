@@ -1,7 +1,7 @@
 """Xacro: a macro file of an arm, expanded to its URDF by the package ``xacro`` in a process apart.
 
 Expanding evaluates the expressions of the file and of all that it includes: a xacro is a program (docs/security.md).
-An expression may compute for ever or fill the memory, and it would hold the interpreter of every other thread. So a
+An expression may compute without end or fill the memory, and it would hold the interpreter of every other thread. So a
 process with limits of time and memory expands it (:mod:`teleop_core.robots.files.xacro_process`).
 """
 
