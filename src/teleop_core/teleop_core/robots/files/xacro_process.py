@@ -97,6 +97,7 @@ def _adapt(path: Path) -> None:
             raise ParameterError("load_yaml", name, f"a file of YAML{line}") from None
 
     xacro.parse, xacro.load_yaml = parse, load_yaml
+    xacro._global_symbols = xacro.create_global_symbols()  # expressions find functions here
     substitution_args._eval_find = substitution_args._eval_dict["find"] = find
 
 
