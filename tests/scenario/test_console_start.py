@@ -104,6 +104,58 @@ def pick(tab: Any, label: str, word: str) -> None:
     }})()""")
 
 
+AT_CONNECTION = """Object.defineProperty(window, 'teleopPage', { configurable: true,
+    get() { return this.t_page; },
+    set(name) { this.t_page = name; window.t_loads ??= document.querySelector('#t-starting').innerText; } })"""
+
+
+@browser
+def test_tab_has_the_name_of_the_console_and_an_empty_scene_is_never_bare(tab: Any) -> None:
+    with ConsoleServer(0) as server:
+        script = tab.call("Page.addScriptToEvaluateOnNewDocument", source=AT_CONNECTION)
+        tab.visit(server.url)
+        tab.until("window.t_loads !== undefined")
+        tab.call("Page.removeScriptToEvaluateOnNewDocument", identifier=script["identifier"])
+        assert "loading the scene" in tab.value("window.t_loads")
+        tab.until("document.querySelector('#t-starting').hidden")
+        assert tab.value("document.title") == "Teleoperation console"
+        tab.until("!document.body.innerText.includes('Software WebGL')")
+
+
+@browser
+@pytest.mark.usefixtures("_run_1")
+def test_form_says_that_it_loads_until_it_has_its_words(tab: Any) -> None:
+    with chosen([], 1) as server:
+        tab.call("Network.setBlockedURLs", urls=["*/start?*"])
+        tab.visit(server.url)
+        tab.shows("Loading the form")
+        assert tab.value("getComputedStyle(document.querySelector('#t-begin')).visibility") == "hidden"
+        tab.call("Network.setBlockedURLs", urls=[])
+        tab.until(READY)
+        tab.until("document.querySelector('.t-loads').hidden")
+        assert tab.value("getComputedStyle(document.querySelector('#t-begin')).visibility") == "visible"
+
+
+@browser
+@pytest.mark.usefixtures("_run_1")
+def test_next_robot_of_the_form_does_not_keep_the_tip_of_a_urdf(tab: Any) -> None:
+    Path("robots").mkdir()
+    shutil.copy(URDF, "robots/arm.urdf")
+    wishes = list[Wish]()
+    with chosen(wishes, 2) as server:
+        server.answers.start._last = {"operator": "remote", "robot": "robots/arm.urdf", "tip": "tool0"}
+        tab.visit(server.url)
+        tab.until(f"{READY} && document.querySelector('#t-tips option')")
+        tab.shows("tip=tool0")
+        pick(tab, "Robot", "rcrt1")
+        tab.until(READY)
+        tab.until("!document.body.innerText.includes('tip=tool0')")
+        assert tab.value("[...document.querySelectorAll('[name=robot] option')].every((e) => !e.disabled)")
+        tab.click("Start")
+        until(lambda: wishes, "it is begun")
+    assert wishes[0].chosen == {"operator": "remote", "robot": "rcrt1"}
+
+
 @browser
 @pytest.mark.slow
 @pytest.mark.parametrize("size", [(1400, 900), (390, 844)])

@@ -11,14 +11,12 @@ from typing import Any
 import numpy as np
 import pytest
 import trimesh
-from numpy.typing import NDArray
 
 import teleop_core as tc
 from present import present
 from teleop_console.recorded_arms import configuration_of, recorded_arms
 from teleop_core.bags import kept_files, reader
-from teleop_core.kernels.geometry import Array
-from teleop_core.robots.bodies.looks import looks_of
+from teleop_core.robots.bodies.looks import Look, looks_of
 
 URDF = (Path(__file__).parents[2] / "examples" / "any_arm.urdf").read_text()
 LINKS = ("column", "upper_arm", "forearm", "wrist_1")
@@ -48,19 +46,22 @@ def recorded(folder: Path, path: Path, **more: list[str] | Mapping[str, str | li
     return tc.run("coarse_box", out=folder / "bag", **options)
 
 
-def drawn(path: Path) -> list[dict[int, tuple[Array, NDArray[np.int64]]]]:
+def drawn(path: Path) -> list[dict[int, tuple[Look, ...]]]:
     """Looks of each arm as the page of a recording draws them."""
     bag = reader.Bag(path)
     arms, _ = recorded_arms(bag, configuration_of(bag))
     return [looks_of(one.arm.robot) for one in arms]
 
 
-def assert_same_looks(
-    found: list[dict[int, tuple[Array, NDArray[np.int64]]]], expected: list[dict[int, tuple[Array, NDArray[np.int64]]]]
-) -> None:
+def assert_same_looks(found: list[dict[int, tuple[Look, ...]]], expected: list[dict[int, tuple[Look, ...]]]) -> None:
     assert [list(looks) for looks in found] == [list(looks) for looks in expected]
     for one, other in zip(found, expected, strict=True):
-        for (vertices, faces), (points, corners) in zip(one.values(), other.values(), strict=True):
+        pairs = [
+            (a.mesh, b.mesh)
+            for own, theirs in zip(one.values(), other.values(), strict=True)
+            for a, b in zip(own, theirs, strict=True)
+        ]
+        for (vertices, faces), (points, corners) in pairs:
             np.testing.assert_array_equal(vertices, points)
             np.testing.assert_array_equal(faces, corners)
 
@@ -129,7 +130,7 @@ def test_two_arms_with_the_same_meshes_keep_them_once_and_each_is_drawn_with_its
         looks = drawn(present(recording.path))
         one.rename(one.with_suffix(".moved"))
         assert_same_looks(drawn(present(recording.path)), looks)
-        assert np.abs(looks[1][1][0] / looks[0][1][0]).max() == pytest.approx(distinct / 4)
+        assert np.abs(looks[1][1][0].mesh[0] / looks[0][1][0].mesh[0]).max() == pytest.approx(distinct / 4)
 
 
 def test_a_mesh_that_is_touched_is_kept_before_those_that_are_only_looked_at(

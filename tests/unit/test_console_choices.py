@@ -1,6 +1,7 @@
 """Choices: what the start page offers is what a session takes, as does the command it shows."""
 
 import math
+import os
 import shlex
 from dataclasses import replace
 from pathlib import Path
@@ -86,6 +87,19 @@ def test_robot_that_cannot_be_loaded_is_refused_before_anything_starts() -> None
     assert choices.refusal({**urdf, "robot": "nowhere.urdf"})
 
 
+def test_tip_of_a_urdf_does_not_hinder_the_next_robot() -> None:
+    chosen = {"operator": "remote", "robot": "rcrt1", "tip": "tool0"}
+    assert not choices.refusal(chosen)
+    assert "tool0" not in choices.command_line(chosen)
+    field = next(field for field in FIELDS if field.name == "robot")
+    assert not any(option.reason for option in choices.options(field, chosen))
+
+
+def test_pipe_is_refused_and_not_read(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "arm.urdf")
+    assert "a file or a folder" in choices.refusal({"operator": "remote", "robot": str(tmp_path / "arm.urdf")})
+
+
 def test_choice_that_is_wrong_as_a_whole_greys_nothing_so_that_one_finds_out_of_it() -> None:
     wrong = {"scenario": "coarse_box", "operator": "points"}
     assert choices.refusal(wrong)
@@ -99,7 +113,17 @@ def test_what_was_not_tried_in_time_is_told_as_not_known() -> None:
     assert [option.reason for option in found] == [None, None]
 
 
-@pytest.mark.parametrize("words", [{"shell": "x"}, {"robot": "a\nb"}, {"robot": "x" * 501}])
+@pytest.mark.parametrize(
+    "words",
+    [
+        {"shell": "x"},
+        {"robot": "a\nb"},
+        {"robot": "x" * 501},
+        {"robot": "/etc/passwd"},
+        {"plant": "[ideal, file=x]"},
+        {"robot": "a.urdf", "tip": "x, drives=y.yaml"},
+    ],
+)
 def test_words_of_no_field_and_unprintable_or_long_ones_are_refused(words: Chosen) -> None:
     with pytest.raises(ParameterError):
         choices.checked(words)

@@ -577,3 +577,15 @@ class Viewer:
         nowhere = np.zeros(3)
         self.camera = SimpleNamespace(aspect=1.2, position=nowhere, look_at=nowhere, up_direction=nowhere)
         self.atomic = nullcontext
+
+
+def test_fingers_of_a_urdf_open_with_the_jaw_and_no_others_are_added(server: Server, tmp_path: Path) -> None:
+    arm = Path(__file__).parents[2] / "examples" / "my_arm.urdf"
+    held = tc.run("pick", duration=1.0, robot=str(arm), geometry=["tip=tool0"])
+    scene, view = drawn(server, RecordedLink(held.bag), held.duration - 0.1)
+    nodes = scene.arms[""]
+    share = view.arms[""].streams["slave/jaw/measured_js"][0] / 0.8
+    assert 0.05 < share <= 1.0
+    for frame in (frame for _, frame in nodes.drawn._fingers):
+        assert abs(frame.position[1]) == pytest.approx(0.006 + 0.04 * share, abs=0.04 / 30)
+    assert not nodes.jaw.fingers

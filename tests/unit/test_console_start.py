@@ -1,6 +1,7 @@
 """Start page: who may begin, end and read what, and what becomes of it."""
 
 import shutil
+import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -100,6 +101,87 @@ def test_robot_that_is_dropped_can_be_chosen_and_replaces_no_other(
         wait_until(lambda: wishes, "it is begun", 60)
 
 
+SECRET = "hunter2"
+
+
+def evaluated(folder: Path) -> tuple[Path, Path]:
+    """A xacro outside of the console's folders whose error quotes a file, and that file."""
+    keys, xacro = folder / "keys.yaml", folder / "arm.xacro"
+    keys.write_text(f"{SECRET}: 1\n")
+    names = f"${{list(xacro.load_yaml('{keys}'))[0]}}"
+    xacro.write_text(f'<robot xmlns:xacro="http://www.ros.org/wiki/xacro"><link name="{names}"/></robot>')
+    return xacro, keys
+
+
+@pytest.mark.parametrize("page", [DRIVES, WATCHES, STRANGER])
+@pytest.mark.parametrize("field", ["robot", "followed", "tip"])
+def test_form_reads_no_file_outside_of_its_folders_before_start(
+    tmp_path: Path, field: str, page: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    xacro, keys = evaluated(tmp_path)
+    asked = {"robot": [str(xacro)]} if field == "robot" else {"operator": ["file"], "followed": [str(keys)]}
+    if field == "tip":  # a list of settings could name a file of drives
+        asked = {"robot": [str(xacro)], "tip": [f"tool0,drives={keys}"]}
+    read, watches = list[str](), [True]
+
+    def watch(event: str, given: tuple[object, ...]) -> None:  # such a hook stays until the process ends
+        if watches and event in {"open", "subprocess.Popen"}:
+            read.append(str(given[:2]))
+
+    sys.addaudithook(watch)
+    with opened(tmp_path / "bags") as (start, _):
+        _, told = start.answer("/start", asked, page)
+        if page != DRIVES:
+            assert "'chosen': {'operator': 'remote'}" in str(told)
+            assert start.answer("/begin", asked, page)[0] == HTTPStatus.CONFLICT
+    watches.clear()
+    assert SECRET not in str(told)
+    assert not [one for one in read if "arm.xacro" in one or "keys.yaml" in one]
+
+
+def test_only_the_terminal_tells_what_a_file_of_another_folder_contains(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    xacro, _ = evaluated(tmp_path)
+    with opened(tmp_path) as (start, wishes):
+        status, told = start.answer("/begin", {"operator": ["remote"], "robot": [str(xacro)]}, DRIVES)
+    assert status == HTTPStatus.CONFLICT
+    assert "the terminal of the console says why" in str(told)
+    assert str(xacro) in str(told)
+    assert "joint" in capsys.readouterr().out
+    assert wishes == [Wish({"operator": "remote"})]
+
+
+def test_symbolic_links_are_followed_neither_by_uploads_nor_in_recordings(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    elsewhere, bags = tmp_path / "elsewhere", tmp_path / "bags"
+    shutil.copytree(EXAMPLE, elsewhere / "run")
+    bags.mkdir()
+    (bags / "linked").symlink_to(elsewhere / "run")
+    shutil.copytree(EXAMPLE, bags / "inside")
+    data = next((bags / "inside").glob("*.mcap"))
+    data.unlink()
+    data.symlink_to(next((elsewhere / "run").glob("*.mcap")))
+    shutil.copytree(EXAMPLE, bags / "plain")
+    (bags / "plain.csv").symlink_to(elsewhere / "new.csv")
+    recordings = Recordings(bags)
+    assert [entry.name for entry in recordings.entries()] == ["plain"]
+    with pytest.raises(ParameterError, match="symbolic link"):
+        recordings.words("export", ["plain"])
+    Path("robots").mkdir()
+    Path("robots/arm.urdf").symlink_to(elsewhere / "arm.urdf")
+    with opened(bags) as (start, _):
+        sent = ("/robot", {"name": ["arm.urdf"]}, DRIVES, body(b"<robot/>"))
+        assert start.answer(*sent)[0] == HTTPStatus.CONFLICT
+        shutil.rmtree("robots")
+        Path("robots").symlink_to(elsewhere)
+        assert start.answer(*sent)[0] == HTTPStatus.CONFLICT
+    assert not (elsewhere / "arm.urdf").exists()
+
+
 @pytest.mark.parametrize("name", ["", "../arm.urdf", "/tmp/arm.urdf", ".urdf", "arm.py", "a/b.urdf"])
 def test_robot_goes_nowhere_but_into_its_folder_and_comes_from_the_driver_alone(
     tmp_path: Path, name: str, monkeypatch: pytest.MonkeyPatch
@@ -134,7 +216,7 @@ def test_several_recordings_are_compared_and_one_is_exported_beside_itself(tmp_p
     for name in ("a", "b"):
         shutil.copytree(EXAMPLE, tmp_path / name)
     recordings, (a, b) = Recordings(tmp_path), (str(tmp_path / "a"), str(tmp_path / "b"))
-    assert recordings.words("score", ["a", "b"]) == ["evaluate", a, b]
+    assert recordings.words("score", ["a", "b"]) == ["evaluate", a, b, "--differences"]
     assert recordings.words("export", ["a"]) == ["export", a, "--out", f"{a}.csv"]
 
 

@@ -10,6 +10,7 @@ import viser
 
 import teleop_core as tc
 from present import present
+from teleop_console.cameras import FIELD
 from teleop_console.hooks import Server
 from teleop_console.link import Arm, ArmView, View
 from teleop_console.scene import Scene
@@ -179,3 +180,14 @@ def test_unknown_axes_are_refused(hand: Hand) -> None:
 def test_a_pose_that_is_none_moves_nothing(hand: Hand) -> None:
     hand.see(np.full(7, np.nan))
     np.testing.assert_allclose(present(hand.gizmo).position, POSE[:3])
+
+
+@pytest.mark.parametrize("robot", ["rcrt1", "puma560"])
+def test_handles_grow_with_the_arm_so_that_a_large_view_shows_them_as_large(server: Server, robot: str) -> None:
+    server.scene.reset()
+    scene = Scene(server, [Arm("", tc.load_robot(robot))])
+    Stylus(server, scene, lambda _: True, lambda *_: None, lambda _: None)
+    gizmo: Any = server.scene.get_handle_by_name(f"{scene.masters['']}/grip")
+    camera = scene.work()
+    height = 900 * gizmo.scale / (2.0 * np.tan(0.5 * FIELD) * np.linalg.norm(camera.position - camera.look_at))
+    assert 60 < height < 400  # pixels on a screen of 900

@@ -257,6 +257,32 @@ def test_actions_may_be_poses_of_the_tip(session: tc.Recording, tmp_path: Path) 
     assert info["fps"] == 10
 
 
+def test_goal_and_object_are_the_state_of_the_environment_if_every_recording_has_them(
+    session: tc.Recording, tmp_path: Path
+) -> None:
+    key = "observation.environment_state"
+    picked, aimed = tc.run("pick", duration=3.0), tc.run("point", duration=3.0)
+    for recording, topic, names in (
+        (picked, "slave/jaw/object_cp", ["object.x", "object.y", "object.z"]),
+        (aimed, "task/state", ["goal_x", "goal_y", "goal_z"]),
+    ):
+        folder = tmp_path / names[0]
+        teleop_exchange.export_recording(recording, folder, "lerobot")
+        info = json.loads((folder / "meta/info.json").read_text())
+        assert info["features"][key]["names"][:3] == names
+        found = vectors(frames_of(folder)[key])
+        assert found.shape[1] == len(info["features"][key]["names"]) >= 7
+        stream = recording[topic]
+        at = [list(stream.columns).index(name.removeprefix("object.")) for name in names]
+        last = stream.values[-1, at]
+        assert np.abs(last).max() > 1e-3
+        assert np.allclose(found[-1, :3], last.astype(np.float32))
+    for recordings in (session, [picked, session]):
+        folder = tmp_path / f"without_{isinstance(recordings, list)}"
+        teleop_exchange.export_recording(recordings, folder, "lerobot")
+        assert key not in json.loads((folder / "meta/info.json").read_text())["features"]
+
+
 def test_recordings_of_other_arms_do_not_mix_and_one_without_a_slave_makes_no_data_set(
     session: tc.Recording, tmp_path: Path
 ) -> None:

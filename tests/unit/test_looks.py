@@ -13,7 +13,7 @@ from teleop_core.base.errors import ParameterError
 from teleop_core.kernels.geometry import rotations_from_quaternions
 from teleop_core.robots import load_robot
 from teleop_core.robots.bodies import bodies_of
-from teleop_core.robots.bodies.looks import looks_of
+from teleop_core.robots.bodies.looks import fingers_of, looks_of
 from teleop_core.robots.files.visuals import mesh_file
 
 TEXT = (Path(__file__).parents[2] / "examples" / "any_arm.urdf").read_text(encoding="utf-8")
@@ -60,8 +60,8 @@ def test_meshes_are_where_pinocchio_has_them_at_any_posture(middle: float, tmp_p
         poses = bodies.poses(q)
         found = np.concatenate(
             [
-                vertices @ rotations_from_quaternions(poses[body, None, 3:])[0].T + poses[body, :3]
-                for body, (vertices, _) in looks.items()
+                look.mesh[0] @ rotations_from_quaternions(poses[body, None, 3:])[0].T + poses[body, :3]
+                for body, (look,) in looks.items()
             ]
         )
         found = np.unique(found.round(9), axis=0)
@@ -79,7 +79,8 @@ def test_plain_shapes_are_drawn_too_and_a_length_in_millimetres_is_read_as_such(
     unit = '<unit name="millimeter" meter="0.001"/>'
     meshes = path.parents[1] / "meshes"
     (meshes / "part.dae").write_text(part.replace("<up_axis>", f"{unit}<up_axis>"))
-    ((vertices, _),) = looks_of(load_robot(str(path), tip="tool0")).values()
+    ((look,),) = looks_of(load_robot(str(path), tip="tool0")).values()
+    vertices, _ = look.mesh
     np.testing.assert_allclose(vertices.max(axis=0), [0.13, 0.12, 0.11], atol=1e-6)
     np.testing.assert_allclose(vertices.min(axis=0), [-0.04] * 3, atol=1e-6)
 
@@ -122,3 +123,58 @@ def test_no_file_is_read_outside_the_package_and_none_that_is_no_mesh(tmp_path: 
     ):
         with pytest.raises(ParameterError, match=r"^mesh is "):
             mesh_file(name, path)
+
+
+MY_ARM = Path(__file__).parents[2] / "examples" / "my_arm.urdf"
+
+
+def test_fingers_are_where_pinocchio_has_them_from_the_closed_to_the_open_jaw() -> None:
+    robot = load_robot(str(MY_ARM), tip="tool0")
+    bodies, fingers = bodies_of(robot), fingers_of(robot)
+    assert len(fingers) == 2
+    model = pinocchio.buildModelFromUrdf(str(MY_ARM))
+    solids = pinocchio.buildGeomFromUrdf(model, str(MY_ARM), pinocchio.GeometryType.VISUAL)
+    data, placed = model.createData(), solids.createData()
+    q = np.array([0.3, -0.4, 0.9, 0.2, -0.5, 0.7])
+    poses = bodies.poses(q)
+    for share in (0.0, 0.5, 1.0):
+        gap = 0.04 * share  # a finger; the other one mimics it
+        full = pinocchio.neutral(model)
+        for name, value in (
+            *zip(robot.joint_names, q, strict=True),
+            ("left_finger_joint", gap),
+            ("right_finger_joint", gap),
+        ):
+            joint = model.joints[model.getJointId(name)]
+            full[joint.idx_q : joint.idx_q + joint.nq] = [value] if joint.nq == 1 else [np.cos(value), np.sin(value)]
+        pinocchio.updateGeometryPlacements(model, data, solids, placed, full)
+        for finger in fingers:
+            turn = rotations_from_quaternions(poses[finger.body, None, 3:])[0]
+            found = turn @ finger.pose(share)[:3] + poses[finger.body, :3]
+            assert min(np.linalg.norm(T.translation - found) for T in placed.oMg) < 1e-9
+
+
+@pytest.mark.parametrize("axis", ["0 1 0", "0 -1 0"])
+def test_open_end_of_a_gripper_is_the_one_at_which_its_fingers_are_farther_from_the_tip(
+    axis: str, tmp_path: Path
+) -> None:
+    text = MY_ARM.read_text(encoding="utf-8")
+    if axis == "0 -1 0":  # coordinates that grow while the fingers close
+        for side in ("left", "right"):
+            head, tail = text.split(f'<joint name="{side}_finger_joint"')
+            sign = "-" if side == "left" else ""
+            tail = tail.replace('xyz="0 1 0"' if side == "left" else 'xyz="0 -1 0"', f'xyz="0 {sign}1 0"', 1)
+            tail = tail.replace('lower="0" upper="0.04"', 'lower="-0.04" upper="0"', 1)
+            text = f'{head}<joint name="{side}_finger_joint"{tail}'
+    path = tmp_path / "arm.urdf"
+    path.write_text(text, encoding="utf-8")
+    for finger in fingers_of(load_robot(str(path), tip="tool0")):
+        assert abs(finger.pose(1.0)[1]) == pytest.approx(0.046)
+        assert abs(finger.pose(0.0)[1]) == pytest.approx(0.006)
+
+
+def test_links_have_the_colours_of_their_materials() -> None:
+    robot = load_robot(str(MY_ARM), tip="tool0")
+    found = {look.color for looks in looks_of(robot).values() for look in looks}
+    assert found == {(0.93, 0.93, 0.90), (0.10, 0.35, 0.60)}
+    assert {finger.look.color for finger in fingers_of(robot)} == {(0.85, 0.45, 0.10)}

@@ -454,7 +454,8 @@ def test_a_setpoint_that_is_no_number_is_neither_sent_nor_kept_and_reset_ends_th
     np.testing.assert_array_equal(bench.run(3000)[-1], MIDDLE + SMALL)
 
 
-def test_a_reset_takes_the_measured_position_within_the_limits_of_the_drives(bench: Bench) -> None:
+def test_a_reset_takes_the_measured_position_within_the_limits_of_drives_and_tool() -> None:
+    bench = Bench(**dict[str, Any]({"operation.tool_speed": 0.05}))
     server, row = bench.slave.server, bench.row
     server.request("stop")
     bench.run(300)
@@ -473,8 +474,10 @@ def test_a_reset_takes_the_measured_position_within_the_limits_of_the_drives(ben
     held = run(10)
     assert abs(held[-1, 0] - stands[0]) > 0.01
     server.request("reset")
-    path = np.vstack((held, run(500)))
+    path = np.vstack((held, run(2000)))
     assert (np.abs(np.diff(path, axis=0)) / DT <= present(ARM.drives).speed_limit * (1 + 1e-9)).all()
+    tips = np.array([ARM.fk(q)[:3, 3] for q in path])
+    assert (np.linalg.norm(np.diff(tips, axis=0), axis=1) / DT <= server.parameters["tool_speed"] * (1 + 1e-6)).all()
     assert np.abs(path[-1] - stands[:6]).max() <= present(ARM.drives).encoder_step.max() + 1e-3
 
 

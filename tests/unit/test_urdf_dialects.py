@@ -83,9 +83,10 @@ def test_a_capsule_is_drawn_with_its_half_spheres(tmp_path: Path) -> None:
     robot = loaded(tmp_path, ('<link name="boom"/>', VISUAL.format('<capsule radius="0.04" length="0.2"/>')))
     (visual,) = robot.visuals
     assert (visual.kind, visual.size) == ("capsule", (0.04, 0.2))
-    ((vertices, _),) = looks_of(robot).values()
-    width = np.sort(np.ptp(vertices, axis=0))
-    turned = np.ptp(vertices, axis=0)
+    ((look,),) = looks_of(robot).values()
+    vertices, _ = look.mesh
+    turned = np.ptp(np.asarray(vertices, dtype=np.float64), axis=0)
+    width = np.sort(turned)
     assert turned.max() <= 0.2 + 2 * 0.04 + 1e-9
     assert width[0] >= 2 * 0.04 * 0.9
 

@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ import pytest
 from present import present
 from teleop_core.base.errors import ParameterError, RecordingError, UnknownNameError
 from teleop_core.robots import load_robot, load_robot_set
+from teleop_core.robots.files import xacro_files
 from teleop_core.robots.robot import Robot
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "any_arm.urdf"
@@ -59,12 +61,7 @@ def test_arguments_of_a_xacro_stand_in_the_geometry_and_stay_texts(tmp_path: Pat
     same(robot, load_robot(str(path), tip="tool0", **{"xacro.height": "0.5"}))
 
 
-def test_packages_are_found_where_meshes_are_and_xacro_is_left_as_it_was(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    from xacro import substitution_args
-
-    before = substitution_args._eval_find
+def test_packages_are_found_where_meshes_are(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = arm(tmp_path, "$(find far_parts)/parts.xacro")
     with pytest.raises(ParameterError, match="far_parts"):
         load_robot(str(path), tip="tool0")
@@ -73,7 +70,6 @@ def test_packages_are_found_where_meshes_are_and_xacro_is_left_as_it_was(
     (path.parent / "parts.xacro").rename(far / "parts.xacro")
     monkeypatch.setenv("AMENT_PREFIX_PATH", str(tmp_path / "install"))
     same(load_robot(str(path), tip="tool0"), load_robot(str(EXAMPLE), tip="tool0"))
-    assert substitution_args._eval_find is substitution_args._eval_dict["find"] is before
 
 
 @pytest.mark.parametrize(
@@ -138,3 +134,33 @@ def test_without_the_package_one_line_says_how_to_get_it(tmp_path: Path) -> None
     told = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert told.stdout.startswith("TeleopError")
     assert "pip install 'teleop_core[urdf]'" in told.stdout
+
+
+@pytest.mark.parametrize(("file", "line"), [("keys.txt", ""), ("keys.yaml", "line 2")])
+def test_error_of_a_loaded_file_names_the_file_and_never_quotes_it(file: str, line: str, tmp_path: Path) -> None:
+    secret = tmp_path / file
+    secret.write_text("user: me\nkey: *hunter2\n")
+    path = arm(tmp_path, place=f"<x a=\"${{xacro.load_yaml('{secret}')}}\"/>")
+    with pytest.raises(ParameterError) as told:
+        load_robot(str(path), tip="tool0")
+    assert file in str(told.value)
+    assert line in str(told.value)
+    assert "hunter2" not in str(told.value)
+
+
+@pytest.mark.parametrize(
+    ("expression", "reason"), [("9**9**9", "expanded within 0.5 s"), ("len('a' * 2**33)", "can be expanded")]
+)
+def test_xacro_without_end_is_refused_while_other_threads_go_on(
+    expression: str, reason: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if "**9" in expression:  # longer than the start of its process, shorter than the expression by centuries
+        monkeypatch.setattr(xacro_files, "PATIENCE", 0.5)
+    path, turns = arm(tmp_path, place=f'<x a="${{{expression}}}"/>'), 0
+    with ThreadPoolExecutor(1) as pool:
+        loading = pool.submit(load_robot, str(path), tip="tool0")
+        while not loading.done():
+            turns += 1
+    with pytest.raises(ParameterError, match=reason):
+        loading.result()
+    assert turns > 10

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import teleop_core as tc
+from teleop_core.commands.progress import shown_progress
 from teleop_core.graph import TICK_NS, topics
 from teleop_core.kernels.fields import PerJoint, Wrench
 from teleop_core.session.runner import record_blocks
@@ -141,9 +142,10 @@ class Side:
         """
         if self._session is not None:
             raise tc.SessionError("the session runs already; end it first")
-        self._session, self._periods = tc.VirtualTime(self._configuration), 0
-        self._blocks: list[NDArray[np.void]] = []
-        self._advance(max(1, self._session.lead))
+        with shown_progress("starting"):  # the first start on a machine compiles kernels, for half a minute or more
+            self._session, self._periods = tc.VirtualTime(self._configuration), 0
+            self._blocks: list[NDArray[np.void]] = []
+            self._advance(max(1, self._session.lead))
         self._begin_ns = self._session.now_ns
 
     def end(self) -> None:

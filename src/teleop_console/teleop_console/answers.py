@@ -133,6 +133,7 @@ class Answers:
         is_packed = response.headers.get("Content-Encoding") == "gzip"
         page = gzip.decompress(response.body) if is_packed else bytes(response.body)
         page = page.replace(b"<head>", _FURNITURE, 1)  # insert before viser's own script, which is long
+        page = page.replace(b"<title>Viser</title>", b"<title>Teleoperation console</title>", 1)
         response.body = gzip.compress(page, 1) if is_packed else page
         del response.headers["Content-Length"]
         response.headers["Content-Length"] = str(len(response.body))

@@ -32,7 +32,7 @@ from teleop_core.graph.topics import (
 )
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots.bodies import bodies_of
-from teleop_core.robots.bodies.looks import looks_of
+from teleop_core.robots.bodies.looks import fingers_of, looks_of
 from teleop_core.robots.bodies.meshes import mesh_of
 from teleop_core.robots.dexterity import sample_workspace
 from teleop_core.robots.robot import Robot
@@ -80,8 +80,8 @@ class ArmNodes:
         self._root = server.scene.add_frame(self.path, show_axes=False)
         if arm.name:
             server.scene.add_label(f"{self.path}/name", arm.name, anchor="top-center")
-        self._looks = looks_of(robot)
-        self.drawn = BodyNodes(server, f"{self.path}/robot", self.bodies, self._looks)
+        self._looks, self._fingers = looks_of(robot), fingers_of(robot)
+        self.drawn = BodyNodes(server, f"{self.path}/robot", self.bodies, self._looks, self._fingers)
         self._ghost: BodyNodes | None = None
         self._is_ghost_shown = False
         self.measured = Tail(server, f"{self.path}/measured", MEASURED)
@@ -91,7 +91,7 @@ class ArmNodes:
         self.master = MasterNodes(server, f"{self.path}/master", self._stand)
         self._tails = self.measured, self.reference, self.master.tail
         self.world = WorldNodes(server, self.path, robot)
-        self.jaw = JawNodes(server, self.path)
+        self.jaw = JawNodes(server, self.path, has_fingers=bool(self._fingers))
         self.fixture = Look()
         self._goal: viser.IcosphereHandle | None = None
         self.outline = OutlineNode(server, f"{self.path}/fixture", self._stand.quaternion)
@@ -190,6 +190,8 @@ class ArmNodes:
         push = view.get(SLAVE_MEASURED_CF)
         self.world.draw(self._poses[-1][:3], None if push is None else push[:3])
         self.jaw.draw(self._poses[-1], view)
+        if self._fingers and self.jaw.opening is not None:
+            self.drawn.grip(self.jaw.opening)
         self._draw_goal(view)
         if self._begin is not None:
             self._meet(view)
@@ -279,7 +281,7 @@ class ArmNodes:
         elif is_shown and scene.get_handle_by_name(place) is None:
             if what == "ghost":
                 scene.add_frame(place, show_axes=False)
-                self._ghost = BodyNodes(self._server, place, self.bodies, self._looks, is_ghost=True)
+                self._ghost = BodyNodes(self._server, place, self.bodies, self._looks, self._fingers, is_ghost=True)
                 self._ghost.move(posture(self._robot))
             else:
                 points, _ = sample_workspace(self._robot, _REACHED, np.random.default_rng(0))

@@ -1,6 +1,6 @@
 """Body nodes: the bodies of an arm on the page; after the first drawing only their frames are sent."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import viser
@@ -9,7 +9,9 @@ from teleop_console.look import HELD, ROLES, WANTED
 from teleop_console.poses import moved, set_pose
 from teleop_core.kernels.geometry import Array, rotations_from_quaternions
 from teleop_core.robots.bodies import Bodies, Role, Solid
+from teleop_core.robots.bodies.looks import Finger, Look
 from teleop_core.robots.bodies.meshes import Mesh, merged, mesh_of
+from teleop_core.robots.visual import Color as RobotColor
 
 _HALO = 0.05
 """Radius of a halo, divided by the reach of the robot."""
@@ -23,11 +25,19 @@ class BodyNodes:
         path: Path of the node above the bodies.
         bodies: The robot's bodies.
         looks: Meshes that replace the solids of some bodies, by the index of the body.
+        fingers: Shapes that the jaw moves.
         is_ghost: Whether the bodies are drawn transparent in one colour, without axes.
     """
 
     def __init__(
-        self, server: viser.ViserServer, path: str, bodies: Bodies, looks: Mapping[int, Mesh], *, is_ghost: bool = False
+        self,
+        server: viser.ViserServer,
+        path: str,
+        bodies: Bodies,
+        looks: Mapping[int, Sequence[Look]],
+        fingers: Sequence[Finger] = (),
+        *,
+        is_ghost: bool = False,
     ) -> None:
         axis = 0.08 * bodies.size
         self._server, self._path, self._bodies = server, path, bodies
@@ -41,13 +51,28 @@ class BodyNodes:
         self._halos: dict[int, viser.IcosphereHandle] = {}
         for i, body in enumerate(bodies.bodies):
             place = f"{path}/{body.name}"
-            if i in looks:
-                role: Role = "link" if i else "base"
-                _add_mesh(server, place, role, looks[i], is_ghost=is_ghost, is_flat=True)
-            else:
+            role: Role = "link" if i else "base"
+            for number, look in enumerate(looks.get(i, ())):
+                name = f"{place}/{role}{number or ''}"
+                _add_mesh(server, name, role, look.mesh, color=look.color, is_ghost=is_ghost, is_flat=True)
+            if i not in looks:
                 add_solids(server, place, body.solids, is_ghost=is_ghost)
+        self._fingers = [(finger, self._add_finger(finger, k, is_ghost=is_ghost)) for k, finger in enumerate(fingers)]
         self._drawn = np.tile(np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]), (len(self._list), 1))
         self._marked: frozenset[int] = frozenset()
+
+    def _add_finger(self, finger: Finger, number: int, *, is_ghost: bool) -> viser.FrameHandle:
+        path = f"{self._path}/{self._bodies.names[finger.body]}/finger{number}"
+        frame = self._server.scene.add_frame(path, show_axes=False)
+        set_pose(frame, finger.rest)
+        look = finger.look
+        _add_mesh(self._server, f"{path}/tool", "tool", look.mesh, color=look.color, is_ghost=is_ghost, is_flat=True)
+        return frame
+
+    def grip(self, share: float) -> None:
+        """Draw the fingers at a share of the jaw's opening, 0 (closed) to 1."""
+        for finger, frame in self._fingers:
+            set_pose(frame, finger.pose(share))
 
     def move(self, joints: Array) -> Array:
         """Draw the bodies at joint positions (n,) [rad, m]; returns the drawn poses (B, 7).
@@ -94,26 +119,28 @@ def add_solids(
     meshes = {}
     for role in dict.fromkeys(solid.role for solid in solids):
         mesh = merged([mesh_of(solid) for solid in solids if solid.role == role])
-        meshes[role] = _add_mesh(server, path, role, mesh, is_ghost=is_ghost, opacity=opacity)
+        meshes[role] = _add_mesh(server, f"{path}/{role}", role, mesh, is_ghost=is_ghost, opacity=opacity)
     return meshes
 
 
 def _add_mesh(
     server: viser.ViserServer,
-    path: str,
+    name: str,
     role: Role,
     mesh: Mesh,
     *,
+    color: RobotColor | None = None,
     is_ghost: bool,
     is_flat: bool = False,
     opacity: float | None = None,
 ) -> viser.MeshHandle:
     vertices, faces = mesh
+    own = ROLES[role] if color is None else (round(255 * color[0]), round(255 * color[1]), round(255 * color[2]))
     return server.scene.add_mesh_simple(
-        f"{path}/{role}",
+        name,
         vertices.astype(np.float32),
         faces.astype(np.uint32),
-        color=WANTED if is_ghost else ROLES[role],
+        color=WANTED if is_ghost else own,
         opacity=0.3 if is_ghost else opacity,
         flat_shading=is_flat,
         cast_shadow=False,

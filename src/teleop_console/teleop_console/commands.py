@@ -8,7 +8,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from teleop_console.start import BAGS
+from teleop_console.folders import BAGS
 from teleop_core.base.errors import ParameterError, TeleopError
 from teleop_core.base.texts import printable
 from teleop_core.commands.arguments import command, ros_module, setting_arguments, without_argument

@@ -10,6 +10,7 @@ from teleop_console.look import ROLES, TARGET
 from teleop_console.poses import move
 from teleop_core.graph.topics import SLAVE_JAW_BOARD, SLAVE_JAW_MEASURED_JS, SLAVE_JAW_OBJECT_CP
 from teleop_core.kernels.geometry import Array, quaternion_products, rotations_from_quaternions
+from teleop_core.slave.jaw.jaw import JawParameters
 
 _THICK = 0.1  # thickness of a finger divided by its length
 _PEG = 0.2  # thickness of a peg divided by that of an object
@@ -45,22 +46,30 @@ class JawNodes:
     Args:
         server: The page.
         path: Path of the node in slave_base.
+        has_fingers: Whether the robot's file has fingers, so that none are added.
+
+    Attributes:
+        opening: Share of the jaw's largest angle, 0 (closed) to 1; None before the jaw has reported an angle.
     """
 
-    def __init__(self, server: viser.ViserServer, path: str) -> None:
-        self._server, self._path = server, path
+    def __init__(self, server: viser.ViserServer, path: str, *, has_fingers: bool = False) -> None:
+        self._server, self._path, self._has_fingers = server, path, has_fingers
+        self.opening: float | None = None
+        self._upper = JawParameters.upper
         self._values: dict[str, Setting] = {}
         self._length = self._size = 0.0
         self.fingers: list[viser.BoxHandle] = []
         self.blocks: list[viser.BoxHandle] = []
         self.pegs: list[viser.BoxHandle] = []
 
-    def retune(self, values: Mapping[str, Setting]) -> None:
+    def retune(self, values: Mapping[str, Setting], upper: Setting | None = None) -> None:
         """Set the sizes from parameters of the jaw.
 
         Args:
             values: Parameters by their names in the group ``jaw_sim``; empty for a session without this group.
+            upper: Largest angle of the jaw's server [rad]; None if it is unknown.
         """
+        self._upper = upper if isinstance(upper, float) and upper > 0.0 else JawParameters.upper
         values = {name: values[name] for name in _DRAWN if name in values}
         if values == self._values:
             return
@@ -81,7 +90,9 @@ class JawNodes:
     def draw(self, tip: Array, view: ArmView) -> None:
         """Draw the fingers at a tip (7,), and the objects at their reported poses."""
         state, place = view.get(SLAVE_JAW_MEASURED_JS), view.get(SLAVE_JAW_OBJECT_CP)
-        if state is not None and self._length > 0.0:
+        if state is not None and np.isfinite(state[0]):
+            self.opening = float(state[0]) / self._upper
+        if state is not None and self._length > 0.0 and not self._has_fingers:
             thick = _THICK * self._length
             while len(self.fingers) < 2:
                 self._add(self.fingers, "finger", (thick, 2.0 * thick, self._length))

@@ -32,6 +32,8 @@
     if (behind) behind.visible = false;
     const color = getComputedStyle(document.documentElement).getPropertyValue('--t-color-scene').trim();
     if (color) ground = [1, 3, 5].map((at) => parseInt(color.slice(at, at + 2), 16) / 255);
+    for (const notice of document.querySelectorAll('.mantine-Notification-root')) // the page adapts to it, see above
+      if (notice.textContent.includes('Software WebGL')) notice.querySelector('button')?.click();
     const settings = soft && !location.search.includes('fixedDpr') && window.__viserTestpoints?.devSettings;
     if (settings) settings.set({ fixedDpr: Math.min(1, Math.max(0.35, Math.sqrt(PIXELS / (innerWidth * innerHeight)))) });
   }
@@ -82,8 +84,9 @@
     hand.hidden = !shown.can_press || !shown.drives;
     for (const take of document.querySelectorAll('button')) // of viser's panel, which is the same for all pages
       if (take.textContent === 'Take control') take.disabled = Boolean(shown.drives);
-    starting.textContent = shown.doing;
-    starting.hidden = !shown.doing;
+    const loads = shown.doing || (window.teleopPage || shown.chooses ? '' : 'loading the scene …');
+    starting.textContent = loads; // it lies over viser's empty scene until viser has connected
+    starting.hidden = !loads;
     const seen = document.querySelector('canvas')?.getBoundingClientRect();
     if (seen) banner.style.width = `${seen.width}px`; // the panel beside it stays in view
   }

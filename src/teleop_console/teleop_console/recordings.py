@@ -9,8 +9,10 @@ import tempfile
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 
+from teleop_console.folders import is_plain
 from teleop_core.base.errors import ParameterError, TeleopError
 
 _MOST = 50
@@ -52,12 +54,16 @@ class Recordings:
         self._judging: tuple[Entry, subprocess.Popen[bytes], Path] | None = None
 
     def entries(self) -> list[Entry]:
-        """The newest recordings with the data that are known so far; the newest recording is first."""
+        """The newest recordings with the data that are known so far; the newest recording is first.
+
+        A recording with a symbolic link is left out, because the link may lead to any file of this user.
+        """
         found = []
         for file in self._folder.glob(f"*/{_FILE}"):
-            name, made = file.parent.name, file.stat().st_mtime
+            name, made = file.parent.name, file.lstat().st_mtime
             found.append(self._known.get((name, made), Entry(name, made)))
-        return sorted(found, key=lambda entry: -entry.made)[:_MOST]
+        newest = sorted(found, key=lambda entry: -entry.made)
+        return list(islice((entry for entry in newest if is_plain(self._folder / entry.name)), _MOST))
 
     def path(self, name: str) -> Path:
         """Path of a recording.
@@ -83,7 +89,10 @@ class Recordings:
             raise ParameterError("action", kind, f"one of {', '.join(_KIND)}, for a recording that is named")
         paths = [str(self.path(name)) for name in names]
         out = ["--out", f"{paths[0]}.csv"] if kind == "export" else []
-        return [_KIND[kind], *(paths[:1] if kind == "export" else paths), *out]
+        if out and Path(out[1]).is_symlink():
+            raise ParameterError("export", out[1], "no symbolic link: remove it, or export with `teleop export`")
+        more = ["--differences"] if kind == "score" and len(paths) > 1 else out
+        return [_KIND[kind], *(paths[:1] if kind == "export" else paths), *more]
 
     def run(self, kind: str, names: Sequence[str]) -> str:
         """Run the command of :meth:`words` at low priority, and return its output."""

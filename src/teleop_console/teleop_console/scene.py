@@ -118,7 +118,8 @@ class Scene:
                 plant = f"{name}/slave_sim" if name else "slave_sim"
                 nodes.world.retune(_values_below(parameters, plant, "world."))
                 jaw = f"{name}/jaw_sim" if name else "jaw_sim"
-                nodes.jaw.retune(_values_below(parameters, jaw, ""))
+                upper = parameters.get((jaw.removesuffix("_sim"), "upper"))
+                nodes.jaw.retune(_values_below(parameters, jaw, ""), None if upper is None else upper.value)
 
     def _show_targets(self, nodes: ArmNodes, points: Array) -> None:
         """Show the points of a task in the hand's space, as balls of 2 mm."""

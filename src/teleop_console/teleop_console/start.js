@@ -7,7 +7,7 @@
   page.hidden = true;
   page.innerHTML = `
     <h1>Teleoperation console</h1>
-    <p class="t-watch" role="status"></p>
+    <p class="t-watch" role="status"></p><p class="t-loads" role="status">Loading the form …</p>
     <section aria-labelledby="t-choose"><h2 id="t-choose">New session</h2><div class="t-fields"></div></section>
     <section aria-labelledby="t-recorded"><h2 id="t-recorded">Recordings</h2>
       <p class="t-muted t-none"></p><ul class="t-list"></ul>
@@ -33,7 +33,7 @@
       const answer = await fetch(`${path}?${new URLSearchParams(words)}`, {
         ...(body && { method: 'POST', body }),
         headers: { 'Teleop-Page': window.teleopPage || 'new' }, cache: 'no-store',
-        signal: AbortSignal.timeout(10000) });
+        signal: AbortSignal.timeout(path === 'begin' ? 30000 : 10000) }); // a xacro may take 20 s
       return [answer.ok, await answer.json()];
     } catch { return [false, 'The console does not answer. Try again.']; }
   }
@@ -70,13 +70,21 @@
 
   function choose(name, word) {
     chosen = { ...chosen, [name]: word };
+    if (name === 'robot') forgetTip();
     one('#t-begin').disabled = true; // until the answer says that these words go together
     one('footer .t-why').textContent = 'checking …';
     look();
   }
 
+  function forgetTip() { // it is a link of the former robot
+    delete chosen.tip;
+    tip.input.value = '';
+  }
+
   function show(told) {
-    chosen = chosen || told.chosen;
+    if (!chosen || !drives) chosen = told.chosen; // words count only from the page that drives
+    if (document.activeElement !== tip?.input && tip) tip.input.value = chosen.tip || '';
+    one('.t-loads').hidden = true;
     for (const given of told.fields) {
       const { name, options } = given, known = fields[name] || field(given), said = JSON.stringify(options);
       if (known.known !== said) {
@@ -150,7 +158,7 @@
   async function keep(file) { // a URDF that was chosen or dropped is the robot
     if (!file) return;
     const [ok, told] = await ask('robot', [['name', file.name]], file);
-    if (ok) { chosen = { ...chosen, robot: told }; await look(); }
+    if (ok) { chosen = { ...chosen, robot: told }; forgetTip(); await look(); }
     else one('footer .t-why').textContent = told;
   }
   for (const kind of ['dragover', 'drop']) page.addEventListener(kind, (event) => event.preventDefault());

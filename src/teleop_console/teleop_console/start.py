@@ -10,19 +10,18 @@ import re
 import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from types import MappingProxyType
 from typing import Protocol
 
 from teleop_console.drivers import Drivers
+from teleop_console.folders import BAGS, ROBOTS
 from teleop_console.recordings import Recordings
 from teleop_core.base.errors import ParameterError, TeleopError
+from teleop_core.base.texts import printable
 
-BAGS = Path("bags")
-"""Folder of the recordings that are listed, and of new ones."""
-ROBOTS = Path("robots")
-"""Folder of the robot files that people drop on the form."""
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}\.urdf")
 _LARGEST = 4 * 1024 * 1024  # largest number of bytes of a robot's file
 _TRY = 0.25  # time for which options are checked before the page is answered [s]
@@ -136,7 +135,7 @@ class StartPage:
         """
         try:
             if path == "/start":
-                return http.HTTPStatus.OK, self._shown(query)
+                return http.HTTPStatus.OK, self._shown(query if self._drivers.may_drive(page) else {})
             if path == "/take":
                 self._drivers.take(page)
                 return http.HTTPStatus.OK, ""
@@ -149,7 +148,7 @@ class StartPage:
             return http.HTTPStatus.CONFLICT, str(error)
 
     def _shown(self, query: Query) -> Mapping[str, object]:
-        """All data that the form shows for a choice.
+        """All data that the form shows for a choice; pages that may not begin a session see the default choice.
 
         Empty while a session or replay runs, because they are slow to compute.
         """
@@ -171,7 +170,7 @@ class StartPage:
             "chosen": chosen,
             "fields": fields,
             "tips": choices.tips(chosen),
-            "refusal": choices.refusal(chosen),
+            "refusal": choices.refusal(chosen, opens=False),
             "command": choices.command_line(chosen),
             "is_repeat": chosen == self._last,
             "recordings": [asdict(entry) for entry in self.recordings.entries()],
@@ -185,7 +184,7 @@ class StartPage:
 
         self._insist_open()
         chosen = choices.checked(_words(query))
-        if reason := choices.refusal(chosen):
+        if reason := choices.refusal(chosen, opens=False) or _unread(choices.refusal(chosen)):
             raise ParameterError("choice", choices.command_line(chosen), f"another choice: {reason}")
         self._last, self.told = chosen, ""
         self._wishes.put(Wish(chosen))
@@ -221,10 +220,13 @@ class StartPage:
         if not _NAME.fullmatch(name):
             raise ParameterError("name", name, "letters, digits, '.', '_' and '-', then .urdf")
         data, file = body(_LARGEST), ROBOTS / name
+        if ROBOTS.is_symlink() or file.is_symlink():
+            raise ParameterError("name", name, f"a name in {ROBOTS} that is no symbolic link")
         if file.exists() and file.read_bytes() != data:
             raise ParameterError("name", name, f"a new name: {file} is another robot")
         ROBOTS.mkdir(exist_ok=True)
-        file.write_bytes(data)
+        with suppress(FileExistsError), file.open("xb") as new:  # "x" does not follow a link that is made meanwhile
+            new.write(data)
         return str(file)
 
     def _end(self, query: Query) -> str:
@@ -235,6 +237,14 @@ class StartPage:
     def _insist_open(self) -> None:
         if not self.is_open:
             raise ParameterError("session", "one that runs", "ended before another session begins")
+
+
+def _unread(reason: str) -> str:
+    """Text for the page about a file that is not the console's own; only the terminal shows what the file contains."""
+    if not reason:
+        return ""
+    print(f"the choice was refused: {printable(reason)}", flush=True)
+    return "a file of this choice cannot be used; the terminal of the console says why"
 
 
 def _words(query: Query) -> dict[str, str]:

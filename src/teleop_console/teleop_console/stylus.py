@@ -26,7 +26,8 @@ LINGER = 1.0
 """Time for which the stylus is held after a small step, so that the next step can follow [s]."""
 GRIP = "grip"
 """Name of a gizmo's node below the node of the master."""
-_SIZE = 0.08  # size of a gizmo [m]
+_SIZE = 0.175  # size of a gizmo as a share of the arm's reach: the view grows with the arm, and the handles with it
+_LEAST_SIZE = 0.08  # smallest size of a gizmo, that of the device's stylus [m]
 
 
 @dataclass
@@ -76,7 +77,12 @@ class Stylus:
         self._lock = threading.RLock()
         self._hands = {
             arm: _Hand(
-                server.scene.add_transform_controls(f"{node}/{GRIP}", scale=_SIZE, depth_test=False, opacity=0.8)
+                server.scene.add_transform_controls(
+                    f"{node}/{GRIP}",
+                    scale=max(_LEAST_SIZE, _SIZE * scene.arms[arm].bodies.size),
+                    depth_test=False,
+                    opacity=0.8,
+                )
             )
             for arm, node in scene.masters.items()
         }

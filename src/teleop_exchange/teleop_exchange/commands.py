@@ -118,6 +118,12 @@ def _buttons(group: Any) -> None:
     group.add_argument(
         "--threshold", type=float, metavar="X", help="a button is pressed above this value (default: 0.5)"
     )
+    group.add_argument(
+        "--jaw",
+        nargs=3,
+        metavar=("COL", "OPEN", "CLOSED"),
+        help="column of a jaw or gripper, and its values when open and when closed",
+    )
     group.add_argument("--buttons-topic", metavar="TOPIC", help="topic of Joy messages in a bag")
     group.add_argument(
         "--buttons", metavar="MAP", help="indices of buttons in the Joy, such as clutch=0,mode=2; or none"

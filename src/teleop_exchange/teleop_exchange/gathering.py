@@ -40,6 +40,8 @@ class Gathered:
         bad_rows: Number of damaged rows that the source left out.
         strange: Number of orientations that are not valid rotations.
         order: Indices of the rows in the order of recording (N,); None if this is the order of the file.
+        closing: How far the jaw is closed (N,), 0 to 1; None without such a column.
+        doubt: Text if another order of a quaternion's columns is more plausible; empty otherwise.
     """
 
     rows: Array
@@ -51,6 +53,8 @@ class Gathered:
     bad_rows: int
     strange: int
     order: NDArray[np.int32] | None = None
+    doubt: str = ""
+    closing: Array | None = None
 
 
 @dataclass(eq=False)
@@ -63,6 +67,7 @@ class _Parts:
     usable: list[NDArray[np.bool_]]
     buttons: list[NDArray[np.uint8]]
     finite: NDArray[np.float64]
+    closing: list[Array]
     farthest: float = 0.0
 
 
@@ -73,7 +78,7 @@ def gather(source: Source, options: ImportOptions) -> Gathered:
         RecordingError: The source contains no rows or an empty column, or its orientations are invalid. Also if
             positions are far beyond a hand's reach and no unit is stated.
     """
-    parts = _Parts([], [], [], [], [], np.zeros(4))
+    parts = _Parts([], [], [], [], [], np.zeros(4), [])
     scale = LENGTHS[source.unit]
     for block in source.blocks():
         rows = np.column_stack((scale * block.position, block.quaternion))
@@ -86,6 +91,8 @@ def gather(source: Source, options: ImportOptions) -> Gathered:
         parts.times.append(block.time)
         if block.log_ns is not None:
             parts.logs.append(block.log_ns)
+        if block.closing is not None:
+            parts.closing.append(block.closing)
         if block.buttons is not None:
             parts.buttons.append(block.buttons)
     count = sum(map(len, parts.rows))
@@ -105,7 +112,35 @@ def gather(source: Source, options: ImportOptions) -> Gathered:
     rows = np.concatenate(parts.rows)
     if count > 1 and not usable.any():
         _refuse_broken_rows(source, rows, stamps)
-    return Gathered(rows, stamps, usable, buttons, presses, told, source.bad_rows, strange, order)
+    return Gathered(
+        rows,
+        stamps,
+        usable,
+        buttons,
+        presses,
+        told,
+        source.bad_rows,
+        strange,
+        order,
+        source.attitudes.doubt,
+        _filled(source, parts.closing),
+    )
+
+
+def _filled(source: Source, parts: list[Array]) -> Array | None:
+    """How far the jaw is closed in each row; a missing value repeats the one before it.
+
+    Raises:
+        RecordingError: The column of the jaw contains no numbers.
+    """
+    if not parts:
+        return None
+    whole = np.concatenate(parts)
+    known = np.flatnonzero(np.isfinite(whole))
+    if not len(known):
+        raise RecordingError(source.path, "the column of --jaw holds no numbers")
+    before = np.searchsorted(known, np.arange(len(whole)), side="right") - 1
+    return np.asarray(whole[known[np.maximum(before, 0)]])
 
 
 def _refuse_broken_rows(source: Source, rows: Array, stamps: Stamps) -> NoReturn:

@@ -18,6 +18,8 @@ LARGE = 1.0
 """Extent of a motion [m] above which the report asks whether the unit is right."""
 FAST = 5.0
 """Speed of a hand [m/s] above which the report asks whether the unit is right."""
+TURNING = 15.0
+"""Speed of turning [rad/s] above which the report asks whether the orientation is right; a wrist reaches some 10."""
 SLOW_HZ = 20.0
 SPEED_HZ = 30.0
 """Rate at which speeds are computed [Hz]; it is low so that the noise of fast devices does not count."""
@@ -41,7 +43,9 @@ class ImportReport:
         rotation: Largest rotation from the first orientation [rad].
         speed: Median and 95th percentile of the speed [m/s], computed at 30 Hz or at the rate if it is lower.
         fastest: Largest speed between two samples [m/s].
+        turning: Median and 95th percentile of the speed of turning [rad/s], computed at the same rate.
         gaps: Begin and length [s] of each gap, the longest first.
+        given: Import options that were given, as arguments of ``teleop import``; empty if there were none.
         told: Texts about what was used, guessed and changed.
         warnings: Texts about possible errors.
         arm: Name of the hand; empty if there is only one hand.
@@ -64,6 +68,8 @@ class ImportReport:
     told: tuple[str, ...]
     warnings: tuple[str, ...]
     arm: str = ""
+    turning: tuple[float, float] = (0.0, 0.0)
+    given: str = ""
     others: "tuple[ImportReport, ...]" = ()
 
     @property
@@ -82,13 +88,14 @@ class ImportReport:
         middle, low, high = self.period_ms
         x, y, z = (f"{1e3 * value:.1f}" for value in self.range)
         median, fast = (f"{1e3 * value:.0f}" for value in self.speed)
-        out = [f"arm       {self.arm}"] * bool(self.arm)
+        turns = " ".join(f"{math.degrees(value):.0f}" for value in self.turning).replace(" ", ", 95 % ")
+        out = [f"arm       {self.arm}"] * bool(self.arm) + [f"given     {self.given}"] * bool(self.given)
         out += [f"taken     {text}" for text in self.told] + [
             f"samples   {self._samples()}",
             f"time      {self.duration:.3f} s at {self.rate:.4g} Hz; 90 % of the periods are "
             f"{low:.3g} to {high:.3g} ms, median {middle:.4g} ms",
             f"range     x {x}, y {y}, z {z} mm; rotation {math.degrees(self.rotation):.1f}°",
-            f"speed     median {median}, 95 % {fast} mm/s",
+            f"speed     median {median}, 95 % {fast} mm/s; turning median {turns} °/s",
             f"gaps      {self._gaps()}",
         ]
         return out + [f"warning   {text}" for text in self.warnings]
@@ -107,8 +114,8 @@ class ImportReport:
         return "\n".join(line for one in (self, *self.others) for line in one.lines())
 
 
-def summary(file: str, out: Path | None, motion: Motion, arm: str = "") -> ImportReport:
-    """Make the report of an imported motion."""
+def summary(file: str, out: Path | None, motion: Motion, arm: str = "", given: str = "") -> ImportReport:
+    """Make the report of an imported motion; ``given`` are its options as arguments of ``teleop import``."""
     period = spread_ms(motion.stamp_ns)
     places, turns = motion.poses[:, :3], motion.poses[:, 3:]
     rate = 1e3 / period[0] if period[0] > 0.0 else 0.0
@@ -116,6 +123,8 @@ def summary(file: str, out: Path | None, motion: Motion, arm: str = "") -> Impor
     steps = speeds(motion.stamp_ns, places)
     every = max(1, round(rate / SPEED_HZ))
     median, high = np.percentile(speeds(motion.stamp_ns[::every], places[::every]), (50, 95))
+    turning = turning_speeds(motion.stamp_ns[::every], turns[::every])
+    slow, swift = np.percentile(turning, (50, 95))
     cosine = np.clip(np.abs(dot(turns, turns[0])), 0.0, 1.0).min()
     return ImportReport(
         file=file, out=out, counts=motion.counts, losses=tuple(motion.losses()),
@@ -125,7 +134,8 @@ def summary(file: str, out: Path | None, motion: Motion, arm: str = "") -> Impor
         range=(float(extent[0]), float(extent[1]), float(extent[2])),
         rotation=2.0 * math.acos(cosine), speed=(float(median), float(high)),
         fastest=float(steps.max()), gaps=motion.gaps, told=tuple(motion.told),
-        warnings=tuple(_warnings(motion, steps, float(extent.max()), rate)), arm=arm,
+        warnings=tuple(_warnings(motion, steps, float(extent.max()), rate, float(swift))), arm=arm,
+        turning=(float(slow), float(swift)), given=given,
     )  # fmt: skip
 
 
@@ -136,8 +146,21 @@ def speeds(stamps: Stamps, places: Array) -> Array:
     return np.asarray(length(np.diff(places, axis=0)) / (np.diff(stamps) * 1e-9))
 
 
-def _warnings(motion: Motion, steps: Array, largest: float, rate: float) -> list[str]:
-    out, c = [], motion.counts
+def turning_speeds(stamps: Stamps, turns: Array) -> Array:
+    """Speeds of turning [rad/s] between unit quaternions (N, 4); a single zero if there is only one row."""
+    if len(stamps) < 2:
+        return np.zeros(1)
+    cosine = np.clip(np.abs(dot(turns[1:], turns[:-1])), 0.0, 1.0)
+    return np.asarray(2.0 * np.arccos(cosine) / (np.diff(stamps) * 1e-9))
+
+
+def _warnings(motion: Motion, steps: Array, largest: float, rate: float, turning: float) -> list[str]:
+    out, c = [motion.doubt] * bool(motion.doubt), motion.counts
+    if turning > TURNING:
+        out.append(
+            f"the hand turns at {turning:.3g} rad/s in 5 % of the time, a hand at less than {TURNING:g}: are the "
+            "columns and the unit of its orientation right? (--quaternion, --euler, --angles)"
+        )
     if largest > LARGE:
         out.append(f"the hand moves {largest:,.4g} m: is the unit mm? (--unit mm, or --scale)")
     elif largest < 1e-3:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from teleop_core.base import RecordingError, damage_told
+from teleop_core.base import ParameterError, RecordingError, damage_told
 from teleop_core.kernels import geometry, product
 from teleop_exchange import gathering, source, times
 from teleop_exchange.options import ImportOptions
@@ -56,6 +56,7 @@ class Motion:
         counts: Counts of the rows.
         told: Texts about what was used, guessed and changed.
         strange: Number of rows that were left out because their orientation is invalid.
+        doubt: Text if another order of a quaternion's columns is more plausible; empty otherwise.
         gaps: Begin and length [s] of each gap, the longest first.
 
     Raises:
@@ -67,7 +68,7 @@ class Motion:
     def __init__(self, path: Path, options: ImportOptions) -> None:
         gathered = gathering.gather(open_source(path, options), options)
         self._path, self._gathered, self._options = path, gathered, options
-        self.told, self.strange = list(gathered.told), gathered.strange
+        self.told, self.strange, self.doubt = list(gathered.told), gathered.strange, gathered.doubt
         usable: NDArray[np.integer] = np.flatnonzero(gathered.is_usable)
         if gathered.order is not None:
             usable = gathered.order[gathered.is_usable[gathered.order]]
@@ -174,6 +175,11 @@ class Motion:
         # A rotation in the file about an axis is the opposite rotation about the mirrored axis.
         return np.column_stack((quaternions[:, 0], -product(quaternions[:, 1:], axes.T)))
 
+    def closings(self) -> tuple[times.Stamps, geometry.Array] | None:
+        """Stamps (n,) [ns] and how far the jaw is closed (n, 1), 0 to 1; None without such a column."""
+        closing = self._gathered.closing
+        return None if closing is None else (self.stamp_ns, closing[self._rows, None])
+
     def presses(self) -> tuple[times.Stamps, NDArray[np.uint8]] | None:
         """Stamps (n,) [ns] and buttons (n, 3) at the first sample and at each change; None without buttons."""
         g = self._gathered
@@ -211,6 +217,8 @@ def open_source(path: Path, options: ImportOptions) -> source.Source:
     if not path.exists():
         raise RecordingError(path, "does not exist")
     if is_bag(path):
+        if options.jaw:
+            raise ParameterError("--jaw", options.jaw, "left out for a recording of ROS: only a table has columns")
         from teleop_exchange.bag_source import BagSource
 
         return BagSource(path, options)

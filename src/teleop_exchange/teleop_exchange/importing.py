@@ -16,7 +16,7 @@ from teleop_core.bags.arms import ARMS_KEY
 from teleop_core.bags.finding import check_new
 from teleop_core.bags.writer import BagWriter
 from teleop_core.base.errors import RecordingError
-from teleop_core.graph.topics import MASTER_BUTTONS, MASTER_MEASURED_CP, Topic
+from teleop_core.graph.topics import HAND_JAW, MASTER_BUTTONS, MASTER_MEASURED_CP, Topic
 from teleop_core.kernels.geometry import Array
 from teleop_exchange.import_report import ImportReport, summary
 from teleop_exchange.imported_motion import Motion
@@ -64,7 +64,9 @@ def import_recording(
     first_ns = min(int(motion.stamp_ns[0]) for motion in motions.values())
     for motion in motions.values():
         motion.begin(first_ns)
-    found = [summary(path.name, out, motion, arm) for arm, motion in motions.items()]
+    found = [
+        summary(path.name, out, motion, arm, shlex.join(wanted[arm].as_arguments())) for arm, motion in motions.items()
+    ]
     report = replace(found[0], others=tuple(found[1:]))
     write(motions, out, _about(path, out, wanted, report))
     return report
@@ -76,6 +78,8 @@ def write(motions: Mapping[str, Motion], out: Path, metadata: dict[str, str]) ->
     for number, (arm, motion) in enumerate(motions.items()):
         name = arm if number else ""
         streams[MASTER_MEASURED_CP.of_arm(name)] = (motion.stamp_ns, motion.poses)
+        if (closings := motion.closings()) is not None:
+            streams[HAND_JAW.of_arm(name)] = closings
         if (presses := motion.presses()) is not None:
             stamps, pressed = presses
             streams[MASTER_BUTTONS.of_arm(name)] = (stamps, pressed.astype(np.float64))

@@ -19,7 +19,15 @@ from numpy.typing import NDArray
 
 from teleop_core.bags.arms import topic_prefix
 from teleop_core.base.errors import RecordingError
-from teleop_core.graph.topics import SLAVE_MEASURED_CP, SLAVE_MEASURED_JS, SLAVE_SERVO_CP, SLAVE_SERVO_JP
+from teleop_core.graph.topics import (
+    SLAVE_JAW_OBJECT_CP,
+    SLAVE_MEASURED_CP,
+    SLAVE_MEASURED_JS,
+    SLAVE_SERVO_CP,
+    SLAVE_SERVO_JP,
+    TASK_STATE,
+    Topic,
+)
 from teleop_core.kernels.geometry import Array
 from teleop_core.session.recording import Recording
 from teleop_exchange.joining import Streams
@@ -27,6 +35,10 @@ from teleop_exchange.joining import Streams
 VERSION = "v3.0"
 FPS = 50
 STATE, ACTION = "observation.state", "action"
+SURROUNDINGS = "observation.environment_state"
+"""Feature with the goal of the task and the pose of the object. Policies such as ACT need this feature or pictures."""
+_GOAL = ("goal_x", "goal_y", "goal_z", "goal_qw", "goal_qx", "goal_qy", "goal_qz", "width")
+_AROUND: dict[Topic, tuple[str, ...]] = {TASK_STATE: _GOAL, SLAVE_JAW_OBJECT_CP: ()}  # all columns of the pose
 _FILE_BYTES = 100 << 20
 _FILES = 1000  # largest number of files in a folder
 _PATTERN = "chunk-{chunk_index:03d}/file-{file_index:03d}.parquet"
@@ -94,9 +106,10 @@ def write_data_set(
     files, episodes, frames = _Files(out / "data"), [], 0
     names: dict[str, list[str]] = {}
     all_numbers: list[Numbers] = []
+    around = [topic for topic in _AROUND if all(_has(recording, topic) for recording in recordings)]
     try:
         for number, recording in enumerate(recordings):
-            found, numbers = _episode(recording, fps, action)
+            found, numbers = _episode(recording, fps, action, around)
             if names and found != names:
                 reason = "has other joints or arms than the first recording of the data set"
                 raise RecordingError(recording.bag.path, reason)
@@ -115,26 +128,40 @@ def write_data_set(
     return frames, tuple(names)
 
 
-def _episode(recording: Recording, fps: int, action: str) -> tuple[dict[str, list[str]], Numbers]:
+def _has(recording: Recording, topic: Topic) -> bool:
+    """Whether each arm of a recording has messages of a topic."""
+    names = [topic_prefix(recording.bag, arm) + topic.name for arm in recording.arms]
+    return all(name in recording.bag.topics and recording.bag.topics[name].count for name in names)
+
+
+def _episode(
+    recording: Recording, fps: int, action: str, around: Sequence[Topic]
+) -> tuple[dict[str, list[str]], Numbers]:
     """Names and numbers (frames, columns) of the features of a recording.
 
     A frame contains the newest message of each topic. Frames at which a topic has had no message are left out.
     """
-    bag, names, topics = recording.bag, {STATE: list[str](), ACTION: list[str]()}, []
+    keys = (STATE, *[SURROUNDINGS] * bool(around), ACTION)
+    bag, names, topics = recording.bag, {key: list[str]() for key in keys}, []
     told = SLAVE_SERVO_JP if action == "joints" else SLAVE_SERVO_CP
     for arm in recording.arms:
         prefix = topic_prefix(bag, arm)
-        for key, topic in ((STATE, SLAVE_MEASURED_JS), (STATE, SLAVE_MEASURED_CP), (ACTION, told)):
+        measured = ((STATE, SLAVE_MEASURED_JS), (STATE, SLAVE_MEASURED_CP))
+        for key, topic in (*measured, *((SURROUNDINGS, topic) for topic in around), (ACTION, told)):
             topics.append((key, prefix, prefix + topic.name))
     bag.require([name for _, _, name in topics])
     streams = Streams(recording, [name for _, _, name in topics])
-    parts: dict[str, list[Array]] = {STATE: [], ACTION: []}
+    parts: dict[str, list[Array]] = {key: [] for key in keys}
     pieces = list(streams.sampled(fps))
     for key, prefix, name in topics:
         columns = [c for c in streams.columns[name] if not c.endswith((".velocity", ".effort"))]
+        if wanted := next((own for topic, own in _AROUND.items() if name == prefix + topic.name), ()):
+            columns = [c for c in columns if c.removesuffix(".position") in wanted]
         at = [streams.columns[name].index(column) for column in columns]
         parts[key].append(np.concatenate([piece.values[name][:, at] for piece in pieces]))
-        tip = "tip." if name.endswith("_cp") else ""
+        tip = {SLAVE_MEASURED_CP.name: "tip.", SLAVE_SERVO_CP.name: "tip.", SLAVE_JAW_OBJECT_CP.name: "object."}.get(
+            name.removeprefix(prefix), ""
+        )
         names[key] += [prefix + tip + column.removesuffix(".position") for column in columns]
     numbers = {key: np.hstack(found).astype(np.float32) for key, found in parts.items()}
     is_known = np.isfinite(np.hstack(list(numbers.values()))).all(axis=1)

@@ -1,5 +1,7 @@
 """Import options: the columns or topics of a file that contain the hand's motion, with units and axes."""
 
+import math
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from itertools import pairwise
@@ -53,7 +55,9 @@ _COUNTS = {
     "matrix": (0, 9),
     "euler": (0, 4),
     "rotation_vector": (0, 3),
+    "jaw": (0, 3),
 }
+_IS_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d{1,2})?")
 _TUPLES = (*_COUNTS, "axes", "numbered_by")
 
 
@@ -85,6 +89,8 @@ class ImportOptions:
         clutch: Column of the clutch button, which is pressed above ``threshold``; empty for no button.
         fixture: Column of the fixture button, with the same rules as ``clutch``.
         mode: Column of the mode button, with the same rules as ``clutch``.
+        jaw: Column of the jaw or gripper, with its values when it is open and when it is closed:
+            ``("width", "0.08", "0")``. The hand then closes the slave's jaw in the same share.
         threshold: Value above which a button counts as pressed.
         skip: Number of lines to leave out at the beginning of a text file.
         episode: Number of the recording in a table of several recordings; None for a table of one recording.
@@ -125,6 +131,7 @@ class ImportOptions:
     clutch: str = ""
     fixture: str = ""
     mode: str = ""
+    jaw: Columns = ()
     threshold: float = 0.5
     skip: int = 0
     episode: int | None = None
@@ -185,7 +192,8 @@ class ImportOptions:
             given = getattr(self, name)
             if len(given) not in counts:
                 needed = " or ".join(str(count) for count in counts if count)
-                what = "an order and three columns" if name == "euler" else f"{needed} columns"
+                forms = {"euler": "an order and three columns", "jaw": "a column, its value if open, and if closed"}
+                what = forms.get(name, f"{needed} columns")
                 raise ParameterError(option(name), given, what)
         if several := [option(name) for name in ORIENTATIONS if getattr(self, name)][1:]:
             raise ParameterError(several[0], "given", "the only option that defines the orientation")
@@ -205,8 +213,16 @@ class ImportOptions:
             raise ParameterError(
                 "--episode", self.episode, "the number of one episode; `import_episodes` imports all of them"
             )
+        if self.jaw and not abs(self.jaw_ends[0] - self.jaw_ends[1]) > 0.0:  # NaN too
+            raise ParameterError("--jaw", self.jaw, "a column and two different numbers")
         if self.skip < 0:
             raise ParameterError("--skip", self.skip, "0 or more")
+
+    @property
+    def jaw_ends(self) -> tuple[float, float]:
+        """Values of the jaw's column when it is open and when it is closed; NaN for words that are no numbers."""
+        opened, closed = (float(word) if _IS_NUMBER.fullmatch(word) else math.nan for word in self.jaw[1:])
+        return opened, closed
 
     @property
     def signed_axes(self) -> Columns:

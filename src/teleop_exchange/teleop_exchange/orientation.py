@@ -13,6 +13,7 @@ from teleop_core.kernels.geometry import quaternion_from_rotation
 
 TOLERANCE = 0.1
 """Largest deviation of a quaternion's length from 1, or of a matrix from a rotation matrix."""
+_UPRIGHT, _OVER = 0.9, 0.5  # mean of |w| of turns that are small on average, and of turns that hardly are
 _MISSING = 1e-6  # length of a quaternion below which no orientation was measured
 
 
@@ -28,6 +29,7 @@ class Attitudes:
         strange: Number of rows that are not valid rotations.
         mirrored: Number of rows that are mirrored rotations; they are included in ``strange``.
         longest: Largest difference of a used quaternion's length from 1.
+        real: Mean of the size of w, as read and as the other order of the columns would read it.
     """
 
     kind: str
@@ -36,6 +38,25 @@ class Attitudes:
     strange: int = 0
     mirrored: int = 0
     longest: float = 0.0
+    real: tuple[float, float] = (0.0, 0.0)
+    _count: int = 0
+
+    @property
+    def doubt(self) -> str:
+        """Text if the other order of a quaternion's columns is more plausible; empty otherwise.
+
+        A wrong order mirrors the four numbers. Sizes of turns and their speeds stay the same, so they tell nothing.
+        But it makes a half turn of every small turn from the axes of the file.
+        """
+        as_read, other = self.real
+        if self.kind != "quaternion" or as_read > _OVER or other < _UPRIGHT:
+            return ""
+        own, better = (f"{2.0 * math.degrees(math.acos(min(w, 1.0))):.0f}°" for w in self.real)
+        swapped = "wxyz" if self.order == "xyzw" else "xyzw"
+        return (
+            f"on average the hand is turned {own} from the axes of the file, in the order {swapped} only {better}: "
+            f"is the order right? (--quaternion-order {swapped})"
+        )
 
     @property
     def width(self) -> int:
@@ -47,12 +68,24 @@ class Attitudes:
         if self.kind == "none":
             return np.tile([1.0, 0.0, 0.0, 0.0], (len(rows), 1))
         if self.kind == "quaternion":
-            turned = rows[:, [3, 0, 1, 2]] if self.order == "xyzw" else rows
-            return self._unit(turned)
+            turned = self._unit(rows[:, [3, 0, 1, 2]] if self.order == "xyzw" else rows)
+            self._weigh(turned[np.isfinite(turned).all(axis=1)])
+            return turned
         if self.kind == "matrix":
             matrices = rows.reshape(-1, 3, 3)
             return self._of_matrices(matrices.transpose(0, 2, 1) if self.order == "column" else matrices)
         return self._of_angles(np.radians(rows) if self.degrees else rows)
+
+    def _weigh(self, unit: Array) -> None:
+        """Add unit quaternions to the means of w in both orders."""
+        total = self._count + len(unit)
+        if total:
+            swapped = unit[:, 1 if self.order == "xyzw" else 3]
+            sums = (abs(unit[:, 0]).sum(), abs(swapped).sum())
+            first, other = (
+                (self._count * mean + float(added)) / total for mean, added in zip(self.real, sums, strict=True)
+            )
+            self.real, self._count = (first, other), total
 
     def _of_angles(self, angles: Array) -> Array:
         from scipy.spatial.transform import Rotation

@@ -22,6 +22,7 @@ class Block:
         quaternion: Orientations (n, 4), w, x, y, z; NaN if missing.
         buttons: Whether clutch, fixture and mode are pressed (n, 3); None if the file has no columns of buttons.
         log_ns: Times of recording (n,) [ns] of a bag.
+        closing: How far the jaw is closed (n,), 0 (open) to 1; NaN if missing. None if the file has no such column.
     """
 
     time: Array | times.Stamps
@@ -29,6 +30,7 @@ class Block:
     quaternion: Array
     buttons: NDArray[np.uint8] | None = None
     log_ns: times.Stamps | None = None
+    closing: Array | None = None
 
 
 @dataclass(frozen=True, eq=False)

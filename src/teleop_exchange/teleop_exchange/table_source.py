@@ -24,6 +24,7 @@ class Columns:
     position: tuple[int, ...]
     orientation: tuple[int, ...]
     buttons: dict[str, int]
+    jaw: tuple[int, ...] = ()
 
 
 class TableSource:
@@ -51,7 +52,7 @@ class TableSource:
         time = self._time(position)
         self.attitudes, orientation = self._orientation(position)
         taken = {*position, *time, *orientation}
-        self._columns = Columns(time, position, orientation, self._buttons(taken))
+        self._columns = Columns(time, position, orientation, self._buttons(taken), self._jaw())
         self._episodes = episodes.Episodes(table, options)
         self.has_time = bool(time)
         self.time_unit = self._time_unit(time)
@@ -60,7 +61,7 @@ class TableSource:
             ", ".join(table.names[column] for column in group) for group in (time, position, orientation)
         )
         self.labels = (time_label, place_label, turn_label)
-        self._tell_unused({*taken, *self._columns.buttons.values()})
+        self._tell_unused({*taken, *self._columns.buttons.values(), *self._columns.jaw})
 
     # -- which columns ---------------------------------------------------------------------------
 
@@ -69,9 +70,9 @@ class TableSource:
         wanted = wanted[1:] if name == "euler" else wanted
         return tuple(tables.column_of(self._table, one, option(name)) for one in wanted)
 
-    def _told(self, what: str, columns: Sequence[int]) -> tuple[int, ...]:
+    def _told(self, what: str, columns: Sequence[int], more: str = "") -> tuple[int, ...]:
         listed = ", ".join(repr(self._table.names[column]) for column in columns)
-        self.told.append(f"{what} = {listed}")
+        self.told.append(f"{what} = {listed}{more}")
         return tuple(columns)
 
     def _position(self) -> tuple[int, ...]:
@@ -211,6 +212,12 @@ class TableSource:
         self.told.append(f"angles in {'degrees' if is_degrees else 'radians'} ({why})")
         return is_degrees
 
+    def _jaw(self) -> tuple[int, ...]:
+        if not (wanted := self._options.jaw):
+            return ()
+        column = tables.column_of(self._table, wanted[0], "--jaw")
+        return self._told("jaw", (column,), f", open at {wanted[1]}, closed at {wanted[2]}")
+
     def _buttons(self, taken: set[int]) -> dict[str, int]:
         found = {}
         for button in BUTTONS:
@@ -292,7 +299,7 @@ class TableSource:
             RecordingError: A cell is not a number, or the file is damaged.
         """
         c = self._columns
-        order = [*c.time, *c.position, *c.orientation, *c.buttons.values()]
+        order = [*c.time, *c.position, *c.orientation, *c.buttons.values(), *c.jaw]
         first, second = len(c.time), len(c.time) + 3
         for columns in self._episodes.blocks(order, self.has_time):
             turned = columns[second : second + len(c.orientation)]
@@ -302,9 +309,15 @@ class TableSource:
                 _time(columns[:first], count),
                 np.column_stack(columns[first:second]).astype(np.float64, copy=False),
                 self.attitudes.quaternions(rows.astype(np.float64, copy=False)),
-                self._pressed(columns[second + len(turned) :], count),
+                self._pressed(columns[second + len(turned) : len(order) - len(c.jaw)], count),
+                closing=self._closing(columns[len(order) - 1]) if c.jaw else None,
             )
         self.told += self._episodes.told()
+
+    def _closing(self, column: tables.Numbers) -> Array:
+        """How far the jaw is closed, 0 (open) to 1; values beyond both ends count as these."""
+        opened, closed = self._options.jaw_ends
+        return np.asarray(np.clip((column.astype(np.float64) - opened) / (closed - opened), 0.0, 1.0))
 
     def _pressed(self, columns: Sequence[tables.Numbers], count: int) -> NDArray[np.uint8] | None:
         if not columns:

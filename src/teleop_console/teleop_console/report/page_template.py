@@ -8,23 +8,24 @@ POLICY = (
     "default-src 'none'; script-src 'unsafe-inline' 'unsafe-eval'; style-src 'unsafe-inline'; "
     "img-src data: blob:; font-src data:; worker-src blob:"
 )
-_SCRIPTS = ("unpack", "thin", "bands", "paths", "plot", "recording", "page")
+_SCRIPTS = ("theme", "unpack", "thin", "bands", "paths", "plot", "recording", "page")
 
 
 @cache
 def style() -> str:
     """Style sheet of the page."""
-    return _text("style.css")
+    return text_of("style.css")
 
 
 @cache
 def script() -> str:
     """All scripts as one text; each script may use the scripts before it."""
-    parts = "\n".join(_text(f"{name}.js") for name in _SCRIPTS)
+    parts = "\n".join(text_of(f"{name}.js") for name in _SCRIPTS)
     return f'"use strict";\n(function () {{\n{parts}}})();\n'
 
 
-def _text(name: str) -> str:
+def text_of(name: str) -> str:
+    """Text of a file beside this module."""
     return (files("teleop_console.report") / name).read_text(encoding="utf-8")
 
 

@@ -3,9 +3,7 @@
 const TIME = "time"; // the mark of axes of time, as figure.py has it
 const NARROW = window.matchMedia("(max-width: 640px)");
 const FEW = 200; // samples that are drawn as dots too
-const AXIS = { gridcolor: "#e9ecef", zerolinecolor: "#ced4da", linecolor: "#adb5bd",
-  showline: true, ticks: "outside", automargin: true };
-const AXIS3 = { gridcolor: "#dee2e6", backgroundcolor: "#fff", zeroline: false };
+const AXIS = { showline: true, ticks: "outside", automargin: true };
 
 class Plot {
   constructor(figure, arrays, recording) {
@@ -16,7 +14,7 @@ class Plot {
     this.layout = laidOut(resolved(figure.layout, arrays));
     // Axes that time_axis() of figure.py made.
     this.axes = Object.keys(this.layout).filter((key) => /^xaxis/.test(key) && this.layout[key].uirevision === TIME);
-    this.traces = resolved(figure.traces, arrays);
+    this.traces = resolved(figure.traces, arrays).map(seen);
     this.curves = []; this.paths = [];
     this.faded = this.traces.flatMap((trace, index) => (trace.meta && trace.meta.surrounds ? [index] : []));
     this.traces.forEach((trace, index) => {
@@ -184,16 +182,8 @@ function put(target, [key, ...further], value) {
 }
 
 function laidOut(own) {
-  const layout = {
-    font: { family: "system-ui, Segoe UI, Roboto, Arial, sans-serif", size: 13, color: "#1c2126" },
-    paper_bgcolor: "#fff", plot_bgcolor: "#fff",
-    legend: { orientation: "h", x: 0, y: 1.02, yanchor: "bottom" },
-    ...own,
-  };
+  const layout = { font: { size: 13 }, legend: { orientation: "h", x: 0, y: 1.02, yanchor: "bottom" }, ...own };
   for (const key of Object.keys(layout)) if (/^[xy]axis/.test(key)) layout[key] = { ...AXIS, ...layout[key] };
-  if (layout.scene) {
-    layout.scene = { ...layout.scene };
-    for (const key of ["xaxis", "yaxis", "zaxis"]) layout.scene[key] = { ...AXIS3, ...layout.scene[key] };
-  }
-  return layout;
+  if (layout.scene) layout.scene = { xaxis: {}, yaxis: {}, zaxis: {}, ...layout.scene };
+  return themed(layout);
 }

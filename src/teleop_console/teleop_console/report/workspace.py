@@ -6,6 +6,7 @@ from typing import Any
 import plotly.graph_objects as plots
 from plotly.subplots import make_subplots
 
+from teleop_console.report.plain_page import Figures, plain_page
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots.robot import Robot
 
@@ -48,11 +49,8 @@ def write_workspace_page(robot: Robot, points: Array, values: Array, file: Path)
         figure.update_yaxes(title_text=f"{name} [m]", scaleanchor=f"x{row}", row=row, col=2)
         figure.update_xaxes(title_text="x [m]", row=row, col=2)
     axes = {f"{axis}axis": {"title": f"{axis} [m]"} for axis in "xyz"}
-    figure.update_layout(
-        title=f"Workspace of {robot.name}: {len(points):,} joint vectors drawn within the limits",
-        showlegend=False,
-        height=820,
-        template="plotly_white",
-        scene={**axes, "aspectmode": "data"},
-    )
-    figure.write_html(file, include_plotlyjs=True, full_html=True)
+    figure.update_layout(showlegend=False, height=820, template="none", scene={**axes, "aspectmode": "data"})
+    told = f"{len(points):,} joint vectors drawn within the limits"
+    figures = Figures()
+    card = figures.card(figure.data, figure.layout, told)
+    file.write_text(plain_page(f"Workspace of {robot.name}", [card], figures), encoding="utf-8")

@@ -1,6 +1,7 @@
 """Arguments that several commands share, and their evaluation."""
 
 import argparse
+import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,15 +12,30 @@ if TYPE_CHECKING:
     from teleop_core.session.configuration import Configuration
 
 
-def geometry_argument(parser: argparse.ArgumentParser) -> None:
+def geometry_argument(parser: argparse.ArgumentParser, action: str | type[argparse.Action] = "store") -> None:
     """Add an argument to a command: lengths that replace the published lengths of the robot."""
     parser.add_argument(
         "--geometry",
         nargs="+",
         default=[],
         metavar="SYMBOL=VALUE",
-        help="lengths and options that replace the published ones [m, rad]",
+        help="lengths and options that replace the published ones [m, rad], such as tip=tool0 of a URDF",
+        action=action,
     )
+
+
+class _Robot(argparse.Action):
+    """Settings of another robot, before all others: geometry and start of the former robot do not hold for it."""
+
+    def __call__(self, parser: Any, namespace: Any, values: Any, option_string: Any = None) -> None:
+        namespace.settings = [f"robot={values}", "geometry=[]", "slave.start=[]", *namespace.settings]
+
+
+class _Geometry(argparse.Action):
+    """Setting of the robot's geometry."""
+
+    def __call__(self, parser: Any, namespace: Any, values: Any, option_string: Any = None) -> None:
+        namespace.settings = [*namespace.settings, f"geometry={json.dumps(values)}"]
 
 
 def command(
@@ -70,8 +86,8 @@ def session_arguments(parser: argparse.ArgumentParser) -> None:
     setting_arguments(parser)
 
 
-def setting_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments for files and values of parameters."""
+def setting_arguments(parser: argparse.ArgumentParser, *, of_robot: bool = True) -> None:
+    """Add the arguments for files and values of parameters; ``of_robot`` adds short forms for the robot's values."""
     parser.add_argument(
         "--config",
         type=Path,
@@ -80,6 +96,10 @@ def setting_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help="ROS 2 parameter file that overrides the scenario; may be repeated",
     )
+    if of_robot:
+        text = "slave: one of `teleop robot`, or a file, as --set robot=ROBOT"
+        parser.add_argument("--robot", action=_Robot, metavar="ROBOT", help=text)
+        geometry_argument(parser, _Geometry)
     parser.add_argument(
         "--set",
         nargs="+",

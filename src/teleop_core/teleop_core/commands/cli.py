@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from teleop_core.base import SessionError, TeleopError, TeleopWarning, one_line
-from teleop_core.commands import compiling, devices, installed, operate
+from teleop_core.commands import compiling, devices, installed, look, operate
 from teleop_core.commands.arguments import (
     command,
     configured,
@@ -139,7 +139,7 @@ def _core() -> tuple[argparse.ArgumentParser, Any]:
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     for add in (_add_sim, _add_live, _add_replay, _add_play, _add_evaluate, _add_lookups):
         add(commands)
-    for module in (operate, devices, compiling):
+    for module in (operate, look, devices, compiling):
         module.add(commands)
     return parser, commands
 
@@ -195,6 +195,9 @@ def _add_evaluate(commands: Any) -> None:
     score.add_argument("bags", type=Path, nargs="+", metavar="BAG", help="recordings to score")
     score.add_argument("--json", type=Path, metavar="FILE", help="write the scores as JSON")
     score.add_argument("--html", type=Path, metavar="FILE", help="write one page with plots")
+    score.add_argument(
+        "--differences", action="store_true", help="show only rows that differ between recordings, largest change first"
+    )
     score.add_argument(
         "--span",
         type=float,
@@ -299,7 +302,7 @@ def _evaluate(arguments: argparse.Namespace) -> int:
     from teleop_core.evaluation.command import evaluate_bags
 
     span = tuple(arguments.span) if arguments.span else None
-    evaluate_bags(arguments.bags, arguments.json, arguments.html, Console(), span)
+    evaluate_bags(arguments.bags, arguments.json, arguments.html, Console(), span, differences=arguments.differences)
     return 0
 
 

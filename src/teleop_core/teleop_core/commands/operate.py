@@ -45,7 +45,7 @@ def add(commands: Any) -> None:
         )
 
 
-def _domains(arguments: argparse.Namespace) -> tuple[int, ...]:
+def chosen_domains(arguments: argparse.Namespace) -> tuple[int, ...]:
     """ROS domains that the command applies to.
 
     Raises:
@@ -70,7 +70,7 @@ def _operators(arguments: argparse.Namespace) -> "list[RemoteControl]":
 
     module = ros_module("remote_control")
     environment()
-    return [module.RemoteControl(domain) for domain in _domains(arguments)]
+    return [module.RemoteControl(domain) for domain in chosen_domains(arguments)]
 
 
 def _stop(arguments: argparse.Namespace) -> int:

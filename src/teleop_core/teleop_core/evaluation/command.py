@@ -8,7 +8,8 @@ from pathlib import Path
 from rich.console import Console
 
 from teleop_core.bags.reader import Bag
-from teleop_core.base import EvaluationError, printable
+from teleop_core.base import EvaluationError, ParameterError, printable
+from teleop_core.evaluation.differences import difference_table
 from teleop_core.evaluation.score import Score
 from teleop_core.evaluation.score_table import score_tables
 from teleop_core.evaluation.scoring import studies
@@ -19,7 +20,13 @@ PAGES = "teleop_core.pages"
 
 
 def evaluate_bags(
-    paths: Sequence[Path], json_file: Path | None, html_file: Path | None, console: Console, span: Seconds | None = None
+    paths: Sequence[Path],
+    json_file: Path | None,
+    html_file: Path | None,
+    console: Console,
+    span: Seconds | None = None,
+    *,
+    differences: bool = False,
 ) -> list[Score]:
     """Score recordings, show the table, and write JSON and page if wanted.
 
@@ -31,11 +38,13 @@ def evaluate_bags(
         html_file: File for the page.
         console: Console that shows the table and the paths of the files.
         span: Begin and end [s] of the scored part of each recording; None for the whole recording.
+        differences: Whether the table shows only the rows that differ.
 
     Returns:
         One score per recording and arm.
 
     Raises:
+        ParameterError: Differences are wanted of a single score.
         EvaluationError: A recording cannot be scored, or a file cannot be written.
         RecordingError: A recording is missing, damaged, or lacks a topic.
     """
@@ -48,7 +57,9 @@ def evaluate_bags(
         console.print(printable(line), markup=False, highlight=False, soft_wrap=True)
         if advice := score.verdict.advice:
             console.print(f"  {advice}", markup=False, highlight=False, soft_wrap=True)
-    for table in score_tables(scores, console.width):
+    if differences and len(scores) < 2:
+        raise ParameterError("--differences", str(paths[0]), "given with two recordings or more")
+    for table in [difference_table(scores)] if differences else score_tables(scores, console.width):
         console.print(table)
     if json_file is not None:
         text = json.dumps([score.to_json() for score in scores], indent=2, allow_nan=False)

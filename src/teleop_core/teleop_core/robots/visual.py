@@ -6,6 +6,8 @@ from typing import Literal
 
 from teleop_core.kernels import Array
 
+Color = tuple[float, float, float]
+"""Red, green and blue, from 0 to 1."""
 VisualKind = Literal["mesh", "box", "cylinder", "capsule", "sphere"]
 
 
@@ -22,6 +24,9 @@ class Visual:
             radius, and length between the centres of its half spheres [m]. Sphere: radius [m].
         file: Name of the mesh as written in the URDF; empty for other kinds.
         urdf: Path of the URDF.
+        color: Colour of the material; None if the file states none.
+        travel: Poses (K, 4, 4) of the shape in the base [m], from the closed to the open jaw, with the arm at home.
+            None for a shape that the jaw does not move.
     """
 
     link: str
@@ -31,3 +36,5 @@ class Visual:
     size: tuple[float, ...]
     file: str
     urdf: Path
+    color: Color | None = None
+    travel: Array | None = None

@@ -12,6 +12,7 @@ from teleop_core.slave.operation.states import Event, State, change
 
 _ENABLED, _FAULT = int(State.ENABLED), int(State.FAULT)
 _PAUSED, _SETPOINT = int(State.PAUSED), int(Fault.SETPOINT)
+_ASKED, _JOINING, _JOINED = 1, 2, 3  # values of must_join: until the setpoint is at the measured position
 _ARRIVED, _HOME, _BLIND = int(Event.ARRIVED), int(Event.HOME), int(commands.CommandStatus.BLIND)
 
 
@@ -96,6 +97,8 @@ def _go_on(
     """Move the setpoint: to a goal, at a speed, after the command, or to rest."""
     if s.state in (_ENABLED, _PAUSED):
         s.must_join = 0
+    elif s.must_join == _JOINING and (_is_near(p, s) or _is_still(s)):  # after the limit of the tool
+        s.must_join = _JOINED
     if s.state == _ENABLED and s.is_busy and not s.must_plan:
         commands.advance_move(s)
     elif s.state == _ENABLED and s.is_busy:  # a move to a goal begins at rest
@@ -105,14 +108,13 @@ def _go_on(
     elif row.command_status != _BLIND and commands.follows(p, s, row.now_ns):
         interpolation.advance_on_way(p, s)
         commands.advance_setpoint(p, s, before, dt)
-    elif watch.is_braked(p, s) or s.must_join:
+    elif watch.is_braked(p, s) or s.must_join in (_ASKED, _JOINING):
         commands.come_to_rest(p, s, commands.WITH_ARM, dt)
-        if s.must_join and (_is_near(p, s) or _is_still(s)):
-            s.must_join = 0
-            for i in range(s.step.shape[0]):
-                s.step[i] = 0.0
+        s.must_join = _JOINING if s.must_join else 0
     else:
-        commands.come_to_rest(p, s, commands.AT_ONCE if s.state == _FAULT else commands.AT_LIMITS, dt)
+        has_joined = s.must_join == _JOINED  # the last step was no motion that could be continued
+        commands.come_to_rest(p, s, commands.AT_ONCE if s.state == _FAULT or has_joined else commands.AT_LIMITS, dt)
+        s.must_join = 0
 
 
 @inner

@@ -38,7 +38,7 @@ def add(commands: Any) -> None:
     parser.add_argument(
         "--out", type=Path, metavar="FILE.yaml", help="write the fitted plant as a parameter file, for --config"
     )
-    setting_arguments(parser)
+    setting_arguments(parser, of_robot=False)  # its robot is that of the table
 
 
 def _run(arguments: argparse.Namespace) -> int:

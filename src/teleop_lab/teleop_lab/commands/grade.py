@@ -82,6 +82,7 @@ def _page(table: Any, name: str) -> str:
     """Page with a table that can be sorted by oddness; odd cells are highlighted."""
     from html import escape
 
+    from teleop_console.report.plain_page import plain_page
     from teleop_lab.grading import ODD, WORST
 
     head = "".join(f"<th>{escape(str(column))}</th>" for column in ("episode", *table.columns))
@@ -93,15 +94,6 @@ def _page(table: Any, name: str) -> str:
             text = f"{value:.4g}" if isinstance(value, float) else str(value)
             cells.append(f"<td{' class=odd' if is_odd else ''}>{escape(text)}</td>")
         rows.append(f"<tr>{''.join(cells)}</tr>")
-    style = (
-        "body{font-family:system-ui,sans-serif;margin:2rem}table{border-collapse:collapse}"
-        "td,th{padding:.25rem .6rem;border-bottom:1px solid #ddd;text-align:right}"
-        ".odd{background:#ffd9a8;color:#000}"
-        "@media(prefers-color-scheme:dark){body{background:#16181c;color:#ddd}}"
-    )
-    return (
-        f'<!doctype html><html lang="en"><meta charset="utf-8"><title>{escape(name)}</title>'
-        f"<style>{style}</style><h1>{escape(name)}</h1><p>Oddest first: by how many robust "
-        "standard deviations the oddest figure is off the median of all episodes.</p>"
-        f"<table><tr>{head}</tr>{''.join(rows)}</table></html>"
-    )
+    text = "Oddest first: by how many robust standard deviations the oddest figure is off the median of all episodes."
+    table_html = f'<div class="card table"><table><tr>{head}</tr>{"".join(rows)}</table></div>'
+    return plain_page(name, [f'<p class="facts">{text}</p>', table_html])

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from teleop_core.base.errors import TeleopError
-from teleop_core.commands.arguments import command, geometry_argument, setting_arguments
+from teleop_core.commands.arguments import command, setting_arguments
 
 if TYPE_CHECKING:
     from teleop_lab.planning.reach_result import Reach
@@ -14,7 +14,7 @@ _EPILOG = """\
 shares are of the time: as given, and with a start of the slave, an order of axes and gains that
 reach the goal with the largest gains. Take them as they are printed, or as a file:
   teleop reach bags/hand --robot rcrt1 --html reach.html --out reach.yaml
-  teleop replay bags/hand --out bags/followed --set robot=rcrt1 --config reach.yaml
+  teleop replay bags/hand --out bags/followed --robot rcrt1 --config reach.yaml
 """
 
 
@@ -28,8 +28,6 @@ def add(commands: Any) -> None:
         metavar="BAG|SCENARIO",
         help="recording, in our or a foreign format, or one of `teleop scenarios`",
     )
-    parser.add_argument("--robot", help="slave that replaces the recording's; one of `teleop robot`")
-    geometry_argument(parser)
     parser.add_argument("--arm", default="", help="namespace of the arm (default: the first)")
     parser.add_argument(
         "--share",
@@ -79,8 +77,6 @@ def _reach(source: str, arguments: argparse.Namespace) -> "Reach":
     with shown_progress(f"searching, {Path(source).name}") as progress:
         return reach(
             source,
-            robot=arguments.robot,
-            geometry=arguments.geometry,
             arm=arguments.arm,
             share=arguments.share / 100.0,
             keeps_axes=arguments.keep_axes,

@@ -5,11 +5,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from teleop_console.report.plain_page import Figures
 from teleop_core.evaluation.figure import FIRST, SECOND
 from teleop_lab.people.journal import DONE, Journal
 from teleop_lab.people.plan import Plan
 from teleop_lab.studies.dataset import swept_coordinates, units_of_scores
-from teleop_lab.studies.page import condition_lines, drawn, label_of, table_html, whole_page
+from teleop_lab.studies.page import condition_lines, label_of, table_html, whole_page
 from teleop_lab.studies.summary import Mean, apart, conditions, differences, median_of, table_text
 
 if TYPE_CHECKING:
@@ -82,7 +83,7 @@ def comparison_table(plan: Plan, people: "xarray.Dataset", simulated: "xarray.Da
 
 def comparison_page(plan: Plan, people: "xarray.Dataset", simulated: "xarray.Dataset") -> str:
     """HTML page of this comparison, with plots, paired differences and answers; it works offline."""
-    parts = []
+    figures, parts = Figures(), list[str]()
     both = {"people": (people, FIRST), "simulated operator": (simulated, SECOND)}
     for metric in plan.study.metrics:
         rows = [[row[0], *map(str, row[1:])] for row in compared(plan, people, simulated, metric)]
@@ -93,7 +94,7 @@ def comparison_page(plan: Plan, people: "xarray.Dataset", simulated: "xarray.Dat
                 for who, (found, color) in both.items()
                 for trace in condition_lines(plan.study, found, metric, median_of)
             ]
-            parts.append(drawn(traces, label_of(plan.study, people, metric)))
+            parts.append(figures.card(traces, label_of(plan.study, people, metric)))
         parts.append(
             table_html((f"change of {metric}", "against the first", *_HEADS[:2]), _changes(plan, both, metric))
         )
@@ -107,7 +108,7 @@ def comparison_page(plan: Plan, people: "xarray.Dataset", simulated: "xarray.Dat
             for values, part in conditions(plan.study, people)
         ]
         parts += ["<h2>Questions</h2>", table_html(("medians of people, 0 to 100", *asked), rows)]
-    return whole_page(plan.people.title, _ABOUT, parts)
+    return whole_page(plan.people.title, _ABOUT, parts, figures)
 
 
 def _changes(plan: Plan, both: dict[str, Any], metric: str) -> list[list[str]]:

@@ -9,6 +9,7 @@ import numpy as np
 import plotly.graph_objects as plots
 from plotly.subplots import make_subplots
 
+from teleop_console.report.plain_page import Figures, plain_page
 from teleop_core.evaluation.bands import LIMIT_COLORS
 from teleop_core.graph.topics import Limit
 from teleop_core.kernels.geometry import Array, rotation_vectors
@@ -20,30 +21,10 @@ COLORS = {Limit.NONE: "#1c7c54", **LIMIT_COLORS}
 """Colour of a sample by the cause that keeps the slave from following it; ``Limit.NONE`` for followed samples."""
 _POINTS = 6_000  # largest number of drawn samples of a path; more make the page slow, and the plot no clearer
 _WORKSPACE = 3_000  # drawn positions that the tip can reach
+_LEAST_VIEW = 0.02  # smallest half of the side of the drawn space [m]
 _BINS = 1_500  # time bins in which causes are drawn
-_ROWS = (2, 3)  # rows of the figure that show curves over time
-_AXES = (("x", "#1971c2"), ("y", "#495057"), ("z", "#b08900"))
-_STYLE = """\
-body { font: 15px/1.45 system-ui, sans-serif; margin: 1rem auto; max-width: 1500px;
-  padding: 0 1rem; }
-pre { overflow-x: auto; background: #f4f4f2; padding: .8rem; font-size: 13px; }
-.pair { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(100%, 460px), 1fr)); }
-.pair > div { min-width: 0; overflow: hidden; }
-@media (max-width: 600px) { h1 { font-size: 1.3rem; } pre { font-size: 10px; padding: .4rem; } }
-"""
-_HEAD = """\
-<!DOCTYPE html>
-<html lang="en"><head><meta charset="utf-8">
-<meta name="viewport" content="width=device-width, initial-scale=1"><link rel="icon" href="data:,">
-<title>{title}</title><style>
-{style}</style></head><body>
-<noscript><p>The plots need JavaScript, which is off here; the tables are all there.</p></noscript>
-"""
-# The first figure is drawn before the second takes its half of the width.
-_TAIL = """\
-<script>addEventListener("load", () => dispatchEvent(new Event("resize")));</script>
-</body></html>
-"""
+_ROWS = (1, 2)  # rows of the figure that show curves over time
+_AXES = (("x", "#1971c2"), ("y", "#868e96"), ("z", "#b08900"))
 _NOTES = """\
 <p>In space: the path of the hand as it is asked of the slave, with nothing cut off, over places
 that the tip can reach (grey). Against time: as a session follows it, where a limit cuts off what is
@@ -61,47 +42,48 @@ def write_reach_page(reaches: "Sequence[Reach]", file: Path) -> None:
     Raises:
         OSError: The file cannot be written.
     """
-    title = "Reach of " + ", ".join(reach.path.name for reach in reaches)
-    parts = [_HEAD.format(title=escape(title), style=_STYLE)]
+    figures, parts = Figures(), list[str]()
     for reach in reaches:
-        parts.append(f"<h1>{escape(reach.path.name)}: reach of {escape(reach.robot.name)}</h1>")
-        parts += [f"<pre>{escape(str(reach))}</pre>", _NOTES, '<div class="pair">']
+        parts.append(f"<h2>{escape(reach.path.name)}: reach of {escape(reach.robot.name)}</h2>")
+        parts += [f'<pre class="card">{escape(str(reach))}</pre>', _NOTES, '<div class="pair">']
         kinds = [("as given", reach.given)]
         kinds += [] if reach.is_given else [("proposed", reach.proposed)]
         for name, followed in kinds:
-            drawn = reach_figure(reach, followed, name)
-            is_first = not any("plotly.js" in part for part in parts)
-            html = drawn.to_html(full_html=False, include_plotlyjs=is_first, config={"responsive": True})
-            parts.append(f"<div>{html}</div>")
+            parts.append(
+                figures.card(*_space(reach, followed), f"{name}, in space: {followed.in_place.share:.1%} within reach")
+            )
+        for name, followed in kinds:
+            drawn = _times(reach.path, followed.session)
+            parts.append(figures.card(drawn.data, drawn.layout, f"{name}, against time: {followed.share:.1%} followed"))
         parts.append("</div>")
-    file.write_text("\n".join([*parts, _TAIL]), encoding="utf-8")
+    title = "Reach of " + ", ".join(reach.path.name for reach in reaches)
+    file.write_text(plain_page(title, parts, figures), encoding="utf-8")
 
 
-def reach_figure(reach: "Reach", followed: "Followed", name: str) -> plots.Figure:
-    """Figure of one placement: the path in space, then position and rotation against time."""
-    titles = (
-        f"{name}, in space: {followed.in_place.share:.1%} within reach",
-        f"{name}, against time: {followed.share:.1%} followed",
-        "",
-    )
-    figure = make_subplots(
-        rows=3,
-        cols=1,
-        row_heights=[0.56, 0.22, 0.22],
-        vertical_spacing=0.06,
-        specs=[[{"type": "scene"}], [{"secondary_y": True}], [{"secondary_y": True}]],
-        subplot_titles=titles,
-    )
-    figure.add_traces([*_workspace(reach), *_in_space(followed)], rows=1, cols=1)
-    _add_times(figure, reach.path, followed.session)
-    axes = {f"{axis}axis": {"title": f"{axis} [m]"} for axis in "xyz"}
-    figure.update_layout(
-        height=980,
-        template="plotly_white",
-        scene={**axes, "aspectmode": "data"},
-        legend={"orientation": "h", "y": -0.06, "itemsizing": "constant"},
-        margin={"l": 60, "r": 10, "t": 60, "b": 40},
-    )
+def _space(reach: "Reach", followed: "Followed") -> tuple[list[Any], dict[str, Any]]:
+    """Traces and layout of the path in space; the path fills the view, and the workspace goes on around it."""
+    places = followed.in_place.asked[:, :3]
+    low, high = places.min(axis=0), places.max(axis=0)
+    half = max(float((high - low).max()), _LEAST_VIEW)
+    axes = {
+        f"{axis}axis": {"title": {"text": f"{axis} [m]"}, "range": [middle - half, middle + half]}
+        for axis, middle in zip("xyz", (0.5 * (low + high)).tolist(), strict=True)
+    }
+    scene = {**axes, "aspectmode": "cube"}
+    legend = {"orientation": "h", "y": 0.0, "yanchor": "top", "itemsizing": "constant"}
+    margin = {"l": 10, "r": 10, "t": 10, "b": 10}
+    return [*_workspace(reach), *_in_space(followed)], {
+        "height": 520, "template": "none", "scene": scene, "legend": legend, "margin": margin,
+    }  # fmt: skip
+
+
+def _times(path: asked.AskedPath, walked: walk.Walked) -> Any:
+    """Figure of position and rotation against time."""
+    double = [{"secondary_y": True}]
+    figure = make_subplots(rows=2, cols=1, shared_xaxes=True, vertical_spacing=0.08, specs=[double, double])
+    _add_times(figure, path, walked)
+    legend = {"orientation": "h", "y": 1.02, "yanchor": "bottom", "itemsizing": "constant"}
+    figure.update_layout(height=520, template="none", legend=legend, margin={"l": 60, "r": 10, "t": 40, "b": 45})
     return figure
 
 
@@ -124,7 +106,7 @@ def _in_space(followed: "Followed") -> list[Any]:
                 plots.Scatter3d(x=x, y=y, z=z, mode="markers", marker={"size": 2, "color": color}, name=_label(cause))
             )
     x, y, z = ([value] for value in walked.asked[0, :3])
-    marker = {"size": 6, "color": "#111", "symbol": "cross"}
+    marker = {"size": 6, "color": "#d6336c", "symbol": "cross"}
     traces.append(plots.Scatter3d(x=x, y=y, z=z, mode="markers", marker=marker, name="start"))
     return traces
 
@@ -136,8 +118,6 @@ def _add_times(figure: Any, path: asked.AskedPath, walked: walk.Walked) -> None:
     turns = np.degrees(rotation_vectors(walked.asked[:, 3:]))
     curves = ((moves, "position [mm]"), (turns, "turn [°]"))
     for row, (values, unit) in zip(_ROWS, curves, strict=True):
-        for cause, bins in _bands(path, walked):
-            _add_band(figure, row, bins, cause)
         for column, (axis, color) in enumerate(_AXES):
             figure.add_trace(
                 plots.Scatter(
@@ -151,11 +131,14 @@ def _add_times(figure: Any, path: asked.AskedPath, walked: walk.Walked) -> None:
                 ),
                 row=row,
                 col=1,
-                secondary_y=True,
+                secondary_y=False,
             )
-        figure.update_yaxes(title_text=unit, side="left", tickmode="auto", row=row, col=1, secondary_y=True)
-        figure.update_yaxes(range=[0, 1], visible=False, row=row, col=1, secondary_y=False)
-    figure.update_xaxes(matches="x", row=_ROWS[1], col=1, title_text="time [s]")
+        # Bands have the second axis: without a curve on the first one, plotly would give it the whole height.
+        for cause, bins in _bands(path, walked):
+            _add_band(figure, row, bins, cause)
+        figure.update_yaxes(title_text=unit, row=row, col=1, secondary_y=False)
+        figure.update_yaxes(range=[0, 1], visible=False, row=row, col=1, secondary_y=True)
+    figure.update_xaxes(row=_ROWS[1], col=1, title_text="time [s]")
 
 
 def _add_band(figure: Any, row: int, bins: tuple[Array, Array], cause: Limit) -> None:
@@ -166,7 +149,7 @@ def _add_band(figure: Any, row: int, bins: tuple[Array, Array], cause: Limit) ->
         fillcolor=f"rgba({red}, {green}, {blue}, 0.35)", name=f"not: {_label(cause)}",
         legendgroup=cause.name, showlegend=row == _ROWS[0], hoverinfo="skip",
     )  # fmt: skip
-    figure.add_trace(band, row=row, col=1, secondary_y=False)
+    figure.add_trace(band, row=row, col=1, secondary_y=True)
 
 
 def _bands(path: asked.AskedPath, walked: walk.Walked) -> Iterable[tuple[Limit, tuple[Array, Array]]]:

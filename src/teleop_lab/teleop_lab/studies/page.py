@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from teleop_console.report.plain_page import Figures, plain_page
 from teleop_core.evaluation.figure import FIRST, FIXTURE, SECOND, THIRD
 from teleop_core.kernels.geometry import Array
 from teleop_lab.drawing import axis
@@ -20,26 +21,22 @@ if TYPE_CHECKING:
     from teleop_lab.studies.tuning import Tuned, Tuning
 
 _COLORS = (FIRST, SECOND, THIRD, FIXTURE, "#7f7f7f", "#17becf", "#bcbd22", "#8c564b")
-_STYLE = """body{font-family:system-ui,sans-serif;max-width:60rem;margin:2rem auto;padding:0 1rem}
-table{border-collapse:collapse;margin:1rem 0}td,th{padding:.25rem .75rem;text-align:left;
-border-bottom:1px solid #ddd;white-space:nowrap}
-@media(prefers-color-scheme:dark){body{background:#16181c;color:#ddd}td,th{border-color:#444}}"""
 
 
 def study_page(study: "Study", found: "xarray.Dataset", title: str) -> str:
     """HTML page of a study; it works offline, with plotly.js inside."""
-    parts = [_table(study, found)]
+    figures, parts = Figures(), [_table(study, found)]
     for metric in study.metrics:
         parts.append(f"<h2>{escape(metric)}</h2>")
         if study.swept:
-            parts.append(drawn(condition_lines(study, found, metric), label_of(study, found, metric)))
+            parts.append(figures.card(condition_lines(study, found, metric), label_of(study, found, metric)))
         if (heat := _heat(study, found, metric)) is not None:
-            parts.append(drawn(*heat))
+            parts.append(figures.card(*heat))
         parts.append(_changes(study, found, metric))
     errors = sorted({str(error) for error in found["error"].values.ravel() if error})
     parts += [f"<p>failed: {escape(error)}</p>" for error in errors]
     facts = ", ".join(f"{name} {value}" for name, value in found.attrs.items() if value)
-    return whole_page(title, f"{facts}. Means over the seeds, with 95 % intervals by the bootstrap.", parts)
+    return whole_page(title, f"{facts}. Means over the seeds, with 95 % intervals by the bootstrap.", parts, figures)
 
 
 def tuning_page(tuning: "Tuning", tuned: "Tuned", title: str) -> str:
@@ -47,7 +44,7 @@ def tuning_page(tuning: "Tuning", tuned: "Tuned", title: str) -> str:
     numbers = [str(n) for n in range(1, len(tuned.trials) + 1)]
     columns: dict[str, list[Any]] = {"trial": [int(n) for n in numbers]}
     columns |= {name: [trial.values[name] for trial in tuned.trials] for name in tuning.searched}
-    parts = []
+    figures, parts = Figures(), list[str]()
     for name, values in columns.items():
         trace = {
             "type": "scatter",
@@ -61,33 +58,17 @@ def tuning_page(tuning: "Tuning", tuned: "Tuned", title: str) -> str:
         where = tuning.searched.get(name)
         kind = {"type": "log"} if isinstance(where, Range) and where.is_log else {}
         layout = {"xaxis": axis(name, **kind), "yaxis": axis(tuning.metric), "height": 300}
-        parts += [f"<h2>{escape(name)}</h2>", drawn([trace], layout)]
+        parts += [f"<h2>{escape(name)}</h2>", figures.card([trace], layout)]
     best = ", ".join(
         f"{name}={value:.4g}" if isinstance(value, float) else f"{name}={value}"
         for name, value in tuned.best.values.items()
     )
-    return whole_page(title, f"Best: {best}, with {tuning.metric} {tuned.best.score:.4g}.", parts)
+    return whole_page(title, f"Best: {best}, with {tuning.metric} {tuned.best.score:.4g}.", parts, figures)
 
 
-def drawn(traces: Any, layout: Any) -> str:
-    """HTML of a figure, for a :func:`whole_page`."""
-    import plotly.graph_objects as go
-
-    figure = go.Figure(traces, layout)
-    figure.update_layout(margin={"t": 10, "b": 50, "l": 70, "r": 20})
-    text: str = figure.to_html({"displayModeBar": False}, full_html=False, include_plotlyjs=False)
-    return text
-
-
-def whole_page(title: str, sentence: str, parts: list[str]) -> str:
+def whole_page(title: str, sentence: str, parts: list[str], figures: Figures) -> str:
     """HTML page of some parts, with plotly.js inside."""
-    from plotly.offline import get_plotlyjs
-
-    return (
-        f'<!doctype html><html lang="en"><meta charset="utf-8"><title>{escape(title)}</title>'
-        f"<style>{_STYLE}</style><script>{get_plotlyjs()}</script><h1>{escape(title)}</h1>"
-        f"<p>{escape(sentence)}</p>" + "".join(parts) + "</html>"
-    )
+    return plain_page(title, [f'<p class="facts">{escape(sentence)}</p>', *parts], figures)
 
 
 def _label(found: "xarray.Dataset", metric: str) -> dict[str, Any]:
@@ -174,4 +155,4 @@ def table_html(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
         *([f"<td>{escape(cell)}</td>" for cell in r] for r in rows),
     ]
     body = "".join(f"<tr>{''.join(line)}</tr>" for line in lines)
-    return f"<table>{body}</table>" if rows else ""
+    return f'<div class="card table"><table>{body}</table></div>' if rows else ""

@@ -1,6 +1,7 @@
 """Robots from URDF: the chain from the root link to a tip, with the drive data of the file.
 
-The joints between root and tip move the tip. All other joints stay at zero, but their links have mass. A joint between
+The joints between root and tip move the tip. All other joints stay at zero, but their links have mass; the jaw moves
+those of a gripper in pictures (:mod:`teleop_core.robots.files.grippers`). A joint between
 root and tip that mimics another joint moves with it (:mod:`teleop_core.robots.dynamics.followers`). The kinematics are
 those of Denavit-Hartenberg chains (:mod:`teleop_core.kinematics.dh_kernels`), the dynamics those of rigid bodies
 (:mod:`teleop_core.robots.dynamics.chain_dynamics`). Effort and velocity limits, damping and friction of the file are
@@ -32,7 +33,8 @@ from teleop_core.robots.drives import ENTRIES, Drives, Dynamics
 from teleop_core.robots.dynamics.chain_dynamics import body_row, chain_dynamics, chain_row
 from teleop_core.robots.dynamics.followers import Follower, Followers, dynamics_row, follower_dynamics, follower_inertia
 from teleop_core.robots.files import urdf_notes, urdf_tree, xacro_files
-from teleop_core.robots.files.visuals import visuals_of
+from teleop_core.robots.files.grippers import strokes_of
+from teleop_core.robots.files.visuals import colors_of, visuals_of
 from teleop_core.robots.rank import directions_of
 from teleop_core.robots.robot import Robot
 
@@ -124,7 +126,9 @@ def load_urdf(
     solution = solution_of(kinds, fixed, reach, controlled) if followers.is_plain else SEARCH
     robot = make(task=controlled, solution=solution)
     coordinates = dict(zip((j.name for j in moving), followers.of(home).tolist(), strict=True))
-    visuals, undrawn = visuals_of(coordinates, links, by_child, Path(path))
+    named = {joint.name: joint for joint in joints}
+    strokes = strokes_of(chain, joints, links, by_child, partial(_leader, named=named))
+    visuals, undrawn = visuals_of(coordinates, links, by_child, Path(path), colors_of(root), strokes)
     # The start posture is not computed here, because its search takes about one second. It is computed at its first
     # use.
     notes = (*urdf_notes.notes_on(chain, links), *undrawn)

@@ -2,9 +2,10 @@
 
 import hashlib
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
+from types import MappingProxyType
 from xml.etree import ElementTree as Xml
 
 import numpy as np
@@ -12,7 +13,7 @@ import numpy as np
 from teleop_core.base import ParameterError
 from teleop_core.kernels import Array, product, rotation, transform
 from teleop_core.robots.files.urdf_tree import Links, UrdfJoint, chain_to, numbers_of, origin_of, tree_of, turn_of_z
-from teleop_core.robots.visual import Visual, VisualKind
+from teleop_core.robots.visual import Color, Visual, VisualKind
 
 _ENDINGS = (".stl", ".dae", ".obj", ".ply", ".glb", ".gltf", ".off")
 _UP = 4  # meshes may be in this many folders above the folder of the URDF
@@ -114,7 +115,12 @@ def _above(folder: Path) -> list[Path]:
 
 
 def visuals_of(
-    home: Mapping[str, float], links: Links, by_child: Mapping[str, UrdfJoint], urdf: Path
+    home: Mapping[str, float],
+    links: Links,
+    by_child: Mapping[str, UrdfJoint],
+    urdf: Path,
+    colors: Mapping[str, Color] = MappingProxyType({}),
+    strokes: Mapping[str, Array] = MappingProxyType({}),
 ) -> tuple[tuple[Visual, ...], list[str]]:
     """Shapes of all links, in the order of the file, and a note on each visual that cannot be drawn.
 
@@ -124,23 +130,27 @@ def visuals_of(
         links: Elements of the links by their names.
         by_child: The joint that carries each link.
         urdf: Path of the URDF.
+        colors: Colours of the materials that the file names.
+        strokes: Coordinates of the joints of a gripper from closed to open, by joint name.
     """
     found, notes = list[Visual](), list[str]()
     for link, element in links.items():
-        T, moved = np.eye(4), 0
         shapes = element.findall("visual")
-        for joint in chain_to(link, by_child) if shapes else ():
-            T = product(T, joint.origin)
-            if joint.name in home and joint.axis is not None:
-                T, moved = product(T, _motion(joint, home[joint.name])), moved + 1
+        chain = chain_to(link, by_child) if shapes else []
+        moved = sum(joint.name in home and joint.axis is not None for joint in chain)
+        T, gripped = place_of(chain, home), [joint.name for joint in chain if joint.name in strokes]
+        steps = zip(*(strokes[name].tolist() for name in gripped), strict=True)
+        ways = [place_of(chain, {**home, **dict(zip(gripped, step, strict=True))}) for step in steps]
         for shape in shapes:
             try:
                 kind, size, file = _shape(f"link {link}", shape)
-                place = product(T, origin_of(f"visual of link {link}", shape))
+                own = origin_of(f"visual of link {link}", shape)
             except ParameterError as error:  # no picture is worth an arm
                 notes.append(f"link {link} is drawn without: {error}")
             else:
-                found.append(Visual(link, moved, place, kind, size, file, urdf))
+                travel = np.stack([product(way, own) for way in ways]) if ways else None
+                color = _color(shape, colors)
+                found.append(Visual(link, moved, product(T, own), kind, size, file, urdf, color, travel))
     return tuple(found), notes
 
 
@@ -166,6 +176,43 @@ def _sizes(
     unit = "" if kind == "mesh" else "m"
     sizes = (numbers_of(where, shape, key, default, unit) for key, default in keys)
     return tuple(float(number) for size in sizes for number in size)
+
+
+def place_of(chain: Sequence[UrdfJoint], values: Mapping[str, float]) -> Array:
+    """Pose (4, 4) at the end of a chain of joints; joints without a value [rad, m] are at 0."""
+    T = np.eye(4)
+    for joint in chain:
+        T = product(T, joint.origin)
+        if joint.name in values and joint.axis is not None:
+            T = product(T, _motion(joint, values[joint.name]))
+    return T
+
+
+def colors_of(root: Xml.Element) -> dict[str, Color]:
+    """Colours of the materials of a URDF, by name; a material may be defined in any link."""
+    found: dict[str, Color] = {}
+    for material in root.iter("material"):
+        color = _rgb(material)
+        if color is not None and (name := material.get("name")):
+            found.setdefault(name, color)
+    return found
+
+
+def _color(shape: Xml.Element, colors: Mapping[str, Color]) -> Color | None:
+    material = shape.find("material")
+    if material is None:
+        return None
+    return _rgb(material) or colors.get(material.get("name", ""))
+
+
+def _rgb(material: Xml.Element) -> Color | None:
+    """Red, green and blue of a material, from 0 to 1; None without a colour, or with one that is none."""
+    color = material.find("color")
+    with suppress(ParameterError):
+        if color is not None and color.get("rgba") is not None:
+            r, g, b, _ = np.clip(numbers_of("material", color, "rgba", (0.0,) * 4), 0.0, 1.0).tolist()
+            return r, g, b
+    return None
 
 
 def _motion(joint: UrdfJoint, value: float) -> Array:

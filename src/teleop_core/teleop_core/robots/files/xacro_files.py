@@ -1,21 +1,25 @@
-"""Xacro: a macro file of an arm, expanded to its URDF by the package ``xacro``.
+"""Xacro: a macro file of an arm, expanded to its URDF by the package ``xacro`` in a process apart.
 
 Expanding evaluates the expressions of the file and of all that it includes: a xacro is a program (docs/security.md).
+An expression may compute without end or fill the memory, and it would hold the interpreter of every other thread. So a
+process with limits of time and memory expands it (:mod:`teleop_core.robots.files.xacro_process`).
 """
 
-import re
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+import json
+import subprocess
+import sys
+from collections.abc import Mapping
+from importlib import import_module
 from pathlib import Path
 
 from teleop_core.base import ParameterError, TeleopError, UnknownNameError, damage_told
-from teleop_core.robots.files import urdf_tree, visuals
 
 EXPANDED = ".expanded.urdf"
 """Suffix of the expanded URDF that a recording stores for a xacro. Arguments for such a file are allowed and
 ignored."""
-_DECLARED = re.compile(r"<xacro:arg\s[^>]*?name=[\"']([^\"']+)")
-_MOST_CHARACTERS = 300  # characters kept of the package's message, which may be pages long
+PATIENCE = 20.0
+"""Time in which a xacro must be expanded [s]; the largest published ones take less than a second."""
+_PROCESS = "teleop_core.robots.files.xacro_process"
 
 
 def xml_of(path: Path, arguments: Mapping[str, str]) -> bytes:
@@ -27,7 +31,8 @@ def xml_of(path: Path, arguments: Mapping[str, str]) -> bytes:
 
     Raises:
         RecordingError: The file cannot be read.
-        ParameterError: The file cannot be expanded, or arguments are given for a file that is not a xacro.
+        ParameterError: The file cannot be expanded, or not within :data:`PATIENCE` and the memory of its process, or
+            arguments are given for a file that is not a xacro.
         UnknownNameError: Neither the file nor a file that it includes declares such an argument.
         TeleopError: The package ``xacro`` is not installed.
     """
@@ -43,63 +48,27 @@ def xml_of(path: Path, arguments: Mapping[str, str]) -> bytes:
 
 def _expanded(path: Path, arguments: dict[str, str]) -> bytes:
     try:
-        import xacro
+        import_module("xacro")
     except ImportError as error:
-        text = f"{path} needs xacro: pip install 'teleop_core[urdf]'"
-        raise TeleopError(text) from error
-    before = len(xacro.all_includes)
+        raise TeleopError(f"{path} needs xacro: pip install 'teleop_core[urdf]'") from error
+    words = [sys.executable, "-P", "-m", _PROCESS, str(path), json.dumps(arguments)]
     try:
-        with _our_files(path):
-            document = xacro.process_file(str(path), mappings=dict(arguments), verbosity=0)
-        expanded: str = document.documentElement.toxml()
-    except Exception as error:  # one line names the file for any exception that its expressions raise
-        if ours := _wrapped(error):
-            raise ours from None
-        reason = " ".join(f"{type(error).__name__}: {error}".split())[:_MOST_CHARACTERS]
-        file = (xacro.filestack or [path])[-1]
-        raise ParameterError("xacro", str(file), f"one that can be expanded ({reason})") from error
-    _refuse_unknown(arguments, [path, *map(Path, xacro.all_includes[before:])])
-    return expanded.encode()
-
-
-def _wrapped(error: BaseException | None) -> TeleopError | None:
-    """TeleopError inside an exception of the package, such as an error of ``$(find NAME)``; None if there is none."""
-    while error is not None and not isinstance(error, TeleopError):
-        error = getattr(error, "exc", None) or error.__cause__ or error.__context__
-    return error
-
-
-def _refuse_unknown(arguments: Mapping[str, str], files: list[Path]) -> None:
-    """Refuse arguments that no file declares; the package accepts them silently."""
-    if arguments:
-        texts = [file.read_text(encoding="utf-8", errors="replace") for file in files]
-        known = sorted({name for text in texts for name in _DECLARED.findall(text)})
-        for name in arguments:
-            if name not in known:
-                raise UnknownNameError("argument of xacro", name, known)
-
-
-@contextmanager
-def _our_files(path: Path) -> Iterator[None]:
-    """Make ``$(find NAME)`` find the same folder as ``package://NAME``, and refuse document types.
-
-    The package has no settings for these two changes, so its functions are replaced during the expansion.
-    """
-    import xacro
-    from xacro import substitution_args
-
-    def find(name: str) -> str:
-        return str(visuals.package_folder(name, path))
-
-    def parse(source: object, filename: str) -> object:
-        urdf_tree.tree_of(Path(filename).read_bytes())
-        return theirs(source, filename)
-
-    theirs, found = xacro.parse, substitution_args._eval_find
-    xacro.parse = parse
-    substitution_args._eval_find = substitution_args._eval_dict["find"] = find
+        done = subprocess.run(words, capture_output=True, check=False, timeout=PATIENCE)
+    except subprocess.TimeoutExpired as error:
+        raise ParameterError("xacro", str(path), f"one that is expanded within {PATIENCE:g} s") from error
     try:
-        yield
-    finally:
-        xacro.parse = theirs
-        substitution_args._eval_find = substitution_args._eval_dict["find"] = found
+        told = json.loads(done.stdout)
+    except ValueError:
+        raise ParameterError("xacro", str(path), "one that is expanded within the memory of a process") from None
+    if "xml" in told:
+        return str(told["xml"]).encode()
+    raise _error(**told)
+
+
+def _error(
+    text: str = "", name: str = "", value: str = "", requirement: str = "", alternatives: list[str] | None = None
+) -> TeleopError:
+    """The error that the process reported."""
+    if alternatives is not None:
+        return UnknownNameError(name, value, alternatives)
+    return ParameterError(name, value, requirement) if name else TeleopError(text)
