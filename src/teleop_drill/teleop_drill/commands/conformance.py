@@ -5,7 +5,7 @@ import sys
 from typing import Any
 
 from teleop_core.base.errors import SessionError
-from teleop_core.commands.arguments import command, ros_module
+from teleop_core.commands.arguments import command, domain_argument, ros_module
 
 _EPILOG = """\
 tests an arm, ours or any other, against CRTK (Collaborative Robotics Toolkit): which topics there
@@ -33,7 +33,7 @@ def add(commands: Any) -> None:
     choice.add_argument("--read-only", action="store_true", help="command nothing")
     choice.add_argument("--yes", action="store_true", help="move the arm without asking first")
     parser.add_argument("--json", action="store_true", help="print JSON in place of the table")
-    parser.add_argument("--domain", type=int, metavar="N", help="ROS domain (default: ROS_DOMAIN_ID)")
+    domain_argument(parser, "ROS domain (default: ROS_DOMAIN_ID)")
     parser.add_argument(
         "--robot",
         metavar="NAME",
