@@ -98,14 +98,20 @@ class Rig(Protocol):
     def way_to_limit(self) -> tuple[Array, float]:
         """Displacement (n,) of one joint to its nearer limit [rad or m], and the displacement of the tip [m]."""
 
-    def drive(self, speeds: Array, seconds: float) -> None:
-        """Drive the joints (n,) at speeds [rad/s or m/s] for a time [s], as a CRTK client does."""
+    def drive(self, speeds: Array, seconds: float, *, is_reversed: bool = False) -> None:
+        """Drive the joints (n,) at speeds [rad/s or m/s] for a time [s], as a CRTK client does.
+
+        With ``is_reversed`` the messages name the joints, the last joint first.
+        """
 
     def now_ns(self) -> int:
         """Present time [ns]."""
 
     def press(self, *, is_pressed: bool, button: int = 0) -> None:
         """Send a message of a stop button with the given number."""
+
+    def press_unheard(self) -> None:
+        """Press and release a new stop button before any reader can have discovered it."""
 
     def command(self, name: str) -> bool:
         """Call a service of the slave; returns whether the command was done."""
@@ -185,6 +191,7 @@ class Exercise:
         said: Text that the arm must have answered, as recorded by :meth:`Rig.note`; empty if any answer is allowed.
         told: Time limit for the report of the state or the fault in ``slave/operation`` [s]; None: no report.
         warns: Whether a node must warn of the fault in ``diagnostics``.
+        brakes: Whether the drives must be off at the end, and brakes hold the arm.
         hand_speed: Largest speed of the hand, or of the commands that replace it [m/s].
         tool_speed: Largest speed of the tip's setpoint that the exercise sets [m/s].
         lost: Longest time that may be missing in the recording [s].
@@ -211,6 +218,7 @@ class Exercise:
     said: str = ""
     told: Time | None = None
     warns: bool = False
+    brakes: bool = False
     hand_speed: float = SPEED
     tool_speed: float = math.inf
     lost: float = 0.0

@@ -19,7 +19,7 @@ from teleop_core.middleware.ros_parameters import to_message
 from teleop_core.middleware.world import Qos
 from teleop_core.nodes.guest import Guest
 from teleop_core.nodes.observer import WARNING, Observer
-from teleop_core.nodes.operation import STOP_TOPIC
+from teleop_core.nodes.operation import RELEASE, STOP_TOPIC
 from teleop_core.nodes.streams import message_type, profile
 from teleop_core.robots.robot import Robot
 from teleop_core.session.configuration import Configuration
@@ -69,7 +69,9 @@ class LiveRig:
             self._node.ros.create_publisher(Bool, STOP_TOPIC, Qos(depth=100, is_latched=True)) for _ in range(2)
         ]
         self._speeds = self._node.ros.create_publisher(JointState, "/slave/servo_jv", Qos())
-        self._services = {name: self._node.ros.create_client(Trigger, f"/slave/{name}") for name in COMMANDS}
+        self._services = {
+            name: self._node.ros.create_client(Trigger, f"/slave/{name}") for name in (*COMMANDS, RELEASE)
+        }
         self._settings = {
             node: self._node.ros.create_client(SetParameters, f"/{node}/set_parameters") for node in _SLAVE
         }
@@ -146,11 +148,17 @@ class LiveRig:
         joint = int(np.argmin(moved + fastest))
         return np.where(np.arange(robot.n) == joint, ways, 0.0), float(moved[joint])
 
-    def drive(self, speeds: Array, seconds: float) -> None:
-        """Drive the joints (n,) at speeds [rad/s or m/s] for a time [s], as a CRTK client does."""
+    def drive(self, speeds: Array, seconds: float, *, is_reversed: bool = False) -> None:
+        """Drive the joints (n,) at speeds [rad/s or m/s] for a time [s], as a CRTK client does.
+
+        With ``is_reversed`` the messages name the joints, the last joint first.
+        """
+        message = JointState(velocity=speeds.tolist())
+        if is_reversed:
+            message = JointState(name=[*self._robot.joint_names[::-1]], velocity=speeds[::-1].tolist())
         deadline = self.now() + seconds
         while self.now() < deadline:
-            self._speeds.publish(JointState(velocity=speeds.tolist()))
+            self._speeds.publish(message)
             self.wait(_DRIVE_PERIOD)
 
     def operation(self) -> dict[str, float]:
@@ -285,6 +293,14 @@ class LiveRig:
         if is_pressed:
             self.mark()
         own.publish(Bool(data=is_pressed))
+
+    def press_unheard(self) -> None:
+        """Press and release a new stop button before any reader can have discovered it."""
+        new = self._node.ros.create_publisher(Bool, STOP_TOPIC, Qos(depth=1, is_latched=True))
+        self._buttons.append(new)
+        self.mark()
+        for is_pressed in (True, False):
+            new.publish(Bool(data=is_pressed))
 
     # -- services --------------------------------------------------------------------------------
 
