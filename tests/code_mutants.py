@@ -625,6 +625,8 @@ CODE_MUTANTS = (
     _mutant("pressed_early", "a press is offered before the arm follows, which counts for nothing",
             "teleop_console/status.py", "    return follows and (", "    return (",
             "console_status"),
+    _mutant("force_any", "a broken sensor's force is given to the hand", "hand/master/haptic_master.py",
+            "if not square <= p.force_range * p.force_range:", "if False:", "force_range"),
     _mutant("last_key_wins", "of a key that stands twice in a file the last one is taken", "base/plain_yaml.py",
             "        _check_keys(loader, node)\n", "", "configuration"),
     _mutant("last_node_wins", "of a node that stands twice in a file the last one is taken", "graph/layers.py",

@@ -140,12 +140,10 @@ MUTANTS = (
             "            self._stop.release()\n            self._node.stage.press(is_pressed=False, heard_ns=0)\n"
             "            self._arm.request(\"reset\")\n",
             "stop_override"),
-    _mutant("new_button_late", "earlier messages of a new button are forgotten", "slave/operation/presses.py",
-            "number - 1 if is_idle else 0", "number - 1", "stop_unheard"),
     _mutant("drives_on", "drives stay on after a fault of a drive", _WATCH,
             "            s.must_brake = 1\n", "            s.must_brake = 0\n", "stuck_effort", "overspeed"),
     _mutant("brakes_only_said", "drives that are said to be off stay on", "slave/simulation.py",
-            "BRAKED_HERE", "False", "overspeed"),
+            "    braked = row.slave_operation[_BRAKED] > 0.0\n", "    braked = False\n", "overspeed"),
     _mutant("any_turn", "a hand may turn by any angle at once", "coupling/mapping/plausibility.py",
             "        and turn <= p.hand_turn * share\n", "", "turn"),
     _mutant("owner_hasty", "a stream is given away after 50 ms of silence", "nodes/sender.py",

@@ -110,9 +110,6 @@ class Rig(Protocol):
     def press(self, *, is_pressed: bool, button: int = 0) -> None:
         """Send a message of a stop button with the given number."""
 
-    def press_unheard(self) -> None:
-        """Press and release a new stop button before any reader can have discovered it."""
-
     def command(self, name: str) -> bool:
         """Call a service of the slave; returns whether the command was done."""
 

@@ -12,8 +12,6 @@ HEARTBEAT = 0.5
 """Silence of the stop button after which it counts as pressed, in exercises with heartbeats [s]."""
 _SERVICE = 0.02
 """Time in which a service call must reach the arm's loop, through the executors of both sides [s]."""
-_FOUND = 1.0
-"""Time in which a slave has discovered a new stop button and read its messages [s]."""
 _RACE = 0.1
 """Time in which the slave must detect a joint at twice its speed [s]; the drill pushes the joint every 5 ms."""
 _STILL = 0.3  # silence that is too short to pause the arm [s]
@@ -127,11 +125,6 @@ def _override(rig: Rig) -> None:
     _note_answer(rig, is_taken=is_taken or not is_overridden)
 
 
-def _press_unheard(rig: Rig) -> None:
-    rig.press_unheard()
-    rig.wait(_FOUND)
-
-
 def _resume_early(rig: Rig) -> None:
     """Pause and resume immediately, so that the arm still brakes when the resume comes."""
     rig.mark()
@@ -241,12 +234,6 @@ STOPS = (
         inject=_override, undo=_release, said=_REFUSED,
         states=(State.FAULT,), faults=(Fault.STOP,), cures=(Cure.RESET,), allowed=at_once,
         told=at_once,
-    ),
-    Exercise(
-        name="stop_unheard", text="stop pressed and released by a new button before the slave knows it",
-        inject=_press_unheard, undo=_release,
-        states=(State.FAULT,), faults=(Fault.STOP,), cures=(Cure.RESET,), allowed=after(_FOUND),
-        told=after(_FOUND),
     ),
     Exercise(
         name="heartbeat", text="one stop button of two falls silent (heartbeat 0.5 s)",

@@ -294,14 +294,6 @@ class LiveRig:
             self.mark()
         own.publish(Bool(data=is_pressed))
 
-    def press_unheard(self) -> None:
-        """Press and release a new stop button before any reader can have discovered it."""
-        new = self._node.ros.create_publisher(Bool, STOP_TOPIC, Qos(depth=1, is_latched=True))
-        self._buttons.append(new)
-        self.mark()
-        for is_pressed in (True, False):
-            new.publish(Bool(data=is_pressed))
-
     # -- services --------------------------------------------------------------------------------
 
     def command(self, name: str) -> bool:
