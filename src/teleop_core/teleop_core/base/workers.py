@@ -18,7 +18,7 @@ def workers(count: int, prepare: Callable[[], object] | None = None) -> Iterator
     """Pool of processes. If its block ends with an exception, such as Ctrl-C, running tasks are killed at once.
 
     Temporary files of the tasks are removed with the pool. No process is replaced after a number of tasks: before
-    Python 3.13 such a pool waits for ever (python/cpython#115634). Open another pool in its place.
+    Python 3.13 such a pool waits without end (python/cpython#115634). Open another pool in its place.
 
     Args:
         count: Number of processes.
