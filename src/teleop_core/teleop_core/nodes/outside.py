@@ -7,7 +7,8 @@ CRTK need a reader of both, and may command the arm while the session's own stag
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from teleop_core.bags.messages import Refusal, deserialise
+from teleop_core.bags.messages import Refusal
+from teleop_core.bags.ros_types import deserialise
 from teleop_core.graph.stage import STAGES
 from teleop_core.graph.topics import SLAVE_SERVO_JP, Topic
 from teleop_core.middleware.world import Qos, Taker

@@ -271,6 +271,8 @@ class _Drill:
         return worst
 
     def _once(self, exercise: Exercise, rig: LiveRig) -> Outcome:
+        if exercise.warns:
+            rig.await_calm(1.2 * WARNED)
         rig.wait(_BEFORE)
         rig.tap.clear()
         outcome = Outcome(exercise=exercise, load=rig.site.load())

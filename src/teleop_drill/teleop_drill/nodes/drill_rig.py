@@ -105,6 +105,12 @@ class LiveRig:
         told = self.observer.statuses.items()
         return {n: _NUMBERS.sub("", s.message) for n, s in told if s.level >= WARNING}
 
+    def await_calm(self, seconds: float) -> None:
+        """Wait until no node warns, for at most a time [s]; a warning that stands hides a new one of the same text."""
+        deadline = self.now() + seconds
+        while self._warnings() and self.now() < deadline:
+            self.wait(0.05)
+
     def note(self, text: str) -> None:
         """Add a note, which the table shows beside the state."""
         self.said = text
