@@ -98,10 +98,10 @@ class Rig(Protocol):
     def way_to_limit(self) -> tuple[Array, float]:
         """Displacement (n,) of one joint to its nearer limit [rad or m], and the displacement of the tip [m]."""
 
-    def drive(self, speeds: Array, seconds: float, *, is_reversed: bool = False) -> None:
+    def drive(self, speeds: Array, seconds: float, *, is_named: bool = False) -> None:
         """Drive the joints (n,) at speeds [rad/s or m/s] for a time [s], as a CRTK client does.
 
-        With ``is_reversed`` the messages name the joints, the last joint first.
+        With ``is_named`` the messages name the joints, and begin with the second one.
         """
 
     def now_ns(self) -> int:

@@ -27,7 +27,7 @@ _SHAKES = 3.0  # frequency of a hand that shakes [Hz]
 _PRESS = 1.0  # duration of the motion of a joint to its limit [s]
 _STAY = 1.5  # time for which the joint is pressed into the limit [s]
 _GAP = 0.08  # gap in the hand's samples, shorter than the command timeout [s]
-_NAMED = 0.05  # speed of the fastest joint that is driven by its name [rad/s or m/s]
+_NAMED = 0.05  # speed of a joint that is driven by its name [rad/s or m/s]
 _TURN = 1.0  # angle by which the hand turns at once [rad]
 _SHARE = 0.5  # speed of the tip during the motion to the limit, divided by the hand's speed
 _SHAKEN = hand.SPEED + 2.0 * math.pi * _SHAKE * _SHAKES
@@ -130,17 +130,16 @@ def _leave_gaps(rig: Rig) -> None:
 
 
 def _drive_named(rig: Rig) -> None:
-    """Drive the joints, one faster than the other, by messages that name them in another order."""
+    """Drive one joint away from its nearer limit, by messages that name the joints in another order."""
     rig.distort(hand.silent)
     rig.wait(0.3)  # wait until other clients may drive the arm
     rig.mark()
-    before = rig.setpoint()
-    ways, _ = rig.way_to_limit()
-    count = len(before)
-    shares = np.arange(1.0, count + 1.0) / count
-    rig.drive(_NAMED * shares * np.sign(np.sum(ways)), 0.5, is_reversed=True)
+    before, (ways, _) = rig.setpoint(), rig.way_to_limit()
+    rig.drive(-_NAMED * np.sign(ways), 0.5, is_named=True)
     went = np.abs(rig.setpoint() - before)
-    rig.note("by name" if (np.diff(went) > 0.0).all() else "not by name")
+    is_asked = ways != 0.0
+    is_right = went[is_asked].min() > 0.2 * _NAMED and not went[~is_asked].any()
+    rig.note("by name" if is_right else "not by name")
 
 
 def _second_commander(rig: Rig) -> None:

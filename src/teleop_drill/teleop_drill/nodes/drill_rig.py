@@ -154,14 +154,16 @@ class LiveRig:
         joint = int(np.argmin(moved + fastest))
         return np.where(np.arange(robot.n) == joint, ways, 0.0), float(moved[joint])
 
-    def drive(self, speeds: Array, seconds: float, *, is_reversed: bool = False) -> None:
+    def drive(self, speeds: Array, seconds: float, *, is_named: bool = False) -> None:
         """Drive the joints (n,) at speeds [rad/s or m/s] for a time [s], as a CRTK client does.
 
-        With ``is_reversed`` the messages name the joints, the last joint first.
+        With ``is_named`` the messages name the joints, and begin with the second one.
         """
         message = JointState(velocity=speeds.tolist())
-        if is_reversed:
-            message = JointState(name=[*self._robot.joint_names[::-1]], velocity=speeds[::-1].tolist())
+        if is_named:
+            order = np.roll(np.arange(self._robot.n), -1)
+            names = [self._robot.joint_names[i] for i in order]
+            message = JointState(name=names, velocity=speeds[order].tolist())
         deadline = self.now() + seconds
         while self.now() < deadline:
             self._speeds.publish(message)
