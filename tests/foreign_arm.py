@@ -29,7 +29,8 @@ class ForeignArm:
     """
 
     def __init__(self, world: World, faults: tuple[str, ...] = ()) -> None:
-        self.world, self.faults, self.state = world, set(faults), "ENABLED"
+        self.world, self.faults = world, set(faults)
+        self.state = "DISABLED" if "disabled" in faults else "ENABLED"
         self.q, self.busy_until_ns = [0.1, 0.2, 0.3], 0
         self.goal, self.home = list(self.q), list(self.q)
         self.past: deque[list[float]] = deque(maxlen=50)
@@ -43,6 +44,7 @@ class ForeignArm:
         self.measured = node.create_publisher(JointState, "PSM/measured_js", Qos(is_reliable="qos" not in faults))
         self.setpoint = node.create_publisher(JointState, "PSM/setpoint_js", Qos())
         self.pose = node.create_publisher(JointState if "type" in faults else PoseStamped, "PSM/measured_cp", Qos())
+        self.wanted = node.create_publisher(PoseStamped, "PSM/setpoint_cp", Qos())
         node.create_subscription(crtk.StringStamped, "PSM/state_command", self.command, Qos())
         node.create_subscription(JointState, "PSM/move_jp", self.move, Qos())
         node.create_subscription(JointState, "PSM/servo_jp", self.servo, Qos())
@@ -82,7 +84,19 @@ class ForeignArm:
             told = self.past[0]
         if "speeds" in self.faults:
             speed = [2.0 * v for v in speed]
+        if "bulge" in self.faults and 0.004 < self.q[0] - self.home[0] < 0.0045:  # for three hundredths of a second
+            told[2] += 0.01
         return told, speed
+
+    def tip(self, now_ns: int, turn: float = 0.0) -> PoseStamped:
+        """Pose of the tip, which the first joint moves; it turns with its way [rad/m]."""
+        pose = PoseStamped()
+        stamp(pose, now_ns)
+        pose.pose.position.x = way = 0.3 * (self.q[0] - self.home[0])
+        length = 0.5 if "unit" in self.faults else 1.0
+        pose.pose.orientation.w = length * math.cos(0.5 * turn * way)
+        pose.pose.orientation.z = length * math.sin(0.5 * turn * way)
+        return pose
 
     def tick(self) -> None:
         now_ns, is_busy = self.world.time_ns(), False
@@ -98,11 +112,14 @@ class ForeignArm:
             state = crtk.OperatingState(state=self.state, is_homed=True, is_busy=is_busy)
             stamp(state, now_ns)
             self.states.publish(state)
+        if "detour" in self.faults:
+            share = min(max(100.0 * (self.q[0] - self.home[0]), 0.0), 1.0)
+            self.q[2] = self.home[2] + 0.01 * math.sin(math.pi * share)
         told, speed = self.lying(dt)
         setpoint = JointState(name=["a", "b", "c"], position=list(self.q))
         stamp(setpoint, now_ns)
         self.setpoint.publish(setpoint)
-        joints = JointState(name=["a", "b", "c"], position=told)
+        joints = JointState(name=["a", "c", "b"] if "swapped" in self.faults else ["a", "b", "c"], position=told)
         if self.faults & {"speeds", "honest"}:
             joints.velocity = speed
         if "stamp" not in self.faults:
@@ -112,8 +129,6 @@ class ForeignArm:
         if "length" in self.faults:
             joints.velocity = [0.0]
         self.measured.publish(joints)
+        self.wanted.publish(self.tip(now_ns))
         if "type" not in self.faults:
-            pose = PoseStamped()
-            stamp(pose, now_ns)
-            pose.pose.orientation.w = 0.5 if "unit" in self.faults else 1.0
-            self.pose.publish(pose)
+            self.pose.publish(self.tip(now_ns, 30.0 if "turning" in self.faults else 0.0))

@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 
@@ -12,3 +13,11 @@ def wait_until(condition: Callable[[], Any], what: str, timeout: float, pause: f
         assert time.monotonic() < end, f"not within {timeout:g} s: {what}"
         time.sleep(pause)
     return result
+
+
+def is_alive(pid: int) -> bool:
+    """Whether a process is there, and not only its exit code."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except FileNotFoundError:
+        return False

@@ -220,7 +220,7 @@ def main() -> int:
         with tempfile.TemporaryDirectory() as own:
             build(given.prefix.absolute(), (given.build or Path(own) / "generated").absolute(), ros)
     except ImportError as error:
-        print(f"{PACKAGE} not built: {error}; install ROS with teleop_core[ros]", file=sys.stderr)
+        print(f"{PACKAGE} not built: {error}; install teleop_core[ros,crtk]", file=sys.stderr)
     except (BuildError, LookupError) as error:
         print(f"{PACKAGE} not built: {error}", file=sys.stderr)
     else:

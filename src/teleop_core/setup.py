@@ -53,6 +53,7 @@ setup(
         "urdf": ["xacro", "robot_descriptions"],
         "devices": ["pygame-ce", "hidapi"],
         "ros": ["ros-jazzy-rclpy[fastrtps]", "ros-jazzy-common-interfaces", "setproctitle"],
+        "crtk": ["catkin-pkg"],
         "test": [
             "EAIK",
             "coverage",

@@ -50,7 +50,16 @@ def findings_of(*faults: str, may_move: bool) -> dict[str, Finding]:
 @pytest.mark.soak
 def test_a_foreign_arm_without_fault_passes() -> None:
     found = findings_of("honest", may_move=True)
-    sound = ("operating_state", "state_command", "measured_js", "measured_cp", "setpoint_js", "move_jp", "servo_jp")
+    sound = (
+        "operating_state",
+        "state_command",
+        "measured_js",
+        "measured_cp",
+        "setpoint_js",
+        "setpoint_cp",
+        "move_jp",
+        "servo_jp",
+    )
     assert {name: found[name].verdict for name in sound} == dict.fromkeys(sound, Verdict.OK), found
 
 

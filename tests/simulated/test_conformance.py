@@ -6,7 +6,7 @@ import pytest
 
 from foreign_arm import ForeignArm
 from simulated.conftest import SimulatedPeer
-from teleop_drill.conformance import Finding, Verdict
+from teleop_drill.conformance import Finding, Verdict, exit_code
 from teleop_drill.nodes.conformance import examine
 from teleop_drill.nodes.conformance_arm import Arm
 
@@ -24,7 +24,16 @@ def findings_of(fault: str, *, may_move: bool = True) -> dict[str, Finding]:
 def test_an_arm_without_fault_passes_and_is_only_moved_by_what_it_takes() -> None:
     found = findings_of("honest")
     verdicts = {name: one.verdict for name, one in found.items()}
-    sound = ("operating_state", "state_command", "measured_js", "measured_cp", "setpoint_js", "move_jp", "servo_jp")
+    sound = (
+        "operating_state",
+        "state_command",
+        "measured_js",
+        "measured_cp",
+        "setpoint_js",
+        "setpoint_cp",
+        "move_jp",
+        "servo_jp",
+    )
     assert {name: verdicts[name] for name in sound} == dict.fromkeys(sound, Verdict.OK), found
     assert {verdict for name, verdict in verdicts.items() if name not in sound} == {Verdict.ABSENT}
 
@@ -56,6 +65,10 @@ PLACES = ("measured_js", "servo_jp", "move_jp")
         ("scaled", PLACES, "measured_js by 0.00", True),
         ("late", PLACES, "setpoint", True),
         ("speeds", ("measured_js",), "the integral of its speeds differs", True),
+        ("swapped", PLACES, "the setpoint moved by 0.01, but measured_js", True),
+        ("bulge", ("measured_js",), "leaves the way of its setpoint", True),
+        ("detour", ("move_jp",), "left the range between begin and goal", True),
+        ("turning", ("measured_cp",), "the setpoint turned by 0 rad, but measured_cp by 0.09", True),
     ],
 )
 def test_faults_are_found_by_looking_or_else_by_moving_the_arm(
@@ -65,6 +78,14 @@ def test_faults_are_found_by_looking_or_else_by_moving_the_arm(
     for topic in topics:
         assert found[topic].verdict is Verdict.FAILED, (topic, found[topic])
         assert note in found[topic].note, found[topic]
+
+
+@pytest.mark.parametrize(
+    ("fault", "may_move", "code"),
+    [("honest", True, 0), ("frozen", True, 1), ("no state", True, 1), ("disabled", True, 3), ("honest", False, 3)],
+)
+def test_rows_that_were_not_tried_are_no_pass(fault: str, may_move: bool, code: int) -> None:
+    assert exit_code(findings_of(fault, may_move=may_move).values()) == code
 
 
 def test_nothing_is_commanded_when_only_looking() -> None:

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 from geometry_msgs.msg import PoseStamped, TwistStamped, WrenchStamped
+from lifecycle_msgs.msg import Transition
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Empty
 
@@ -14,6 +15,8 @@ from teleop_core.middleware.world import Qos
 
 if TYPE_CHECKING:
     from peers import AnyPeer as Peer
+
+TURN = np.array([0.01, 0.0, 0.0, 0.0, 0.0, 0.0])
 
 
 @pytest.fixture
@@ -34,6 +37,43 @@ def test_a_pose_is_moved_to_and_one_out_of_reach_is_refused_and_counted(client: 
     goal.pose.position.z -= 5.0
     client.send("move_cp", goal)
     client.peer.wait_value("slave", "refused.slave/move_cp", lambda count: count == 1)
+
+
+def test_a_composed_session_takes_streams_of_a_client_unless_its_own_stages_command(peer: "Peer", compose: Any) -> None:
+    compose(operator={"approach_time": 1.0, "patience": 0.0}, slave={"operation": {"longest_outage": 0.0}})
+    client = StockClient(peer)
+    client.wait(lambda: "setpoint_cp" in client.newest and client.newest["setpoint_cp"].header.stamp.sec > 0, "a hand")
+    goal = JointState(position=(client.joints() + TURN).tolist())
+    for name, message in (("servo_jp", goal), ("servo_cp", PoseStamped(pose=client.newest["setpoint_cp"].pose))):
+        for _ in range(100):
+            client.send(name, message)  # there is a reader
+            client.spin()
+        peer.wait_value("slave", f"refused.slave/{name}", lambda count: count >= 1)
+    assert peer.change("haptic_master", Transition.TRANSITION_DEACTIVATE)
+
+    def rests() -> bool:
+        before = client.joints()
+        for _ in range(100):
+            client.spin()
+        return np.array_equal(before, client.joints())
+
+    client.wait(rests, "rest without a hand")
+    goal = JointState(position=(client.joints() + TURN).tolist())
+
+    def is_there() -> bool:
+        client.send("servo_jp", goal)
+        return np.allclose(client.joints(), goal.position, atol=1e-9)
+
+    client.wait(is_there, "where the client leads")
+    pose = client.newest["setpoint_cp"].pose
+    pose.position.z += 0.002
+
+    def is_higher() -> bool:
+        client.send("servo_cp", PoseStamped(pose=pose))
+        told = client.newest["setpoint_cp"].pose
+        return told is not pose and abs(told.position.z - pose.position.z) < 1e-5
+
+    client.wait(is_higher, "where the client leads the tip")
 
 
 def test_states_are_commanded_and_told_and_a_paused_arm_refuses_to_move(client: StockClient) -> None:

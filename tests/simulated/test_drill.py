@@ -10,19 +10,18 @@ import pytest
 
 from drill_runs import run_drill
 from mutants import ROOT
-from teleop_drill.drill import SHORT, chosen, inside
+from teleop_drill.drill import chosen, inside
 from teleop_drill.nodes import drill
 from teleop_drill.simulation.drill import simulated_drill
 
 pytestmark = pytest.mark.slow
-PARTS = 4
-"""Sessions that share the rows: each test is short, and two run at once."""
 MUTANTS = ("stop_late", "not_recorded")
 """Those that no law of random schedules finds, of each half of the drill: what moves, what is recorded."""
 
 
 def assert_it_behaves(folder: Path, rows: Sequence[str], *words: str) -> None:
-    code, text, outcomes = run_drill(folder, "--simulated", *words, *rows)
+    chosen_rows = () if list(rows) == rows_of(is_composed="--composed" in words) else rows
+    code, text, outcomes = run_drill(folder, "--simulated", *words, *chosen_rows)
     assert set(outcomes) == set(rows)
     assert {name: one["failures"] for name, one in outcomes.items() if one["failures"]} == {}, text
     assert code == 0
@@ -32,15 +31,17 @@ def rows_of(*, is_composed: bool) -> list[str]:
     return [one.name for one in chosen((), is_composed=is_composed)]
 
 
-@pytest.mark.parametrize("part", range(PARTS))
-def test_an_arm_behaves_under_every_fault(part: int, tmp_path: Path) -> None:
-    assert_it_behaves(tmp_path, rows_of(is_composed=False)[part::PARTS])
-
-
-def test_an_arm_behaves_under_every_fault_that_a_process_for_all_has_alone(tmp_path: Path) -> None:
-    rows = set(rows_of(is_composed=True))
-    own = sorted((rows - set(rows_of(is_composed=False))) | (rows & set(SHORT)))
-    assert_it_behaves(tmp_path, own, "--composed")
+@pytest.mark.parametrize("words", [(), ("--composed",)], ids=["processes", "composed"])
+def test_an_arm_behaves_under_every_fault_in_one_go_twice_to_the_same_bits(
+    words: tuple[str, ...], tmp_path: Path
+) -> None:
+    """All rows in the order of the table: each begins at home, whatever the rows before it did to the arm."""
+    files = []
+    for run in ("first", "second"):
+        (folder := tmp_path / run).mkdir()
+        assert_it_behaves(folder, rows_of(is_composed=bool(words)), *words)
+        files.append((folder / "drill.json").read_bytes())
+    assert files[0] == files[1]
 
 
 @pytest.mark.parametrize("looks", [4, 9])
@@ -74,12 +75,6 @@ def test_a_drill_whose_environment_another_drill_has_left_breaks_its_stage(
 ) -> None:
     monkeypatch.setenv("TELEOP_PARTS", inside.__file__)
     assert_it_behaves(tmp_path, ["stage_raises"], "--composed")
-
-
-@pytest.mark.soak
-@pytest.mark.parametrize("part", range(PARTS))
-def test_an_arm_behaves_under_every_fault_in_one_process(part: int, tmp_path: Path) -> None:
-    assert_it_behaves(tmp_path, rows_of(is_composed=True)[part::PARTS], "--composed")
 
 
 @pytest.mark.parametrize("name", MUTANTS)

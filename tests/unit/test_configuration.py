@@ -8,6 +8,7 @@ import pytest
 import yaml
 
 from teleop_core.base import ParameterError, TeleopError, TeleopWarning, UnknownNameError
+from teleop_core.base.plain_yaml import parse
 from teleop_core.graph import BUILT_IN, RECORDER_NAME, layers
 from teleop_core.session.configuration import Configuration, configure
 
@@ -163,6 +164,28 @@ def test_file_of_another_shape_is_refused_with_its_name(tmp_path: Path, text: st
         layers.load_file(path)
     assert "mine.yaml" in str(error.value)
     assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("a: 1\nslave:\n  x: 1\n  y: 2\n  x: 3\n", "the key 'x' twice, in lines 3 and 5"),
+        ("slave: {}\nteleop: {}\nslave: {}\n", "the key 'slave' twice, in lines 1 and 3"),
+        ("{true: 1, yes: 2}", "the key 'yes' twice, in lines 1 and 1"),
+        ("slave: {ros__parameters: {robot: mma}}\n/slave: {ros__parameters: {robot: rcrt1}}", "slave.robot .*/slave;"),
+        ("slave: {ros__parameters: {operation.heartbeat: 0.1, operation: {heartbeat: 1.0}}}", "slave.operation.heart"),
+    ],
+)
+def test_what_a_file_gives_twice_is_refused_and_not_taken_from_the_last(tmp_path: Path, text: str, said: str) -> None:
+    path = tmp_path / "mine.yaml"
+    path.write_text(text)
+    with pytest.raises(TeleopError, match=said) as error:
+        layers.load_file(path)
+    assert "mine.yaml" in str(error.value)
+
+
+def test_a_key_that_is_merged_may_be_given_again() -> None:
+    assert parse("b: &b {x: 1, y: 2}\na: &a\n  <<: *b\n  x: 2\nc: {<<: *a, y: 3}")["c"] == {"x": 2, "y": 3}
 
 
 def test_unknown_name_in_a_file_is_refused_with_its_stage(tmp_path: Path) -> None:

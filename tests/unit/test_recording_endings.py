@@ -1,5 +1,6 @@
 """Ends of recordings when their directory is moved, removed or in the way, and on a full disk."""
 
+import os
 import resource
 import shutil
 import signal
@@ -11,6 +12,7 @@ import numpy as np
 import pytest
 from rosbags.highlevel import AnyReader
 
+from patience import wait_until
 from teleop_core.bags.mcap_source import McapSource
 from teleop_core.bags.reader import Bag, recover
 from teleop_core.bags.writer import BagWriter
@@ -47,6 +49,41 @@ def assert_holds(path: Path, count: int = SECONDS * 1000) -> None:
     np.testing.assert_array_equal(series.stamp_ns, np.arange(count) * MS)
     with AnyReader([path]) as reader:
         assert sum(1 for _ in reader.messages()) == count
+
+
+@pytest.mark.parametrize("size", [0, 100, 300_000, 600_000])
+@pytest.mark.parametrize("compression", ["none", "zstd"])
+def test_a_file_that_is_truncated_while_it_is_recorded_goes_on_and_its_loss_is_told(
+    size: int, compression: str, tmp_path: Path
+) -> None:
+    path, written = tmp_path / "bag", SECONDS * 1000
+    writer = BagWriter(path, [TOPIC], JOINTS, compression=compression)
+    for number in range(SECONDS):
+        writer.write_block(second(number))
+    (file,) = path.glob("*.mcap")
+    wait_until(lambda: file.stat().st_size > 600_000, "three blocks on the disk", 60)
+    os.truncate(file, size)
+    writer.write_block(second(SECONDS))
+    with pytest.raises(RecordingError, match="was truncated by another program during the recording") as told:
+        writer.close()
+    stamps = Bag(path).read(TOPIC).stamp_ns // MS
+    kept = len(stamps) - 1000
+    assert 0 <= kept < written
+    assert np.array_equal(stamps, [*range(kept), *range(written, written + 1000)])
+    assert f"{written - kept} messages are lost; {len(stamps)} messages are safe" in str(told.value)
+    with AnyReader([path]) as reader:
+        assert sum(1 for _ in reader.messages()) == len(stamps)
+
+
+def test_a_file_that_is_truncated_just_before_its_end_is_no_whole_recording(tmp_path: Path) -> None:
+    writer = BagWriter(tmp_path / "bag", [TOPIC], JOINTS, compression="none")
+    writer.write_block(second(0))
+    writer.write_block(second(1))
+    (file,) = (tmp_path / "bag").glob("*.mcap")
+    wait_until(lambda: writer._jobs.empty() and file.stat().st_size > 400_000, "two blocks on the disk", 60)
+    os.truncate(file, 0)
+    with pytest.raises(RecordingError, match="2000 messages are lost; 0 messages are safe"):
+        writer.close()
 
 
 def test_a_moved_directory_is_finished_where_it_is_and_its_new_place_told(tmp_path: Path) -> None:

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 import teleop_core as tc
-from patience import wait_until
+from patience import is_alive, wait_until
 from teleop_core.graph.layers import config_folder
 from teleop_lab import Study, read_study, sweep
 from teleop_lab.studies import point, summary
@@ -133,6 +133,9 @@ def test_a_session_that_fails_is_a_point_with_its_error(own_parts: None, tmp_pat
         ({"metrics": ["task.tme_s"]}, "task.time_s"),
         ({"metrics": []}, "key of a score"),
         ({"seeds": (-1,)}, "whole numbers >= 0"),
+        ({"seeds": (1, 10**50)}, "at most 18 digits"),
+        ({"seeds": range(10**9)}, "sessions of a study is 2000000000, must be at most 1000000"),
+        ({"seeds": range(600_000)}, "sessions of a study is 1200000, must be at most 1000000"),
         ({"metrics": ["session.scenario"]}, "key of a score"),
         ({"metrics": ["jaw.grips"]}, "no stage writes slave/jaw/grip"),
         ({"metrics": ["insertion.depth_mm"]}, "which has no insertion"),
@@ -142,6 +145,16 @@ def test_a_session_that_fails_is_a_point_with_its_error(own_parts: None, tmp_pat
 def test_a_wrong_study_is_refused_before_its_first_session(changes: dict[str, Any], said: str) -> None:
     with pytest.raises(tc.TeleopError, match=said):
         study(**changes).points()
+
+
+@pytest.mark.parametrize("count", [10**9, 10**50, 10**350], ids=["1e9", "1e50", "1e350"])
+def test_a_file_with_more_seeds_than_a_study_may_have_is_refused_before_they_are_listed(
+    count: int, tmp_path: Path
+) -> None:
+    file = tmp_path / "many.yaml"
+    file.write_text(f"scenario: point\nseeds: {count}\nmetrics: [task.time_s]\n")
+    with pytest.raises(tc.ParameterError, match="a number of seeds, at most 1000000"):
+        read_study(file)
 
 
 def test_a_store_of_another_study_is_refused(found: Found, tmp_path: Path) -> None:
@@ -239,14 +252,6 @@ def test_processes_of_a_study_end_when_it_is_killed(tmp_path: Path) -> None:
     whole.kill()
     whole.wait()
     wait_until(lambda: not any(map(is_alive, processes)), "their end", 60)
-
-
-def is_alive(pid: int) -> bool:
-    """Whether a process is there, and not only its exit code."""
-    try:
-        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
-    except FileNotFoundError:
-        return False
 
 
 @pytest.mark.slow

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from teleop_console.folders import BAGS
 from teleop_core.base.errors import ParameterError, TeleopError
 from teleop_core.base.texts import printable
-from teleop_core.commands.arguments import command, ros_module, setting_arguments, without_argument
+from teleop_core.commands.arguments import command, domain_argument, ros_module, setting_arguments, without_argument
 
 if TYPE_CHECKING:
     from teleop_console.server import ConsoleServer
@@ -35,7 +35,7 @@ def add(commands: Any) -> None:
     parser = command(commands, "console", _run, text, _EPILOG)
     parser.add_argument("bag", type=Path, nargs="?", help="recording to replay")
     parser.add_argument("--attach", action="store_true", help="show a session that is running already")
-    parser.add_argument("--domain", type=int, metavar="N", help="ROS domain of the session, for --attach")
+    domain_argument(parser, "ROS domain of the session, for --attach")
     parser.add_argument("--port", type=int, default=8080, help="port of the page (default: 8080)")
     parser.add_argument(
         "--host", default="127.0.0.1", help="network address of the page (default: reachable from this machine only)"
@@ -107,16 +107,18 @@ def _attach(arguments: argparse.Namespace, server: "ConsoleServer") -> None:
 
     ros_module("guest")
     from teleop_console.console_link import LiveLink
+    from teleop_core.middleware.domains import domain_of_environment
     from teleop_core.nodes.children import environment
     from teleop_core.nodes.guest import Guest
     from teleop_core.nodes.operation import StopButton
     from teleop_core.nodes.sessions import domains
 
     environment()
-    found = (arguments.domain,) if arguments.domain is not None else domains()
+    named = domain_of_environment() if arguments.domain is None else arguments.domain
+    found = domains() if named is None else (named,)
     if len(found) > 1:
-        named = ", ".join(map(str, found))
-        raise ParameterError("--domain", None, f"one of {named}: several sessions run here")
+        running = ", ".join(map(str, found))
+        raise ParameterError("--domain", None, f"one of {running}: several sessions run here")
     domain = found[0] if found else 0
     with Guest("teleop_console_stop", domain, start_parameter_services=False) as guest:
         button = StopButton(guest)

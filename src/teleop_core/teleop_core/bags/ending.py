@@ -1,5 +1,6 @@
 """Ending of a recording: writes index and metadata. A failure to write them never deletes recorded messages."""
 
+from contextlib import suppress
 from pathlib import Path
 
 from teleop_core.bags import rosbag2
@@ -21,13 +22,19 @@ def end(path: Path, file: McapFile, start_ns: int, stopped: OSError | None, give
     Returns:
         Error to raise in the caller of the writer; None if the recording is complete and at ``path``.
     """
+    with suppress(OSError):  # a disk that failed is reported below
+        file.go_on_after_truncation()
     found = file.statistics()
-    if stopped is None:
+    if file.truncated:
+        what = f"{found.message_count} messages"
+    elif stopped is None:
         what = f"all {found.message_count} messages"
     else:
         seconds = max(0, found.message_end_time - start_ns) / SECOND_NS
         what = f"the first {seconds:.1f} s ({found.message_count} of {given} messages)"
     said = f"cannot be written any more ({stopped.strerror}); " if stopped else ""
+    if file.truncated:
+        said += f"was truncated by another program during the recording, {file.truncated} messages are lost; "
     try:
         home = _finished(path, file, start_ns)
     except OSError as error:
@@ -44,7 +51,7 @@ def end(path: Path, file: McapFile, start_ns: int, stopped: OSError | None, give
         return RecordingError(path, f"{said}was removed during the recording and is created again with {what}")
     if home is not None:
         return RecordingError(path, f"{said}was moved or removed during the recording; {what} are in {home}")
-    return RecordingError(path, f"{said}{what} are safe") if stopped else None
+    return RecordingError(path, f"{said}{what} are safe") if said else None
 
 
 def _finished(path: Path, file: McapFile, start_ns: int) -> Path | None:

@@ -1,18 +1,20 @@
 """Writing of an MCAP file: complete chunks one after the other, and an index at the end.
 
 Nothing is buffered: when :meth:`McapFile.append` returns, the operating system has the data. A chunk that could not be
-written completely is cut off again; complete chunks are always kept.
+written completely is cut off again; complete chunks are always kept. If another program truncates the file meanwhile,
+the file goes on after the last chunk that is still there.
 """
 
 import os
 import shutil
 import struct
 import zlib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
+from io import BytesIO
 from pathlib import Path
 
-from mcap.data_stream import RecordBuilder
+from mcap.data_stream import ReadDataStream, RecordBuilder
 from mcap.opcode import Opcode
 from mcap.records import (
     Channel,
@@ -38,6 +40,14 @@ _INDEX_HEAD = struct.Struct("<BQHI")  # opcode, length, channel, bytes of entrie
 _FOOTER_HEAD = struct.Struct("<BQQQ")  # opcode, length, summary start, summary offset start
 
 
+_ENTRY = 16  # bytes of an entry of a message index
+
+
+def _end_of(chunk: ChunkIndex) -> int:
+    """Place in the file after a chunk and its message indexes."""
+    return chunk.chunk_start_offset + chunk.chunk_length + chunk.message_index_length
+
+
 def encode(*records: McapRecord) -> bytes:
     """Concatenated bytes of some records."""
     builder = RecordBuilder()
@@ -57,6 +67,9 @@ class McapFile:
         compression: Name in the chunk's record: ``zstd``, ``lz4`` or empty.
         compress: Function that compresses a chunk.
         background: Functions that write to the disk.
+
+    Attributes:
+        truncated: Number of messages that another program has cut off.
 
     Raises:
         OSError: The file cannot be created or written.
@@ -80,13 +93,14 @@ class McapFile:
         self._counts = {channel.id: 0 for channel in channels}
         self._start_ns, self._end_ns = 0, 0
         self._metadata: list[MetadataIndex] = []
+        self.truncated = 0
         self._file = path.open("x+b", buffering=0)
         start = MAGIC + encode(Header("ros2", f"teleop_core {__version__}"), *schemas, *channels)
         for name, entries in metadata.items():
             record = encode(Metadata(name, entries))
             self._metadata.append(MetadataIndex(len(start), len(record), name))
             start += record
-        self._end = len(start)
+        self._head, self._end = start, len(start)
         try:
             self._write(start)
         except OSError:
@@ -111,6 +125,7 @@ class McapFile:
 
     def append_compressed(self, chunk: Chunk, data: bytes, crc: int) -> None:
         """Write a chunk that is already compressed to ``data``; ``crc`` is the checksum of its uncompressed bytes."""
+        self.go_on_after_truncation()
         begin, name = self._end, self._compression
         tail = struct.pack("<I", len(name)) + name + struct.pack("<Q", len(data))
         length = _CHUNK_HEAD.size - 9 + len(tail) + len(data)
@@ -167,6 +182,7 @@ class McapFile:
         Raises:
             OSError: The disk has no space for index and footer; the file ends after its last whole chunk.
         """
+        self.go_on_after_truncation()
         try:
             self._cut()
             end = encode(DataEnd(0))
@@ -175,6 +191,35 @@ class McapFile:
             with suppress(OSError):
                 self._cut()
             raise
+
+    def go_on_after_truncation(self) -> None:
+        """Forget chunks that another program has cut off; without this a hole of zeros would stand in their place."""
+        size = os.fstat(self._file.fileno()).st_size
+        if size >= self._end:
+            return
+        before, kept = sum(self._counts.values()), [(raw, one) for raw, one in self._chunks() if _end_of(one) <= size]
+        self._index, self._chunk_count = bytearray().join(raw for raw, _ in kept), len(kept)
+        self._counts = dict.fromkeys(self._counts, 0)
+        for _, one in kept:
+            for channel, offset in one.message_index_offsets.items():
+                head = os.pread(self._file.fileno(), _INDEX_HEAD.size, offset)
+                self._counts[channel] += _INDEX_HEAD.unpack(head)[3] // _ENTRY
+        self._start_ns = min((one.message_start_time for _, one in kept), default=0)
+        self._end_ns = max((one.message_end_time for _, one in kept), default=0)
+        self._end = max((_end_of(one) for _, one in kept), default=len(self._head))
+        self.truncated += before - sum(self._counts.values())
+        if size < len(self._head):
+            self._background.cut(self._file, 0)
+            self._write(self._head)
+        self._cut()
+
+    def _chunks(self) -> Iterator[tuple[bytes, ChunkIndex]]:
+        """Index record of each chunk, as bytes and decoded."""
+        at = 0
+        while at < len(self._index):
+            end = at + 9 + int.from_bytes(self._index[at + 1 : at + 9], "little")
+            yield bytes(self._index[at:end]), ChunkIndex.read(ReadDataStream(BytesIO(self._index[at + 9 : end])))
+            at = end
 
     def _cut(self) -> None:
         """Remove all bytes after the last whole chunk."""

@@ -1,8 +1,8 @@
 """Plain YAML: reads files and settings, with limits on the cost of reading, and writes them.
 
 The format is YAML 1.1 as PyYAML's safe loader reads it, except that dates stay texts. Recursive aliases, aliases that
-expand to too many values, and overlong numbers are refused. If PyYAML includes libyaml, libyaml reads and writes: the
-values are the same, and it is five times as fast.
+expand to too many values, overlong numbers, and a key that stands twice in one mapping are refused. If PyYAML includes
+libyaml, libyaml reads and writes: the values are the same, and it is five times as fast.
 """
 
 import stat
@@ -12,6 +12,7 @@ from typing import Any
 import yaml
 
 from teleop_core.base.errors import TeleopError
+from teleop_core.base.texts import shown
 
 LARGEST_TEXT = 1 << 20
 """Largest size of a file [bytes], which takes two seconds to read. The parameters in a recording have five thousand
@@ -23,6 +24,7 @@ LONGEST_NUMBER = 400
 DEEPEST = 100
 """Largest depth of nested lists and mappings; libyaml's composer has no limit of its own."""
 _DATE = "tag:yaml.org,2002:timestamp"
+_MERGE = "tag:yaml.org,2002:merge"
 _NUMBERS = ("tag:yaml.org,2002:int", "tag:yaml.org,2002:float")
 
 
@@ -74,7 +76,7 @@ def parse(text: str) -> Any:
         node = loader.get_single_node()
         if node is None:
             return None
-        _count(node, {}, set())
+        _count(loader, node, {}, set())
         return loader.construct_document(node)
     except yaml.MarkedYAMLError as error:
         raise UnreadableError(_told(error)) from error
@@ -100,11 +102,25 @@ def _told(error: yaml.MarkedYAMLError) -> str:
     return f"is not YAML: {said}{place}"
 
 
-def _count(node: yaml.Node, known: dict[int, int], within: set[int]) -> int:
+def _check_keys(loader: Any, node: yaml.MappingNode) -> None:
+    """Refuse a key that stands twice; PyYAML would take the last one. Keys of a merge (``<<``) may be overridden."""
+    lines: dict[Any, int] = {}
+    for key, _ in node.value:
+        if not isinstance(key, yaml.ScalarNode):
+            continue  # no mapping can have such a key
+        name = _MERGE if key.tag == _MERGE else loader.construct_object(key)
+        line = key.start_mark.line + 1
+        if name in lines:
+            raise UnreadableError(f"has the key {shown(key.value)} twice, in lines {lines[name]} and {line}")
+        lines[name] = line
+
+
+def _count(loader: Any, node: yaml.Node, known: dict[int, int], within: set[int]) -> int:
     """Number of values that a node expands to, with its aliases.
 
     Raises:
-        UnreadableError: The node contains itself, or there are too many values, or a number is too long.
+        UnreadableError: The node contains itself, or there are too many values, or a number is too long, or a key
+            stands twice.
     """
     if isinstance(node, yaml.ScalarNode):
         if node.tag in _NUMBERS and len(node.value) > LONGEST_NUMBER:
@@ -118,8 +134,9 @@ def _count(node: yaml.Node, known: dict[int, int], within: set[int]) -> int:
     within.add(id(node))
     entries = node.value
     if isinstance(node, yaml.MappingNode):
+        _check_keys(loader, node)
         entries = [part for pair in node.value for part in pair]
-    total = 1 + sum(_count(entry, known, within) for entry in entries)
+    total = 1 + sum(_count(loader, entry, known, within) for entry in entries)
     within.discard(id(node))
     if total > MOST_VALUES:
         raise UnreadableError(f"expands to more than {MOST_VALUES} values, perhaps by aliases")

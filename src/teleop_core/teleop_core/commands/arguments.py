@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from teleop_core.base.errors import TeleopError
+from teleop_core.base.errors import ParameterError, TeleopError
 
 if TYPE_CHECKING:
     from teleop_core.session.configuration import Configuration
@@ -62,6 +62,20 @@ def out_argument(parser: argparse.ArgumentParser) -> None:
     """Add the argument of the recording's path to a command. An interrupted command keeps the recorded part."""
     parser.set_defaults(records=True)
     parser.add_argument("--out", type=Path, required=True, help="directory for the recording; it must not exist yet")
+
+
+def domain_argument(parser: argparse.ArgumentParser, text: str) -> None:
+    """Add the argument of a ROS domain to a command; ``text`` is its help."""
+    parser.add_argument("--domain", type=_domain, metavar="N", help=text)
+
+
+def _domain(text: str) -> int:
+    from teleop_core.middleware.domains import checked_domain
+
+    try:
+        return checked_domain("domain", text)
+    except ParameterError as error:
+        raise argparse.ArgumentTypeError(str(error)) from error
 
 
 def without_argument(parser: argparse.ArgumentParser) -> None:

@@ -11,7 +11,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any, NoReturn
 
-from teleop_core.base import SessionError, TeleopError, TeleopWarning, one_line
+from teleop_core.base import ParameterError, SessionError, TeleopError, TeleopWarning, one_line
 from teleop_core.commands import compiling, devices, installed, look, operate
 from teleop_core.commands.arguments import (
     command,
@@ -398,6 +398,8 @@ def _workspace(arguments: argparse.Namespace) -> int:
     from teleop_core.robots import load_robot_set
     from teleop_core.robots.dexterity import sample_workspace, write_workspace_csv
 
+    if arguments.seed < 0:
+        raise ParameterError("--seed", arguments.seed, "0 or more")
     write_page = page_maker("workspace") if arguments.html is not None else None
     robot = load_robot_set(arguments.name, arguments.geometry)
     rng = np.random.default_rng(arguments.seed)

@@ -31,18 +31,17 @@ def add(commands: argparse._SubParsersAction) -> None:  # type: ignore[type-arg]
 
 
 def _run(arguments: argparse.Namespace) -> int:
-    from concurrent.futures import ProcessPoolExecutor, as_completed
-    from multiprocessing import get_context
+    from concurrent.futures import as_completed
 
+    from teleop_core.base.workers import workers
     from teleop_core.commands.progress import shown_progress
     from teleop_core.kernels.store import prune
 
     phases = list(phases_of(is_all=arguments.all))
     total, done, compiled = sum(map(len, phases)), 0, 0
-    workers = ProcessPoolExecutor(len(sched_getaffinity(0)), get_context("spawn"))
-    with shown_progress("kernels") as progress, workers:
+    with shown_progress("kernels") as progress, workers(len(sched_getaffinity(0))) as pool:
         for jobs in phases:
-            waiting = [workers.submit(_compile, job, arguments.all) for job in jobs]
+            waiting = [pool.submit(_compile, job, arguments.all) for job in jobs]
             for made in as_completed(waiting):
                 compiled, done = compiled + made.result(), done + 1
                 progress(done, total)

@@ -1,12 +1,12 @@
 """``teleop stop`` and ``teleop operate``: stop arms, command their states, show their states."""
 
 import argparse
-import os
 from typing import TYPE_CHECKING, Any
 
 from teleop_core.base.errors import SessionError
-from teleop_core.commands.arguments import command, ros_module
+from teleop_core.commands.arguments import command, domain_argument, ros_module
 from teleop_core.graph.topics import STATE_COMMANDS
+from teleop_core.middleware.domains import domain_of_environment
 
 if TYPE_CHECKING:
     from teleop_core.nodes.remote_control import ArmState, RemoteControl
@@ -37,12 +37,7 @@ def add(commands: Any) -> None:
     operate.add_argument("words", nargs="*", metavar="COMMAND", help="see below")
     operate.add_argument("--arm", help="namespace of one arm (default: all)")
     for parser in (stop, operate):
-        parser.add_argument(
-            "--domain",
-            type=int,
-            metavar="N",
-            help="ROS domain (default: ROS_DOMAIN_ID, or those of all sessions of this machine)",
-        )
+        domain_argument(parser, "ROS domain (default: ROS_DOMAIN_ID, or those of all sessions of this machine)")
 
 
 def chosen_domains(arguments: argparse.Namespace) -> tuple[int, ...]:
@@ -53,8 +48,8 @@ def chosen_domains(arguments: argparse.Namespace) -> tuple[int, ...]:
     """
     if arguments.domain is not None:
         return (arguments.domain,)
-    if "ROS_DOMAIN_ID" in os.environ:
-        return (int(os.environ["ROS_DOMAIN_ID"]),)
+    if (named := domain_of_environment()) is not None:
+        return (named,)
     from teleop_core.nodes.sessions import domains
 
     found = domains()

@@ -172,6 +172,7 @@ def parse_layer(content: object, where: str) -> Layer:
         UnknownNameError: There is no such stage, or a parameter under ``/**`` has a name like that of a known one.
     """
     layer: Layer = {}
+    given: dict[str, object] = {}  # keys of the parameters of single stages
     if not isinstance(content, Mapping):
         raise TeleopError(f"{where}: must contain stages, each with ros__parameters")
     for key, inner in sorted(content.items(), key=lambda item: item[0] != EVERY):
@@ -187,11 +188,12 @@ def parse_layer(content: object, where: str) -> Layer:
                 for stage in _owners(own, where):
                     layer.setdefault(stage, {})[own] = layer.setdefault(EVERY, {})[own] = value
             continue
-        arm = name.removesuffix(stage)
         layer.setdefault(name, {})
         for own, value in values:
-            owner, _, present = _current(f"{stage}.{own}").partition(".")
-            layer.setdefault(arm + owner, {})[present] = value
+            full = name.removesuffix(stage) + _current(f"{stage}.{own}")
+            _check_once(full, key, given, where)
+            owner, _, present = full.partition(".")
+            layer.setdefault(owner, {})[present] = value
     _share_robot(layer)
     if isinstance(delays := layer.get(SESSION, {}).get("delays"), list | tuple):
         layer[SESSION]["delays"] = [str(one).replace(*_READER) for one in delays]
@@ -204,6 +206,13 @@ def _without_those_of_ros(values: Mapping[str, Any], where: str) -> list[tuple[s
     if said := [name for name, _ in every if name.partition(".")[0] in _OF_ROS]:
         warnings.warn(f"{where}: without effect on a session: {', '.join(said)}", TeleopWarning, stacklevel=4)
     return [(name, value) for name, value in every if name not in said]
+
+
+def _check_once(full: str, key: object, given: dict[str, object], where: str) -> None:
+    """Refuse a parameter under two keys that mean one node, or in two spellings; ``given`` is written."""
+    if full in given:
+        raise TeleopError(f"{where}: {full} is given twice, under {given[full]} and {key}; keep one of them")
+    given[full] = key
 
 
 def _owners(name: str, where: str) -> list[str]:

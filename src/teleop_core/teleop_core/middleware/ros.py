@@ -20,6 +20,7 @@ from rclpy.signals import SignalHandlerOptions
 from teleop_core.bags.background import SYSTEM, Background
 from teleop_core.graph.layers import RealTimeParameters
 from teleop_core.middleware import real_time, ros_lifecycle, ros_node, world
+from teleop_core.middleware.domains import checked_domain, domain_of_environment
 from teleop_core.middleware.world import Node as LocalNode
 
 BAD_ARGUMENTS = (
@@ -94,12 +95,14 @@ class RosWorld:
 
     def guest(self, domain: int | None = None) -> world.World:
         """See :class:`~teleop_core.middleware.world.World`."""
+        number = domain_of_environment() if domain is None else checked_domain("domain", domain)
         context = Context()
-        context.init(args=[], domain_id=domain)
+        context.init(args=[], domain_id=number)
         return RosWorld(context)
 
     def init(self, arguments: Sequence[str]) -> None:
         """Start the middleware with the arguments of a command line; signal handlers are not changed."""
+        domain_of_environment()
         rclpy.init(args=list(arguments), signal_handler_options=SignalHandlerOptions.NO)
 
     def shutdown(self) -> None:

@@ -14,9 +14,10 @@ from contextlib import suppress
 from typing import IO, Any, cast
 
 from teleop_core.base.errors import SessionError
+from teleop_core.middleware.domains import VARIABLE, checked_domain, domain_of_environment
+from teleop_core.nodes import parent
 from teleop_core.nodes.chances import Chances
 from teleop_core.nodes.discovery import choose_transport
-from teleop_core.nodes.parent import VARIABLE
 from teleop_core.nodes.start import SESSION
 from teleop_core.nodes.starter import NODE, Starter
 
@@ -38,11 +39,14 @@ def environment(domain: int | None = None) -> dict[str, str]:
 
     Args:
         domain: ROS domain; None for the domain in ``ROS_DOMAIN_ID``, or for a free domain if this is not set.
+
+    Raises:
+        ParameterError: The domain is not the number of a domain.
     """
+    given = domain_of_environment() if domain is None else checked_domain("domain", domain)
     os.environ.setdefault("AMENT_PREFIX_PATH", sys.prefix)
     choose_transport()
-    given = str(domain) if domain is not None else os.environ.get("ROS_DOMAIN_ID")
-    return dict(os.environ) | {"ROS_DOMAIN_ID": given or free_domain()}
+    return dict(os.environ) | {VARIABLE: free_domain() if given is None else str(given)}
 
 
 _reserved: deque[socket.socket] = deque()
@@ -124,8 +128,9 @@ class Child:
         log = self._log.fileno()
         files = {"out": log, "err": log, "line": theirs.fileno(), "parameters": parameters.fileno()}
         with theirs:
+            variables = env | {parent.VARIABLE: "<line>"}
             self._process = starter.start(
-                command or ["teleop_core.nodes", *ours], env | {VARIABLE: "<line>"}, files, main="" if command else NODE
+                command or ["teleop_core.nodes", *ours], variables, files, main="" if command else NODE
             )
         self._chances, self._silent = Chances(self._process.pid), 0.0
 

@@ -7,15 +7,17 @@ commands that come once or some hundred times a second. Commands that come a tho
 """
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from teleop_core.bags.messages import Refusal, layout, read_joints, read_values
 from teleop_core.base.errors import TeleopError
-from teleop_core.graph.topics import SLAVE_MEASURED_CF, SLAVE_MEASURED_CP, Kind, Topic
+from teleop_core.graph.topics import SLAVE_MEASURED_CF, SLAVE_MEASURED_CP, SLAVE_SERVO_CP, SLAVE_SERVO_JP, Kind, Topic
 from teleop_core.kernels.geometry import Array, framed_wrenches, pose_from_transform, transform_from_pose
 from teleop_core.nodes.crtk import SINGLE, STREAMED, Condition, OperatingState, Refusals, is_installed
+from teleop_core.nodes.outside import OutsideCommands
 from teleop_core.nodes.sender import SECOND_NS
 from teleop_core.nodes.streams import message_type, profile
 from teleop_core.slave.motion_commands import Told
@@ -57,6 +59,10 @@ class CrtkSlave:
         else:
             node.ros.get_logger().info("crtk_msgs is not installed: no slave/operating_state")
         self._subscriptions = [self._listen(*entry) for entry in self._commands()]
+        streams = {name: command for name, _, _, command in self._commands()}
+        led = {SLAVE_SERVO_JP: streams["interpolate_jp"], SLAVE_SERVO_CP: streams["interpolate_cp"]}
+        takes = {topic: partial(self._take, topic.name.removeprefix("slave/"), led[topic]) for topic in led}
+        self._outside = OutsideCommands(node, takes, self._refusals)
         self._measured = Measured(node, stage)
 
     def note(self, stamp_ns: int) -> None:
@@ -74,6 +80,7 @@ class CrtkSlave:
             self._state.close()
         for subscription in self._subscriptions:
             self._node.ros.destroy(subscription)
+        self._outside.close()
         self._measured.close()
 
     def _condition(self) -> Condition:

@@ -82,6 +82,10 @@ def manipulability(robot: Robot, q: object, length: float = 1.0) -> float:
     return float(np.prod(singular_values(robot, q, length)))
 
 
+MOST_SAMPLES = 1_000_000
+"""Largest number of samples of a workspace; each takes some hundred bytes of memory."""
+
+
 def sample_workspace(robot: Robot, count: int, rng: np.random.Generator, length: float = 1.0) -> tuple[Array, Array]:
     """Tip positions and manipulability of joint vectors drawn evenly inside the limits.
 
@@ -92,7 +96,7 @@ def sample_workspace(robot: Robot, count: int, rng: np.random.Generator, length:
 
     Args:
         robot: The arm.
-        count: Number of samples, at least 1.
+        count: Number of samples, from 1 to :data:`MOST_SAMPLES`.
         rng: Source of the draws.
         length: Distance [m] that counts as much as one radian in the manipulability.
 
@@ -100,10 +104,10 @@ def sample_workspace(robot: Robot, count: int, rng: np.random.Generator, length:
         Points in the base (k, 3) [m], and manipulability (k,). For a robot without loops k equals ``count``.
 
     Raises:
-        ParameterError: The count is below 1, or the length is not above 0.
+        ParameterError: The count is out of bounds, or the length is not above 0.
     """
-    if count < 1:
-        raise ParameterError("count", count, "at least 1")
+    if not 1 <= count <= MOST_SAMPLES:
+        raise ParameterError("count", count, f"at least 1 and at most {MOST_SAMPLES}")
     _check_length(length)
     joints = rng.uniform(robot.lower, robot.upper, (count, robot.n))
     answer = robot.solve_fk_batch(joints, search=False)

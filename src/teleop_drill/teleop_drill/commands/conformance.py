@@ -2,10 +2,11 @@
 
 import argparse
 import sys
+from collections import Counter
 from typing import Any
 
 from teleop_core.base.errors import SessionError
-from teleop_core.commands.arguments import command, ros_module
+from teleop_core.commands.arguments import command, domain_argument, ros_module
 
 _EPILOG = """\
 tests an arm, ours or any other, against CRTK (Collaborative Robotics Toolkit): which topics there
@@ -19,7 +20,8 @@ must follow what it was told, in time and in place; its speeds must add up to it
 forces and free are never tried. Stop whoever else commands the arm, and keep a hand at the
 emergency stop.
 verdicts: ok; absent, which is allowed; not tried, with the reason; noted, works but look at it;
-FAILED. The exit code is 1 if a row FAILED.
+FAILED. The exit code is 1 if a row FAILED, else 3 if a row was not tried, as of an arm that is not
+enabled and homed, else 0.
 """
 _QUESTION = "move {}? one joint by 0.01 rad, its tip by 3 mm, each back again; pause, resume [y/N] "
 
@@ -33,7 +35,7 @@ def add(commands: Any) -> None:
     choice.add_argument("--read-only", action="store_true", help="command nothing")
     choice.add_argument("--yes", action="store_true", help="move the arm without asking first")
     parser.add_argument("--json", action="store_true", help="print JSON in place of the table")
-    parser.add_argument("--domain", type=int, metavar="N", help="ROS domain (default: ROS_DOMAIN_ID)")
+    domain_argument(parser, "ROS domain (default: ROS_DOMAIN_ID)")
     parser.add_argument(
         "--robot",
         metavar="NAME",
@@ -49,7 +51,7 @@ def _run(arguments: argparse.Namespace) -> int:
     from rich.console import Console
 
     from teleop_core.robots import load_robot
-    from teleop_drill.conformance import Verdict, findings_json, findings_table
+    from teleop_drill.conformance import Verdict, exit_code, findings_json, findings_table
 
     ros_module("conformance", "teleop_drill.nodes")
     from teleop_core.nodes.children import environment
@@ -80,11 +82,10 @@ def _run(arguments: argparse.Namespace) -> int:
         print(findings_json(arm.namespace, findings))
     else:
         Console().print(findings_table(arm.namespace, findings))
-    failed = sum(finding.verdict is Verdict.FAILED for finding in findings)
-    if not arguments.json:
-        there = sum(finding.verdict is not Verdict.ABSENT for finding in findings)
-        print(f"{there} of {len(findings)} rows are there, {failed} failed")
-    return 1 if failed else 0
+        count = Counter(finding.verdict for finding in findings)
+        there, failed = len(findings) - count[Verdict.ABSENT], count[Verdict.FAILED]
+        print(f"{there} of {len(findings)} rows are there, {failed} failed, {count[Verdict.SKIPPED]} not tried")
+    return exit_code(findings)
 
 
 def _agreed(namespace: str) -> bool:

@@ -18,6 +18,12 @@ _STYLES = {
 }
 
 
+def exit_code(findings: Iterable[Finding]) -> int:
+    """Exit code of the test: 1 if a row failed, else 3 if a row was not tried, which is no pass, else 0."""
+    verdicts = {finding.verdict for finding in findings}
+    return 1 if Verdict.FAILED in verdicts else 3 if Verdict.SKIPPED in verdicts else 0
+
+
 def findings_table(namespace: str, findings: Iterable[Finding]) -> Table:
     """Table with a row for each finding."""
     table = Table(title=f"CRTK: {escape(namespace)}", title_justify="left")

@@ -98,8 +98,11 @@ class Rig(Protocol):
     def way_to_limit(self) -> tuple[Array, float]:
         """Displacement (n,) of one joint to its nearer limit [rad or m], and the displacement of the tip [m]."""
 
-    def drive(self, speeds: Array, seconds: float) -> None:
-        """Drive the joints (n,) at speeds [rad/s or m/s] for a time [s], as a CRTK client does."""
+    def drive(self, speeds: Array, seconds: float, *, is_named: bool = False) -> None:
+        """Drive the joints (n,) at speeds [rad/s or m/s] for a time [s], as a CRTK client does.
+
+        With ``is_named`` the messages name the joints, and begin with the second one.
+        """
 
     def now_ns(self) -> int:
         """Present time [ns]."""
@@ -185,6 +188,7 @@ class Exercise:
         said: Text that the arm must have answered, as recorded by :meth:`Rig.note`; empty if any answer is allowed.
         told: Time limit for the report of the state or the fault in ``slave/operation`` [s]; None: no report.
         warns: Whether a node must warn of the fault in ``diagnostics``.
+        brakes: Whether the drives must be off at the end, and brakes hold the arm.
         hand_speed: Largest speed of the hand, or of the commands that replace it [m/s].
         tool_speed: Largest speed of the tip's setpoint that the exercise sets [m/s].
         lost: Longest time that may be missing in the recording [s].
@@ -211,6 +215,7 @@ class Exercise:
     said: str = ""
     told: Time | None = None
     warns: bool = False
+    brakes: bool = False
     hand_speed: float = SPEED
     tool_speed: float = math.inf
     lost: float = 0.0

@@ -131,6 +131,24 @@ def shifted(way: tuple[float, float, float]) -> Distortion:
     return moved(lambda pose: pose + offset)
 
 
+def turned(angle: float) -> Distortion:
+    """Turn all samples by an angle about the stylus's own x axis [rad], which causes a jump at the begin."""
+    w, x = math.cos(0.5 * angle), math.sin(0.5 * angle)
+
+    def change(pose: Array) -> Array:
+        a, b, c, d = pose[3:7]
+        pose[3:7] = a * w - b * x, a * x + b * w, c * w + d * x, d * w - c * x
+        return pose
+
+    return moved(change)
+
+
+def gapped(sent: int, lost: int) -> Distortion:
+    """Send ``sent`` samples, lose ``lost``, and so on."""
+    count = itertools.count()
+    return lambda sample: [sample] if next(count) % (sent + lost) < sent else []
+
+
 def filled(number: float) -> Distortion:
     """Replace all coordinates of the position by one number, such as NaN."""
 

@@ -98,6 +98,8 @@ def judge(exercise: Exercise, seen: Seen, numbers: Numbers) -> Iterator[Measured
     """All measurements of one fault, each with its bounds."""
     yield from _always(exercise, seen, numbers)
     yield from _told(exercise, seen, numbers)
+    if exercise.brakes:
+        yield _unpowered(seen, numbers)
     if exercise.motion in {Motion.RESTS, Motion.HOLDS}:
         yield from _stops(exercise, seen, numbers)
     elif exercise.motion is Motion.GOES_ON:
@@ -162,6 +164,14 @@ def _told(exercise: Exercise, seen: Seen, numbers: Numbers) -> Iterator[Measured
         most = exercise.allowed(numbers) + WARNED + late(seen, numbers)
         text = "diagnostics warned after {0:.0f} ms, at most {1:.0f}"
         yield Measured("warned_s", text, seen.since(seen.warned_ns), most)
+
+
+def _unpowered(seen: Seen, numbers: Numbers) -> Measured:
+    """Check that drives which are off give no effort in the last samples of the fault."""
+    last = seen.measured_js.within(seen.end_ns - _NOW_NS, seen.end_ns).values[:, -numbers.robot.n :]
+    effort = float(np.max(np.abs(last), initial=0.0)) if last.size else math.nan
+    text = "the drives gave {0:.3g} N m or N, must be off"
+    return Measured("effort_n", text, effort, _ROUNDING, scale=1.0)
 
 
 def _stops(exercise: Exercise, seen: Seen, numbers: Numbers) -> Iterator[Measured]:

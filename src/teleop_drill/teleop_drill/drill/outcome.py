@@ -21,6 +21,7 @@ class Outcome:
         told: Time until ``slave/operation`` reported the expected state [s]; None without this report.
         state: Operating state that followed; None if the slave had ended.
         fault: Fault that the slave reported.
+        is_braked: Whether the drives were off after the fault, and brakes held the arm.
         measures: All measured numbers with their bounds, by name.
         recording: Text about the state of the recording; empty before the recording is checked.
         is_recorded: Whether the recording is as expected.
@@ -36,6 +37,7 @@ class Outcome:
     told: float | None = None
     state: State | None = None
     fault: Fault = Fault.NONE
+    is_braked: bool = False
     measures: dict[str, Measured] = field(default_factory=dict)
     recording: str = ""
     is_recorded: bool = True
@@ -64,6 +66,8 @@ class Outcome:
         if asked.faults and self.fault not in asked.faults:
             wanted = " or ".join(fault.word for fault in asked.faults)
             found.append(f"reported {self.fault.word}, not {wanted}")
+        if asked.brakes and not self.is_braked:
+            found.append("the drives are on, must be off, and the brakes on")
         if asked.said and self.note != asked.said:
             found.append(f"answered {self.note or 'nothing'!r}, not {asked.said!r}")
         found += [one.failure for one in self.measures.values() if one.failure]

@@ -26,6 +26,9 @@ _SHAKE = 0.02  # amplitude of a hand that shakes [m]
 _SHAKES = 3.0  # frequency of a hand that shakes [Hz]
 _PRESS = 1.0  # duration of the motion of a joint to its limit [s]
 _STAY = 1.5  # time for which the joint is pressed into the limit [s]
+_GAP = 0.08  # gap in the hand's samples, shorter than the command timeout [s]
+_NAMED = 0.05  # speed of a joint that is driven by its name [rad/s or m/s]
+_TURN = 1.0  # angle by which the hand turns at once [rad]
 _SHARE = 0.5  # speed of the tip during the motion to the limit, divided by the hand's speed
 _SHAKEN = hand.SPEED + 2.0 * math.pi * _SHAKE * _SHAKES
 
@@ -114,6 +117,31 @@ def _second_master(rig: Rig) -> None:
         rig.wait(hand.PERIOD)
 
 
+def _second_master_in_gaps(rig: Rig) -> None:
+    """The hand's samples have gaps, shorter than the command timeout, in which a second master goes on."""
+    lost = round(_GAP / hand.PERIOD)
+    rig.distort(hand.gapped(lost, lost))
+    _second_master(rig)
+
+
+def _leave_gaps(rig: Rig) -> None:
+    rig.distort(hand.faithful)
+    _leave(MASTER_MEASURED_CP)(rig)
+
+
+def _drive_named(rig: Rig) -> None:
+    """Drive one joint away from its nearer limit, by messages that name the joints in another order."""
+    rig.distort(hand.silent)
+    rig.wait(0.3)  # wait until other clients may drive the arm
+    rig.mark()
+    before, (ways, _) = rig.setpoint(), rig.way_to_limit()
+    rig.drive(-_NAMED * np.sign(ways), 0.5, is_named=True)
+    went = np.abs(rig.setpoint() - before)
+    is_asked = ways != 0.0
+    is_right = went[is_asked].min() > 0.2 * _NAMED and not went[~is_asked].any()
+    rig.note("by name" if is_right else "not by name")
+
+
 def _second_commander(rig: Rig) -> None:
     """A second publisher sends joint commands to another position."""
     rig.mark()
@@ -185,6 +213,7 @@ SAMPLES = (
     _disturbed("infinite", "hand sends 1e308 m", hand.filled(1e308), motion=Motion.HOLDS,
                warns=True),
     _disturbed("teleport", "hand jumps by 10 cm", hand.shifted((0.1, 0.0, 0.0)), warns=True),
+    _disturbed("turn", "hand turns by 1 rad at once", hand.turned(_TURN), warns=True),
     _disturbed("random", "hand at random places in 20 cm", hand.scattered(0.2),
                motion=Motion.HOLDS, warns=True),
     _disturbed("stamps_frozen", "hand's stamps stand still", hand.frozen_stamps(),
@@ -211,6 +240,15 @@ SAMPLES = (
         name="second_master", text="second master for 0.5 s", inject=_second_master,
         undo=_leave(MASTER_MEASURED_CP), motion=Motion.GOES_ON,
         states=(State.ENABLED, State.PAUSED), cures=(Cure.NOTHING, Cure.RESUME),
+    ),
+    Exercise(
+        name="second_master_in_gaps", text="second master for 0.5 s, hand with gaps of 0.08 s",
+        inject=_second_master_in_gaps, undo=_leave_gaps, motion=Motion.GOES_ON,
+        states=(State.ENABLED, State.PAUSED), cures=(Cure.NOTHING, Cure.RESUME), gap=after(_GAP),
+    ),
+    Exercise(
+        name="named_joints", text="servo_jv names the joints in another order", inject=_drive_named,
+        undo=_straighten, motion=Motion.LED, said="by name",
     ),
     Exercise(
         name="second_commander", text="second publisher of slave/servo_jp",

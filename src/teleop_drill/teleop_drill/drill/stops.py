@@ -99,6 +99,32 @@ def _press_two(rig: Rig) -> None:
     _note_answer(rig, is_taken=rig.command("reset"))
 
 
+def _press_homing(rig: Rig) -> None:
+    """Press while the arm moves to its start position."""
+    rig.command("home")
+    rig.press(is_pressed=True)
+
+
+def _press_disabled(rig: Rig) -> None:
+    """Disable the arm, press and release a button that it knows, and request motion without a reset."""
+    rig.press(is_pressed=False)
+    rig.command("disable")
+    rig.wait(0.5)  # wait until the arm is at rest; before, enable is refused
+    rig.press(is_pressed=True)
+    rig.press(is_pressed=False)
+    rig.wait(_BEAT)
+    _note_answer(rig, is_taken=rig.command("enable") or rig.command("resume"))
+
+
+def _override(rig: Rig) -> None:
+    """Press a button, override it by the service ``release``, and request motion without a reset."""
+    rig.press(is_pressed=True)
+    rig.wait(0.5)
+    is_overridden = rig.command("release")
+    is_taken = rig.command("enable") or rig.command("resume")
+    _note_answer(rig, is_taken=is_taken or not is_overridden)
+
+
 def _resume_early(rig: Rig) -> None:
     """Pause and resume immediately, so that the arm still brakes when the resume comes."""
     rig.mark()
@@ -140,7 +166,7 @@ def _stuck(fault: Fault, told: Time) -> Exercise:
         name=f"stuck_{fault.word}", text=f"joints held fast; {fault.word} alone may stop them",
         inject=partial(_hold_fast, fault), undo=_let_go, states=(State.FAULT,), faults=(fault,),
         cures=(Cure.RESET,), allowed=lambda n: told(n) + 0.5 * _ROUNDS, told=told, watch=3.0,
-        breaks_simulator=True,
+        breaks_simulator=True, brakes=True,
     )  # fmt: skip
 
 
@@ -192,6 +218,24 @@ STOPS = (
         told=at_once,
     ),
     Exercise(
+        name="stop_homing", text="stop pressed while the arm homes", inject=_press_homing, undo=_release,
+        states=(State.FAULT,), faults=(Fault.STOP,), cures=(Cure.RESET,), allowed=at_once,
+        told=at_once,
+    ),
+    Exercise(
+        name="stop_disabled",
+        text="stop pressed and released while the arm is disabled; then enable without reset",
+        inject=_press_disabled, undo=_release, said=_REFUSED,
+        states=(State.FAULT,), faults=(Fault.STOP,), cures=(Cure.RESET,), allowed=at_once,
+        told=at_once,
+    ),
+    Exercise(
+        name="stop_override", text="stop pressed, overridden by release, then enable without reset",
+        inject=_override, undo=_release, said=_REFUSED,
+        states=(State.FAULT,), faults=(Fault.STOP,), cures=(Cure.RESET,), allowed=at_once,
+        told=at_once,
+    ),
+    Exercise(
         name="heartbeat", text="one stop button of two falls silent (heartbeat 0.5 s)",
         inject=_miss_heartbeat, undo=_hear_again,
         states=(State.FAULT,), faults=(Fault.HEARTBEAT,), cures=(Cure.RESET,),
@@ -214,7 +258,7 @@ STOPS = (
         name="overspeed", text="a joint runs away; overspeed alone may stop it",
         inject=_run_away, undo=_let_go, motion=Motion.LED, states=(State.FAULT,),
         faults=(Fault.OVERSPEED,), cures=(Cure.RESET,), told=after(_RACE), hand_speed=math.inf,
-        breaks_simulator=True,
+        breaks_simulator=True, brakes=True,
     ),
     Exercise(
         name="wild_gains", text="gains that are unstable at 1 kHz", inject=_take_bad_gains,

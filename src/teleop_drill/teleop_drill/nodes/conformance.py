@@ -102,7 +102,7 @@ def _watched(trials: Trials, name: str, findings: dict[str, Finding], robot: Rob
     A command that moved only the setpoint did not move the arm. From outside it is unknown whether the command or the
     measurement is wrong, so both rows fail.
     """
-    watch = Watch(trials.arm, None if robot is None else robot.fk)
+    watch = Watch(trials.arm, robot)
     verdict, note = TRIALS[name](trials)
     lies = watch.lies()
     for topic, lie in lies.items():

@@ -19,6 +19,8 @@ WAY = 0.003
 """Distance by which the tip is moved [m]."""
 _NEAR = 0.05  # share of the displacement that may be missing at the end
 _MOVED = 0.3  # least share of the displacement that counts as a motion
+_BEYOND = 0.3  # largest share of the displacement by which a move may leave the range between begin and goal
+_TURNED = 0.02  # largest turn of a tip whose commanded orientation stays the same [rad]
 _PATIENCE = 10.0  # longest duration of a move [s]
 _NOTHING = 1.5  # time after which a command that has caused no motion is assumed to cause none [s]
 _STATE = 3.0  # longest duration of a change of state [s]
@@ -39,6 +41,8 @@ class Trials:
         self._start = np.empty(0)
         self._joint, self._axis = ((-1, 0.0), (-1, 0.0))  # joint or axis whose direction is known to be free, and the
         # sign
+        self._first: set[int] = set()  # joints that are moved first, because two topics name them in another order
+        self._turned = 0.0  # largest turn of the tip in a trial [rad]
 
     def unfit(self) -> str:
         """Reason why no trial is possible; empty if trials are possible."""
@@ -53,6 +57,8 @@ class Trials:
         if self.arm.newest("setpoint_js") is None and self.arm.newest("measured_js") is None:
             return "neither setpoint_js nor measured_js: the arm's position is unknown"
         self._start = self.joints()
+        names = [list(one.name) for one in map(self.arm.newest, ("setpoint_js", "measured_js")) if one is not None]
+        self._first = {i for i, pair in enumerate(zip(names[0], names[-1], strict=False)) if len({*pair}) > 1}
         return ""
 
     # -- where it is -----------------------------------------------------------------------------
@@ -123,7 +129,7 @@ class Trials:
 
     def move_joints(self, name: str, *, is_relative: bool) -> Outcome:
         """Move a joint there and back; the arm must report busy during the motion only."""
-        for joint, sign in self._candidates(self._joint, len(self._start)):
+        for joint, sign in self._joints():
             begin = self.joints()
             step = np.zeros(len(begin))
             step[joint] = sign * TURN
@@ -136,8 +142,7 @@ class Trials:
     def _move(self, name: str, begin: Array, goal: Array, sent: Array) -> Outcome | None:
         """Result of a move of joints; None if nothing moved."""
         message = self.arm.message(name, position=sent.tolist())
-        off = partial(self._off, self.joints, goal)
-        return self._watch_move(name, message, off, float(np.abs(goal - begin).max()))
+        return self._watch_move(name, message, self.joints, begin, goal)
 
     def move_tip(self, name: str) -> Outcome:
         """Move the tip by a few millimetres; the arm must report busy during the motion only."""
@@ -145,20 +150,37 @@ class Trials:
             p, q = self.place()
             goal = p.copy()
             goal[axis] += sign * WAY
-            message = _filled(self.arm.message(name), goal, q)
-            off = partial(self._off, lambda: self.place()[0], goal)
-            outcome = self._watch_move(name, message, off, WAY)
+            message, self._turned = _filled(self.arm.message(name), goal, q), 0.0
+            outcome = self._watch_move(name, message, partial(self._position, q), p, goal)
             if outcome is not None:
                 self._axis = axis, sign
-                return outcome
+                return self._unturned(outcome)
         return Verdict.FAILED, "the tip moves along no axis in either direction"
 
-    def _off(self, where: Callable[[], Array], goal: Array) -> float:
-        return float(np.abs(where() - goal).max())
+    def _position(self, orientation: Array) -> Array:
+        """Position of the tip; its turn away from an orientation (4,) is noted."""
+        position, now = self.place()
+        self._turned = max(self._turned, 2.0 * math.acos(min(1.0, abs(float(orientation @ now)))))
+        return position
 
-    def _watch_move(self, name: str, message: Any, off: Callable[[], float], way: float) -> Outcome | None:
-        tap, busy = self.arm.tap("operating_state"), [False]
+    def _unturned(self, outcome: Outcome) -> Outcome:
+        """The outcome of a trial in which the tip must not turn."""
+        if outcome[0] is Verdict.OK and self._turned > _TURNED:
+            return Verdict.FAILED, f"the tip turned by {self._turned:.2g} rad, but its orientation was to stay"
+        return outcome
+
+    def _watch_move(
+        self, name: str, message: Any, where: Callable[[], Array], begin: Array, goal: Array
+    ) -> Outcome | None:
+        """Result of a move from begin to goal, both (n,); None if nothing moved."""
+        tap, busy, beyond = self.arm.tap("operating_state"), [False], [0.0]
+        way, lower, upper = float(np.abs(goal - begin).max()), np.minimum(begin, goal), np.maximum(begin, goal)
         tap.read()
+
+        def off() -> float:
+            place = where()
+            beyond[0] = max(beyond[0], float(np.abs(place - np.clip(place, lower, upper)).max()))
+            return float(np.abs(place - goal).max())
 
         def watch(state: Any) -> None:
             busy[0] = busy[0] or state.is_busy
@@ -172,7 +194,14 @@ class Trials:
         self.arm.wait(lambda: tap.read(watch) > 0 and not tap.newest.is_busy and busy[0], 2.0)
         if not busy[0]:
             return Verdict.FAILED, "is_busy never became true: clients that wait for the move wait without end"
-        return (Verdict.FAILED, "still busy at its goal") if tap.newest.is_busy else _OK
+        if tap.newest.is_busy:
+            return Verdict.FAILED, "still busy at its goal"
+        text = f"left the range between begin and goal, {way:.2g}, by {beyond[0]:.2g}"
+        return (Verdict.FAILED, text) if beyond[0] > _BEYOND * way else _OK
+
+    def _joints(self) -> list[tuple[int, float]]:
+        """Joints to try, each with a sign; those of :attr:`_first` first."""
+        return sorted(self._candidates(self._joint, len(self._start)), key=lambda one: one[0] not in self._first)
 
     def _candidates(self, known: tuple[int, float], count: int) -> list[tuple[int, float]]:
         """Directions to try: the direction that is known to be free, or all directions if none is known."""
@@ -180,7 +209,7 @@ class Trials:
 
     def stream_joints(self, name: str, rate: float, *, is_relative: bool = False) -> Outcome:
         """Stream a joint there and back again in two seconds."""
-        for joint, sign in self._candidates(self._joint, len(self._start)):
+        for joint, sign in self._joints():
             begin = self.joints()
 
             def sent(share: float, last: float, p: Array = begin, i: int = joint, s: float = sign) -> Any:
@@ -208,14 +237,15 @@ class Trials:
                 goal[i] += s * WAY * share
                 return _filled(self.arm.message(name), goal, q)
 
-            outcome = self._stream(name, rate, sent, partial(self._along_axis, p, axis, sign))
+            self._turned = 0.0
+            outcome = self._stream(name, rate, sent, partial(self._along_axis, (p, q), axis, sign))
             if outcome is not None:
                 self._axis = axis, sign
-                return outcome
+                return self._unturned(outcome)
         return Verdict.FAILED, "the tip follows along no axis in either direction"
 
-    def _along_axis(self, begin: Array, axis: int, sign: float) -> float:
-        return float(sign * (self.place()[0] - begin)[axis] / WAY)
+    def _along_axis(self, begin: tuple[Array, Array], axis: int, sign: float) -> float:
+        return float(sign * (self._position(begin[1]) - begin[0])[axis] / WAY)
 
     def _stream(
         self, name: str, rate: float, sent: Callable[[float, float], Any], where: Callable[[], float]
@@ -239,7 +269,7 @@ class Trials:
 
     def run_joints(self, name: str) -> Outcome:
         """Command a speed of a joint, then send nothing; the joint must come to rest by itself."""
-        for joint, sign in self._candidates(self._joint, len(self._start)):
+        for joint, sign in self._joints():
             begin, speed = self.joints(), np.zeros(len(self._start))
             speed[joint] = sign * 2.0 * TURN
             message = self.arm.message(name, velocity=speed.tolist())
@@ -252,7 +282,7 @@ class Trials:
     def run_tip(self, name: str) -> Outcome:
         """Command a speed of the tip, then send nothing; the tip must come to rest by itself."""
         for axis, sign in self._candidates(self._axis, 3):
-            begin, message = self.place()[0], self.arm.message(name)
+            begin, message = self.place(), self.arm.message(name)
             setattr(message.twist.linear, "xyz"[axis], sign * 2.0 * WAY)
             where = partial(self._along_axis, begin, axis, sign)
             outcome = self._run(name, message, self.arm.message(name), where)

@@ -172,10 +172,16 @@ class _Drill:
     # -- sessions --------------------------------------------------------------------------------
 
     def _prepared(self) -> LiveRig:
-        """Return a ready session as :meth:`_ready` does; if this fails, one new session is tried."""
+        """Return a ready session whose arm began at home; if this fails, one new session is tried.
+
+        In each exercise the arm may stand still while the hand moves on, and so its circle moves away from home. There
+        a joint limit cuts the circle, and the arm's way is no longer that of the hand.
+        """
         if self._rig is None:
             return self._ready()
         try:
+            if not self._rig.command("home"):
+                raise SessionError("the arm does not home")
             return self._ready()
         except SessionError as error:
             self._say(f"gives the session up: {error}")
@@ -265,6 +271,8 @@ class _Drill:
         return worst
 
     def _once(self, exercise: Exercise, rig: LiveRig) -> Outcome:
+        if exercise.warns:
+            rig.await_calm(1.2 * WARNED)
         rig.wait(_BEFORE)
         rig.tap.clear()
         outcome = Outcome(exercise=exercise, load=rig.site.load())

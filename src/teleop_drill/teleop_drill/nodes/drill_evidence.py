@@ -33,7 +33,8 @@ def note_state(outcome: Outcome, rig: LiveRig, before: dict[str, float]) -> None
         first_ns, outcome.told_by = min(told)
         outcome.detected = 1e-9 * (first_ns - begin_ns)
     if rig.session.is_running("slave"):
-        outcome.state = State(int(rig.operation()["state"]))
+        operation = rig.operation()
+        outcome.state, outcome.is_braked = State(int(operation["state"])), bool(operation["is_braked"])
 
 
 def seen_of(outcome: Outcome, rig: LiveRig, time_ns: tuple[int, int], scheduling: Scheduling) -> Seen:

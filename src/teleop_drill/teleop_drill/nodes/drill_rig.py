@@ -19,7 +19,7 @@ from teleop_core.middleware.ros_parameters import to_message
 from teleop_core.middleware.world import Qos
 from teleop_core.nodes.guest import Guest
 from teleop_core.nodes.observer import WARNING, Observer
-from teleop_core.nodes.operation import STOP_TOPIC
+from teleop_core.nodes.operation import RELEASE, STOP_TOPIC
 from teleop_core.nodes.streams import message_type, profile
 from teleop_core.robots.robot import Robot
 from teleop_core.session.configuration import Configuration
@@ -69,7 +69,9 @@ class LiveRig:
             self._node.ros.create_publisher(Bool, STOP_TOPIC, Qos(depth=100, is_latched=True)) for _ in range(2)
         ]
         self._speeds = self._node.ros.create_publisher(JointState, "/slave/servo_jv", Qos())
-        self._services = {name: self._node.ros.create_client(Trigger, f"/slave/{name}") for name in COMMANDS}
+        self._services = {
+            name: self._node.ros.create_client(Trigger, f"/slave/{name}") for name in (*COMMANDS, RELEASE)
+        }
         self._settings = {
             node: self._node.ros.create_client(SetParameters, f"/{node}/set_parameters") for node in _SLAVE
         }
@@ -102,6 +104,12 @@ class LiveRig:
         """Present warnings of each node; numbers are removed, because they change with every report."""
         told = self.observer.statuses.items()
         return {n: _NUMBERS.sub("", s.message) for n, s in told if s.level >= WARNING}
+
+    def await_calm(self, seconds: float) -> None:
+        """Wait until no node warns, for at most a time [s]; a warning that stands hides a new one of the same text."""
+        deadline = self.now() + seconds
+        while self._warnings() and self.now() < deadline:
+            self.wait(0.05)
 
     def note(self, text: str) -> None:
         """Add a note, which the table shows beside the state."""
@@ -146,11 +154,19 @@ class LiveRig:
         joint = int(np.argmin(moved + fastest))
         return np.where(np.arange(robot.n) == joint, ways, 0.0), float(moved[joint])
 
-    def drive(self, speeds: Array, seconds: float) -> None:
-        """Drive the joints (n,) at speeds [rad/s or m/s] for a time [s], as a CRTK client does."""
+    def drive(self, speeds: Array, seconds: float, *, is_named: bool = False) -> None:
+        """Drive the joints (n,) at speeds [rad/s or m/s] for a time [s], as a CRTK client does.
+
+        With ``is_named`` the messages name the joints, and begin with the second one.
+        """
+        message = JointState(velocity=speeds.tolist())
+        if is_named:
+            order = np.roll(np.arange(self._robot.n), -1)
+            names = [self._robot.joint_names[i] for i in order]
+            message = JointState(name=names, velocity=speeds[order].tolist())
         deadline = self.now() + seconds
         while self.now() < deadline:
-            self._speeds.publish(JointState(velocity=speeds.tolist()))
+            self._speeds.publish(message)
             self.wait(_DRIVE_PERIOD)
 
     def operation(self) -> dict[str, float]:

@@ -5,12 +5,11 @@ import tempfile
 import traceback
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, field
 from functools import partial
-from multiprocessing import get_context
 from pathlib import Path
 
+from teleop_core.base.workers import workers
 from teleop_core.graph.graph import RECORDER_NAME
 from teleop_core.nodes.crews import Processes
 from teleop_core.nodes.start import SESSION
@@ -39,8 +38,7 @@ _CIRCLE = (
     "slave.operation.tool_speed=0.5",
     "slave.start_speed=1.0",
 )
-_ROUND = 20  # number of schedules that are chosen together
-_PER_CHILD = 25  # sessions per process of this machine: killed simulated processes stay in memory
+_ROUND = 20  # schedules that are chosen together and share processes: killed simulated processes stay in memory
 
 
 @dataclass
@@ -190,7 +188,7 @@ def shrink(found: Found, law: str) -> Found:
 
 
 def run_seeds(
-    first: int, count: int, workers: int | None = None, processes: Processes = Processes.SIDES, breaks: float = 0.0
+    first: int, count: int, cores: int | None = None, processes: Processes = Processes.SIDES, breaks: float = 0.0
 ) -> Iterator[Found]:
     """Run schedules on all cores; of every three seeds, the one with the rarest combination of fault and state is run.
 
@@ -199,17 +197,16 @@ def run_seeds(
     Args:
         first: Seed of the first schedule, which is always run.
         count: Number of schedules to run.
-        workers: Number of processes; None: one for each core.
+        cores: Number of processes; None: one for each core.
         processes: Distribution of the nodes over processes.
         breaks: As in :func:`run_seed`.
     """
-    workers = workers or os.cpu_count() or 1
+    cores = cores or len(os.sched_getaffinity(0))
     met: Counter[tuple[str, str]] = Counter()
-    context = get_context("forkserver")
-    with ProcessPoolExecutor(workers, context, max_tasks_per_child=_PER_CHILD) as pool:
-        for begin in range(0, count, _ROUND):
-            threes = (range(first + 3 * k, first + 3 * k + 3) for k in range(begin, min(begin + _ROUND, count)))
-            seeds = [min(three, key=lambda s: _known(s, met, processes)) for three in threes]
+    for begin in range(0, count, _ROUND):
+        threes = (range(first + 3 * k, first + 3 * k + 3) for k in range(begin, min(begin + _ROUND, count)))
+        seeds = [min(three, key=lambda s: _known(s, met, processes)) for three in threes]
+        with workers(min(cores, len(seeds))) as pool:
             for found in pool.map(partial(run_seed, processes=processes, breaks=breaks), seeds):
                 met.update(found.met)
                 yield found

@@ -6,6 +6,8 @@ from pathlib import Path
 
 from teleop_core.base.errors import ParameterError
 
+_MOST_JOBS = 1000
+
 
 def add_study(
     parser: argparse.ArgumentParser, what: str, line: str, only: str = "", *, must_keep: bool = False
@@ -44,8 +46,8 @@ def check_outputs(arguments: argparse.Namespace) -> None:
     """
     from teleop_core.evaluation.command import check_places
 
-    if arguments.jobs is not None and arguments.jobs < 1:
-        raise ParameterError("--jobs", arguments.jobs, "1 or more processes")
+    if arguments.jobs is not None and not 1 <= arguments.jobs <= _MOST_JOBS:
+        raise ParameterError("--jobs", arguments.jobs, f"1 to {_MOST_JOBS} processes")
     check_places(arguments.html, arguments.csv)
 
 

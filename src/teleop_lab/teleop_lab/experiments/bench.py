@@ -1,16 +1,15 @@
 """Bench: runs the sessions of experiments, each only once."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from functools import cache, partial
-from multiprocessing import get_context
 from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from teleop_core.base.errors import ParameterError, UnknownNameError
+from teleop_core.base.workers import workers
 from teleop_core.evaluation import Score
 from teleop_core.graph.topics import NO_COMMAND_NS
 from teleop_core.hand.operators import Motion
@@ -221,7 +220,7 @@ class Bench:
         do = partial(_work, work, self.seed, self._settings)
         if self.workers == 1:
             return list(self._counted(map(do, jobs), len(jobs)))
-        with ProcessPoolExecutor(self.workers, get_context("spawn")) as pool:
+        with workers(self.workers) as pool:
             return list(self._counted(pool.map(do, jobs), len(jobs)))
 
     def _counted(self, results: Iterable[Result], total: int) -> Iterator[Result]:

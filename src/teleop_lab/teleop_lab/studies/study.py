@@ -28,6 +28,8 @@ _SPEED = 25.0
 """Simulated seconds per second that one process computes, scoring included; measured on a busy machine."""
 _BEGIN = 0.1  # time to begin a session [s]
 _START = 4.0  # time to start the processes [s]
+MOST_SESSIONS = 1_000_000
+"""Largest number of sessions of a study; each takes half a kilobyte of memory, and a file."""
 _RESULT = 4096
 """Size of a stored result on the disk [bytes]: one block."""
 _SECOND = 200_000
@@ -96,8 +98,12 @@ class Study:
                 raise ParameterError(f"sweep of {name}", (), "at least one value")
             if len({repr(value) for value in values}) < len(values):
                 raise ParameterError(f"sweep of {name}", tuple(values), "values that differ")
-        if not len(self.seeds) or len(set(self.seeds)) < len(self.seeds) or min(self.seeds) < 0:
-            raise ParameterError("seed", tuple(self.seeds), "whole numbers >= 0 that differ")
+        count = math.prod(map(len, self.swept.values())) * len(self.seeds)
+        if count > MOST_SESSIONS:
+            raise ParameterError("sessions of a study", count, f"at most {MOST_SESSIONS}; use fewer values or seeds")
+        is_told = len(self.seeds) and len(set(self.seeds)) == len(self.seeds)
+        if not is_told or min(self.seeds) < 0 or max(self.seeds) >= 10**18:
+            raise ParameterError("seed", tuple(self.seeds), "whole numbers >= 0 of at most 18 digits that differ")
         if not len(self.metrics):
             raise ParameterError("metrics", (), "at least one key of a score, for example task.time_s")
         measured = [key for key in keys() if key not in SESSION_KEYS]
@@ -314,9 +320,10 @@ def read_entries(path: Path | str, known: Sequence[str] = _KEYS) -> dict[str, An
 def common(content: Mapping[str, Any], path: Path) -> dict[str, Any]:
     """Scenario, seeds, settings and parts of a file."""
     seeds, fixed = content.get("seeds", 1), named(content, "set")
-    is_count = isinstance(seeds, int) and seeds > 0
+    is_count = isinstance(seeds, int) and 0 < seeds <= MOST_SESSIONS
     if not is_count and not (isinstance(seeds, list) and all(isinstance(s, int) for s in seeds)):
-        raise ParameterError("seeds", seeds, "a number of seeds, or a list of whole numbers")
+        text = f"a number of seeds, at most {MOST_SESSIONS}, or a list of whole numbers"
+        raise ParameterError("seeds", seeds, text)
     if "duration" in content:
         fixed = {f"{SESSION}.duration": content["duration"], **fixed}
     return {

@@ -4,17 +4,17 @@ import atexit
 import os
 import tempfile
 from collections.abc import Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
 from concurrent.futures.process import BrokenProcessPool
 from functools import lru_cache, partial
-from multiprocessing import current_process, get_context, parent_process
+from multiprocessing import current_process
 from pathlib import Path
 from shutil import rmtree
-from threading import Thread
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from teleop_core.base.errors import SessionError
 from teleop_core.base.own_parts import forget_own_parts, load_own_parts, named_files
+from teleop_core.base.workers import workers
 from teleop_lab.studies.point import Point, Result, code_digest, compute
 from teleop_lab.studies.store import write_result
 
@@ -52,7 +52,7 @@ def in_processes(
         return
     left = {point.name: point for point in points}
     for _ in range(_TRIES):
-        with ProcessPoolExecutor(count, get_context("spawn"), _begin, (tuple(parts),)) as pool:
+        with workers(count, partial(load_own_parts, tuple(parts))) as pool:
             try:
                 for result in _as_they_come(pool, do, list(left.values()), 2 * count):
                     del left[result.name]
@@ -67,18 +67,7 @@ def in_processes(
         yield Result(point.name, point.key, {}, f"its process died {_TRIES} times", 0.0)
 
 
-def _begin(parts: tuple[Path, ...]) -> None:
-    """Prepare a worker process; it exits as soon as its parent process no longer exists."""
-    Thread(target=_end_with, args=(parent_process(),), daemon=True).start()
-    load_own_parts(parts)
-
-
-def _end_with(other: Any) -> None:
-    other.join()
-    os._exit(1)  # all results on the disk are complete
-
-
-def _as_they_come(pool: ProcessPoolExecutor, do: "partial[Result]", points: list[Point], most: int) -> Iterator[Result]:
+def _as_they_come(pool: Executor, do: "partial[Result]", points: list[Point], most: int) -> Iterator[Result]:
     waiting: set[Future[Result]] = set()
     rest = iter(points)
     while True:
