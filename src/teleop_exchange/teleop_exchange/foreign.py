@@ -21,6 +21,9 @@ from teleop_core.session.recorded_hand import COLUMNS
 from teleop_exchange.imported_motion import Motion
 from teleop_exchange.options import ImportOptions
 
+_NAMED = ("rotation vector =", "angles in radians")
+"""Notes on the columns of turns in a table of an operator."""
+
 
 def master_of_others(path: Path, bag: reader.Bag | None, prefixes: Sequence[str]) -> memory.MemoryBag:
     """Copy of the master's topics in memory, with the same stamps and metadata.
@@ -81,7 +84,9 @@ def _read(path: Path, arm: str, options: ImportOptions) -> dict[topics.Topic, Se
         topic = topics.MASTER_BUTTONS.of_arm(arm)
         at, pressed = presses
         found[topic] = Series(at, at, pressed.astype(np.float64), (), topic.frame_id)
-    if notes := [*motion.told, *motion.losses()]:
+    # Columns that the head names in full are no guess, and need no note.
+    notes = [note for note in motion.told if options.position != COLUMNS[1:4] or not note.startswith(_NAMED)]
+    if notes := [*notes, *motion.losses()]:
         warnings.warn(f"{path.name}: {'; '.join(notes)}", TeleopWarning, stacklevel=4)
     return found
 
