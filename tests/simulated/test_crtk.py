@@ -205,6 +205,22 @@ def test_no_command_of_any_size_poisons_the_arm(client: StockClient) -> None:
     client.wait(lambda: np.allclose(client.joints(), np.array(MIDDLE) + 0.01, atol=1e-9), "the goal")
 
 
+def test_an_old_enable_does_not_wake_the_arm_and_an_old_pause_stops_it(client: StockClient) -> None:
+    def old(word: str) -> None:
+        message = crtk.StringStamped(string=word)
+        message.header.stamp.sec = client.peer.time_ns() // 10**9 - 60
+        client.commands["state_command"].publish(message)
+
+    client.send("state_command", crtk.StringStamped(string="resume"))  # finds the reader
+    old("pause")
+    client.reaches(("PAUSED", True, False))
+    for _ in range(50):
+        old("resume")
+        client.spin()
+    assert client.state() == ("PAUSED", True, False)
+    assert any("s old, at most 5 s" in one.text for one in client.peer.machine.log)  # type: ignore[attr-defined]
+
+
 def test_a_speed_that_is_a_minute_old_moves_nothing_and_is_counted(client: StockClient) -> None:
     before = client.joints()
     message = JointState(velocity=[0.05, 0.0, 0.0, 0.0, 0.0, 0.0])

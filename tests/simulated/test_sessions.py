@@ -16,6 +16,7 @@ from teleop_core.kernels.geometry import Array
 from teleop_core.robots import load_robot
 from teleop_core.session.configuration import configure
 from teleop_core.session.virtual import VirtualTime
+from teleop_core.slave.operation import OperationParameters
 from teleop_core.slave.pair import ArmParameters, SimulatedArm
 
 if TYPE_CHECKING:
@@ -238,6 +239,7 @@ def test_nodes_give_bit_equal_setpoints_to_the_core_for_the_same_commands(peer: 
     # A machine that stands still is no outage here, and an arm that is heard of late blinds
     # nobody: the law is about numbers.
     patient: dict[str, Any] = {"operation__longest_outage": 0.0, "operation__longest_silence": 60.0}
+    patient["operation__oldest_command"] = 0.0  # stamps from 0 on
     peer.start("slave", max_catch_up=10_000, command_timeout=LONGEST_TIMEOUT, **patient)
     # Stamps from 0 on: within the feedback timeout nothing depends on when feedback came.
     peer.start("inverse_kinematics", feedback_timeout=5.0)
@@ -295,7 +297,8 @@ def _core_answers(poses: Array, stamps: list[int]) -> Array:
 
 
 def _assert_core_slave_leads_alike(commands: dict[int, Array], setpoints: "Listener") -> None:
-    given = ArmParameters(start=tuple(HOME.tolist()), command_timeout=LONGEST_TIMEOUT)
+    operation = OperationParameters(oldest_command=0.0)
+    given = ArmParameters(start=tuple(HOME.tolist()), command_timeout=LONGEST_TIMEOUT, operation=operation)
     stage = SimulatedArm(given)
     row = stage.signals
     for i, in_force in enumerate(setpoints.stamps):

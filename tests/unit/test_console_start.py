@@ -240,4 +240,5 @@ def test_verdict_of_a_recording_is_the_one_that_evaluate_gives(tmp_path: Path) -
     assert by_name["run_1"].is_good == score.verdict.is_good
     assert "operator random" in by_name["run_1"].about
     assert by_name["broken"].is_good is False
-    assert "could not be scored" in by_name["broken"].verdict
+    assert by_name["broken"].verdict.startswith("could not be scored: ")
+    assert "is no recording" in by_name["broken"].verdict  # the reason of the command

@@ -18,6 +18,7 @@ from teleop_core.base.errors import ParameterError, TeleopError
 _MOST = 50
 """Largest number of listed recordings."""
 _FILE = "metadata.yaml"
+_TOLD = "told.txt"  # file for what the command says while it scores
 _COLUMNS = 132  # width of a command's output in characters
 _KIND = {"score": "evaluate", "export": "export"}
 
@@ -111,8 +112,8 @@ class Recordings:
             return
         out = Path(tempfile.mkdtemp(prefix="teleop_console_"), "score.json")
         words = [*_program(), "evaluate", str(self._folder / waiting.name), "--json", str(out)]
-        nothing = subprocess.DEVNULL
-        self._judging = waiting, subprocess.Popen(words, stdout=nothing, stderr=nothing), out
+        with (out.parent / _TOLD).open("w") as told:  # a pipe that nobody empties would stop the process
+            self._judging = waiting, subprocess.Popen(words, stdout=subprocess.DEVNULL, stderr=told), out
 
     def rest(self) -> None:
         """Cancel the verdict that is being computed, because a session needs the processors now."""
@@ -129,7 +130,8 @@ class Recordings:
         if process.poll() is None:
             return
         self._judging = None
-        self._known[entry.name, entry.made] = _judged(self._folder, entry, out)
+        reason = (out.parent / _TOLD).read_text(encoding="utf-8", errors="replace").strip().rpartition("\n")[2]
+        self._known[entry.name, entry.made] = _judged(self._folder, entry, out, reason)
         shutil.rmtree(out.parent)
 
 
@@ -148,10 +150,11 @@ def _operator(path: Path) -> list[str]:
     return []
 
 
-def _judged(folder: Path, entry: Entry, out: Path) -> Entry:
-    """Entry with the verdict of the recording's score, or with a note that the recording could not be scored."""
+def _judged(folder: Path, entry: Entry, out: Path, reason: str) -> Entry:
+    """Entry with the verdict of the recording's score, or with the reason why the recording could not be scored."""
     if not out.is_file():
-        return Entry(entry.name, entry.made, "", "could not be scored: teleop evaluate", False)
+        why = reason.removeprefix("teleop evaluate: ").removeprefix(f"{folder / entry.name}: ")
+        return Entry(entry.name, entry.made, "", f"could not be scored: {why or 'teleop evaluate'}", False)
     score = json.loads(out.read_text(encoding="utf-8"))[0]
     session, verdict = score["session"], score["verdict"]
     told = [str(session[key]) for key in ("scenario", "robot") if session.get(key)]

@@ -32,6 +32,7 @@ def is_installed() -> bool:
     return True
 
 
+_STOPPING = ("disable", "pause", "stop")
 SINGLE = Qos(depth=10)
 """QoS of one-shot commands: reliable, so that none is lost if the sender is reliable too."""
 STREAMED = Qos(depth=1, is_reliable=False)
@@ -51,12 +52,19 @@ class OperatingState:
         arm: Namespace of the topics, ``slave`` or ``master``.
         request: Executes a command by name and returns an answer with a text.
         condition: Returns the current condition.
+        aged: Returns why a command with a stamp is refused at a time [ns]; None if it is not. Commands that stop an
+            arm have any age.
     """
 
     def __init__(
-        self, node: Any, arm: str, request: Callable[[str], tuple[Answer, str]], condition: Callable[[], Condition]
+        self,
+        node: Any,
+        arm: str,
+        request: Callable[[str], tuple[Answer, str]],
+        condition: Callable[[], Condition],
+        aged: Callable[[int, int], tuple[Answer, str] | None] = lambda stamp_ns, now_ns: None,
     ) -> None:
-        self._node, self._request, self._condition = node, request, condition
+        self._node, self._request, self._condition, self._aged = node, request, condition, aged
         self._kind = message_type(OPERATING_STATE)
         self._changes: deque[tuple[int, Condition]] = deque(maxlen=100)
         self._publisher = node.ros.create_lifecycle_publisher(self._kind, f"{arm}/operating_state", _LATCHED)
@@ -84,9 +92,11 @@ class OperatingState:
             known = ", ".join(COMMANDS)
             log.warning(f"no state command {name!r:.40}; known: {known}")
             return
+        stamp = message.header.stamp
         try:
             with self._node.lock:
-                answer, text = self._request(name)
+                aged = self._aged(stamp.sec * SECOND_NS + stamp.nanosec, self._node.world.time_ns())
+                answer, text = (aged if name not in _STOPPING else None) or self._request(name)
         except TeleopError as error:
             log.warning(str(error))
             return

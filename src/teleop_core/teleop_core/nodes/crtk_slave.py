@@ -55,7 +55,7 @@ class CrtkSlave:
         self._operation = stage.signals["slave_operation"]
         self._state: OperatingState | None = None
         if is_installed():
-            self._state = OperatingState(node, "slave", stage.request, self._condition)
+            self._state = OperatingState(node, "slave", stage.request, self._condition, self._motion.refusal_of_age)
         else:
             node.ros.get_logger().info("crtk_msgs is not installed: no slave/operating_state")
         self._subscriptions = [self._listen(*entry) for entry in self._commands()]

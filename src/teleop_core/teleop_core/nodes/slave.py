@@ -123,6 +123,7 @@ class SlaveNode(TickingNode):
             self._offset_ns = offset_ns
             self._fail(Fault.CLOCK, abs(step), 1e-9 * _CLOCK_STEP_NS)
         self._relate_anew(offset_ns)
+        self.stage.state["ahead_ns"] = self.epoch_ns - offset_ns
         commands = self.ports.inputs[_SERVO]
         if any(entry.conflict for entry in commands):
             self._fail(Fault.PUBLISHERS)

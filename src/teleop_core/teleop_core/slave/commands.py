@@ -200,7 +200,7 @@ def take_command(p: SlaveNumbers, s: SlaveState, row: SlaveRow, dt: float) -> in
     if stamp_ns < s.seen_ns - ownership.AHEAD_NS:  # stamps of another clock after a silence: a new stream
         s.seen_ns = 0
     is_new, last_ns = stamp_ns > s.seen_ns, s.seen_ns
-    if stamp_ns <= row.now_ns + ownership.AHEAD_NS:  # otherwise every later command would count as old
+    if stamp_ns <= row.now_ns + max(0, -s.ahead_ns) + ownership.AHEAD_NS:  # otherwise later commands would count as old
         s.seen_ns = max(s.seen_ns, stamp_ns)
     s.asked_ns = 0
     if s.state != _ENABLED or s.is_busy or s.motion != 0 or not s.is_homed:
@@ -239,7 +239,9 @@ def _take_reference(
         FRESH or REFUSED.
     """
     is_first, period_ns = last_ns == 0, min(stamp_ns - last_ns, _SLOWEST_NS)
-    is_wrong = ownership.has_wrong_age(p, stamp_ns, now_ns) or ownership.is_led_by_another(p, s, leader, now_ns)
+    is_wrong = ownership.is_led_by_another(p, s, leader, now_ns)
+    if ownership.has_wrong_age(p, stamp_ns, now_ns):  # also by the system's clock, if it was stepped since the start
+        is_wrong = is_wrong or ownership.has_wrong_age(p, stamp_ns, now_ns - s.ahead_ns)
     far = max(p.timeout_ns, _SLOWEST_NS if is_first else period_ns) * 1e-9
     for i in range(s.command.shape[0]):
         near = abs(wanted[i] - s.target[i]) <= p.speed_limit[i] * far

@@ -41,6 +41,7 @@ class OwnershipState(Fields):
     leader: int  # a Leader
     led_ns: int  # time of its last accepted command
     gap_ns: int  # time between its last two commands, as far as it is measured
+    ahead_ns: int  # lead of the ticks' clock over the system's, which may have been stepped since the start [ns]
 
 
 AHEAD_NS = 1_000_000_000

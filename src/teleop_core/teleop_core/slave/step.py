@@ -8,7 +8,7 @@ from teleop_core.slave import commands, interpolation, velocity
 from teleop_core.slave.arm import ArmModel
 from teleop_core.slave.operation import watch
 from teleop_core.slave.operation.faults import Fault
-from teleop_core.slave.operation.states import Event, State, change
+from teleop_core.slave.operation.states import AFTER_RESET, Event, State, change
 
 _ENABLED, _FAULT = int(State.ENABLED), int(State.FAULT)
 _PAUSED, _SETPOINT = int(State.PAUSED), int(Fault.SETPOINT)
@@ -97,8 +97,8 @@ def _go_on(
     """Move the setpoint: to a goal, at a speed, after the command, or to rest."""
     if s.state in (_ENABLED, _PAUSED):
         s.must_join = 0
-    elif s.must_join == _JOINING and (_is_near(p, s) or _is_still(s)):  # after the limit of the tool
-        s.must_join = _JOINED
+    elif s.must_join == AFTER_RESET:
+        s.must_join = 0 if _is_near(p, s) else _ASKED
     if s.state == _ENABLED and s.is_busy and not s.must_plan:
         commands.advance_move(s)
     elif s.state == _ENABLED and s.is_busy:  # a move to a goal begins at rest
@@ -166,6 +166,8 @@ def slave_step(
     _go_on(p, s, arm, row, joints, dt)
     commands.limit_tool(p, s, arm, row.slave_setpoint_cp, dt)
     _insist_on_numbers(p, s, arm, row)
+    if s.must_join == _JOINING and (_is_near(p, s) or _is_still(s)):  # after the limit of the tool
+        s.must_join = _JOINED
     if s.is_busy and not s.must_plan and s.moved_ticks >= s.move_ticks:
         change(s, _ARRIVED)
     pose_from_transform(arm.T, row.slave_setpoint_cp)

@@ -79,6 +79,10 @@ _RESET, _STOP, _MOVE, _ARRIVED = (int(Event.RESET), int(Event.STOP), int(Event.M
 _RESUME, _LAPSED = int(Event.RESUME), int(Event.LAPSED)
 
 
+AFTER_RESET = 4
+"""Value of ``must_join`` after a reset: only an arm that is not at its setpoint makes the setpoint move."""
+
+
 class OperatingState(Fields):
     """Fields of a state record that :func:`change` reads and writes."""
 
@@ -113,6 +117,8 @@ def change(s: OperatingState, event: int) -> int:
     if event == _MOVE and not s.is_homed:
         return _REFUSED
     answer = _ALREADY if follower == state else _DONE
+    if follower == _FAULT and state != _FAULT:
+        s.must_join = 0
     if event != _RESUME and follower != state:
         s.must_home = s.is_homing if follower == _PAUSED else 0
     answer = _take(s, event, answer)
@@ -139,7 +145,7 @@ def _take(s: OperatingState, event: int, answer: int) -> int:
         s.is_stopped = 1
         return _ALREADY if was else _DONE
     if event == _RESET:
-        s.is_stopped, s.must_join = 0, 1
+        s.is_stopped, s.must_join = 0, AFTER_RESET
     if event == _MOVE:
         s.is_busy, s.must_plan = 1, 1
         return _DONE
