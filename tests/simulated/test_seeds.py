@@ -115,3 +115,11 @@ def test_arguments_that_do_not_go_together_are_refused_in_one_line(words: Any, n
     assert done.returncode == 2
     assert needed in done.stderr
     assert len(done.stderr.strip().splitlines()) == 1
+
+
+@pytest.mark.parametrize("count", ["0", "-1"])
+def test_no_schedules_are_refused_and_start_no_session(count: str) -> None:
+    words = [sys.executable, "-m", "teleop_core.commands.cli", "drill", "--seeds", count]
+    done = subprocess.run(words, check=False, capture_output=True, text=True)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert f"--seeds is {count}, must be at least 1" in done.stderr

@@ -13,6 +13,7 @@ from rich.console import Console
 
 import teleop_core as tc
 from teleop_core.bags.memory import MemoryBag
+from teleop_core.bags.reports import report
 from teleop_core.bags.series import Series
 from teleop_core.base import NoParameters, Registry
 from teleop_core.base.errors import EvaluationError
@@ -299,3 +300,10 @@ def test_an_arm_that_is_stopped_on_the_way_is_told_first_with_time_and_reason() 
     score = tc.run("coarse_box", duration=4.0, settings={"operation.events": ("stop@3",)}).score()
     assert score.verdict.worst == "halt.share"
     assert "from 3 s on: FAULT, homed: emergency stop" in score.verdict.text
+
+
+def test_an_operation_of_another_writer_without_numbers_is_no_halt(session: MemoryBag) -> None:
+    bag = kept(session, lambda time: time >= 0.0)
+    told = {"state": "running", "fault": "none"}
+    bag._reports[topics.SLAVE_OPERATION.name] = [(bag.start_ns, report(bag.start_ns, "arm", 0, "running", told))]
+    assert tc.Recording(bag).score().value("halt.share") == 0.0

@@ -11,6 +11,7 @@ from teleop_core.nodes.sender import SECOND_NS
 from teleop_core.nodes.ticking import TickingNode
 from teleop_core.slave.commands import CommandStatus
 from teleop_core.slave.operation import Fault, State, operation_text
+from teleop_core.slave.ownership import Leader
 from teleop_core.slave.slave import SlaveParameters
 
 _SERVO = SLAVE_SERVO_JP.name
@@ -200,14 +201,17 @@ class SlaveNode(TickingNode):
             return ["waits for slave/servo_jp and holds"]
         if status is CommandStatus.STALE:
             return [f"no slave/servo_jp for {servo_jp.age():.1f} s: holds"]
-        if status is not CommandStatus.REFUSED:
-            return []
-        row, motion = self.row, self.stage.motion
-        aged = motion.refusal_of_age(int(row["slave_servo_jp_ns"]), int(row["now_ns"]))
-        if aged is not None:
-            return [f"slave/servo_jp {aged[1]}: holds"]
-        source = motion.source
-        return [f"slave/servo_jp is refused beside {source}" if source != "servo" else "slave/servo_jp jumped: holds"]
+        return [self._refusal()] if status is CommandStatus.REFUSED else []
+
+    def _refusal(self) -> str:
+        """Text with the reason why the newest ``slave/servo_jp`` was refused."""
+        stamp_ns, now_ns = int(self.row["slave_servo_jp_ns"]), int(self.row["now_ns"])
+        if (aged := self.stage.motion.refusal_of_age(stamp_ns, now_ns)) is not None:
+            return f"slave/servo_jp {aged[1]}: holds"
+        leader = Leader(int(self.stage.state["leader"]))
+        if leader not in {Leader.NOBODY, Leader.SERVO_JP}:
+            return f"slave/servo_jp is refused beside {leader.command}"
+        return "slave/servo_jp jumped: holds"
 
     def values(self) -> dict[str, str]:
         """State, the command that moves the arm, and the number of refused commands."""

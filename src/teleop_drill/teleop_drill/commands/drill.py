@@ -48,7 +48,7 @@ def add(commands: Any) -> None:
     parser.add_argument(
         "--seeds",
         type=int,
-        default=0,
+        default=None,
         metavar="N",
         help="run this number of random schedules of faults on the simulated machine; their seeds begin at --seed",
     )
@@ -87,7 +87,9 @@ def _run(arguments: argparse.Namespace) -> int:
     from teleop_core.evaluation.command import check_places
     from teleop_drill.drill import SHORT, chosen
 
-    if arguments.seeds or arguments.faults is not None:
+    if arguments.seeds is not None and arguments.seeds < 1:  # none would mean the drill in real processes
+        raise ParameterError("--seeds", arguments.seeds, "at least 1")
+    if arguments.seeds is not None or arguments.faults is not None:
         from teleop_drill.commands.seeds import run_schedules
 
         return run_schedules(arguments)

@@ -3,6 +3,8 @@
 Both explain other figures, so a verdict names them first.
 """
 
+from contextlib import suppress
+
 import numpy as np
 
 from teleop_core.evaluation import TRACKED, Context, Key, Metric, Window
@@ -51,12 +53,13 @@ class HaltMetric(Metric):
     def __init__(self, context: Context) -> None:
         bag, self._found = context.bag, dict[str, float | str | None](share=0.0, at_s=None, reason=None)
         info = bag.topics.get(SLAVE_OPERATION.name)
-        reports = bag.reports(SLAVE_OPERATION) if info is not None and info.count else []
+        is_report = info is not None and info.count > 0 and info.type == SLAVE_OPERATION.kind.ros_type
+        reports = bag.reports(SLAVE_OPERATION) if is_report else []
         ends = [*(report.stamp_ns for report in reports[1:]), bag.end_ns][: len(reports)]
         total = 0.0
         for report, end_ns in zip(reports, ends, strict=True):
-            state, fault = (report.values.get(name, "0") for name in ("state", "fault"))
-            if float(fault) == 0.0 or float(state) == State.ENABLED:
+            state, fault = (_number(report.values.get(name)) for name in ("state", "fault"))
+            if state in (None, State.ENABLED) or not fault:  # no numbers: a report of another writer
                 continue
             begin_ns = max(report.stamp_ns, bag.start_ns)
             total += max(0.0, 1e-9 * (end_ns - begin_ns))
@@ -70,3 +73,10 @@ class HaltMetric(Metric):
     def values(self) -> dict[str, float | str | None]:
         """Values named by ``keys``."""
         return self._found
+
+
+def _number(text: str | None) -> float | None:
+    """Number that a report states; None without one."""
+    with suppress(ValueError):
+        return None if text is None else float(text)
+    return None
