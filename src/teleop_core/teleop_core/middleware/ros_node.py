@@ -5,15 +5,14 @@ from typing import Any
 
 from rclpy.client import Client
 from rclpy.duration import Duration
-from rclpy.guard_condition import GuardCondition
 from rclpy.lifecycle import LifecyclePublisher
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.service import Service
 from rclpy.subscription import Subscription
-from rclpy.timer import Timer
 
+from teleop_core.middleware.agenda import Agenda, Guard, Timer
 from teleop_core.middleware.ros_taking import RosTaker
 from teleop_core.middleware.world import Endpoint, Qos
 
@@ -23,8 +22,6 @@ _DESTROY = {
     Subscription: "destroy_subscription",
     Service: "destroy_service",
     Client: "destroy_client",
-    Timer: "destroy_timer",
-    GuardCondition: "destroy_guard_condition",
 }
 
 
@@ -79,8 +76,7 @@ class RosNode:
         self.resolve_topic_name = self.own.resolve_topic_name
         self.create_service = self.own.create_service
         self.create_client = self.own.create_client
-        self.create_timer = self.own.create_timer
-        self.create_guard_condition = self.own.create_guard_condition
+        self.agenda = Agenda()
         self.count_publishers = self.own.count_publishers
         self.get_topic_names_and_types = self.own.get_topic_names_and_types
         self.get_service_names_and_types = self.own.get_service_names_and_types
@@ -98,17 +94,26 @@ class RosNode:
         """Subscription whose messages the executor passes to ``callback``."""
         return self.own.create_subscription(kind, name, callback, profile_of(qos))
 
+    def create_timer(self, period: float, callback: Callable[[], None]) -> Timer:
+        """Timer whose function the executor calls."""
+        return self.agenda.timer(period, callback)
+
+    def create_guard_condition(self, callback: Callable[[], None]) -> Guard:
+        """Guard whose function the executor calls."""
+        return Guard(self.agenda, callback)
+
     def destroy(self, entity: Any) -> None:
         """Destroy an object that one of the methods above has made."""
+        if isinstance(entity, Timer):
+            self.agenda.drop(entity)
+            return
         own = entity.own if isinstance(entity, RosPublisher) else entity
         destroy = next(name for kind, name in _DESTROY.items() if isinstance(own, kind))
         getattr(self.own, destroy)(own)
 
     def defer(self, work: Callable[..., object], *arguments: object) -> None:
-        """Let the executor call ``work`` soon; without an executor nothing happens. May be called from any thread."""
-        executor = self.own.executor
-        if executor is not None:
-            executor.create_task(work, *arguments)
+        """Let the executor call ``work`` soon. May be called from any thread."""
+        self.agenda.defer(work, *arguments)
 
     def publishers(self, name: str) -> list[Endpoint]:
         """Discovered publishers of a topic."""
