@@ -7,8 +7,10 @@ address ends the process.
 import ctypes
 from typing import Any
 
+import numba
 import numpy as np
-from numba import carray, float64, int32, int64, types, uint8
+from llvmlite import ir
+from numba import float64, int32, int64, types, uint8
 from numba.core import cgutils
 from numba.extending import intrinsic, overload
 
@@ -36,7 +38,6 @@ if IS_COMPILED:
         """Call of a C function of up to four arguments; the calling convention ignores further ones."""
 
         def generate(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
-            ir = cgutils.ir
             word = ir.IntType(64)
             kind = ir.FunctionType(ir.IntType(32), [word] * 4)
             return builder.call(builder.inttoptr(arguments[0], kind.as_pointer()), arguments[1:])
@@ -81,9 +82,9 @@ if IS_COMPILED:
     for _plain, _kind in ((floats, float64), (integers, int64), (shorts, int32), (octets, uint8)):
 
         def _compiled(kind: Any) -> Any:
-            return lambda address, count: lambda address, count: carray(_pointer(address), count, kind)
+            return lambda address, count: lambda address, count: numba.carray(_pointer(address), count, kind)  # type: ignore[call-arg, attr-defined]
 
         overload(_plain)(_compiled(_kind))
 
     # numba compares the signatures of both functions, annotations too.
-    overload(call)(lambda function, a, b, c, d: lambda function, a, b, c, d: _call(function, a, b, c, d))
+    overload(call)(lambda function, a, b, c, d: lambda function, a, b, c, d: _call(function, a, b, c, d))  # type: ignore[call-arg]  # noqa: PLW0108

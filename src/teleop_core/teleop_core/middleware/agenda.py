@@ -21,11 +21,11 @@ class Timer:
     Args:
         period: Time between two calls [s].
         callback: Function to call.
-        wake: Called when the timer becomes due earlier than before.
+        agenda: Agenda of the timer.
     """
 
-    def __init__(self, period: float, callback: Work, wake: Work) -> None:
-        self._period_ns, self.callback, self._wake = max(1, round(period * 1e9)), callback, wake
+    def __init__(self, period: float, callback: Work, agenda: "Agenda") -> None:
+        self._period_ns, self.callback, self._agenda = max(1, round(period * 1e9)), callback, agenda
         self._is_canceled = False
         self.due_ns = time.monotonic_ns() + self._period_ns
 
@@ -36,7 +36,7 @@ class Timer:
     def reset(self) -> None:
         """Continue the timer; the next call is one period from now."""
         self.due_ns, self._is_canceled = time.monotonic_ns() + self._period_ns, False
-        self._wake()
+        self._agenda.wake()
 
     def is_canceled(self) -> bool:
         """Whether the timer is paused."""
@@ -61,7 +61,7 @@ class Agenda:
 
     def timer(self, period: float, callback: Work) -> Timer:
         """Add a timer; the period is in [s]."""
-        made = Timer(period, callback, lambda: self.wake())
+        made = Timer(period, callback, self)
         self._timers = (*self._timers, made)
         self.wake()
         return made

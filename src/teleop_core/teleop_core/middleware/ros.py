@@ -18,7 +18,7 @@ from rclpy.signals import SignalHandlerOptions
 
 from teleop_core.bags.background import SYSTEM, Background
 from teleop_core.graph.layers import RealTimeParameters
-from teleop_core.middleware import real_time, ros_lifecycle, ros_node, world
+from teleop_core.middleware import real_time, ros_lifecycle, ros_node, ros_taking, world
 from teleop_core.middleware.domains import checked_domain, domain_of_environment
 from teleop_core.middleware.ros_executor import RosExecutor
 from teleop_core.middleware.world import Node as LocalNode
@@ -49,6 +49,8 @@ class RosWorld:
     sleep = staticmethod(time.sleep)
     thread_ident = staticmethod(threading.get_ident)
     take_real_time: Callable[[RealTimeParameters], list[str]] = staticmethod(real_time.apply_options)
+
+    functions = staticmethod(ros_taking.functions)
 
     def lock(self) -> world.Lock:
         """See :class:`~teleop_core.middleware.world.World`."""

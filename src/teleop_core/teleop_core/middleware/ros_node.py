@@ -49,6 +49,19 @@ class RosPublisher:
         self.publish: Callable[[Any], None] = own.publish
         self.get_subscription_count: Callable[[], int] = own.get_subscription_count
 
+    @property
+    def pointer(self) -> int:
+        """Address of the publisher in rcl, for kernels; 0 while the node is not active."""
+        return 0 if self._is_managed and not self.own.is_activated else int(self._handle.pointer)
+
+    def hold(self) -> None:
+        """Keep the publisher in memory until :meth:`release`: kernels publish without the interpreter's lock."""
+        self._handle.__enter__()
+
+    def release(self) -> None:
+        """Let the publisher be destroyed."""
+        self._handle.__exit__(None, None, None)
+
     def send(self, data: bytes) -> None:
         """Send bytes, if the node is active."""
         if self._is_managed and not self.own.is_activated:

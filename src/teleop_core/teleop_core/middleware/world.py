@@ -391,6 +391,12 @@ class World(Protocol):
     def background(self) -> Background:
         """Functions for writing recordings."""
 
+    def functions(self) -> Mapping[str, int]:
+        """Addresses of the C functions by which kernels reach the middleware and the clock; empty if there are none.
+
+        The names are the fields of :class:`teleop_core.nodes.wire.Calls`.
+        """
+
     def monotonic_ns(self) -> int:
         """Time of a monotonic clock [ns]."""
 

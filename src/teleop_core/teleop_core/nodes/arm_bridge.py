@@ -68,7 +68,7 @@ class ArmBridgeNode(TickingNode):
                 stamp_ns = taken.sent_ns
             sample = Sample(message.name, message.position, message.velocity, message.effort, stamp_ns)
             if self.stage.hear(sample, self.world.time_ns()) and self._has_server:
-                self._output.send(stamp_ns)
+                self.ports.send_now(self._output, stamp_ns)
 
     def _command(self, now_ns: int) -> Command | None:
         is_led = self.input(SLAVE_OPERATION).stamp_ns is not None

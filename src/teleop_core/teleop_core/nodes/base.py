@@ -247,14 +247,14 @@ class CoreNode(TunedNode):
 
     def _open_feed(self) -> None:
         """Feed the node's messages to the recorder of this machine, if there is one."""
-        outputs = {topic.name: output for topic, output in self.ports.outputs.items()}
-        if not outputs:
-            return
-        self._feed = Feed(outputs, self.world)
-        for name, output in outputs.items():
-            output.tap = self._feed.channels[name].give
-            self._feed.channels[name].join(True)
-        self._feed.flush()  # send fed messages before the middleware publishes the first message
+        names = [topic.name for topic in self.ports.outputs]
+        self._feed = Feed(names, self.world) if names else None
+        channels = self._feed.channels if self._feed is not None else {}
+        self.ports.connect(channels, self._feed)
+        if self._feed is not None:
+            for channel in channels.values():
+                channel.join(True)
+            self._feed.flush()  # send fed messages before the middleware publishes the first message
 
     def _fed_turn(self) -> None:
         self.turn()

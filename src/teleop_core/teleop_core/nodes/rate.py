@@ -52,24 +52,28 @@ class Recent:
 
     Args:
         size: Number of values that are stored.
+
+    Attributes:
+        numbers: Memory of the numbers (size,), which kernels also write.
+        count: Number of values that were put so far, (1,).
     """
 
     def __init__(self, size: int = 1000) -> None:
-        self._numbers = np.zeros(size)
-        self._count = 0
+        self.numbers, self.count = np.zeros(size), np.zeros(1, np.int64)
 
     def put(self, number: float) -> None:
         """Add a number, which replaces the oldest number."""
-        self._numbers[self._count % len(self._numbers)] = number
-        self._count += 1
+        count = self.count.item()
+        self.numbers[count % len(self.numbers)] = number
+        self.count[0] = count + 1
 
     def clear(self) -> None:
         """Delete all numbers."""
-        self._count = 0
+        self.count[0] = 0
 
     def summary(self) -> tuple[float, float, float]:
         """Median, 99th percentile and maximum; zeros without numbers."""
-        kept = self._numbers[: self._count]
+        kept = self.numbers[: self.count.item()]
         if not len(kept):
             return 0.0, 0.0, 0.0
         median, high = np.percentile(kept, (50.0, 99.0))

@@ -23,7 +23,6 @@ from teleop_core.nodes.loop import Loop
 from teleop_core.nodes.making import make_node
 from teleop_core.nodes.rate import Schedule
 from teleop_core.nodes.recorder import RecorderNode
-from teleop_core.nodes.streams import Output
 from teleop_core.session.links import link_texts
 
 _AFTER_NS = 700_000
@@ -76,7 +75,6 @@ class TeleopSession:
             phase_ns=0 if members[0] is graph.members[0] else _AFTER_NS,
         )
         self._at_work: tuple[bool, ...] = ()
-        self._pending: list[tuple[Output, bytes, int]] = []
         self._ticks = 0
         self._loop = Loop(world, "session", self._turn, last.fail, patience=last.patience)
         self._loop.start()
@@ -126,17 +124,15 @@ class TeleopSession:
     def _tick(self, tick_ns: int) -> None:
         """Make one tick [ns, monotonic]. The gate keeps all nodes open until all messages are published."""
         self._ticks += 1
-        waiting: list[tuple[Output, bytes, int]] = []
         with self._gate:
             for node in self._stages:
                 if node.is_at_work:
                     node.tick(tick_ns)
-                    # Messages with the longest path to their reader are sent first: the slave's setpoint first, the
-                    # master's sample last.
-                    waiting[:0] = self._pending
-                    self._pending.clear()
-            for output, data, sent_ns in waiting:
-                output.publish(data, sent_ns)
+            # Messages with the longest path to their reader are sent first: the slave's setpoint first, the master's
+            # sample last.
+            for node in reversed(self._stages):
+                if node.is_at_work:
+                    node.ports.publish()
             self._feed.flush()
             for node in self._stages:
                 if node.is_at_work:
@@ -153,12 +149,13 @@ class TeleopSession:
         channels: dict[str, Any] = dict(self._feed.channels)
         for recorder in self._recorder:
             channels |= recorder.channels
-        for name, out in outputs.items():
-            out.inputs = [entry for entry in inputs if entry.topic.name == name]
-            channel = channels.get(name)
-            out.tap, out.pending = channel.give if channel else None, self._pending
         for entry in inputs:
             entry.join(entry.topic.name in outputs)
+        for name, out in outputs.items():
+            out.serve([entry for entry in inputs if entry.topic.name == name])
+        for node in active:
+            node.ports.waits = True
+            node.ports.connect(channels, self._feed)
         for name, channel in channels.items():
             channel.join(name in outputs)
         self._feed.flush()  # send fed messages before the middleware publishes the first message

@@ -36,6 +36,10 @@ class SimulatedWorld:
         self.background: Background = Disk(process)
         self.sleep: Callable[[float], None] = self._scheduler.sleep
 
+    def functions(self) -> dict[str, int]:
+        """None: kernels cannot reach the simulated middleware."""
+        return {}
+
     def time_ns(self) -> int:
         """Time of the system's clock [ns]."""
         now_ns = self.monotonic_ns()
