@@ -113,6 +113,10 @@ class Guard:
             self._is_triggered = True
             self._agenda.defer(self._call)
 
+    def cancel(self) -> None:
+        """Call the function no more."""
+        self._callback = _nothing
+
     def _call(self) -> None:
         self._is_triggered = False
         self._callback()

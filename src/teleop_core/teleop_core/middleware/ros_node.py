@@ -120,6 +120,9 @@ class RosNode:
         if isinstance(entity, Timer):
             self.agenda.drop(entity)
             return
+        if isinstance(entity, Guard):
+            entity.cancel()
+            return
         own = entity.own if isinstance(entity, RosPublisher) else entity
         destroy = next(name for kind, name in _DESTROY.items() if isinstance(own, kind))
         getattr(self.own, destroy)(own)

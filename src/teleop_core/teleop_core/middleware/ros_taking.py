@@ -140,6 +140,10 @@ class RosTaker:
         if answer != _OK:
             self._forget_error()
             return None
+        return self.taken()
+
+    def taken(self) -> Taken:
+        """The last message that was taken, also by a kernel."""
         found, info = self._bytes, self._info
         return Taken(
             ctypes.string_at(found.buffer, found.length),

@@ -117,7 +117,7 @@ class Thread(Protocol):
 class Line(Protocol):
     """Connection for bytes between two processes of one machine; its methods never wait."""
 
-    def send(self, data: bytes | bytearray) -> int:
+    def send(self, data: bytes | bytearray | memoryview) -> int:
         """Write as many bytes as the connection accepts now; return the number of bytes written.
 
         Raises:

@@ -87,6 +87,7 @@ class Feed:
         self.waiting = bytearray()
         self.block: Any = records(fields_of(Block))[0]
         self._bytes = np.zeros(_BLOCK, np.uint8)
+        self._view, self._fill = self._bytes.data, np.asarray(self.block)["fill"]
         self.block["at"], self.block["room"] = self._bytes.ctypes.data, _BLOCK
         self.channels = {name: Channel(self, index) for index, name in enumerate(self._names)}
 
@@ -97,10 +98,10 @@ class Feed:
 
     def spill(self) -> None:
         """Move the messages of the block to the queue."""
-        fill = int(self.block["fill"])
+        fill = int(self._fill)
         if fill and len(self.waiting) < MOST:
-            self.waiting += self._bytes[:fill].data
-        self.block["fill"] = 0
+            self.waiting += self._view[:fill]
+        self._fill[...] = 0
 
     def put(self, index: int, word: int, data: bytes = b"", number: int = 0, time_ns: int = 0) -> None:
         """Append a frame to the queue."""
@@ -115,15 +116,23 @@ class Feed:
             if now_ns - self._looked_ns > _AGAIN_NS:
                 self._looked_ns = now_ns
                 self._connect()
-        self.spill()
-        if self._line is not None and self.waiting:
-            try:
-                written = self._line.send(self.waiting)
-            except BlockingIOError:
-                return
-            except OSError:  # the recorder has ended; a new recorder may start
-                self.close()
-                return
+        fill = int(self._fill)
+        if self._line is None or not (fill or self.waiting):
+            return
+        is_straight = not self.waiting  # nothing has to be copied if the socket accepts everything
+        if not is_straight:
+            self.spill()
+        try:
+            written = self._line.send(self._view[:fill] if is_straight else self.waiting)
+        except BlockingIOError:
+            return
+        except OSError:  # the recorder has ended; a new recorder may start
+            self.close()
+            return
+        if is_straight and written == fill:
+            self._fill[...] = 0
+        else:
+            self.spill()
             del self.waiting[:written]
 
     def close(self) -> None:

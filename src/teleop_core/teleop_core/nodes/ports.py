@@ -1,6 +1,6 @@
 """Ports: connect the topics that a node reads and writes to the fields of its stage's signals."""
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -16,7 +16,6 @@ from teleop_core.graph.topics import BY_NAME, PORTS_BETWEEN_ARMS, Kind, Quality,
 from teleop_core.kernels import bound, records
 from teleop_core.kernels.fields import Cells
 from teleop_core.kernels.geometry import Array
-from teleop_core.kernels.memory import integers
 from teleop_core.middleware.world import Publisher, World
 from teleop_core.nodes import wire
 from teleop_core.nodes.feed import NO_BLOCK, Feed
@@ -73,14 +72,10 @@ class Ports:
         self._feed: Feed | None = None
         # First input to read, and the port to leave out; first output to write, and the stamp of samples [ns].
         self._reading, self._writing = np.array((0, -1)), np.zeros(2, np.int64)
-        self._times, self._is_part_silent = np.zeros(2, np.int64), False
+        self._times = np.zeros(2, np.int64)
         self._has_clock = self._calls is not None and bool(self._calls.own["clock"])
         if self._calls is not None:
             self._bind(self._calls.own)
-
-    def _set_stamp(self, entry: Input) -> None:
-        """Write the stamp of an input that was read in Python into the signals."""
-        integers(int(entry.own["stamp_at"]), 1)[0] = entry.own["stamp_ns"]
 
     def _make_inputs(
         self, owner: Any, signals: Any, feeds: Feeds, joint_names: tuple[str, ...], buttons: tuple[int, ...]
@@ -129,6 +124,7 @@ class Ports:
         block = self._feed.block if self._feed is not None else NO_BLOCK
         self._read_all = bound(wire.read_all, self._read_records, calls, self._reading)
         self._write_all = bound(wire.write_all, self._write_records, calls, self._writing, self._times)
+        self._are_sound = bound(wire.are_sound, self._write_records)
         self._send_all = bound(wire.send_all, self._write_records, calls, block, self._writing)
 
     def _stamp_field(self, written: Topic) -> str:
@@ -156,30 +152,20 @@ class Ports:
         place[0], place[1] = 0, -1 if trigger is None else self._numbers[trigger.name]
         while (index := self._read_all()) < count:
             entry = self._entries[index]
-            if entry.own["needs_python"]:
-                entry.newest()
-            else:
-                entry.newest_after_foreign()
-            if entry.own["stamp_at"] and entry.own["has_stamp"]:
-                self._set_stamp(entry)
+            entry.finish()
             place[0] = index + 1
         for name, parts in self._summed:
             self.row[name] = np.sum(parts, axis=0)
 
-    def send(self, now_ns: int, silent: Collection[str] = ()) -> None:
-        """Send the stage's outputs, except the topics in ``silent``.
-
-        Each output gets the stamp that its topic declares.
+    def send(self, now_ns: int) -> None:
+        """Send the stage's outputs, each with the stamp that its topic declares.
 
         An output whose stamp was already sent is not a new answer and is not sent. Values of a user's stage that are
         not finite are not sent either.
         """
-        if self._must_check and not wire.are_sound(self._write_records):
+        if self._must_check and not self._are_sound():
             self.refused += 1
             return
-        if silent or self._is_part_silent:
-            self._write_records["is_silent"] = [output.name in silent for output in self._sent]
-            self._is_part_silent = bool(silent)
         self._read_clocks()
         place, count = self._writing, len(self._sent)
         place[0], place[1] = 0, now_ns
@@ -191,15 +177,15 @@ class Ports:
 
     def send_one(self, output: Output, stamp_ns: int) -> None:
         """Send the current values of one output with a stamp [ns], if :meth:`send` would."""
-        if wire.is_due(output.own, stamp_ns):
+        if output.is_due(stamp_ns):
             self.send_now(output, stamp_ns)
 
     def send_now(self, output: Output, stamp_ns: int) -> None:
         """Send the current values of one output with a stamp [ns]."""
         assert self._world is not None
-        if output.own["is_pending"]:
+        if output.is_pending:
             self.publish()
-        wire.write_one(output.own, stamp_ns, self._world.monotonic_ns(), self._world.time_ns())
+        output.write(stamp_ns, self._world.monotonic_ns(), self._world.time_ns())
         if not self.waits:
             self.publish()
 
@@ -208,7 +194,7 @@ class Ports:
         place, count = self._writing, len(self._sent)
         place[0] = 0
         while (index := self._send_all()) < count:
-            if self._write_records["writer"][index]:
+            if self._sent[index].is_direct:
                 assert self._feed is not None
                 self._feed.spill()  # the recorder's block is full
             else:

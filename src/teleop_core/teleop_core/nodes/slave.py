@@ -19,6 +19,7 @@ _SELDOM = 10
 """Number of turns between two checks of clocks and publishers."""
 _ANSWERS = 50
 """Largest number of the arm's samples that are answered in one turn, so that a turn takes less than a tick."""
+_DISABLED = float(State.DISABLED)
 _CLOCK_STEP_NS = 100_000_000
 """Largest change of the system clock relative to the monotonic clock that does not count as a step [ns]."""
 
@@ -94,7 +95,7 @@ class SlaveNode(TickingNode):
     def advance(self, now_ns: int) -> None:
         """Read the emergency stop, then make one step. Several late steps also read the stop before each step."""
         with self.lock:  # locked for both: a reset in between would treat a silent button as released
-            is_idle = self._state[0] == State.DISABLED
+            is_idle = self._state[0] == _DISABLED
             for is_pressed in self._stop.take(now_ns, is_idle=is_idle):
                 heard_ns = self._stop.heard_ns
                 self.stage.press(is_pressed=is_pressed, heard_ns=now_ns if heard_ns is None else heard_ns)

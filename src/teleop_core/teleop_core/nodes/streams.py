@@ -19,7 +19,7 @@ from teleop_core.kernels import bound, record_dtype, records
 from teleop_core.kernels.fields import Cells, fields_of
 from teleop_core.kernels.geometry import Array
 from teleop_core.kernels.memory import integers, octets
-from teleop_core.middleware.world import Owner, Publisher, Taken, World
+from teleop_core.middleware.world import Owner, Publisher, Taken, Taker, World
 from teleop_core.nodes import wire
 from teleop_core.nodes.feed import Channel
 from teleop_core.nodes.quality import NO_OVERRIDES, QualityOverrides
@@ -109,6 +109,36 @@ class Calls:
         for name, address in world.functions().items():
             self.own[name] = address
         self.own["time_at"], self.own["count_at"] = self._time.ctypes.data, self._count.ctypes.data
+
+
+class RareTakers:
+    """Subscriptions that seldom have a message, so that a look at all of them must cost little.
+
+    Args:
+        world: World of the subscriptions.
+        own: The subscriptions.
+    """
+
+    def __init__(self, world: World, own: Sequence[Taker]) -> None:
+        self._own, self._count = own, np.zeros(1, np.int64)
+        found = [getattr(taker, "places", None) for taker in own]
+        self._look: Callable[[], int] | None = None
+        if all(places is not None for places in found):
+            self._look = bound(wire.take_raw, np.array(found, np.int64), Calls(world).own, self._count)
+
+    def next(self, count: int) -> tuple[int, Taken] | None:
+        """Index of one of the first ``count`` subscriptions, and its oldest message; None if none has a message."""
+        if self._look is None:
+            for index, taker in enumerate(self._own[:count]):
+                if (taken := taker.take()) is not None:
+                    return index, taken
+            return None
+        self._count[0] = count
+        index = self._look()
+        if index == count:
+            return None
+        own: Any = self._own[index]
+        return index, own.taken()
 
 
 class Input:
@@ -224,9 +254,18 @@ class Input:
         if self._cells["needs_python"]:
             return self._newest_after(self.take(), before)
         answer = self._newest()
-        return self.newest_after_foreign() if answer == wire.FOREIGN else answer == wire.NEW
+        return self._newest_after_foreign() if answer == wire.FOREIGN else answer == wire.NEW
 
-    def newest_after_foreign(self) -> bool:
+    def finish(self) -> None:
+        """Read the newest message for :func:`~teleop_core.nodes.wire.read_all`, which needs Python for it."""
+        if self._cells["needs_python"]:
+            self.newest()
+        else:
+            self._newest_after_foreign()
+        if self._cells["stamp_at"] and self._cells["has_stamp"]:
+            integers(self._cells["stamp_at"], 1)[0] = self._cells["stamp_ns"]
+
+    def _newest_after_foreign(self) -> bool:
         """As :meth:`newest`, after a kernel has found a message of another form."""
         before = self._pressed()
         return self._newest_after(self._take_foreign() or self.take(), before)
@@ -400,6 +439,33 @@ class Output:
     def sent(self) -> int:
         """Number of sent messages."""
         return int(self._cells["sent"])
+
+    @property
+    def is_pending(self) -> bool:
+        """Whether a written message is still to be sent."""
+        return bool(self._cells["is_pending"])
+
+    @property
+    def is_direct(self) -> bool:
+        """Whether kernels send the messages."""
+        return bool(self._cells["writer"])
+
+    @property
+    def is_silent(self) -> bool:
+        """Whether nothing is written; can be set."""
+        return bool(self._cells["is_silent"])
+
+    @is_silent.setter
+    def is_silent(self, value: bool) -> None:
+        self._cells["is_silent"] = value
+
+    def is_due(self, stamp_ns: int) -> bool:
+        """Whether values with a stamp [ns] are to be sent; see :func:`~teleop_core.nodes.wire.write_all`."""
+        return bool(wire.is_due(self.own, stamp_ns))
+
+    def write(self, stamp_ns: int, now_ns: int, time_ns: int) -> None:
+        """Write the present values into the buffer, as :func:`~teleop_core.nodes.wire.write_one`."""
+        wire.write_one(self.own, stamp_ns, now_ns, time_ns)
 
     def serve(self, inputs: Sequence[Input]) -> None:
         """Pass the values of each message to readers in this process."""

@@ -35,6 +35,7 @@ _NOT_UNIT = 1 + REASONS.index(Refusal.NOT_UNIT)
 _NOT_NEWER = 1 + REASONS.index(Refusal.NOT_NEWER)
 _SECOND_PUBLISHER = 1 + REASONS.index(Refusal.SECOND_PUBLISHER)
 _FLOOD = 1 + REASONS.index(Refusal.FLOOD)
+_EMPTY = 401  # RCL_RET_SUBSCRIPTION_TAKE_FAILED: the queue is empty
 _HEADER = 4  # bytes before the first number; numbers are aligned from there
 _FRAME = 20  # bytes of a feed's frame before its message
 
@@ -309,7 +310,7 @@ def take(r: Reading, calls: Calls) -> int:
         return is_new
     while True:
         answer = call(calls.take, r.reader, r.message_at, r.info_at, 0)
-        if answer == 401:  # RCL_RET_SUBSCRIPTION_TAKE_FAILED: the queue is empty
+        if answer == _EMPTY:
             return NOTHING
         if answer != 0:  # a message that the middleware cannot deliver is skipped
             call(calls.forget_error, 0, 0, 0, 0)
@@ -326,6 +327,27 @@ def take(r: Reading, calls: Calls) -> int:
             return FOREIGN
         if accept(r, stamp_ns, now_ns, read_clock(calls, 0)):
             return NEW
+
+
+@kernel
+def take_raw(places: Integers, calls: Calls, count: Integers) -> int:
+    """Take one message of any subscription into the subscription's own buffer.
+
+    Args:
+        places: Addresses of each subscription, of its buffer and of its information (n, 3).
+        calls: C functions.
+        count: Number of subscriptions to look at, the first ones (1,).
+
+    Returns:
+        Index of the subscription of the message; ``count`` if none has a message.
+    """
+    for i in range(count[0]):
+        answer = call(calls.take, places[i, 0], places[i, 1], places[i, 2], 0)
+        if answer == 0:
+            return i
+        if answer != _EMPTY:
+            call(calls.forget_error, 0, 0, 0, 0)
+    return count[0]
 
 
 @kernel
