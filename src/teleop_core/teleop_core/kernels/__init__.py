@@ -204,7 +204,7 @@ def bound(compiled: Callable[P, R], *arguments: P.args, **_: P.kwargs) -> Callab
     """
     if isinstance(compiled, FunctionType) or not is_kernel(compiled):
         return partial(compiled, *arguments)
-    return partial(_compiler.entry(compiled, _types(arguments)), *map(_memory, arguments))
+    return partial(_compiler.entry(compiled, types_of(arguments)), *map(_memory, arguments))
 
 
 def _memory(value: Any) -> Any:
@@ -253,11 +253,12 @@ def apart(compiled: Callable[..., R], *arguments: object) -> Callable[..., R]:
     Raises:
         KernelError: The kernel cannot be compiled for these arguments.
     """
-    code: Any = _compiler.Code(compiled, _types(arguments)) if IS_COMPILED else compiled
+    code: Any = _compiler.Code(compiled, types_of(arguments)) if IS_COMPILED else compiled
     return cast("Callable[..., R]", code)
 
 
-def _types(arguments: tuple[object, ...]) -> tuple[Any, ...]:
+def types_of(arguments: tuple[object, ...]) -> tuple[Any, ...]:
+    """Types of arguments for the compiler."""
     return tuple(_type_of(bare(argument)) for argument in arguments)
 
 
@@ -295,12 +296,14 @@ def bare(value: Any) -> Any:
 
 
 if TYPE_CHECKING:
+    from teleop_core.kernels.addresses import *  # noqa: F403
     from teleop_core.kernels.fields import *  # noqa: F403
     from teleop_core.kernels.geometry import *  # noqa: F403
     from teleop_core.kernels.parts import *  # noqa: F403
     from teleop_core.kernels.portable import *  # noqa: F403
 else:  # imported when they are first used
     _NAMES = {
+        "addresses": ("Addressed", "addressed", "call_address"),
         "fields": ("Fields", "IntegerPerJoint", "Integers", "PerJoint", "PoseRow", "Quaternion", "Vector3", "Wrench",
             "fields_of", "record", "record_array"),
         "geometry": ("Array", "checked_array", "is_rigid", "multiply_quaternions", "pose_from_transform", "rotation",
