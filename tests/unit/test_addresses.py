@@ -18,7 +18,7 @@ from teleop_core.kernels import (
     raise_pending,
     record,
 )
-from teleop_core.kernels.addresses import copy_words, word_at
+from teleop_core.kernels.addresses import copy_memory, word_at
 from teleop_core.kernels.progress import compiled_count
 
 
@@ -116,14 +116,21 @@ def test_an_exception_of_a_plain_python_function_is_raised_after_the_list() -> N
         _run(made)
 
 
-def test_words_are_copied_from_address_to_address() -> None:
+def test_memory_is_copied_from_address_to_address() -> None:
     source, target = np.arange(5.0), np.zeros(5)
 
     @kernel
+    def move_odd(a: int, b: int) -> None:
+        copy_memory(a, b, 19)
+
+    @kernel
     def move(a: int, b: int) -> int:
-        copy_words(a + 8, b, 3)
+        copy_memory(a + 8, b, 24)
         return word_at(b + 8)
 
+    copy_bytes = np.arange(20, dtype=np.uint8), np.zeros(20, np.uint8)
+    move_odd(copy_bytes[0].ctypes.data, copy_bytes[1].ctypes.data)
+    assert copy_bytes[1].tolist() == [*range(19), 0]
     word = move(source.ctypes.data, target.ctypes.data)
     assert target.tolist() == [1.0, 2.0, 3.0, 0.0, 0.0]
     assert np.array([word]).view(np.float64)[0] == 2.0

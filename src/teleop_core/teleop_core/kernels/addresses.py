@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from teleop_core import kernels
 from teleop_core.kernels.callables import keep
+from teleop_core.kernels.dependencies import hexdigest
 
 __all__ = ["Addressed", "addressed", "call_address"]
 
@@ -106,9 +107,9 @@ def _call_plain(address: int, _block_address: int) -> None:
     _plain[address].run()
 
 
-def _copy_plain(source: int, target: int, words: int) -> None:
-    """Copy words in pure-Python mode."""
-    ctypes.memmove(target, source, 8 * words)
+def _copy_plain(source: int, target: int, size: int) -> None:
+    """Copy bytes in pure-Python mode."""
+    ctypes.memmove(target, source, size)
 
 
 def _word_plain(address: int) -> int:
@@ -121,29 +122,31 @@ call_address: Callable[[int, int], None] = _call_plain
 
 An exception of the called kernel is an exception of the caller.
 """
-copy_words: Callable[[int, int, int], None] = _copy_plain
-"""Copy some words of eight bytes from an address to another one; for kernels."""
+copy_memory: Callable[[int, int, int], None] = _copy_plain
+"""Copy some bytes from an address to another one; for kernels."""
 word_at: Callable[[int], int] = _word_plain
 """Word of eight bytes at an address, as an integer; for kernels."""
 
 if kernels.IS_COMPILED:
     from teleop_core.kernels import blocks as _blocks
 
-    call_address, copy_words, word_at = _blocks.call_address, _blocks.copy_words, _blocks.word_at
+    _native: Any = _blocks
+    call_address, copy_memory, word_at = _native.call_address, _native.copy_memory, _native.word_at
 
 
 @cache
 def _entry(kinds: tuple[Any, ...], result: Any) -> Any:
     """Code that unpacks a block for arguments of some types and calls the kernel whose address comes first."""
-    return _code_of(_blocks.unpacking(kinds, result))
+    return _code_of(_blocks.unpacking(kinds, result), hexdigest(map(str, (*kinds, result))))
 
 
 @cache
 def _plain_entry() -> Any:
     """Code that calls the C function whose address is in a block."""
-    return _code_of(_blocks.call_c)
+    return _code_of(_blocks.call_c, "C")
 
 
-def _code_of(run: Any) -> Any:
-    made = kernels.kernel_from_source("def enter(block):\n    run(block)\n", "enter", {"run": run})
+def _code_of(run: Any, key: str) -> Any:
+    """Code of a function that takes the address of a block; its symbol contains the key, as no two may be the same."""
+    made = kernels.kernel_from_source(f"def enter(block):\n    run(block)  # {key}\n", "enter", {"run": run})
     return kernels._compiler.Code(made, kernels.types_of((0,)))

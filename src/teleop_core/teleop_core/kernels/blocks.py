@@ -28,6 +28,8 @@ def _words(value: Any, kind: Any) -> list[int]:
         return [value.ctypes.data, value.itemsize, *value.shape, *value.strides]
     if isinstance(kind, types.FunctionType):
         return [value._wrapper_address, id(value), value._code_address]
+    if isinstance(kind, types.Opaque):  # None, or a kernel: the type says it all
+        return []
     if isinstance(kind, types.Number | types.Boolean):
         return [int.from_bytes(np.asarray(value).tobytes().ljust(8, b"\0"), "little", signed=True)]
     raise KernelError("argument", f"{value!r} is {kind}, must be a number, an array, a record or a pointer")
@@ -36,7 +38,7 @@ def _words(value: Any, kind: Any) -> list[int]:
 def _value(context: Any, builder: Any, kind: Any, words: Any) -> Any:
     """Value of a type from the next words; ``words`` is an iterator over the addresses of words."""
     if isinstance(kind, types.BaseTuple):
-        return context.make_tuple(builder, kind, [_value(context, builder, one, words) for one in kind])
+        return context.make_tuple(builder, kind, [_value(context, builder, one, words) for one in kind.types])
     if isinstance(kind, types.Record):
         return builder.inttoptr(builder.load(next(words)), context.get_value_type(kind))
     if isinstance(kind, types.Array):
@@ -46,6 +48,8 @@ def _value(context: Any, builder: Any, kind: Any, words: Any) -> Any:
         for name in ("c_addr", "py_addr", "jit_addr"):
             setattr(made, name, builder.inttoptr(builder.load(next(words)), cgutils.voidptr_t))
         return made._getvalue()
+    if isinstance(kind, types.Opaque):
+        return context.get_dummy_value()
     return context.unpack_value(builder, kind, builder.bitcast(next(words), context.get_data_type(kind).as_pointer()))
 
 
@@ -114,16 +118,27 @@ def call_c(_context: Any, block: Any) -> Any:
 
 
 @intrinsic  # type: ignore[misc]
-def copy_words(_context: Any, source: Any, target: Any, words: Any) -> Any:
-    """Copy words from an address to another one."""
+def copy_memory(_context: Any, source: Any, target: Any, size: Any) -> Any:
+    """Copy bytes from an address to another one; most often they are a few words, which a loop copies fastest."""
 
     def generate(context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
-        source, target = (builder.inttoptr(one, _WORD.as_pointer()) for one in arguments[:2])
-        with cgutils.for_range(builder, arguments[2]) as loop:
-            builder.store(builder.load(builder.gep(source, [loop.index])), builder.gep(target, [loop.index]))
+        source, target, size = arguments
+        words = builder.lshr(size, _WORD(3))
+        _copy(builder, _WORD, source, target, words)
+        done = builder.shl(words, _WORD(3))
+        rest = [builder.add(one, done) for one in (source, target)]
+        _copy(builder, ir.IntType(8), *rest, builder.sub(size, done))
         return context.get_dummy_value()
 
     return types.void(types.int64, types.int64, types.int64), generate
+
+
+def _copy(builder: Any, kind: Any, source: Any, target: Any, count: Any) -> None:
+    """Copy numbers of a type."""
+    places = [builder.inttoptr(one, kind.as_pointer()) for one in (source, target)]
+    with cgutils.for_range(builder, count) as loop:
+        source, target = (builder.gep(one, [loop.index]) for one in places)
+        builder.store(builder.load(source, align=1), target, align=1)
 
 
 @intrinsic  # type: ignore[misc]

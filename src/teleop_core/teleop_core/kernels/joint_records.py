@@ -19,6 +19,7 @@ from numba.core.pythonapi import unbox
 from numba.core.typing.typeof import _typeof_ndarray, typeof_impl
 from numba.np import arrayobj, numpy_support
 
+from teleop_core.kernels.dependencies import hexdigest
 from teleop_core.kernels.layout import COUNT, PerJoints, joint_sizes
 
 _INT = ir.IntType(64)
@@ -46,6 +47,10 @@ class JointRecord(_RECORD):
         """NumPy's type, which depends on the number of joints."""
         raise NumbaNotImplementedError("the size of this record depends on the number of joints")
 
+    def __repr__(self) -> str:
+        """Name, which distinguishes all types."""
+        return str(self.name)
+
     def can_convert_to(self, _context: Any, _other: Any) -> None:
         """Records with arrays over joints convert to no other records."""
 
@@ -69,6 +74,16 @@ def _from_struct_dtype(dtype: np.dtype[Any]) -> types.Record:
     return JointRecord(fields, fixed, shapes)
 
 
+def _symbol(kind: Any) -> tuple[str, tuple[int]]:
+    """Part of the symbols of kernels that take a record.
+
+    Numba puts a number there that differs from process to process. Two kernels from the disk could have one symbol, and
+    the address of the first one would be taken for both.
+    """
+    return type(kind).__name__, (int(hexdigest([kind.name])[:15], 16),)
+
+
+types.Record.mangling_args = property(_symbol)
 _plain_from_struct_dtype = numpy_support.from_struct_dtype
 numpy_support.from_struct_dtype = _from_struct_dtype
 register_default(JointRecord)(models.RecordModel)
