@@ -65,7 +65,7 @@ def check_version(found: str = numba.__version__) -> None:
 
 
 _config: Any = numba.config
-IS_COMPILED = not _config.DISABLE_JIT
+IS_COMPILED: bool = not _config.DISABLE_JIT
 """Whether kernels are compiled; False in pure-Python mode."""
 
 if IS_COMPILED:

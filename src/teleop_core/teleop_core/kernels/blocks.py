@@ -38,7 +38,8 @@ def _words(value: Any, kind: Any) -> list[int]:
 def _value(context: Any, builder: Any, kind: Any, words: Any) -> Any:
     """Value of a type from the next words; ``words`` is an iterator over the addresses of words."""
     if isinstance(kind, types.BaseTuple):
-        return context.make_tuple(builder, kind, [_value(context, builder, one, words) for one in kind.types])
+        parts: Any = kind
+        return context.make_tuple(builder, kind, [_value(context, builder, part, words) for part in parts])
     if isinstance(kind, types.Record):
         return builder.inttoptr(builder.load(next(words)), context.get_value_type(kind))
     if isinstance(kind, types.Array):
@@ -122,12 +123,12 @@ def copy_memory(_context: Any, source: Any, target: Any, size: Any) -> Any:
     """Copy bytes from an address to another one; most often they are a few words, which a loop copies fastest."""
 
     def generate(context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
-        source, target, size = arguments
-        words = builder.lshr(size, _WORD(3))
-        _copy(builder, _WORD, source, target, words)
+        begin, end, count = arguments
+        words = builder.lshr(count, _WORD(3))
+        _copy(builder, _WORD, begin, end, words)
         done = builder.shl(words, _WORD(3))
-        rest = [builder.add(one, done) for one in (source, target)]
-        _copy(builder, ir.IntType(8), *rest, builder.sub(size, done))
+        begin, end, count = builder.add(begin, done), builder.add(end, done), builder.sub(count, done)
+        _copy(builder, ir.IntType(8), begin, end, count)
         return context.get_dummy_value()
 
     return types.void(types.int64, types.int64, types.int64), generate

@@ -83,7 +83,7 @@ def _symbol(kind: Any) -> tuple[str, tuple[int]]:
     return type(kind).__name__, (int(hexdigest([kind.name])[:15], 16),)
 
 
-types.Record.mangling_args = property(_symbol)
+_RECORD.mangling_args = property(_symbol)
 _plain_from_struct_dtype = numpy_support.from_struct_dtype
 numpy_support.from_struct_dtype = _from_struct_dtype
 register_default(JointRecord)(models.RecordModel)
