@@ -93,7 +93,7 @@ def entry_of(function: Callable[..., Any], arguments: tuple[Any, ...], result: A
     space = {
         "function": function,
         "converted": converted,
-        "keep": _keep,
+        "keep": keep,
         "view": _views(),
         "c_type": ctypes.CFUNCTYPE(c_result, *c_arguments),
     }
@@ -101,7 +101,8 @@ def entry_of(function: Callable[..., Any], arguments: tuple[Any, ...], result: A
     return space["entry"]
 
 
-def _keep(error: BaseException) -> None:
+def keep(error: BaseException) -> None:
+    """Store an exception for :func:`raise_pending`, unless one is stored."""
     if getattr(_pending, "error", None) is None:
         _pending.error = error
         _stored.add(threading.get_ident())
