@@ -1,6 +1,5 @@
 """Node ``network``: delays and loses messages between both sides, whichever node publishes them."""
 
-
 from teleop_core.coupling.network.network import BACK, THERE
 from teleop_core.coupling.network.presets import NetworkParameters
 from teleop_core.graph import topics

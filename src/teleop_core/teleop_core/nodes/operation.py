@@ -80,10 +80,10 @@ class StopButton:
 class StopInput:
     """Reader of the emergency stop in every tick; reading takes 1 µs and needs no executor.
 
-    The first reader is read in every tick; the other two, and the count of lost messages, in every fourth tick. No press is lost: readers keep all
-    messages, and missing messages count as a press (:class:`~teleop_core.slave.operation.presses.Presses`). Missing
-    messages are found by the message numbers and by the loss count of the first reader, which receives all reliable
-    senders. The second reader also receives earlier states. A button that exists but sends nothing counts as pressed
+    The first reader is read in every tick; the other two, and the count of lost messages, in every fourth tick. No
+    press is lost: readers keep all messages, and missing messages count as a press
+    (:class:`~teleop_core.slave.operation.presses.Presses`). Missing messages are found by the message numbers and by
+    the loss count of the first reader, which receives all reliable senders. The second reader also receives earlier states. A button that exists but sends nothing counts as pressed
     after half a second, because it may have been pressed before its discovery.
 
     Args:

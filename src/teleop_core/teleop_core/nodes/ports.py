@@ -13,7 +13,7 @@ from teleop_core.graph.graph import BUILT_IN
 from teleop_core.graph.signals import make_signals
 from teleop_core.graph.stage import Stage
 from teleop_core.graph.topics import BY_NAME, PORTS_BETWEEN_ARMS, Kind, Quality, Topic
-from teleop_core.kernels import bound, records
+from teleop_core.kernels import held, records
 from teleop_core.kernels.fields import Cells
 from teleop_core.kernels.geometry import Array
 from teleop_core.middleware.world import Publisher, World
@@ -122,10 +122,10 @@ class Ports:
     def _bind(self, calls: Any) -> None:
         """Bind the kernels to their records."""
         block = self._feed.block if self._feed is not None else NO_BLOCK
-        self._read_all = bound(wire.read_all, self._read_records, calls, self._reading)
-        self._write_all = bound(wire.write_all, self._write_records, calls, self._writing, self._times)
-        self._are_sound = bound(wire.are_sound, self._write_records)
-        self._send_all = bound(wire.send_all, self._write_records, calls, block, self._writing)
+        self._read_all = held(wire.read_all, self._read_records, calls, self._reading)
+        self._write_all = held(wire.write_all, self._write_records, calls, self._writing, self._times)
+        self._are_sound = held(wire.are_sound, self._write_records, self._writing)
+        self._send_all = held(wire.send_all, self._write_records, calls, block, self._writing)
 
     def _stamp_field(self, written: Topic) -> str:
         """Field of the stamp that an output passes on; empty for the time of sampling."""
@@ -150,10 +150,11 @@ class Ports:
         """Update the signals of all ports except the trigger's port."""
         place, count = self._reading, len(self._entries)
         place[0], place[1] = 0, -1 if trigger is None else self._numbers[trigger.name]
-        while (index := self._read_all()) < count:
-            entry = self._entries[index]
-            entry.finish()
+        self._read_all()
+        while (index := place.item(0)) < count:
+            self._entries[index].finish()
             place[0] = index + 1
+            self._read_all()
         for name, parts in self._summed:
             self.row[name] = np.sum(parts, axis=0)
 
@@ -163,15 +164,19 @@ class Ports:
         An output whose stamp was already sent is not a new answer and is not sent. Values of a user's stage that are
         not finite are not sent either.
         """
-        if self._must_check and not self._are_sound():
-            self.refused += 1
-            return
-        self._read_clocks()
         place, count = self._writing, len(self._sent)
+        if self._must_check:
+            self._are_sound()
+            if not place[0]:
+                self.refused += 1
+                return
+        self._read_clocks()
         place[0], place[1] = 0, now_ns
-        while (index := self._write_all()) < count:
+        self._write_all()
+        while (index := place.item(0)) < count:
             self.publish()  # a message of the same tick is still in the buffer
-            place[0], place[1] = index, now_ns
+            place[0] = index
+            self._write_all()
         if not self.waits:
             self.publish()
 
@@ -193,13 +198,15 @@ class Ports:
         """Publish and record what is written."""
         place, count = self._writing, len(self._sent)
         place[0] = 0
-        while (index := self._send_all()) < count:
+        self._send_all()
+        while (index := place.item(0)) < count:
             if self._sent[index].is_direct:
                 assert self._feed is not None
                 self._feed.spill()  # the recorder's block is full
             else:
                 self._sent[index].publish()
             place[0] = index
+            self._send_all()
 
     def _read_clocks(self) -> None:
         """Read the clocks for kernels that cannot read them."""

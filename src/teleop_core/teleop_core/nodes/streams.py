@@ -15,7 +15,7 @@ import numpy as np
 from teleop_core.bags import messages
 from teleop_core.base.errors import MessageTypeError
 from teleop_core.graph.topics import Kind, Topic
-from teleop_core.kernels import bound, record_dtype, records
+from teleop_core.kernels import held, record_dtype, records
 from teleop_core.kernels.fields import Cells, fields_of
 from teleop_core.kernels.geometry import Array
 from teleop_core.kernels.memory import integers, octets
@@ -122,9 +122,9 @@ class RareTakers:
     def __init__(self, world: World, own: Sequence[Taker]) -> None:
         self._own, self._count = own, np.zeros(1, np.int64)
         found = [getattr(taker, "places", None) for taker in own]
-        self._look: Callable[[], int] | None = None
+        self._look: Callable[[], None] | None = None
         if all(places is not None for places in found):
-            self._look = bound(wire.take_raw, np.array(found, np.int64), Calls(world).own, self._count)
+            self._look = held(wire.take_raw, np.array(found, np.int64), Calls(world).own, self._count)
 
     def next(self, count: int) -> tuple[int, Taken] | None:
         """Index of one of the first ``count`` subscriptions, and its oldest message; None if none has a message."""
@@ -134,7 +134,8 @@ class RareTakers:
                     return index, taken
             return None
         self._count[0] = count
-        index = self._look()
+        self._look()
+        index = self._count.item()
         if index == count:
             return None
         own: Any = self._own[index]
@@ -189,7 +190,8 @@ class Input:
         self._bytes = bytearray(self._cells["size"] + _SPARE)
         self._bytes_at = np.frombuffer(self._bytes, np.uint8).ctypes.data
         calls = Calls(self._world)
-        self._take, self._newest = (bound(kernel, own, calls.own) for kernel in (wire.take, wire.newest))
+        kernels = wire.answer_take, wire.answer_newest
+        self._take, self._newest = (held(kernel, own, calls.own) for kernel in kernels)
         self.subscription: Subscription | None = None
         self._listen()
 
@@ -240,10 +242,12 @@ class Input:
         """Write the next valid message in the queue into the signals; return whether there was one."""
         if self._cells["needs_python"]:
             return self._take_held() if self._delay_ns else self._take_in_python()
-        while (answer := self._take()) == wire.FOREIGN:
+        self._take()
+        while (answer := self._cells["answer"]) == wire.FOREIGN:
             if self._take_foreign():
                 return True
-        return answer == wire.NEW
+            self._take()
+        return bool(answer == wire.NEW)
 
     def newest(self) -> bool:
         """Write the newest valid message into the signals; return whether there was one.
@@ -253,8 +257,9 @@ class Input:
         before = self._pressed()
         if self._cells["needs_python"]:
             return self._newest_after(self.take(), before)
-        answer = self._newest()
-        return self._newest_after_foreign() if answer == wire.FOREIGN else answer == wire.NEW
+        self._newest()
+        answer = self._cells["answer"]
+        return self._newest_after_foreign() if answer == wire.FOREIGN else bool(answer == wire.NEW)
 
     def finish(self) -> None:
         """Read the newest message for :func:`~teleop_core.nodes.wire.read_all`, which needs Python for it."""

@@ -92,6 +92,7 @@ class Reading(Form):
     stamp_ns: int
     arrival_ns: int
     is_new: int
+    answer: int
     refused: Annotated[Integers, 10]
     limit: int
     silence_ns: int
@@ -330,24 +331,34 @@ def take(r: Reading, calls: Calls) -> int:
 
 
 @kernel
-def take_raw(places: Integers, calls: Calls, count: Integers) -> int:
+def answer_take(r: Reading, calls: Calls) -> None:
+    """:func:`take`, with its answer in the record."""
+    r.answer = take(r, calls)
+
+
+@kernel
+def answer_newest(r: Reading, calls: Calls) -> None:
+    """:func:`newest`, with its answer in the record."""
+    r.answer = newest(r, calls)
+
+
+@kernel
+def take_raw(places: Integers, calls: Calls, place: Integers) -> None:
     """Take one message of any subscription into the subscription's own buffer.
 
     Args:
         places: Addresses of each subscription, of its buffer and of its information (n, 3).
         calls: C functions.
-        count: Number of subscriptions to look at, the first ones (1,).
-
-    Returns:
-        Index of the subscription of the message; ``count`` if none has a message.
+        place: Number of subscriptions to look at, the first ones. Set to the index of the one of the message, or left
+            if none has a message.
     """
-    for i in range(count[0]):
+    for i in range(place[0]):
         answer = call(calls.take, places[i, 0], places[i, 1], places[i, 2], 0)
         if answer == 0:
-            return i
+            place[0] = i
+            return
         if answer != _EMPTY:
             call(calls.forget_error, 0, 0, 0, 0)
-    return count[0]
 
 
 @kernel
@@ -373,40 +384,39 @@ def newest(r: Reading, calls: Calls) -> int:
 
 
 @kernel
-def read_all(inputs: Array, calls: Calls, place: Integers) -> int:
+def read_all(inputs: Array, calls: Calls, place: Integers) -> None:
     """Write the newest valid messages of inputs to the signals, with their stamps.
 
     Args:
         inputs: Records of :class:`Reading` (n,).
         calls: C functions.
-        place: The first input to read; then the port to leave out, or -1.
-
-    Returns:
-        Index of an input that Python must read; n if all are done.
+        place: The first input to read; then the port to leave out, or -1. The first is set to the index of an input
+            that Python must read, or to n if all are done.
     """
     for i in range(place[0], inputs.shape[0]):
         r = inputs[i]
         if r.port == place[1]:
             continue
         if r.needs_python or newest(r, calls) == FOREIGN:
-            return i
+            place[0] = i
+            return
         if r.stamp_at and r.has_stamp:
             integers(r.stamp_at, 1)[0] = r.stamp_ns
-    return inputs.shape[0]
+    place[0] = inputs.shape[0]
 
 
 # -- outputs ---------------------------------------------------------------------------------------
 
 
 @kernel
-def are_sound(outputs: Array) -> bool:
-    """Whether all values of outputs, records of :class:`Writing` (n,), are finite."""
+def are_sound(outputs: Array, place: Integers) -> None:
+    """Set ``place[0]`` to whether all values of outputs, records of :class:`Writing` (n,), are finite."""
+    place[0] = 1
     for i in range(outputs.shape[0]):
         source = floats(outputs[i].source_at, outputs[i].width)
         for k in range(outputs[i].width):
             if not np.isfinite(source[k]):
-                return False
-    return True
+                place[0] = 0
 
 
 @inner
@@ -462,17 +472,15 @@ def write_one(w: Writing, stamp_ns: int, now_ns: int, time_ns: int) -> None:
 
 
 @kernel
-def write_all(outputs: Array, calls: Calls, place: Integers, times: Integers) -> int:
+def write_all(outputs: Array, calls: Calls, place: Integers, times: Integers) -> None:
     """Write the messages of outputs that are due.
 
     Args:
         outputs: Records of :class:`Writing` (n,).
         calls: C functions.
-        place: The first output to write; then the stamp of outputs that pass on no stamp [ns].
+        place: The first output to write; then the stamp of outputs that pass on no stamp [ns]. The first is set to
+            the index of an output whose last message must be sent first, or to n if all are written.
         times: Monotonic time and time of the system's clock [ns], in a world without C functions.
-
-    Returns:
-        Index of an output whose last message must be sent first; n if all are written.
     """
     if calls.clock:
         times[0], times[1] = read_clock(calls, 1), read_clock(calls, 0)
@@ -481,11 +489,12 @@ def write_all(outputs: Array, calls: Calls, place: Integers, times: Integers) ->
         if w.is_silent:
             continue
         if w.is_pending:
-            return i
+            place[0] = i
+            return
         stamp_ns = integers(w.stamp_at, 1)[0] if w.stamp_at else place[1]
         if _is_due(w, stamp_ns):
             write_one(w, stamp_ns, times[0], times[1])
-    return outputs.shape[0]
+    place[0] = outputs.shape[0]
 
 
 @kernel
@@ -513,7 +522,7 @@ def _feed(w: Writing, block: Block) -> bool:
 
 
 @kernel
-def send_all(outputs: Array, calls: Calls, block: Block, place: Integers) -> int:
+def send_all(outputs: Array, calls: Calls, block: Block, place: Integers) -> None:
     """Send what is written: to the middleware if anyone reads it there, and to the recorder.
 
     A topic that nobody reads is not published: a later reader of a volatile topic would not receive it either.
@@ -522,19 +531,16 @@ def send_all(outputs: Array, calls: Calls, block: Block, place: Integers) -> int
         outputs: Records of :class:`Writing` (n,).
         calls: C functions.
         block: Bytes for the recorder.
-        place: The first output to send.
-
-    Returns:
-        Index of an output that Python must send, or for which the block has no room; n if all are sent.
+        place: The first output to send; set to the index of an output that Python must send, or for which the block
+            has no room, or to n if all are sent.
     """
     for i in range(place[0], outputs.shape[0]):
         w = outputs[i]
         if not w.is_pending:
             continue
-        if not w.writer:
-            return i
-        if w.is_fed and block.is_open and not _feed(w, block):
-            return i
+        if not w.writer or (w.is_fed and block.is_open and not _feed(w, block)):
+            place[0] = i
+            return
         count = integers(calls.count_at, 1)
         count[0] = 1
         if not w.is_latched:
@@ -545,4 +551,4 @@ def send_all(outputs: Array, calls: Calls, block: Block, place: Integers) -> int
             w.fed += 1
         w.is_pending = 0
         w.sent += 1
-    return outputs.shape[0]
+    place[0] = outputs.shape[0]
