@@ -83,8 +83,9 @@ class StopInput:
     The first reader is read in every tick; the other two, and the count of lost messages, in every fourth tick. No
     press is lost: readers keep all messages, and missing messages count as a press
     (:class:`~teleop_core.slave.operation.presses.Presses`). Missing messages are found by the message numbers and by
-    the loss count of the first reader, which receives all reliable senders. The second reader also receives earlier states. A button that exists but sends nothing counts as pressed
-    after half a second, because it may have been pressed before its discovery.
+    the loss count of the first reader, which receives all reliable senders. The second reader also receives earlier
+    states. A button that exists but sends nothing counts as pressed after half a second, because it may have been
+    pressed before its discovery.
 
     Args:
         owner: Node that owns it; its executor looks for buttons that send nothing.

@@ -98,15 +98,18 @@ class TeleopSession:
 
     def _turn(self) -> None:
         """Run all stages for each tick that is due."""
-        if not self._loop.is_ready and self._are_all_there():
+        is_first = not self._loop.is_ready and self._are_all_there()
+        if is_first:
             self._stages[-1].prepare()  # give the loop its priority after all kernels are compiled
-            self._schedule.start()  # ticks that passed meanwhile must not be caught up
             self._loop.is_ready = True
         with self._gate:
             at_work = tuple(node.is_at_work for node in self.nodes)
             if at_work != self._at_work:
                 self._link()
                 self._at_work = at_work
+        if is_first:
+            self._tick(self._world.monotonic_ns())  # loads what the first tick needs, which takes many ticks
+            self._schedule.start()  # ticks that passed meanwhile must not be caught up
         if not self._loop.is_ready or not any(at_work):
             self._world.sleep(0.01)
             self._schedule.start()
