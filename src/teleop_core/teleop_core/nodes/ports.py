@@ -62,6 +62,8 @@ class Ports:
         """Number of steps whose outputs were not sent because they contained NaN or infinity."""
         self.waits = False
         """Whether messages stay in their buffers until :meth:`publish`; a session publishes after all its stages."""
+        self.is_muted = False
+        """Whether nothing is sent, as in a first tick that only loads code."""
         self.inputs: dict[str, list[Input]] = {}
         self.outputs: dict[Topic, Output] = {}
         self._summed: list[tuple[str, list[Array]]] = []
@@ -164,6 +166,8 @@ class Ports:
         An output whose stamp was already sent is not a new answer and is not sent. Values of a user's stage that are
         not finite are not sent either.
         """
+        if self.is_muted:
+            return
         place, count = self._writing, len(self._sent)
         if self._must_check:
             self._are_sound()
@@ -187,6 +191,8 @@ class Ports:
 
     def send_now(self, output: Output, stamp_ns: int) -> None:
         """Send the current values of one output with a stamp [ns]."""
+        if self.is_muted:
+            return
         assert self._world is not None
         if output.is_pending:
             self.publish()

@@ -108,7 +108,9 @@ class TeleopSession:
                 self._link()
                 self._at_work = at_work
         if is_first:
+            self._mute(is_muted=True)
             self._tick(self._world.monotonic_ns())  # loads what the first tick needs, which takes many ticks
+            self._mute(is_muted=False)
             self._schedule.start()  # ticks that passed meanwhile must not be caught up
         if not self._loop.is_ready or not any(at_work):
             self._world.sleep(0.01)
@@ -118,6 +120,10 @@ class TeleopSession:
             if not self._loop.is_running:  # there may be a thousand ticks to catch up
                 return
             self._tick(tick_ns)
+
+    def _mute(self, *, is_muted: bool) -> None:
+        for node in self._stages:
+            node.ports.is_muted = is_muted
 
     def _are_all_there(self) -> bool:
         """Whether every node that starts by itself has been at work, so that no sample is missed."""

@@ -135,7 +135,8 @@ class TopicsMetric(Metric):
             "1",
             "missing messages, found by gaps between the stamps: lost, or skipped by a stage that "
             "takes only the newest. A gap counts at the topic where it begins, and does not count in "
-            "a replayed file. Null for topics that are no streams or are sent only on changes",
+            "a replayed file. Null for topics that are no streams, are sent only on changes, or came "
+            "through a simulated network, which loses packets on purpose",
         ),
         Key(
             "topics.<name>.lost",
@@ -166,7 +167,9 @@ class TopicsMetric(Metric):
 
     def _gaps(self, name: str) -> int | None:
         tally = self._stamps.of.get(name)
-        return None if tally is None or tally.topic.is_seldom else tally.gaps()
+        if tally is None or tally.topic.is_seldom or tally.topic.stamp.may_skip:
+            return None
+        return tally.gaps()
 
     def rows(self) -> list[TableRow]:
         """Sums over all topics."""
