@@ -48,6 +48,8 @@ class RosWorld:
     time_ns = staticmethod(time.time_ns)
     sleep = staticmethod(time.sleep)
     thread_ident = staticmethod(threading.get_ident)
+    thread_time_ns = staticmethod(time.thread_time_ns)
+    give_way = staticmethod(real_time.give_way)
     take_real_time: Callable[[RealTimeParameters], list[str]] = staticmethod(real_time.apply_options)
 
     functions = staticmethod(ros_taking.functions)

@@ -418,6 +418,12 @@ class World(Protocol):
     def take_real_time(self, options: RealTimeParameters) -> list[str]:
         """Apply real-time options to the calling thread; returns one line for each refused option."""
 
+    def give_way(self) -> None:
+        """Take the real-time priority from the calling thread."""
+
+    def thread_time_ns(self) -> int:
+        """Processor time that the calling thread has used [ns]."""
+
     def tidy(self) -> None:
         """Free the memory of objects that remain from the start, before the loops run."""
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from teleop_core.graph.signals import TICK_NS
+from teleop_core.nodes.strain import Strain
 
 REPORT_PERIOD = 1.0
 """Time between two reports of a node [s]."""
@@ -104,6 +105,8 @@ class Schedule:
         self._clock, self._sleep = clock, sleep
         self._max_catch_up, self._period_ns = max_catch_up, period_ns
         self._phase_ns = phase_ns
+        self.strain: Strain | None = None
+        """Judges whether the loop must give way; None for a loop without real-time priority."""
         self.counts = TickCounts()
         self.lateness = Recent()
         """Delay of each wake-up after the time of its tick, [ns]."""
@@ -114,6 +117,8 @@ class Schedule:
         self._next_ns = self._clock() + self._period_ns
         if self._phase_ns is not None:
             self._next_ns += (self._phase_ns - self._next_ns) % self._period_ns
+        if self.strain is not None:
+            self.strain.start()
 
     def due(self) -> range:
         """Sleep until the next tick is due.
@@ -127,10 +132,13 @@ class Schedule:
             now_ns = self._clock()
         late_ns = now_ns - self._next_ns
         missed = late_ns // self._period_ns
-        dropped = max(0, missed - self._max_catch_up)
+        has_given_way = self.strain is not None and self.strain.is_over
+        dropped = missed if has_given_way else max(0, missed - self._max_catch_up)
         first_ns = self._next_ns + dropped * self._period_ns
         self._next_ns += (missed + 1) * self._period_ns
         self._count(late_ns, missed, dropped)
+        if self.strain is not None:
+            self.strain.note(now_ns, is_late=late_ns > self._period_ns // 2)
         return range(first_ns, self._next_ns, self._period_ns)
 
     def _count(self, late_ns: int, missed: int, dropped: int) -> None:

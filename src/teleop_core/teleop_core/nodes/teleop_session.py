@@ -67,6 +67,7 @@ class TeleopSession:
         self._gate = world.lock()
         for node in self._stages:
             node.has_own_loop, node.gate = False, self._gate
+            node.tells_strain = node is self._stages[-1]
         last = self._stages[-1]
         self._schedule = Schedule(
             world.monotonic_ns,
@@ -101,6 +102,7 @@ class TeleopSession:
         is_first = not self._loop.is_ready and self._are_all_there()
         if is_first:
             self._stages[-1].prepare()  # give the loop its priority after all kernels are compiled
+            self._schedule.strain = self._stages[-1].schedule.strain
             self._loop.is_ready = True
         with self._gate:
             at_work = tuple(node.is_at_work for node in self.nodes)

@@ -62,6 +62,14 @@ class SimulatedWorld:
         self._scheduler.current.has_priority = options.priority > 0
         return []
 
+    def give_way(self) -> None:
+        """Take the priority from the calling thread."""
+        self._scheduler.current.has_priority = False
+
+    def thread_time_ns(self) -> int:
+        """Processor time that the calling thread has used [ns]."""
+        return self._scheduler.current.used_ns
+
     def tidy(self) -> None:
         """Do nothing, because a simulated start leaves no garbage."""
 
