@@ -272,8 +272,8 @@ class Input:
 
     def _newest_after_foreign(self) -> bool:
         """As :meth:`newest`, after a kernel has found a message of another form."""
-        before = self._pressed()
-        return self._newest_after(self._take_foreign() or self.take(), before)
+        before, has_found = self._pressed(), bool(self._cells["has_found"])
+        return self._newest_after(self._take_foreign() or self.take(), before) or has_found
 
     def _newest_after(self, is_new: bool, before: bytes) -> bool:
         """Write the newest message into the signals, after the first one was written if ``is_new``."""

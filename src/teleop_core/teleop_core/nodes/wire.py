@@ -93,6 +93,7 @@ class Reading(Form):
     arrival_ns: int
     is_new: int
     answer: int
+    has_found: int
     refused: Annotated[Integers, 10]
     limit: int
     silence_ns: int
@@ -377,6 +378,7 @@ def newest(r: Reading, calls: Calls) -> int:
     while True:
         answer = take(r, calls)
         if answer != NEW:
+            r.has_found = found  # before a message of another form
             return FOREIGN if answer == FOREIGN else found
         found = NEW
         if r.is_buttons and not (target[0] == clutch and target[1] == fixture and target[2] == mode):
