@@ -18,7 +18,7 @@ from teleop_core.kernels import records
 from teleop_core.kernels.fields import Cells
 from teleop_core.middleware.world import Taken
 from teleop_core.nodes import wire
-from teleop_core.nodes.streams import READING, Calls, Input, Output, describe, message_type
+from teleop_core.nodes.streams import READING, Calls, Input, Output, describe
 
 JOINTS = ("a", "shoulder", "b2")
 STREAMS = (

@@ -45,7 +45,6 @@ class ArmBridgeNode(TickingNode):
 
     def work(self, ticks: Iterable[int], report: Callable[[int], None] | None = None) -> None:
         """Pass on the arm's measurements, and command the arm if a command is due in one of the ticks."""
-        self.read_ports()
         now_ns = self.epoch_ns + max(ticks)
         with self.lock:
             self._listen()

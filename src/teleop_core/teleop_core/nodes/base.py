@@ -19,7 +19,7 @@ from teleop_core.nodes.loop import Loop
 from teleop_core.nodes.news import Commanders, introduction
 from teleop_core.nodes.ports import NO_PORTS, Ports
 from teleop_core.nodes.quality import profile
-from teleop_core.nodes.rate import REPORT_PERIOD, Recent, Schedule, TickCounts, report_phase
+from teleop_core.nodes.rate import REPORT_PERIOD, Phases, Recent, Schedule, TickCounts, report_phase
 from teleop_core.nodes.strain import Strain
 from teleop_core.nodes.streams import Input, message_type
 from teleop_core.nodes.tuned import TunedNode
@@ -54,6 +54,8 @@ class CoreNode(TunedNode):
         """Time without progress after which the loop counts as hung [s]; 0: never."""
         self.has_own_loop = True
         """Whether the node works in its own thread; False if it works in the thread of a whole session."""
+        self.phases: Phases | None = None
+        """Time that the phases of a session's ticks took; its last node reports them."""
         self.tells_strain = True
         """Whether the reports of this node say that its loop has given way; one node of a session does."""
         self.is_at_work = self.has_worked = False
@@ -95,7 +97,10 @@ class CoreNode(TunedNode):
         """Do one round of work; blocks for a tenth of a second at most."""
         raise NotImplementedError
 
-    def tick(self, tick_ns: int) -> None:
+    def take(self) -> None:
+        """Read what came from other processes; a session calls this method of all its nodes before :meth:`step`."""
+
+    def step(self, tick_ns: int) -> None:
         """Work for one tick [ns, monotonic]; a session calls this method of all its nodes in turn."""
         raise NotImplementedError
 
@@ -392,6 +397,8 @@ class CoreNode(TunedNode):
             concerns.append("failed; see its log")
         rate = self._reporter.rate(self.counts.ticks)
         values = tick_values(self._word, rate, self.counts, TICK_NS * 1e-6)
+        if self.phases is not None:
+            values |= self.phases.values()
         values["gave_way"] = str(self.schedule.strain.times if self.schedule.strain is not None else 0)
         values |= input_values(inputs) | self._reporter.rates(inputs)
         values |= {f"sent.{t.name}": str(o.sent) for t, o in self.ports.outputs.items()}

@@ -51,7 +51,6 @@ class MasterBridgeNode(TickingNode):
 
     def work(self, ticks: Iterable[int], report: Callable[[int], None] | None = None) -> None:
         """Pass on the device's messages, and send it the force of the newest tick."""
-        self.read_ports()
         now_ns = self.epoch_ns + max(ticks)
         with self.lock:
             is_new = self._listen()

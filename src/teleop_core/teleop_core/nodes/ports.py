@@ -62,8 +62,6 @@ class Ports:
         """Number of steps whose outputs were not sent because they contained NaN or infinity."""
         self.waits = False
         """Whether messages stay in their buffers until :meth:`publish`; a session publishes after all its stages."""
-        self.is_muted = False
-        """Whether nothing is sent, as in a first tick that only loads code."""
         self.inputs: dict[str, list[Input]] = {}
         self.outputs: dict[Topic, Output] = {}
         self._summed: list[tuple[str, list[Array]]] = []
@@ -93,6 +91,7 @@ class Ports:
                 topic, full_name = heard(port, name, self._arm), _name_for(owner, name)
                 self._entries.append(Input(owner, topic, full_name, joint_names, target, delay, buttons, into))
                 into["port"] = number
+                self._entries[-1].is_trigger = port == self._stage.trigger
             own_entries = self.inputs[port.name] = self._entries[-len(found) :]
             own_entries[0].own["stamp_at"] = self._place(f"{port.field}_ns")
             if len(targets) > 1:
@@ -157,6 +156,10 @@ class Ports:
             self._entries[index].finish()
             place[0] = index + 1
             self._read_all()
+        self.add_up()
+
+    def add_up(self) -> None:
+        """Update the signals of ports that several topics feed."""
         for name, parts in self._summed:
             self.row[name] = np.sum(parts, axis=0)
 
@@ -166,8 +169,6 @@ class Ports:
         An output whose stamp was already sent is not a new answer and is not sent. Values of a user's stage that are
         not finite are not sent either.
         """
-        if self.is_muted:
-            return
         place, count = self._writing, len(self._sent)
         if self._must_check:
             self._are_sound()
@@ -191,8 +192,6 @@ class Ports:
 
     def send_now(self, output: Output, stamp_ns: int) -> None:
         """Send the current values of one output with a stamp [ns]."""
-        if self.is_muted:
-            return
         assert self._world is not None
         if output.is_pending:
             self.publish()

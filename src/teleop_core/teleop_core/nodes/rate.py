@@ -48,6 +48,30 @@ class TickCounts:
     dropped: int = 0
 
 
+class Phases:
+    """Time that a loop has spent in each phase of its ticks since it began.
+
+    Attributes:
+        ticks: Number of ticks.
+        used_ns: Time in each phase [ns], by its name.
+    """
+
+    def __init__(self, *names: str) -> None:
+        self.ticks, self.used_ns = 0, dict.fromkeys(names, 0)
+
+    def put(self, *times_ns: int) -> None:
+        """Add a tick: its begin and the end of each of its phases, by a monotonic clock [ns]."""
+        self.ticks += 1
+        for name, begin_ns, end_ns in zip(self.used_ns, times_ns, times_ns[1:], strict=False):
+            self.used_ns[name] += end_ns - begin_ns
+
+    def values(self) -> dict[str, str]:
+        """Names and texts for a report: ticks, and the time of each phase [µs]."""
+        return {f"phase_us.{name}": str(used_ns // 1000) for name, used_ns in self.used_ns.items()} | {
+            "phase_ticks": str(self.ticks)
+        }
+
+
 class Recent:
     """The last numbers of a stream, for their median and extremes.
 

@@ -51,22 +51,28 @@ class SlaveNode(TickingNode):
     def start(self) -> None:
         """Store the offset between the clocks, so that later steps of the system clock are detected."""
         super().start()
-        self._is_told = False
+        self._is_told = self._is_ready = False
         self._offset_ns, self._turns, self._floods = self.epoch_ns, 0, 0
         self._seen, self._missed = self.counts, self.counts.missed
 
-    def work(self, ticks: Iterable[int], report: Callable[[int], None] | None = None) -> None:
-        """Read the newest command and make the steps of some ticks [ns, monotonic]."""
-        if not self._is_told:
-            self.read_ports()
-            self._is_told = self.input(SLAVE_MEASURED_JS).stamp_ns is not None
-            self._seen, self._missed = self.counts, self.counts.missed
+    def take(self) -> None:
+        """Read the newest command and the arm's samples; look for faults."""
+        self._is_ready, self._before_ns = self._is_told, self.row["slave_setpoint_js_ns"]
+        if self._is_ready:
+            self._look()
+            super().take()
             return
-        before_ns = self.row["slave_setpoint_js_ns"]
-        self._look()
+        self.read_ports()
+        self._is_told = self.input(SLAVE_MEASURED_JS).stamp_ns is not None
+        self._seen, self._missed = self.counts, self.counts.missed
+
+    def work(self, ticks: Iterable[int], report: Callable[[int], None] | None = None) -> None:
+        """Make the steps of some ticks [ns, monotonic], if the position of the arm is known."""
+        if not self._is_ready:
+            return
         super().work(ticks, report)
         stamp_ns = self.row["slave_setpoint_js_ns"]
-        if stamp_ns != before_ns:
+        if stamp_ns != self._before_ns:
             self.delay.put(self.world.time_ns() - stamp_ns)
 
     def read_ports(self, trigger: Topic | None = None) -> None:

@@ -7,6 +7,7 @@ deserialised and read by name. Both give the same values.
 
 from collections import Counter, deque
 from collections.abc import Callable, Sequence
+from functools import cache
 from importlib import import_module
 from typing import Any, Protocol, runtime_checkable
 
@@ -91,6 +92,28 @@ def describe(cells: Cells, form: messages.Layout) -> None:
     cells["is_whole"], cells["width"], cells["size"] = form.kind is Kind.BUTTONS, form.width, form.size
     cells["template_at"], cells["mask_at"] = form.template.ctypes.data, form.mask.ctypes.data
     cells["places_at"] = form.places.ctypes.data
+
+
+@cache
+def load() -> None:
+    """Load the kernels that Python calls one by one, which takes ms at their first call."""
+    reading, writing = (records(kind)[0] for kind in (READING, WRITING))
+    sender, row, count = Sender(into=reading), np.zeros(1), np.zeros(1, np.int64)
+    for cells in map(Cells, (reading, writing)):
+        for name in ("template_at", "mask_at", "places_at"):
+            cells[name] = row.ctypes.data
+    for name in ("target_at", "row_at"):
+        reading[name] = row.ctypes.data
+    for name in ("source_at", "kept_at", "readers_at"):
+        writing[name] = row.ctypes.data
+    sender.admit(b"", 0, 0)
+    sender.note_old(0, 0)
+    wire.read(reading, count.ctypes.data, 8)
+    wire.accept(reading, 0, 0, 0)
+    wire.is_due(writing, 0)
+    buffer = np.zeros(16, np.uint8)
+    writing["buffer_at"], writing["size"] = buffer.ctypes.data, len(buffer)
+    wire.write_one(writing, 0, 0, 0)
 
 
 class Calls:
@@ -186,12 +209,15 @@ class Input:
         self.sender = options.sender(own) if options is not None else Sender(into=own)
         self._is_fault = options is not None and options.second_publisher == "fault"
         self.own, self._cells = own, Cells(own)
+        load()
         self._describe()
         self._bytes = bytearray(self._cells["size"] + _SPARE)
         self._bytes_at = np.frombuffer(self._bytes, np.uint8).ctypes.data
         calls = Calls(self._world)
         kernels = wire.answer_take, wire.answer_newest
         self._take, self._newest = (held(kernel, own, calls.own) for kernel in kernels)
+        self.is_trigger = False
+        """Whether each message of the topic is a step of the stage."""
         self.subscription: Subscription | None = None
         self._listen()
 
@@ -386,10 +412,14 @@ class Input:
             self._listen()
 
     @property
-    def place(self) -> tuple[int, int]:
-        """Addresses at which a sender in this process writes: of the values, and of five fields from ``received``."""
+    def place(self) -> tuple[int, int, int]:
+        """Addresses at which a sender in this process writes.
+
+        Of the values, of five fields from ``received``, and of the stamp in the signals of a stage that has its own
+        clock; 0 for the trigger of a stage, whose stamp changes with each answer.
+        """
         received: Any = np.asarray(self.own)["received"]
-        return self._target.ctypes.data, received.ctypes.data
+        return self._target.ctypes.data, received.ctypes.data, 0 if self.is_trigger else self._cells["stamp_at"]
 
     def hold(self, stamp_ns: int, values: messages.Values) -> None:
         """Receive a sample of a sender in this process, on a link with a delay."""
@@ -476,7 +506,7 @@ class Output:
         """Pass the values of each message to readers in this process."""
         self._held = [entry for entry in inputs if entry.delay]
         places = [entry.place for entry in inputs if not entry.delay]
-        self._readers = np.array(places or [(0, 0)], np.int64).ravel()
+        self._readers = np.array(places or [(0, 0, 0)], np.int64).ravel()
         self._cells["readers_at"], self._cells["readers"] = self._readers.ctypes.data, len(places)
 
     def connect(self, tap: "Tap | None") -> None:

@@ -21,7 +21,7 @@ from teleop_core.nodes.feed import Feed
 from teleop_core.nodes.files import graph_of
 from teleop_core.nodes.loop import Loop
 from teleop_core.nodes.making import make_node
-from teleop_core.nodes.rate import Schedule
+from teleop_core.nodes.rate import Phases, Schedule
 from teleop_core.nodes.recorder import RecorderNode
 from teleop_core.session.links import link_texts
 
@@ -75,6 +75,7 @@ class TeleopSession:
             last.options.max_catch_up,
             phase_ns=0 if members[0] is graph.members[0] else _AFTER_NS,
         )
+        self._phases = last.phases = Phases("take", "step", "give", "tell")
         self._at_work: tuple[bool, ...] = ()
         self._ticks = 0
         self._loop = Loop(world, "session", self._turn, last.fail, patience=last.patience)
@@ -110,9 +111,6 @@ class TeleopSession:
                 self._link()
                 self._at_work = at_work
         if is_first:
-            self._mute(is_muted=True)
-            self._tick(self._world.monotonic_ns())  # loads what the first tick needs, which takes many ticks
-            self._mute(is_muted=False)
             self._schedule.start()  # ticks that passed meanwhile must not be caught up
         if not self._loop.is_ready or not any(at_work):
             self._world.sleep(0.01)
@@ -123,31 +121,33 @@ class TeleopSession:
                 return
             self._tick(tick_ns)
 
-    def _mute(self, *, is_muted: bool) -> None:
-        for node in self._stages:
-            node.ports.is_muted = is_muted
-
     def _are_all_there(self) -> bool:
         """Whether every node that starts by itself has been at work, so that no sample is missed."""
         waited_for = [n for n in self.nodes if n.options.autostart and not n.has_ended]
         return any(n.has_worked for n in self.nodes) and all(n.has_worked for n in waited_for)
 
     def _tick(self, tick_ns: int) -> None:
-        """Make one tick [ns, monotonic]. The gate keeps all nodes open until all messages are published."""
+        """Make one tick [ns, monotonic]: take, step, give, tell. The gate keeps all nodes open until it is over."""
+        clock = self._world.monotonic_ns
         self._ticks += 1
         with self._gate:
-            for node in self._stages:
-                if node.is_at_work:
-                    node.tick(tick_ns)
+            at_work = [node for node in self._stages if node.is_at_work]
+            begin_ns = clock()
+            for node in at_work:
+                node.take()
+            taken_ns = clock()
+            for node in at_work:
+                node.step(tick_ns)
+            stepped_ns = clock()
             # Messages with the longest path to their reader are sent first: the slave's setpoint first, the master's
             # sample last.
-            for node in reversed(self._stages):
-                if node.is_at_work:
-                    node.ports.publish()
+            for node in reversed(at_work):
+                node.ports.publish()
             self._feed.flush()
-            for node in self._stages:
-                if node.is_at_work:
-                    node.tell()
+            given_ns = clock()
+            for node in at_work:
+                node.tell()
+            self._phases.put(begin_ns, taken_ns, stepped_ns, given_ns, clock())
 
     def _link(self) -> None:
         """Connect every stage's output to its readers in this process, if both are at work."""

@@ -452,13 +452,15 @@ def write_one(w: Writing, stamp_ns: int, now_ns: int, time_ns: int) -> None:
         time_ns: Time of the system's clock [ns].
     """
     source = floats(w.source_at, w.width)
-    readers = integers(w.readers_at, 2 * w.readers)
+    readers = integers(w.readers_at, 3 * w.readers)
     for i in range(w.readers):
-        target, state = floats(readers[2 * i], w.width), integers(readers[2 * i + 1], 5)
+        target, state = floats(readers[3 * i], w.width), integers(readers[3 * i + 1], 5)
         for k in range(w.width):
             target[k] = source[k]
         state[0] += 1
         state[1], state[2], state[3], state[4] = 1, stamp_ns, now_ns, 1
+        if readers[3 * i + 2]:
+            integers(readers[3 * i + 2], 1)[0] = stamp_ns
     head, places = shorts(w.buffer_at, w.size // 4), integers(w.places_at, w.width)
     head[1] = np.int32(stamp_ns // SECOND_NS)
     head[2] = np.int32(stamp_ns % SECOND_NS)
