@@ -73,7 +73,8 @@ class Mover:
         count = math.ceil((time + self._settle) / slave.dt)
         way = cubic_move(self.goal, goal, time, slave.dt * np.arange(1.0, count + 1.0))[0]
         way = np.ascontiguousarray(way)
-        _drive(*slave.arguments, slave.signals, way, self._now_ns, slave.dt)
+        (calls,) = slave.arguments
+        _drive(calls, slave.signals, way, self._now_ns, slave.dt)
         self._now_ns += count * TICK_NS
         self.goal = goal
         return np.array(slave.signals["slave_measured_js"][: len(goal)])
