@@ -1,8 +1,8 @@
 """Code of kernels that only other kernels call: kept as it is until such a caller is optimised.
 
-Numba optimises each kernel and makes machine code of it, with all kernels that it calls inside, also if only other
-kernels will call it. This work is done once for each level of calls. An :class:`InnerLibrary` leaves it to the kernel that
-is called by address or from Python, whose code contains all the others.
+Numba optimises each kernel, and makes machine code of it with all kernels that it calls inside, also if only other
+kernels will call it. So a kernel is optimised once for each level of calls. An :class:`InnerLibrary` leaves this work
+to the kernel that is called by address or from Python, whose code contains all the others.
 """
 
 from typing import Any
@@ -65,5 +65,6 @@ def _loaded(codegen: Any, state: Any) -> Any:
     return made
 
 
-_plain = JITCodeLibrary._unserialize
-JITCodeLibrary._unserialize = _loaded
+_LIBRARY: Any = JITCodeLibrary
+_plain = _LIBRARY._unserialize
+_LIBRARY._unserialize = _loaded
