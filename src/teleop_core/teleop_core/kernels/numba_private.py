@@ -1,4 +1,4 @@
-"""All uses of numba's internals are in this module, ``borrowing`` and ``room``; any version may change them.
+"""Numba's internals, which any version may change; only this module and its neighbours in this folder use them.
 
 The public interface of numba cannot stamp a cache, compile without a wrapper for Python, treat literals as plain
 numbers, or report a mistake in one line.
