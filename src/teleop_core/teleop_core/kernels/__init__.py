@@ -281,7 +281,7 @@ if TYPE_CHECKING:
     from teleop_core.kernels.portable import *  # noqa: F403
 else:  # imported when they are first used
     _NAMES = {
-        "addresses": ("Addressed", "addressed", "call_address"),
+        "addresses": ("Addressed", "addressed", "call_address", "held"),
         "fields": ("Fields", "IntegerPerJoint", "Integers", "PerJoint", "PoseRow", "Quaternion", "Vector3", "Wrench",
             "fields_of", "record", "record_array"),
         "geometry": ("Array", "checked_array", "is_rigid", "multiply_quaternions", "pose_from_transform", "rotation",

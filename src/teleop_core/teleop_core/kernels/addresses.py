@@ -7,7 +7,7 @@ and a block of words with the values of its arguments; :func:`call_address` call
 
 import ctypes
 from collections.abc import Callable
-from functools import cache
+from functools import cache, partial
 from itertools import count
 from typing import Any
 from weakref import WeakValueDictionary
@@ -19,7 +19,7 @@ from teleop_core import kernels
 from teleop_core.kernels.callables import keep
 from teleop_core.kernels.dependencies import hexdigest
 
-__all__ = ["Addressed", "addressed", "call_address"]
+__all__ = ["Addressed", "addressed", "call_address", "held"]
 
 Words = NDArray[np.int64]
 
@@ -100,6 +100,46 @@ def addressed(function: Callable[..., object], *arguments: object) -> Addressed:
         KernelError: The kernel cannot be compiled for these arguments.
     """
     return Addressed(function, arguments)
+
+
+def held(function: Callable[..., object], *arguments: object) -> Callable[[], None]:
+    """Kernel with its arguments as a Python function that keeps the interpreter's lock while the kernel runs.
+
+    For a loop that must not be late: a kernel that releases the lock for some µs may wait 0.2 ms and more to get it
+    back, if another thread of the process works. The result of the kernel is ignored.
+
+    Args:
+        function: A kernel, or a plain Python function.
+        arguments: As in :func:`addressed`.
+
+    Raises:
+        KernelError: The kernel cannot be compiled for these arguments.
+    """
+    if not kernels.is_kernel(function):
+        return partial(_run_plain, function, arguments)
+    made = addressed(function, *arguments)
+    if not kernels.IS_COMPILED:
+        return made.run
+    call: Any = partial(_enter_code(), made.address, made.block_address)
+    call.made = made  # keeps the block alive
+    found: Callable[[], None] = call
+    return found
+
+
+def _run_plain(function: Callable[..., object], arguments: tuple[object, ...]) -> None:
+    function(*arguments)
+
+
+@cache
+def _enter_code() -> Callable[[int, int], None]:
+    """Compiled form of :func:`_enter`, without a check of the types of its arguments."""
+    made = kernels._compiler.dispatcher(_enter, keeps_lock=True)
+    return kernels._compiler.entry(made, kernels.types_of((0, 0)))
+
+
+def _enter(address: int, block_address: int) -> None:
+    """Call an address from Python."""
+    call_address(address, block_address)
 
 
 def _call_plain(address: int, _block_address: int) -> None:

@@ -154,8 +154,10 @@ class InnerDispatcher(Dispatcher):
         raise TypeError(f"{self.py_func.__name__} is called by kernels only: decorate it with kernel")
 
 
-def dispatcher(function: Callable[..., Any], *, is_inner: bool = False) -> Any:
+def dispatcher(function: Callable[..., Any], *, is_inner: bool = False, keeps_lock: bool = False) -> Any:
     """Kernel that is compiled when it is first called."""
+    if keeps_lock:
+        return Dispatcher(function, targetoptions={**_OPTIONS, "nogil": False}, pipeline_class=Pipeline)
     if is_inner:
         options = {**_OPTIONS, "no_cpython_wrapper": True}
         return InnerDispatcher(function, targetoptions=options, pipeline_class=Pipeline)
