@@ -1,5 +1,9 @@
 """Programs: lists of copies and calls, executed once per tick."""
 
+import os
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 
@@ -113,3 +117,25 @@ def test_another_program_compiles_nothing() -> None:
     run(other, 2)
     assert compiled_count() == before
     assert values.tolist() == [6.0, 6.0, 6.0, 6.0, 6.0, 6.0, 6.0]
+
+
+SESSION = """
+import hashlib
+from teleop_core.session import api, virtual
+rows = virtual.VirtualTime(api.configuration("coarse_box", texts=["teleop.duration=1"])).run(20)
+print(hashlib.sha256(rows.tobytes()).hexdigest())
+"""
+
+
+def test_a_session_in_plain_python_has_the_bits_of_a_compiled_one() -> None:
+    compiled, plain = (
+        subprocess.run(
+            [sys.executable, "-c", SESSION],
+            env=os.environ | {"NUMBA_DISABLE_JIT": off},
+            capture_output=True,
+            text=True,
+            check=True,
+        ).stdout
+        for off in ("0", "1")
+    )
+    assert compiled == plain
