@@ -22,7 +22,7 @@ setup: $(VENV)/.installed
 $(VENV)/.installed: constraints.txt $(wildcard src/*/setup.py src/*/pyproject.toml)
 	$(PYTHON) -m venv $(VENV)
 	$(INSTALL) -e 'src/teleop_core[ros,devices]' -e src/teleop_machines -e src/teleop_console -e src/teleop_exchange -e src/teleop_lab -e src/teleop_drill -e src/lerobot_robot_teleop_core
-	$(BIN)/teleop compile
+	$(BIN)/teleop compile --scenarios
 	touch $@
 
 # What tests, checks and benchmarks need besides.

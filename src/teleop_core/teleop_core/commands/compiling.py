@@ -13,6 +13,7 @@ if TYPE_CHECKING:
 
 _EPILOG = """\
 a session compiles what it needs and is not there yet; compiled before, it starts at once:
+  teleop compile --scenarios                            what "make setup" compiles
   teleop compile                                        everything of teleop_core, for every arm and graph
 """
 _FIRST = "coarse_box"
@@ -37,10 +38,12 @@ _PAIR = "pair"
 
 def add(commands: argparse._SubParsersAction) -> None:  # type: ignore[type-arg]
     """Add the command's parser."""
-    command(commands, "compile", _run, "compile all kernels now, on all processors", _EPILOG)
+    parser = command(commands, "compile", _run, "compile all kernels now, on all processors", _EPILOG)
+    text = "compile only what the built-in scenarios need, also with an arm from a URDF file"
+    parser.add_argument("--scenarios", action="store_true", help=text)
 
 
-def _run(_arguments: argparse.Namespace) -> int:
+def _run(arguments: argparse.Namespace) -> int:
     from concurrent.futures import as_completed
 
     from teleop_core.base.workers import workers
@@ -48,8 +51,10 @@ def _run(_arguments: argparse.Namespace) -> int:
     from teleop_core.kernels.store import prune
 
     phases = list(phases_of())
+    if arguments.scenarios:
+        phases.pop()
     total, done, compiled = sum(map(len, phases)), 0, 0
-    with shown_progress("kernels") as progress, workers(len(sched_getaffinity(0))) as pool:
+    with shown_progress("kernels") as progress, workers(len(sched_getaffinity(0)), _collect_rarely) as pool:
         for jobs in phases:
             waiting = [pool.submit(_compile, job) for job in jobs]
             for made in as_completed(waiting):
@@ -61,14 +66,24 @@ def _run(_arguments: argparse.Namespace) -> int:
 
 
 def phases_of() -> Iterator[Sequence[Job]]:
-    """Groups of jobs. Jobs of one group run in parallel; later groups reuse the kernels of earlier groups."""
+    """Groups of jobs. Jobs of one group run in parallel; later groups reuse the kernels of earlier groups.
+
+    The last group is what no built-in scenario needs.
+    """
     from teleop_core.graph.graph import BUILT_IN
     from teleop_core.graph.layers import list_scenarios
 
-    yield [Job(stage=stage) for stage in (*reversed(BUILT_IN), _PAIR)]
-    yield [Job(), *(Job(texts=(f"robot=arm{joints}.urdf",)) for joints in _ARMS)]
-    scenarios = [Job(scenario) for scenario in list_scenarios() if scenario != _FIRST]
-    yield [*(Job(texts=texts) for texts in _parts()), *scenarios]
+    yield [Job(stage=stage) for stage in reversed(BUILT_IN)]
+    arms = (Job(texts=(f"robot=arm{joints}.urdf",)) for joints in _ARMS)
+    yield [Job(), *arms, *(Job(scenario) for scenario in list_scenarios() if scenario != _FIRST)]
+    yield [Job(stage=_PAIR), *(Job(texts=texts) for texts in _parts())]
+
+
+def _collect_rarely() -> None:
+    """Collect garbage a hundred times less often: of the processor time of compilation, collections take a seventh."""
+    import gc
+
+    gc.set_threshold(100_000)
 
 
 def _parts() -> Iterator[tuple[str, ...]]:
