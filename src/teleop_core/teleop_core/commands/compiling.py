@@ -16,13 +16,12 @@ a session compiles what it needs and is not there yet; compiled before, it start
   teleop compile --scenarios                            what "make setup" compiles
   teleop compile                                        everything of teleop_core, for every arm and graph
 """
-_FIRST = "coarse_box"
 
 
 class Job(NamedTuple):
     """Kernels to compile: those of a stage, or those of a short session."""
 
-    scenario: str = _FIRST
+    scenario: str = "coarse_box"
     texts: tuple[str, ...] = ()
     stage: str = ""
 
@@ -30,8 +29,6 @@ class Job(NamedTuple):
 _MESH = "OFF\n4 4 6\n0 0 0\n90 90 0\n90 0 90\n0 90 90\n3 0 2 1\n3 0 1 3\n3 0 3 2\n3 1 2 3\n"
 """A closed surface of four triangles [mm], for parts that need a file."""
 _AXES = "0 0 1", "0 1 0"
-_ARMS = (6, 7)
-"""Joints of arms from files: one whose axes meet in a wrist, and one that is redundant."""
 _PAIR = "pair"
 """Stage of a job for a server and its simulated arm as one object."""
 
@@ -74,8 +71,8 @@ def phases_of() -> Iterator[Sequence[Job]]:
     from teleop_core.graph.layers import list_scenarios
 
     yield [Job(stage=stage) for stage in reversed(BUILT_IN)]
-    arms = (Job(texts=(f"robot=arm{joints}.urdf",)) for joints in _ARMS)
-    yield [Job(), *arms, *(Job(scenario) for scenario in list_scenarios() if scenario != _FIRST)]
+    seven, six, puma = (Job(texts=(f"robot={name}",)) for name in ("arm7.urdf", "arm6.urdf", "puma560"))
+    yield [seven, *map(Job, list_scenarios()), six, puma]  # arms that share kernels follow one another
     yield [Job(stage=_PAIR), *(Job(texts=texts) for texts in _parts())]
 
 

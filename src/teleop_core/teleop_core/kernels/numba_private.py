@@ -186,7 +186,8 @@ class Pointer(CFunc):
 def c_function(function: Any, signature: Any) -> Any:
     """Function of a fixed signature, kernel or not, as a value that kernels call.
 
-    Like :func:`numba.cfunc`, but with this package's stamp. The value shares a cache file with the kernel of the same
+    A kernel that returns the result of the signature is its own code. Another one is compiled like
+    :func:`numba.cfunc`, but with this package's stamp: the value shares a cache file with the kernel of the same
     function; with different stamps, each would invalidate the cache of the other.
     """
     arguments, result = normalize_signature(signature)
@@ -195,6 +196,11 @@ def c_function(function: Any, signature: Any) -> Any:
     made = vars(function).setdefault("_pointers", {}) if is_compiled else {}
     if (arguments, result) in made:
         return made[arguments, result]
+    if is_compiled and not isinstance(function, InnerDispatcher):
+        code = Code(function, tuple(arguments))
+        if code.signature().return_type == result:
+            made[arguments, result] = code
+            return code
     target = function.py_func if is_compiled else entry_of(function, arguments, result)
     callback: Any = Pointer(target, (arguments, result), locals={}, options=_ERRORS, pipeline_class=Pipeline)
     if is_compiled:
@@ -216,7 +222,7 @@ class Code(types.WrapperAddressProtocol):  # type: ignore[misc]
 
     def __init__(self, kernel: Any, arguments: tuple[Any, ...]) -> None:
         kernel.compile(arguments)
-        self._made = kernel.overloads[arguments]  # keeps the code alive
+        self._function, self._made = kernel.py_func, kernel.overloads[arguments]  # keeps the code alive
         self._code_address = self._made.library.get_pointer_to_function(self._made.fndesc.llvm_func_name)
 
     def __wrapper_address__(self) -> int:
@@ -226,6 +232,10 @@ class Code(types.WrapperAddressProtocol):  # type: ignore[misc]
     def signature(self) -> Any:
         """Types of the kernel's arguments and of its return value."""
         return self._made.signature
+
+    def __call__(self, *arguments: Any) -> Any:
+        """Run the Python function."""
+        return self._function(*arguments)
 
 
 def entry(kernel: Any, arguments: tuple[Any, ...]) -> Callable[..., Any]:
