@@ -2,8 +2,8 @@
 
 A loop of SCHED_FIFO that cannot keep up would make up its ticks for ever, and no other program would run on its
 processor. It gives way if, over :data:`WINDOW_NS`, it uses more than 70 % of a processor or more than half of its
-wake-ups are late; and at once if it misses more than :data:`BEHIND` ticks in two wake-ups in a row, because then it
-falls further behind by making up ticks. It then runs without priority, and a late wake-up makes one tick, the newest,
+wake-ups are late; and at once if it misses more than :data:`BEHIND` ticks in a wake-up and still more in the next one,
+because then it falls further behind by making up ticks. It then runs without priority, and a late wake-up makes one tick, the newest,
 and skips the others. It takes its priority again when it uses less than half of a processor.
 """
 
@@ -16,7 +16,7 @@ WINDOW_NS = 2_000_000_000
 MOST_USED, MOST_LATE = 0.7, 0.5
 """Share of a processor, and share of late ticks, beyond which a loop gives way."""
 BEHIND = 20
-"""Number of missed ticks of a wake-up that the next wake-up must not exceed again."""
+"""Number of missed ticks beyond which the next wake-up must miss fewer."""
 ROOM = 0.5
 """Share of a processor below which a loop takes its priority again."""
 
@@ -37,7 +37,7 @@ class Strain:
     def __init__(self, world: World, take_priority: Callable[[], object], say: Callable[[str], None]) -> None:
         self._world, self._take_priority, self._say = world, take_priority, say
         self.is_over, self.times = False, 0
-        self._used, self._behind = 0.0, 0
+        self._used, self._missed = 0.0, 0
         self.start()
 
     def start(self) -> None:
@@ -55,9 +55,8 @@ class Strain:
         """
         self._turns += 1
         self._late += is_late
-        self._behind = self._behind + 1 if missed > BEHIND else 0
-        elapsed_ns = now_ns - self._begin_ns
-        falls_behind = self._behind > 1 and not self.is_over
+        falls_behind = BEHIND < self._missed < missed and not self.is_over
+        self._missed, elapsed_ns = missed, now_ns - self._begin_ns
         if elapsed_ns < WINDOW_NS and not falls_behind:
             return
         self._used = (self._world.thread_time_ns() - self._used_ns) / max(elapsed_ns, 1)

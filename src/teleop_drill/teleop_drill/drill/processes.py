@@ -5,6 +5,7 @@ from functools import partial
 
 from teleop_core.slave.operation import Fault, State
 from teleop_drill.drill.exercise import Cure, Exercise, Master, Motion, Rig, after, at_once, outage, silence, unheard
+from teleop_drill.drill.hand import SPEED
 from teleop_drill.drill.inside import HANGS, RAISES, SLOWS, WORKS
 from teleop_drill.drill.numbers import Numbers
 from teleop_drill.drill.recordings import LONGEST_LOSS
