@@ -1,21 +1,15 @@
 """``teleop compile``: compiles the kernels of the built-in parts before a session needs them."""
 
-import argparse
 from collections.abc import Iterator, Sequence
 from os import sched_getaffinity
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
-from teleop_core.commands.arguments import command
+from cyclopts import Parameter
 
 if TYPE_CHECKING:
     from teleop_core.session.configuration import Configuration
 
-_EPILOG = """\
-a session compiles what it needs and is not there yet; compiled before, it starts at once:
-  teleop compile                                        what the scenarios need
-  teleop compile --all                                  every robot, law, plant and shape too
-"""
 _FIRST = "coarse_box"
 Job = tuple[str, str, str]
 """Scenario, setting (may be empty), and stage; an empty stage means the whole session."""
@@ -23,31 +17,33 @@ _MESH = "OFF\n4 4 6\n0 0 0\n90 90 0\n90 0 90\n0 90 90\n3 0 2 1\n3 0 1 3\n3 0 3 2
 """A closed surface of four triangles [mm], for parts that need a file."""
 
 
-def add(commands: argparse._SubParsersAction) -> None:  # type: ignore[type-arg]
-    """Add the command's parser."""
-    text = "compile the kernels of built-in parts now, on all processors"
-    parser = command(commands, "compile", _run, text, _EPILOG)
-    parser.add_argument("--all", action="store_true", help="also compile kernels that no scenario needs")
+def compile_(*, all_: Annotated[bool, Parameter(name="--all")] = False) -> None:
+    """Compile the kernels of built-in parts now, on all processors.
 
+    A session compiles what it needs and is not there yet; compiled before, it starts at once:
 
-def _run(arguments: argparse.Namespace) -> int:
+        teleop compile                                        what the scenarios need
+        teleop compile --all                                  every robot, law, plant and shape too
+
+    Args:
+        all_: Also compile kernels that no scenario needs.
+    """
     from concurrent.futures import as_completed
 
     from teleop_core.base.workers import workers
     from teleop_core.commands.progress import shown_progress
     from teleop_core.kernels.store import prune
 
-    phases = list(phases_of(is_all=arguments.all))
+    phases = list(phases_of(is_all=all_))
     total, done, compiled = sum(map(len, phases)), 0, 0
     with shown_progress("kernels") as progress, workers(len(sched_getaffinity(0))) as pool:
         for jobs in phases:
-            waiting = [pool.submit(_compile, job, arguments.all) for job in jobs]
+            waiting = [pool.submit(_compile, job, all_) for job in jobs]
             for made in as_completed(waiting):
                 compiled, done = compiled + made.result(), done + 1
                 progress(done, total)
     prune()
     print(f"{compiled} kernels compiled" if compiled else "all kernels are there")
-    return 0
 
 
 def phases_of(*, is_all: bool) -> Iterator[Sequence[Job]]:
