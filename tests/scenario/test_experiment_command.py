@@ -35,7 +35,7 @@ def test_experiment_prints_published_beside_predicted(teleop_again: "Run") -> No
 
 
 def test_help_teaches_what_a_mark_means(teleop_again: "Run") -> None:
-    shown = teleop_again("experiment", "--help").stdout
+    shown = " ".join(teleop_again("experiment", "--help").stdout.split())
     assert "teleop experiment all --html" in shown
     assert "not whether a number is small" in shown
 

@@ -225,14 +225,16 @@ def application(name: str = "") -> "App":
         result_action="return_value",
     )
     for module, commands in COMMANDS.items():
-        if name in commands and find_spec(package := module.partition(".")[0]) is None:
-            raise TeleopError(f"install {package}, which has this command")
+        if find_spec(package := module.partition(".")[0]) is None:
+            if name in commands:
+                raise TeleopError(f"install {package}, which has this command")
+            continue
         for one in commands:
             app.command(f"{module}:{one}{'_' * (one in {'compile', 'import'})}", name=one)
     if name not in app:
         for entry in installed():
             app.command(loaded(entry), name=entry.name)
-        app.register_install_completion_command()
+    app.register_install_completion_command(show=False)
     if name and name not in app:
         raise UnknownNameError("COMMAND", name, (one for one in app if not one.startswith("-")))
     return app
@@ -275,3 +277,7 @@ def overview() -> str:
     rows |= {entry.name: (loaded(entry).__doc__ or "").partition("\n")[0].rstrip(".") for entry in installed()}
     lines = (fill(text, 88, initial_indent=f"  {name:13}", subsequent_indent=15 * " ") for name, text in rows.items())
     return "\n".join(("usage: teleop [--parts FILE.py] COMMAND ...\n", _ABOUT, "\ncommands:", *lines, "", _USAGE))
+
+
+if __name__ == "__main__":
+    sys.exit(main())
