@@ -10,11 +10,14 @@ setup(
     description="Console and report of teleop_core: a session in the browser, and scores as a page",
     license="Apache-2.0",
     packages=find_packages(include=["teleop_console", "teleop_console.*"]),
-    package_data={"teleop_console": ["py.typed", "*.pyi", "*.css", "*.js", "report/*.js", "report/*.css"]},
+    package_data={
+        "teleop_console": ["py.typed", "*.pyi", "*.css", "*.js", "report/*.js", "report/*.css", "report/*.html"]
+    },
     python_requires=">=3.11",
     install_requires=[
         f"teleop_core=={VERSION}",
         "cyclopts",
+        "jinja2",
         "lazy_loader",
         "msgspec",
         "numpy",

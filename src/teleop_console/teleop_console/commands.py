@@ -38,11 +38,11 @@ def console(
     Opens the page, on which a session is chosen; drag the stylus and the arm follows:
 
         teleop console
-        teleop console --set operator=remote         starts one at once
+        teleop console --set operator=remote  # starts one at once
         teleop console --scenario fine_box --set slave_sim.plant=hardware
-        teleop console --set operator=human          watch a simulated hand
-        teleop console --attach                      a session that runs already
-        teleop console bags/run_1                    replay a recording
+        teleop console --set operator=human   # watch a simulated hand
+        teleop console --attach               # a session that runs already
+        teleop console bags/run_1             # replay a recording
 
     The page is served to this machine alone. With --host others reach it, who need the token that is printed with the
     address. One browser drives at a time; anybody may press the emergency stop.

@@ -97,13 +97,13 @@ options:
   --install-completion     let this shell complete commands and options by tab
 
 a first session:
-  teleop sim --scenario coarse_box --out bags/coarse    record 46 s of teleoperation
-  teleop evaluate bags/coarse --html coarse.html        score it, look at it
+  teleop sim --scenario coarse_box --out bags/coarse    # record 46 s of teleoperation
+  teleop evaluate bags/coarse --html coarse.html        # score it, look at it
   teleop replay bags/coarse --out bags/unfiltered --set reference_filter.is_on=false
 a hand of your own:
-  teleop import hand.csv --out bags/hand                CSV, Parquet, bags: see import --help
-  teleop replay bags/hand --out bags/answer             let the slave follow it
-  teleop export bags/answer --out answer.csv            or .parquet, or a LeRobot data set"""
+  teleop import hand.csv --out bags/hand                # CSV, Parquet, bags: see import --help
+  teleop replay bags/hand --out bags/answer             # let the slave follow it
+  teleop export bags/answer --out answer.csv            # or .parquet, or a LeRobot data set"""
 
 
 @dataclass(frozen=True)

@@ -22,8 +22,8 @@ def compile_(*, all_: Annotated[bool, Parameter(name="--all")] = False) -> None:
 
     A session compiles what it needs and is not there yet; compiled before, it starts at once:
 
-        teleop compile                                        what the scenarios need
-        teleop compile --all                                  every robot, law, plant and shape too
+        teleop compile        # what the scenarios need
+        teleop compile --all  # every robot, law, plant and shape too
 
     Args:
         all_: Also compile kernels that no scenario needs.

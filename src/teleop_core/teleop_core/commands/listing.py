@@ -78,7 +78,7 @@ def robot(
 
     For example:
 
-        teleop robot                                   all robots
+        teleop robot  # all robots
         teleop robot rcrt1 --urdf rcrt1.urdf
 
     Args:

@@ -47,9 +47,9 @@ def topic(
 
     For example:
 
-        teleop topic list                          topics with types, publishers and readers
-        teleop topic hz /slave/measured_js         rate, each second
-        teleop topic echo /slave/measured_cp       messages as YAML
+        teleop topic list                     # topics with types, publishers and readers
+        teleop topic hz /slave/measured_js    # rate, each second
+        teleop topic echo /slave/measured_cp  # messages as YAML
 
     Args:
         action: What to do.
@@ -90,8 +90,8 @@ def param(
 
     For example:
 
-        teleop param list                          nodes with parameters
-        teleop param list motion_scaling           parameters of a node, with their values
+        teleop param list                 # nodes with parameters
+        teleop param list motion_scaling  # parameters of a node, with their values
         teleop param get motion_scaling fine_gain
         teleop param set motion_scaling fine_gain 0.2
 
@@ -128,7 +128,7 @@ def service(
     For example:
 
         teleop service list
-        teleop service call /recorder/split        a service of the type std_srvs/srv/Trigger
+        teleop service call /recorder/split  # a service of the type std_srvs/srv/Trigger
 
     Args:
         action: What to do.

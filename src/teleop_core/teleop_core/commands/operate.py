@@ -86,9 +86,9 @@ def operate(*commands: Annotated[str, Parameter(name="COMMAND")], arm: str | Non
     Without commands it says how the arms are; commands are sent one after the other:
 
         teleop operate
-        teleop operate enable home                 an arm that waits for people
-        teleop operate release reset enable        after an emergency stop
-        teleop operate pause --arm left            one arm of several
+        teleop operate enable home           # an arm that waits for people
+        teleop operate release reset enable  # after an emergency stop
+        teleop operate pause --arm left      # one arm of several
 
     Args:
         commands: release, enable, disable, pause, resume, home, unhome, reset or stop.

@@ -65,7 +65,7 @@ def live(
     For example:
 
         teleop live --scenario coarse_box --out bags/live
-        teleop live --out bags/live --without slave_sim     your own arm takes its place
+        teleop live --out bags/live --without slave_sim  # your own arm takes its place
 
     Args:
         out: Directory for the recording; it must not exist yet.

@@ -25,9 +25,9 @@ def conformance(
     Tests an arm, ours or any other, against CRTK (Collaborative Robotics Toolkit): which topics there are, their types,
     rates, stamps and numbers, and whether it does what a stock client tells it.
 
-        teleop conformance slave --read-only     look, touch nothing
-        teleop conformance /PSM1                 asks before it moves anything
-        teleop conformance slave --yes --json    for programs
+        teleop conformance slave --read-only   # look, touch nothing
+        teleop conformance /PSM1               # asks before it moves anything
+        teleop conformance slave --yes --json  # for programs
 
     It pauses and resumes the arm, moves one joint by 0.01 rad (or 10 mm) and the tip by 3 mm, at most 0.02 rad/s and
     6 mm/s where it chooses the speed, and goes back each time. Whatever it measures must follow what it was told, in

@@ -80,16 +80,16 @@ def drill(
 
     Without a name all faults are injected, which takes minutes:
 
-        teleop drill --list                      what there is
+        teleop drill --list                                       # what there is
         teleop drill stop_topic kill_motion_scaling
-        teleop drill --short                     five faults, less than a minute
-        teleop drill --simulated                 all on a simulated machine: the same bits every time
-        teleop drill --simulated --seed 7 flood  with other delays, costs and discoveries
-        teleop drill --seeds 100                 random faults at random times, and laws that must hold
+        teleop drill --short                                      # five faults, less than a minute
+        teleop drill --simulated                                  # all on a simulated machine: the same bits every time
+        teleop drill --simulated --seed 7 flood                   # with other delays, costs and discoveries
+        teleop drill --seeds 100                                  # random faults at random times, and their laws
         teleop drill --composed --json drill.json
-        teleop drill --drives "python examples/foreign_slave.py"    drives of your own
+        teleop drill --drives "python examples/foreign_slave.py"  # drives of your own
         teleop drill --drives "arm_bridge --ros-args --params-file arm.yaml" --arm "./controller"
-        teleop drill --set real_time.priority=50  on a machine that others keep busy
+        teleop drill --set real_time.priority=50                  # on a machine that others keep busy
 
     It starts sessions of its own, simulated, on a ROS domain of their own, kills and stops processes of these sessions
     alone, and keeps the machine's cores busy for seconds. Exit code 0: all as expected.

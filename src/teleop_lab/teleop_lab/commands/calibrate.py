@@ -55,15 +55,15 @@ def calibrate(
 
     Simulated, to see what a measurement would tell before it is made:
 
-        teleop calibrate --poses 40 --noise 0.1e-3            a tracker of 0.1 mm; the rcrt1 as published
-        teleop calibrate --poses 30 --noise ruler             a ruler of 0.5 mm along x, y and z
+        teleop calibrate --poses 40 --noise 0.1e-3  # a tracker of 0.1 mm; the rcrt1 as published
+        teleop calibrate --poses 30 --noise ruler   # a ruler of 0.5 mm along x, y and z
         teleop calibrate --robot puma560 --errors prototype theta2=2e-3 --choose random
 
     From measurements, and back into a session:
 
         teleop calibrate --data poses.csv --frame unknown --out arm.yaml
         teleop sim --set robot=arm.yaml --out bags/calibrated
-        teleop calibrate --data published --fit d3            tables E.1-E.3 of the rcrt1's source
+        teleop calibrate --data published --fit d3  # tables E.1-E.3 of the rcrt1's source
 
     poses.csv has a column per joint, named as `teleop robot` shows them or q1, q2 ..., and x, y, z of the tip; metres
     and radians, or as the head says: "theta1_deg", "x [mm]". Errors are called a1, alpha1, d1, theta1 for link 1 and so

@@ -23,10 +23,10 @@ def experiment(
 
     Without a name the experiments are listed; `all` runs every one, in five to seven minutes:
 
-        teleop experiment resolution                          a table: published, predicted, difference
-        teleop experiment master_slave gravity --seed 5       other hands; sessions both need run once
-        teleop experiment all --html experiments.html         one page with the source's figures
-        teleop experiment all --json experiments.json         every number, exact
+        teleop experiment resolution                     # a table: published, predicted, difference
+        teleop experiment master_slave gravity --seed 5  # other hands; sessions both need run once
+        teleop experiment all --html experiments.html    # one page with the source's figures
+        teleop experiment all --json experiments.json    # every number, exact
 
     A mark says whether prediction and publication agree, ✓, or not, ✗, not whether a number is small.
 

@@ -21,9 +21,9 @@ def fit(
     Without a table those of the RCRT-1's source are taken (ten runs to each of six points), with the gains that the
     numbers of the plant `hardware` were fitted with:
 
-        teleop fit                                            half a minute
-        teleop fit --free coulomb.theta1 bias.theta1          these alone
-        teleop fit rests.csv --robot scara --out scara.yaml   a machine of yours; then
+        teleop fit                                           # half a minute
+        teleop fit --free coulomb.theta1 bias.theta1         # these alone
+        teleop fit rests.csv --robot scara --out scara.yaml  # a machine of yours; then
         teleop sim --config scara.yaml --set robot=scara --out bags/predicted
 
     A table is a CSV with a row per run: point, target_<joint> and <joint> of every joint [rad or m]. What can be free:

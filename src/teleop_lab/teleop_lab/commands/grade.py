@@ -27,9 +27,9 @@ def grade(
 
     For example:
 
-        teleop grade hands.csv                              a table with a column of episodes
+        teleop grade hands.csv                              # a table with a column of episodes
         teleop grade hands.csv --csv grades.csv --html grades.html
-        teleop grade hands.csv --usual keep.txt --most 3.5  episodes that are no odder, one a line
+        teleop grade hands.csv --usual keep.txt --most 3.5  # episodes that are no odder, one a line
         teleop grade dataset --position observation.state.6 observation.state.7 observation.state.8
 
     A data set of LeRobot says which numbers are a place only by --position. An episode is as odd as its oddest figure:
@@ -85,21 +85,17 @@ def grade(
 
 
 def _page(table: Any, name: str) -> str:
-    """Page with a table that can be sorted by oddness; odd cells are highlighted."""
-    from html import escape
-
-    from teleop_console.report.plain_page import plain_page
+    """Page with the episodes, the oddest first; odd cells are highlighted."""
+    from teleop_console.report.pages import Cell, Table, Text, page
     from teleop_lab.grading import ODD, WORST
 
-    head = "".join(f"<th>{escape(str(column))}</th>" for column in ("episode", *table.columns))
     rows = []
     for number, row in table.iterrows():
-        cells = [f"<td>{number}</td>"]
+        cells = [Cell(str(number))]
         for column, value in row.items():
             is_odd = column == row[WORST] and row[ODD] > 3.5
-            text = f"{value:.4g}" if isinstance(value, float) else str(value)
-            cells.append(f"<td{' class=odd' if is_odd else ''}>{escape(text)}</td>")
-        rows.append(f"<tr>{''.join(cells)}</tr>")
+            cells.append(Cell(f"{value:.4g}" if isinstance(value, float) else str(value), "odd" * is_odd))
+        rows.append(("", cells))
     text = "Oddest first: by how many robust standard deviations the oddest figure is off the median of all episodes."
-    table_html = f'<div class="card table"><table><tr>{head}</tr>{"".join(rows)}</table></div>'
-    return plain_page(name, [f'<p class="facts">{text}</p>', table_html])
+    heads = [Cell(str(column)) for column in ("episode", *table.columns)]
+    return page(name, [Text(text), Table([heads], rows)])

@@ -28,9 +28,9 @@ def people(
 
     A study is a YAML file, as of `teleop study`, with an entry `people`; then:
 
-        teleop people late.yaml --store late             opens the participant's page; prints the conductor's
-        teleop people late.yaml --store late             ended and called again, it goes on where it was
-        teleop people late.yaml --store late --compare   scores beside those of the simulated operator
+        teleop people late.yaml --store late            # opens the participant's page; prints the conductor's
+        teleop people late.yaml --store late            # ended and called again, it goes on where it was
+        teleop people late.yaml --store late --compare  # scores beside those of the simulated operator
         teleop people late.yaml --store late --compare --html late.html --csv late.csv
 
     Args:

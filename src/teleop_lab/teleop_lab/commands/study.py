@@ -38,8 +38,8 @@ def study(
 
     Then:
 
-        teleop study delay.yaml --explain               how many sessions, how long, how many bytes
-        teleop study delay.yaml --store delay           killed and called again, it goes on
+        teleop study delay.yaml --explain      # how many sessions, how long, how many bytes
+        teleop study delay.yaml --store delay  # killed and called again, it goes on
         teleop study delay.yaml --store delay --html delay.html --csv delay.csv
 
     Args:

@@ -35,7 +35,7 @@ def tune(
 
     Then:
 
-        teleop tune config/studies/scale.yaml --store best           killed and called again, it goes on
+        teleop tune config/studies/scale.yaml --store best  # killed and called again, it goes on
         teleop tune config/studies/scale.yaml --store best --trials 60 --html best.html
 
     Args:
