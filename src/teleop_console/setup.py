@@ -22,6 +22,7 @@ setup(
         "msgspec",
         "numpy",
         "plotly",
+        "segno",
         "viser>=1.1,<1.2",
     ],
     data_files=[

@@ -58,7 +58,7 @@ def test_json_holds_every_number_exactly(teleop_again: "Run", tmp_path: Path) ->
         (("resolution", "--html", "{folder}"), "is a directory"),
         (("resolution", "--html", "/proc/page.html"), "cannot be written"),
         (("resolution", "--seed", "-1"), "seed is -1"),
-        (("resolution", "--seed", "one"), "invalid int value"),
+        (("resolution", "--seed", "one"), "unable to convert"),
     ],
 )
 def test_wrong_use_is_told_in_one_line_and_writes_nothing(

@@ -5,6 +5,7 @@ import webbrowser
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import partial
+from ipaddress import ip_address
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -27,6 +28,7 @@ def console(
     port: int = 8080,
     host: str = "127.0.0.1",
     token: str = "",
+    qr: bool = False,
     no_browser: bool = False,
     scenario: str | None = None,
     out: Path | None = None,
@@ -44,8 +46,10 @@ def console(
         teleop console --attach               # a session that runs already
         teleop console bags/run_1             # replay a recording
 
-    The page is served to this machine alone. With --host others reach it, who need the token that is printed with the
-    address. One browser drives at a time; anybody may press the emergency stop.
+    The page is served to this machine alone, to those who know the address that is printed. With --host others reach
+    it. One browser drives at a time; anybody who has the address may press the emergency stop.
+
+        teleop console --host 0.0.0.0 --qr           # a phone opens the page from the code
 
     Args:
         bag: Recording to replay.
@@ -53,7 +57,8 @@ def console(
         domain: ROS domain of the session, for --attach.
         port: Port of the page.
         host: Network address of the page; by default it is reachable from this machine only.
-        token: Secret that opens the page; by default a new one with --host, else none.
+        token: Secret in the page's address, without which nothing is answered; by default a new one.
+        qr: Show the page's address as a QR code for a phone; needs --host with an address that the phone can reach.
         no_browser: Open no browser.
         scenario: Scenario, one of `teleop scenarios`; a person moves the hand.
         out: Directory of the recording; without it, a new one in bags.
@@ -61,6 +66,8 @@ def console(
             replaces slave_sim; may be repeated.
         settings: Values of parameters.
     """
+    if qr and is_loopback(host):
+        raise ParameterError("--qr", qr, "given with --host, such as --host 0.0.0.0: no phone reaches this address")
     if bag is not None and attach:
         raise ParameterError("BAG", str(bag), "left out with --attach, which shows a running session")
     from teleop_console.answers import Situation
@@ -74,6 +81,8 @@ def console(
         is_told = attach or bag is not None or told != Wish()
         server.answers.situation = Situation(doing="starting …" if is_told else "")
         print(f"console at {server.url}; Ctrl-C ends it", flush=True)
+        if qr:
+            _show_code(server.url_elsewhere)
         if not no_browser and not webbrowser.open(server.url):
             print("there is no browser here: open this address in one", flush=True)
         with suppress(KeyboardInterrupt):
@@ -85,6 +94,21 @@ def console(
             elif told != Wish() and not _drive(told, server):
                 return
             _choose(server)
+
+
+def is_loopback(host: str) -> bool:
+    """Whether only this machine can reach an address."""
+    try:
+        return ip_address(host).is_loopback
+    except ValueError:
+        return host == "localhost"
+
+
+def _show_code(url: str) -> None:
+    import segno
+
+    print(f"for a phone: {url}")
+    segno.make(url).terminal(compact=True)
 
 
 @dataclass(frozen=True)

@@ -38,7 +38,7 @@ def people(
         store: Directory that keeps recordings and answers.
         port: Port of the pages.
         host: Network address of the pages; by default they are reachable from this machine only.
-        token: Secret that opens the pages; by default a new one with --host, else none.
+        token: Secret in the pages' addresses, without which nothing is answered; by default a new one.
         no_browser: Open no browser.
         compare: Run the simulated operator and compare it with the people's answers; conduct no trials.
         outputs: Files with the trials, of --compare.

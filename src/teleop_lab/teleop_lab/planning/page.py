@@ -74,8 +74,9 @@ def _space(reach: Reach, followed: Followed) -> Figure:
         if (limits == cause).any()
     ]
     traces.append(in_space(walked.asked[:1, :3], "start", "#d6336c", 1.0, "markers", size=6, symbol="cross"))
-    sentence = f"{walked.share:.1%} within reach"
-    return Figure("in space", sentence, traces, {"scene": {**axes, "aspectmode": "cube"}}, 520)
+    legend = {"orientation": "h", "y": 1.02, "yanchor": "bottom", "itemsizing": "constant"}
+    layout = {"scene": {**axes, "aspectmode": "cube"}, "legend": legend}
+    return Figure("in space", f"{walked.share:.1%} within reach", traces, layout, 520)
 
 
 def _times(path: asked.AskedPath, walked: walk.Walked, sentence: str) -> Figure:
