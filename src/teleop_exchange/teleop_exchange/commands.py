@@ -101,8 +101,8 @@ def export(
 ) -> None:
     """Write recordings as tables or a data set.
 
-    Writes a recording as CSV or Parquet, with a column for each number of each topic over the time, or recordings as a
-    LeRobot data set (version 3.0 of its format, no pictures) with an episode each.
+    Writes a recording as CSV or Parquet, with a column for each number of each topic over the time. Or writes
+    recordings as a LeRobot data set (version 3.0 of its format, no pictures) with an episode each.
 
     For example:
 

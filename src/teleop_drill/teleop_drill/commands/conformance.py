@@ -29,8 +29,8 @@ def conformance(
         teleop conformance /PSM1               # asks before it moves anything
         teleop conformance slave --yes --json  # for programs
 
-    It pauses and resumes the arm, moves one joint by 0.01 rad (or 10 mm) and the tip by 3 mm, at most 0.02 rad/s and
-    6 mm/s where it chooses the speed, and goes back each time. Whatever it measures must follow what it was told, in
+    It pauses and resumes the arm, moves one joint by 0.01 rad (or 10 mm) and the tip by 3 mm, and goes back each time.
+    Where it chooses the speed, that is at most 0.02 rad/s and 6 mm/s. Whatever it measures must follow what it was told, in
     time and in place; its speeds must add up to its way. Efforts, forces and free are never tried. Stop whoever else
     commands the arm, and keep a hand at the emergency stop.
 
