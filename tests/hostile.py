@@ -223,7 +223,8 @@ def leaves_in_the_middle_of_a_message(watcher: PageClient, driver: PageClient) -
 def has_no_token(watcher: PageClient, driver: PageClient) -> None:
     for token in ("", "guess", TOKEN[:-1], TOKEN.upper(), TOKEN + "x"):
         for path in ("/", "/alive", "/stop", "/strip?begin=0&end=1&pixels=100", "/page?begin=1"):
-            assert ask(watcher.port, path, token=token, Teleop_Page="new", Cookie=f"teleop_console_1={TOKEN}")[0] == 403
+            assert ask(watcher.port, path, token=token, Teleop_Page="new")[0] == 403
+            assert ask(watcher.port, path, Teleop_Page="new", Cookie=f"teleop_console_1={TOKEN}")[0] == 403
         for _ in range(20):
             with pytest.raises(InvalidStatus):
                 PageClient(watcher.port, comes_up=False, token=token)

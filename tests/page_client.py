@@ -137,10 +137,10 @@ class PageClient:
 
 
 def ask(port: int, path: str, *, token: str = TOKEN, **headers: str) -> Any:
-    """Status and body of an answer to a request with a token and some headers."""
+    """Status and body of an answer to a request with a token, as a browser keeps it, and some headers."""
     connection = http.client.HTTPConnection("127.0.0.1", port, timeout=20)
-    path += ("&" if "?" in path else "?") + f"token={token}"
-    connection.request("GET", path, headers={n.replace("_", "-"): v for n, v in headers.items()})
+    told = {"Cookie": f"teleop_console_{port}={token}"} | {n.replace("_", "-"): v for n, v in headers.items()}
+    connection.request("GET", path, headers=told)
     answer = connection.getresponse()
     body = answer.read()
     connection.close()

@@ -274,6 +274,7 @@ def test_stop_is_answered_while_the_form_works_and_no_stranger_begins_a_session(
         foreign = {"Teleop_Page": driver.name, "Origin": "http://example.org"}
         assert ask(server.port, "/begin?operator=remote", **foreign)[0] == 403
         head = f"POST /robot?name=arm.urdf HTTP/1.1\r\nHost: 127.0.0.1:{server.port}\r\n"
+        head += f"Cookie: teleop_console_{server.port}={TOKEN}\r\n"
         slow = f"{head}Teleop-Page: {driver.name}\r\nContent-Length: 1000\r\n\r\n<"
         with socket.create_connection(("127.0.0.1", server.port)) as one:
             one.sendall(slow.encode())  # and then nothing
