@@ -172,7 +172,8 @@ def test_malformed_request_for_the_stop_is_none_and_ends_nothing(
     server, desk, _ = served
     pressed = desk.stops
     with socket.create_connection(("127.0.0.1", server.port), timeout=30) as guest:
-        guest.sendall(line + b"\r\nTeleop-Page: new\r\n\r\n")
+        host = f"Host: 127.0.0.1:{server.port}\r\nCookie: teleop_console_{server.port}={TOKEN}\r\n"
+        guest.sendall(line + b"\r\nTeleop-Page: new\r\n" + host.encode() + b"\r\n")
         guest.shutdown(socket.SHUT_WR)
         while guest.recv(4096):
             pass
