@@ -30,9 +30,9 @@ def conformance(
         teleop conformance slave --yes --json  # for programs
 
     It pauses and resumes the arm, moves one joint by 0.01 rad (or 10 mm) and the tip by 3 mm, and goes back each time.
-    Where it chooses the speed, that is at most 0.02 rad/s and 6 mm/s. Whatever it measures must follow what it was told, in
-    time and in place; its speeds must add up to its way. Efforts, forces and free are never tried. Stop whoever else
-    commands the arm, and keep a hand at the emergency stop.
+    Where it chooses the speed, that is at most 0.02 rad/s and 6 mm/s. Whatever it measures must follow what it was
+    told, in time and in place; its speeds must add up to its way. Efforts, forces and free are never tried. Stop
+    whoever else commands the arm, and keep a hand at the emergency stop.
 
     Verdicts: ok; absent, which is allowed; not tried, with the reason; noted, works but look at it; FAILED. The exit
     code is 1 if a row FAILED, else 3 if a row was not tried, as of an arm that is not enabled and homed, else 0.
