@@ -2,18 +2,15 @@
 
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from teleop_core.bags.finding import check_new
 from teleop_core.base.errors import ParameterError
 from teleop_core.commands.options import ros_module
 from teleop_core.nodes.crews import Processes
-
-if TYPE_CHECKING:
-    from teleop_drill.commands.drill import Options
+from teleop_drill.commands.options import Options
 
 
-def run_schedules(names: tuple[str, ...], options: "Options") -> int:
+def run_schedules(names: tuple[str, ...], options: Options) -> int:
     """Run the schedules; returns 1 if a law was broken.
 
     Raises:
