@@ -150,8 +150,6 @@ def test_stop_is_sent_while_the_loop_that_serves_the_pages_is_busy(
     try:
         assert stops(server, desk)
         assert ask(server.port, "/alive", Teleop_Page="new")[0] == 200
-        for path in ("/", "/stop", "/teleop.js"):  # pages without the token do not reach the loop
-            assert ask(server.port, path, token="guess", Teleop_Page="new")[0] == 403
     finally:
         goes_on.set()
 

@@ -1,9 +1,8 @@
 """Front: accepts the connections of the page's server, and answers the emergency stop without the event loop.
 
 One event loop processes the messages of all pages, so a stop would wait for all of them. Therefore a separate thread
-accepts the connections. It refuses requests without the token, and answers requests for the stop and signs of life
-immediately. Another thread answers slow requests, one after the other. All other connections are passed on to the event
-loop unread.
+accepts the connections. It answers requests for the stop and signs of life immediately. Another thread answers slow
+requests, one after the other. All other connections are passed on to the event loop unread.
 """
 
 import logging
@@ -51,8 +50,6 @@ class Front:
         opened: Listening socket; it is closed at the end.
         paths: Paths of requests that this object answers.
         answer: Function that answers one of these requests; called in a thread of this object.
-        token: Bytes without which no request is answered or passed on.
-        refusal: Answer to a request without these bytes.
         slow: Paths whose answers may take long; they do not delay other answers.
 
     Attributes:
@@ -60,16 +57,8 @@ class Front:
     """
 
     def __init__(
-        self,
-        opened: socket.socket,
-        paths: frozenset[str],
-        answer: Answer,
-        slow: frozenset[str],
-        token: bytes,
-        refusal: Response,
+        self, opened: socket.socket, paths: frozenset[str], answer: Answer, slow: frozenset[str] = frozenset()
     ) -> None:
-        refusal.headers["Connection"] = "close"
-        self._token, self._refusal = token, refusal.serialize()
         self._opened, self._paths, self._answer, self._slow = opened, paths, answer, slow
         self._line: queue.Queue[tuple[socket.socket, bytes] | None] = queue.Queue(_LINE)
         threading.Thread(target=self._work, name="console start", daemon=True).start()
@@ -129,28 +118,19 @@ class Front:
             data = b""
         line, is_line, _ = data.partition(b"\r\n")
         is_ours = bool(is_line) and _path(line) in self._paths
-        is_known = self._token in data  # the guard looks where it stands
-        is_whole = b"\r\n\r\n" in data if is_ours or not is_known else bool(is_line)
+        is_whole = b"\r\n\r\n" in data if is_ours else bool(is_line)
         if not data:
             self._drop(one)
         elif not is_whole and len(data) < _LARGEST:
             if one not in self._partial:  # otherwise the socket would always be readable
                 self._selector.unregister(one)
                 self._partial.add(one)
-        elif not is_known:
-            self._forget(one)
-            self._refuse(one)
         elif is_ours:
             self._forget(one)
             (self._later if _path(line) in self._slow else self._reply)(one, data)
         else:
             self._forget(one)
             self._pass_on(one)
-
-    def _refuse(self, one: socket.socket) -> None:
-        with one, suppress(OSError):
-            one.recv(_LARGEST)  # a connection that is closed with unread bytes loses the answer
-            one.sendall(self._refusal)
 
     def _later(self, one: socket.socket, data: bytes) -> None:
         try:

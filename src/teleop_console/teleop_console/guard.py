@@ -16,7 +16,6 @@ from urllib.parse import parse_qs, urlsplit
 
 from teleop_core.base.errors import ParameterError
 
-NO_TOKEN = "the token is missing or wrong: open the address that was printed at the start"
 HEADERS = {
     "Content-Security-Policy": (
         "default-src 'self' data: blob: 'unsafe-inline' 'unsafe-eval'; connect-src 'self' data: "
@@ -61,9 +60,6 @@ class Guard:
     The ports of Host and Origin are compared with each other, but not with our own port, because a browser may reach
     the page through a forwarded port. A browser cannot be made to send a Host to which it did not connect.
 
-    Attributes:
-        token: Secret that requests must contain.
-
     Args:
         port: Port of the server. It is part of the cookie's name, because all ports of a host share cookies.
         token: Secret that requests must contain.
@@ -75,7 +71,7 @@ class Guard:
     def __init__(self, port: int, token: str) -> None:
         if not re.fullmatch(r"[A-Za-z0-9._~-]+", token):
             raise ParameterError("token", token, "letters, digits and . _ ~ - only")
-        self.token = token
+        self._token = token
         self._cookie = f"teleop_console_{port}"
 
     def refusal(self, request: Request) -> str:
@@ -87,12 +83,12 @@ class Guard:
         if is_foreign or not _is_visit(request):
             return "only the console's own page may do this"
         if not self._has_token(request):
-            return NO_TOKEN
+            return "the token is missing or wrong: open the address that was printed at the start"
         return ""
 
     def cookie(self) -> str:
         """Value of Set-Cookie with which the page no longer needs the token in its address."""
-        return f"{self._cookie}={self.token}; Path=/; HttpOnly; SameSite=Strict"
+        return f"{self._cookie}={self._token}; Path=/; HttpOnly; SameSite=Strict"
 
     def _has_token(self, request: Request) -> bool:
         given = parse_qs(urlsplit(request.path).query).get("token", [])
@@ -102,7 +98,7 @@ class Guard:
             except CookieError:
                 continue
             given += [found.value] if found else []
-        return any(secrets.compare_digest(g.encode(), self.token.encode()) for g in given)
+        return any(secrets.compare_digest(g.encode(), self._token.encode()) for g in given)
 
 
 def _is_same(origins: Sequence[str], host: str) -> bool:

@@ -33,7 +33,7 @@ from teleop_console.connection import Connection, Crowd, Gate
 from teleop_console.drivers import Drivers
 from teleop_console.filter import FLOOD, LARGEST, NO_VALUE, WATCHES, Filter, Sets, decode
 from teleop_console.front import Body, Front
-from teleop_console.guard import HEADERS, NO_TOKEN, Guard
+from teleop_console.guard import HEADERS, Guard
 from teleop_console.guard import Request as Asked
 from teleop_core.base.errors import SessionError
 
@@ -88,8 +88,7 @@ class Server(viser.ViserServer):
     def __init__(self, opened: socket, guard: Guard, drivers: Drivers, answers: Answers, label: str) -> None:
         host, port = opened.getsockname()[:2]
         answer = partial(_answered, guard, answers)
-        refusal = answer_of(http.HTTPStatus.FORBIDDEN, f"{NO_TOKEN}\n".encode())
-        self._front = Front(opened, answers.paths, answer, answers.slow_paths, guard.token.encode(), refusal)
+        self._front = Front(opened, answers.paths, answer, answers.slow_paths)
         self._drivers, self._public = drivers, set[str]()
         self.filter = Filter(self, drivers.may_drive, _logger().warning)
         rich.get_console().quiet = True  # only viser writes to this console
