@@ -23,7 +23,6 @@ setup(
         "lazy_loader",
         "numpy",
         "pandas",
-        "plotly",
         "pyyaml",
         "rich",
         "scipy",

@@ -18,7 +18,7 @@ import teleop_lab
 import teleop_machines
 from named import shown_in_help
 from teleop_core.commands.cli import Call, parse
-from teleop_core.commands.options import Changes
+from teleop_core.commands.options import ParameterOptions
 from teleop_core.evaluation.score import keys
 from teleop_core.graph.layers import parse_setting
 from teleop_core.session import api, virtual
@@ -86,7 +86,7 @@ def test_every_relative_link_leads_somewhere(name: str) -> None:
 def settings_of(call: Call | None) -> list[str]:
     """Texts ``key=value`` of the settings of a command."""
     values = () if call is None else call.arguments.arguments.values()
-    return [text for value in values if isinstance(value, Changes) for text in value.texts]
+    return [text for value in values if isinstance(value, ParameterOptions) for text in value.texts]
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -12,7 +12,7 @@ from teleop_console import choices
 from teleop_console.choices import FIELDS, OWN, START, Chosen
 from teleop_core.base.errors import ParameterError
 from teleop_core.commands.cli import parse
-from teleop_core.commands.options import Settings
+from teleop_core.commands.options import SessionOptions
 from teleop_core.session.api import configuration
 from teleop_core.session.configuration import Configuration
 
@@ -34,7 +34,7 @@ def by_command(line: str) -> Configuration:
     call = parse(words[1:])
     assert call is not None
     told = call.arguments.arguments
-    settings = told.get("settings", Settings())
+    settings = told.get("settings", SessionOptions())
     return configuration(told.get("scenario"), files=settings.config, texts=[*OWN, *settings.texts])
 
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from teleop_console.folders import BAGS
 from teleop_core.base.errors import ParameterError, TeleopError
 from teleop_core.base.texts import printable
-from teleop_core.commands.options import Domain, Nodes, Settings, ros_module
+from teleop_core.commands.options import Domain, Nodes, SessionOptions, ros_module
 
 if TYPE_CHECKING:
     from teleop_console.server import ConsoleServer
@@ -33,7 +33,7 @@ def console(
     scenario: str | None = None,
     out: Path | None = None,
     without: Nodes = (),
-    settings: Settings = Settings(),
+    settings: SessionOptions = SessionOptions(),
 ) -> None:
     """See a session in the browser, drive it, replay a recording.
 
@@ -76,9 +76,9 @@ def console(
     from teleop_core.bags.finding import check_new
 
     check_new(out)
-    told = Wish(scenario, out, without, settings)
+    told = Launch(scenario, out, without, settings)
     with ConsoleServer(port, host, token) as server:
-        is_told = attach or bag is not None or told != Wish()
+        is_told = attach or bag is not None or told != Launch()
         server.answers.situation = Situation(doing="starting …" if is_told else "")
         print(f"console at {server.url}; Ctrl-C ends it", flush=True)
         if qr:
@@ -91,7 +91,7 @@ def console(
                 return
             if bag is not None:
                 replay(server, bag)
-            elif told != Wish() and not _drive(told, server):
+            elif told != Launch() and not _drive(told, server):
                 return
             _choose(server)
 
@@ -112,13 +112,13 @@ def _show_code(url: str) -> None:
 
 
 @dataclass(frozen=True)
-class Wish:
+class Launch:
     """Session to start."""
 
     scenario: str | None = None
     out: Path | None = None
     without: tuple[str, ...] = ()
-    settings: Settings = field(default_factory=Settings)
+    settings: SessionOptions = field(default_factory=SessionOptions)
 
     def configured(self, texts: list[str]) -> "Configuration":
         """Configuration of the session with ``texts`` in place of those of its settings."""
@@ -139,7 +139,9 @@ def _choose(server: "ConsoleServer") -> None:
             if wish.recording is not None:
                 replay(server, wish.recording)
             else:
-                _drive(Wish(wish.chosen.get("scenario"), settings=Settings(set_=tuple(texts(wish.chosen)))), server)
+                _drive(
+                    Launch(wish.chosen.get("scenario"), settings=SessionOptions(set_=tuple(texts(wish.chosen)))), server
+                )
         except TeleopError as error:
             start.told = f"It ended: {error}"
             print(printable(start.told), flush=True)
@@ -173,20 +175,20 @@ def _attach(asked: int | None, server: "ConsoleServer") -> None:
             Console(server, link).run(lambda: False)
 
 
-def _drive(wish: Wish, server: "ConsoleServer") -> bool:
+def _drive(launch: Launch, server: "ConsoleServer") -> bool:
     """Show sessions on the page, one after the other; returns whether the page ended the last session."""
     from teleop_console.choices import OWN
 
     ros_module("guest")
     from teleop_console.console_session import show_session
 
-    first = wish.out or BAGS / time.strftime("console_%Y%m%d_%H%M%S")
-    texts, number, wanted = [*OWN, *wish.settings.texts], 0, list[str]()
+    first = launch.out or BAGS / time.strftime("console_%Y%m%d_%H%M%S")
+    texts, number, wanted = [*OWN, *launch.settings.texts], 0, list[str]()
     start = server.answers.start
 
     def renew(more: tuple[str, ...]) -> str:
         try:
-            wish.configured([*texts, *more])
+            launch.configured([*texts, *more])
         except TeleopError as error:
             return str(error)
         wanted.extend(more)
@@ -195,9 +197,9 @@ def _drive(wish: Wish, server: "ConsoleServer") -> bool:
     while True:
         out = first if not number else first.with_name(f"{first.name}_session{number + 1}")
         wanted.clear()
-        configuration = wish.configured(texts)
+        configuration = launch.configured(texts)
         show_session(
-            server, configuration, out, lambda _: bool(wanted or start.is_ended), renew=renew, without=wish.without
+            server, configuration, out, lambda _: bool(wanted or start.is_ended), renew=renew, without=launch.without
         )
         print(f"{out}: recorded; next: teleop evaluate {out}", flush=True)
         if not wanted:

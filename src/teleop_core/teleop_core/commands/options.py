@@ -34,7 +34,7 @@ Domain = Annotated[int | None, Parameter(converter=_domain, metavar="N")]
 
 @Parameter(name="*")
 @dataclass(frozen=True, kw_only=True)
-class Changes:
+class ParameterOptions:
     """Options for files and values of parameters."""
 
     config: Files = ()
@@ -50,7 +50,7 @@ class Changes:
 
 @Parameter(name="*")
 @dataclass(frozen=True, kw_only=True)
-class Settings(Changes):
+class SessionOptions(ParameterOptions):
     """Options that configure a session."""
 
     robot: str | None = None

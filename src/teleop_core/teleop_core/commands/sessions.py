@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 from cyclopts import Parameter
 
 from teleop_core.base import SessionError, TeleopWarning
-from teleop_core.commands.options import Nodes, Settings, Words, done, ros_module
+from teleop_core.commands.options import Nodes, SessionOptions, Words, done, ros_module
 from teleop_core.commands.progress import shown_progress
 
 
@@ -21,7 +21,7 @@ def sim(
     scenario: str | None = None,
     duration: float | None = None,
     seed: int | None = None,
-    settings: Settings = Settings(),
+    settings: SessionOptions = SessionOptions(),
 ) -> None:
     """Run and record a session in virtual time.
 
@@ -58,7 +58,7 @@ def live(
     processes: Literal["sides", "nodes", "one"] = "sides",
     composed: Annotated[bool, Parameter(show_default=False)] = False,
     without: Nodes = (),
-    settings: Settings = Settings(),
+    settings: SessionOptions = SessionOptions(),
 ) -> None:
     """Run and record a session as ROS 2 nodes.
 
@@ -99,7 +99,7 @@ def replay(
     *,
     out: Path,
     begin: Annotated[Literal["device", "hand"], Parameter(name="--from")] = "device",
-    settings: Settings = Settings(),
+    settings: SessionOptions = SessionOptions(),
 ) -> None:
     """Run a recorded master through the graph again, in virtual time.
 

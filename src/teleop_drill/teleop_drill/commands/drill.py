@@ -10,7 +10,7 @@ from cyclopts import Parameter
 
 from teleop_core.bags.finding import check_new
 from teleop_core.base.errors import ParameterError
-from teleop_core.commands.options import Settings, ros_module
+from teleop_core.commands.options import SessionOptions, ros_module
 from teleop_drill.commands.options import Options
 
 if TYPE_CHECKING:
@@ -18,7 +18,9 @@ if TYPE_CHECKING:
 
 
 def drill(
-    *names: Annotated[str, Parameter(name="NAME")], options: Options = Options(), settings: Settings = Settings()
+    *names: Annotated[str, Parameter(name="NAME")],
+    options: Options = Options(),
+    settings: SessionOptions = SessionOptions(),
 ) -> int:
     """Inject all known faults into a running session, and measure the reaction of the arm.
 
@@ -69,7 +71,7 @@ def drill(
     return code
 
 
-def _outcomes(exercises: "tuple[Exercise, ...]", options: Options, settings: Settings) -> "list[Outcome]":
+def _outcomes(exercises: "tuple[Exercise, ...]", options: Options, settings: SessionOptions) -> "list[Outcome]":
     from rich.console import Console
 
     console = Console()

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from teleop_core.commands.options import Changes, Words
+from teleop_core.commands.options import ParameterOptions, Words
 
 
 def fit(
@@ -14,7 +14,7 @@ def fit(
     loss: str = "cauchy",
     json: Path | None = None,
     out: Path | None = None,
-    changes: Changes = Changes(),
+    changes: ParameterOptions = ParameterOptions(),
 ) -> None:
     """Fit friction, bias and weights of the hardware plant to where a machine came to rest.
 

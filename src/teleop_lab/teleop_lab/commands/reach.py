@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from teleop_core.base.errors import TeleopError
-from teleop_core.commands.options import Settings
+from teleop_core.commands.options import SessionOptions
 
 if TYPE_CHECKING:
     from teleop_lab.planning.reach_result import Reach
@@ -21,7 +21,7 @@ def reach(
     keep_axes: bool = False,
     html: Path | None = None,
     out: Path | None = None,
-    settings: Settings = Settings(),
+    settings: SessionOptions = SessionOptions(),
 ) -> None:
     """Say how much of a hand's motion a slave can follow, and propose where to put it.
 
@@ -59,7 +59,7 @@ def reach(
         print(f"parameters: {out}; take them with --config {out}")
 
 
-def _reach(source: str, arm: str, share: float, keep_axes: bool, settings: Settings) -> "Reach":
+def _reach(source: str, arm: str, share: float, keep_axes: bool, settings: SessionOptions) -> "Reach":
     from teleop_core.commands.progress import shown_progress
     from teleop_lab.planning.reach import reach as found_reach
 
