@@ -6,8 +6,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from teleop_console.commands import show_code
 from teleop_console.guard import Guard, Request, is_wildcard
 from teleop_core.base.errors import ParameterError
+from teleop_core.commands.cli import main
 
 
 def ask(guard: Guard, path: str = "/", is_socket: bool = False, **headers: str | list[str]) -> str:
@@ -98,3 +100,17 @@ def test_right_token_does_not_help_a_page_from_elsewhere() -> None:
 def test_wildcard_is_told_from_other_addresses() -> None:
     assert all(map(is_wildcard, ("0.0.0.0", "::", "")))
     assert not any(map(is_wildcard, ("127.0.0.1", "robot")))
+
+
+def test_code_for_a_phone_is_that_of_the_address_and_needs_an_address_that_a_phone_reaches(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    for words in ([], ["--host", "localhost"], ["--host", "127.0.0.2"]):
+        assert main(["console", "--no-browser", "--qr", *words]) == 2
+        assert "--host 0.0.0.0" in capsys.readouterr().err
+    url = "http://192.0.2.7:8080/?token=secret"
+    show_code(url)
+    told, *rows = capsys.readouterr().out.splitlines()
+    assert told == f"for a phone: {url}"
+    assert len(rows) > 10
+    assert len({len(row) for row in rows}) == 1

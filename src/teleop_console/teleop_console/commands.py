@@ -82,7 +82,7 @@ def console(
         server.answers.situation = Situation(doing="starting …" if is_told else "")
         print(f"console at {server.url}; Ctrl-C ends it", flush=True)
         if qr:
-            _show_code(server.url_elsewhere)
+            show_code(server.url_elsewhere)
         if not no_browser and not webbrowser.open(server.url):
             print("there is no browser here: open this address in one", flush=True)
         with suppress(KeyboardInterrupt):
@@ -104,7 +104,8 @@ def is_loopback(host: str) -> bool:
         return host == "localhost"
 
 
-def _show_code(url: str) -> None:
+def show_code(url: str) -> None:
+    """Print an address and its QR code for a terminal."""
     import segno
 
     print(f"for a phone: {url}")
