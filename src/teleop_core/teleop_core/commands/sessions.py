@@ -29,7 +29,7 @@ def sim(
 
         teleop sim --scenario coarse_box --out bags/coarse
         teleop sim --scenario wall --robot puma560 --out bags/wall
-        teleop sim --out bags/fine --duration 20 --set fine_gain=0.2 slave.command_timeout=0.2
+        teleop sim --out bags/fine --set fine_gain=0.2 slave.command_timeout=0.2
 
     Args:
         out: Directory for the recording; it must not exist yet.
