@@ -54,7 +54,7 @@ COMMANDS = {
     "teleop_core.commands.devices": {
         "devices": "List gamepads and 3-D mice of this machine, for --set operator=gamepad or spacemouse"
     },
-    "teleop_core.commands.compiling": {"compile": "Compile the kernels of built-in parts now, on all processors"},
+    "teleop_core.commands.compiling": {"compile": "Compile all kernels now, on all processors"},
     "teleop_console.commands": {"console": "See a session in the browser, drive it, replay a recording"},
     "teleop_exchange.commands": {
         "import": "Turn a file from another system into a recording",
