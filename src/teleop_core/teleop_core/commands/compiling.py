@@ -1,20 +1,13 @@
 """``teleop compile``: compiles the kernels of the built-in parts before a session needs them."""
 
-import argparse
 from collections.abc import Iterable, Iterator, Sequence
 from os import sched_getaffinity
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-from teleop_core.commands.arguments import command
-
 if TYPE_CHECKING:
     from teleop_core.session.configuration import Configuration
 
-_EPILOG = """\
-a session compiles what it needs and is not there yet; compiled before, it starts at once:
-  teleop compile                                        everything of teleop_core, for every arm and graph
-"""
 _FIRST = "coarse_box"
 
 
@@ -35,12 +28,13 @@ _PAIR = "pair"
 """Stage of a job for a server and its simulated arm as one object."""
 
 
-def add(commands: argparse._SubParsersAction) -> None:  # type: ignore[type-arg]
-    """Add the command's parser."""
-    command(commands, "compile", _run, "compile all kernels now, on all processors", _EPILOG)
+def compile_() -> None:
+    """Compile all kernels now, on all processors.
 
+    A session compiles what it needs and is not there yet; compiled before, it starts at once:
 
-def _run(_arguments: argparse.Namespace) -> int:
+        teleop compile  # everything of teleop_core, for every arm and graph
+    """
     from concurrent.futures import as_completed
 
     from teleop_core.base.workers import workers
@@ -57,7 +51,6 @@ def _run(_arguments: argparse.Namespace) -> int:
                 progress(done, total)
     prune()
     print(f"{compiled} kernels compiled" if compiled else "all kernels are there")
-    return 0
 
 
 def phases_of() -> Iterator[Sequence[Job]]:
