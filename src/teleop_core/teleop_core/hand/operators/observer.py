@@ -16,7 +16,7 @@ from teleop_core.hand.operators.glances import STILL_TIME, Glance, Glances
 from teleop_core.hand.operators.hand_room import HandRoom, TurnsOfHand, turned
 from teleop_core.hand.operators.observer_parameters import ObserverParameters
 from teleop_core.hand.operators.shapes import minimum_jerk
-from teleop_core.hand.operators.submovement import Move, Way
+from teleop_core.hand.operators.submovement import SURE, Doubt, Move, Way, chance_inside
 from teleop_core.hand.tasks import Act
 from teleop_core.kernels import Array, dot, length, product
 from teleop_core.kernels.axes import axis_map
@@ -62,6 +62,7 @@ class Observer:
         self._close = -math.inf  # time at which the hand closes for a moment [s]
         self._holds, self._since = False, -math.inf  # whether the hand stays closed, and since which time [s]
         self._lag = -1.0  # delay with which the last motion was seen, without the eye's delay [s]; < 0: not known
+        self._doubt: Doubt = SURE  # of the seen place of the tip
 
     def __call__(self, times: Array) -> Array:
         """Rows (N, 13) of :data:`~teleop_core.hand.operators.Motion` for times (N,) [s]."""
@@ -105,30 +106,51 @@ class Observer:
         width, act = float(task[_WIDTH]), int(task[_ACT])
         if task[_NUMBER] != self._number and act != Act.PASS:
             self._number = float(task[_NUMBER])
-            self._next = now + p.reaction
+            self._next, self._doubt = now + p.reaction, SURE
         when = max(self._next, self._seen_at(until), now)
         if when > until:
             return False
         glance = self._glances.at(when)
         way = self._way(glance)
         off, turn = float(length(way.step)), float(length(way.turn))
-        if act != Act.PASS and off <= 0.5 * width and turn <= 0.5 * task[_TURN]:
+        if act != Act.PASS and self._is_worth_it(off, turn):
             self._press(when, act)
         elif off > _SHORTEST * width or turn > _SHORTEST * task[_TURN] or abs(way.missing) > _SHORTEST:
-            self._begin(when, glance, way)
+            ahead = self._velocity() * self._time_of_look() if act == Act.PRESS else 0.0
+            self._begin(when, glance, way._replace(step=way.step + ahead))
             return True
+        elif act != Act.PASS:  # inside, but not sure: look again
+            self._next, self._doubt = when + self._time_of_look(), SURE
         return False
+
+    def _is_worth_it(self, off: float, turn: float) -> bool:
+        """Whether to press now, believed ``off`` [m] and ``turn`` [rad] beside the goal, rather than to look again."""
+        p, task, doubt, width = self._p, self._seen.task, self._doubt, float(self._seen.task[_WIDTH])
+        extrapolated = p.noise / p.least_time * float(length(self._velocity())) * self._time_of_look()
+        chance = chance_inside(off, math.hypot(doubt.spread, extrapolated), width)
+        later = chance_inside(0.0, extrapolated, width)  # 1 for a goal at rest
+        if task[_TURN] > 0.0:
+            chance *= chance_inside(turn, doubt.turn_spread, float(task[_TURN]))
+        return (later - chance) * p.error_cost < self._time_of_look()
+
+    def _time_of_look(self) -> float:
+        """Time of another submovement and of seeing its end [s]; a lag that is not known yet counts as none."""
+        return self._p.least_time + max(self._lag, 0.0) + self._p.eye
+
+    def _velocity(self) -> Array:
+        """Velocity of a goal that moves (3,) [m/s]; zero for a goal of the jaw, which follows the block in a hand."""
+        is_led = int(self._seen.task[_ACT]) in (Act.PRESS, Act.PASS)
+        return self._glances.speed_of_goal(float(self._seen.task[_WIDTH])) if is_led else np.zeros(3)
 
     def _way(self, glance: Glance) -> Way:
         """The motion to be made, from the data seen and, during a press, from the force felt."""
         p, task, turn, lever, missing = self._p, self._seen.task, np.zeros(3), 0.0, 0.0
         is_moving = int(task[_ACT]) == Act.PASS
         goal = glance.goal if is_moving else task[_GOAL : _GOAL + 3]
-        step = goal - glance.tip[:3]
-        if is_moving:
-            step = step + self._glances.speed_of_goal(float(task[_WIDTH])) * (p.eye + p.least_time)
+        lead = p.eye + p.least_time if is_moving else max(self._lag, 0.0)
+        step = goal - glance.tip[:3] + self._doubt.place + lead * self._velocity()
         if task[_TURN] > 0.0:
-            turn = self._turns_of_hand.of_tip(glance.tip[3:], task[_ATTITUDE : _ATTITUDE + 4])
+            turn = self._turns_of_hand.of_tip(glance.tip[3:], task[_ATTITUDE : _ATTITUDE + 4]) + self._doubt.turn
             lever = float(task[_WIDTH] / task[_TURN])
         felt = float(length(glance.force))
         if task[_FORCE] > 0.0 and felt >= _FELT:
@@ -227,19 +249,20 @@ class Observer:
         p = self._p
         if self._lag < 0.0:
             return p.longest_wait
-        return min(p.longest_wait, p.eye + 1.5 * self._lag + p.reaction)
+        return min(p.longest_wait, 2.0 * p.eye + 1.5 * self._lag + p.least_time)
 
     def _begin(self, now: float, seen: Glance, way: Way) -> None:
         """Begin a submovement; bring the hand back instead if the hand or the arm is at the end of its range."""
-        p, task = self._p, self._seen.task
-        gain, width = float(self._seen.state[STATE["gain"]]) or 1.0, float(task[_WIDTH])
+        p = self._p
+        gain = float(self._seen.state[STATE["gain"]]) or 1.0
+        if way.missing == 0.0:
+            way = way._replace(step=(1.0 - p.undershoot) * way.step, turn=(1.0 - p.undershoot) * way.turn)
         distance, angle = float(length(way.step)), float(length(way.turn))
-        duration = p.least_time + p.time_per_bit * math.log2(distance / width + 1.0)
-        duration = max(duration, distance / gain / p.fastest, self._careful(seen.tip[:3], way.step))
-        if angle > 0.0:
-            bits = p.time_per_bit * math.log2(angle / float(task[_TURN]) + 1.0)
-            duration = max(duration, p.least_time + bits, angle / p.fastest_turn)
-        ended = Way(self._ended(way.step, duration), self._ended(way.turn, duration) if angle else way.turn, way.lever)
+        duration = max(p.least_time, distance / gain / p.fastest, angle / p.fastest_turn)
+        duration = max(duration, self._careful(seen.tip[:3], way.step))
+        step_noise = self._noise(way.step, duration)
+        turn_noise = self._noise(way.turn, duration) if angle else np.zeros(3)
+        ended = Way(way.step + step_noise, way.turn + turn_noise, way.lever)
         step = product(self._hand_of_slave, ended.step) / gain
         turn = self._turns_of_hand.of_hand(ended.turn, self._hand[3:]) if angle else way.turn
         was_back, fits = self._move is not None and self._move.is_clutched, self._room.share(self._hand, step, turn)
@@ -252,11 +275,10 @@ class Observer:
         if self._move is not None and self._was_felt:
             seen, unseen = seen._replace(tip=self._move.seen.tip), unseen + self._move.unseen
         self._go(Move(now, duration, self._hand, fits * step, fits * turn, seen, ended, unseen))
-        spread = p.noise * distance / duration
-        missed = math.erfc(0.5 * width / (math.sqrt(2.0) * max(spread, 1e-12)))
-        is_press = int(task[_ACT]) == Act.PRESS and p.error_cost > 0.0
-        if is_press and missed * p.error_cost < max(self._lag, 0.0) + p.eye:
-            self._press(now + duration, Act.PRESS)
+        # As uncertain as the movement itself: the operator decides before it has seen all of the end.
+        turn_doubt = self._noise(way.turn, duration) if angle else SURE.turn
+        spread = p.noise / duration
+        self._doubt = Doubt(self._noise(way.step, duration), turn_doubt, spread * distance, spread * angle)
 
     def _careful(self, tip: Array, step: Array) -> float:
         """Duration [s] at which the noise of a step (3,) [m] does not reach walls or edges; 0 without walls and edges.
@@ -273,12 +295,12 @@ class Observer:
             slowest = max(slowest, float((lean / np.maximum(gap, 0.5 * task[_WIDTH])).max()))
         return _SURE * p.noise * slowest
 
-    def _ended(self, way: Array, duration: float) -> Array:
-        """A displacement or rotation (3,) with the noise of a hand that makes it in ``duration`` [s]."""
+    def _noise(self, way: Array, duration: float) -> Array:
+        """Error of the end (3,) of a displacement [m] or rotation [rad] that the hand makes in ``duration`` [s]."""
         p, distance, noise = self._p, float(length(way)), self._rng.standard_normal(3)
         along = way / max(distance, 1e-12)
         ahead = along * float(dot(along, noise))
-        return way + p.noise * distance / duration * (ahead + p.noise_across * (noise - ahead))
+        return p.noise * distance / duration * (ahead + p.noise_across * (noise - ahead))
 
     def _bring_back(self, now: float, seen: Glance, step: Array, turn: Array) -> None:
         """Clutch, and bring the hand to the pose with most room for a step (3,) [m] and a turn (3,) [rad]."""

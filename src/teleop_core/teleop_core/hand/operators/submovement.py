@@ -1,5 +1,6 @@
-"""Submovement: one movement of an operator who corrects by sight, and the wanted displacement."""
+"""Submovement: one movement of an operator who corrects by sight, the wanted displacement, and the doubt after it."""
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -34,3 +35,28 @@ class Move(NamedTuple):
     way: Way  # path of the tip, as the hand feels it
     unseen: Array  # motions that were felt but not yet seen, including this one (6,) [m]
     is_clutched: bool = False  # the slave does not follow
+
+
+class Doubt(NamedTuple):
+    """Error of the seen place of the tip, and the standard deviation that the operator knows of it."""
+
+    place: Array  # (3,) [m]
+    turn: Array  # (3,) [rad]
+    spread: float = 0.0  # [m]
+    turn_spread: float = 0.0  # [rad]
+
+
+SURE = Doubt(np.zeros(3), np.zeros(3))
+"""No doubt: the tip was seen at rest."""
+
+
+def chance_inside(off: float, spread: float, width: float) -> float:
+    """Probability that a place with a normal error lies within a width.
+
+    Args:
+        off: Believed distance from the middle [m or rad].
+        spread: Standard deviation of the error, in the same unit; 0: no error.
+        width: Width, in the same unit.
+    """
+    scale = math.sqrt(2.0) * max(spread, 1e-12)
+    return 0.5 * (math.erf((0.5 * width - off) / scale) + math.erf((0.5 * width + off) / scale))
