@@ -5,13 +5,11 @@ with a lag. :mod:`teleop_lab.experiments.operator_models` fits all of them to Ma
 """
 
 import math
-from collections.abc import Callable
-from typing import NamedTuple
 
 import numpy as np
 
 from teleop_core.hand.operators.observer_parameters import ObserverParameters
-from teleop_core.kernels import kernel
+from teleop_core.kernels import inner, kernel
 from teleop_core.kernels.geometry import Array
 
 LAGS = np.array([0.0083, 0.025, 0.075, 0.225])
@@ -27,82 +25,70 @@ BITS = np.log2(TARGETS[:, 0] / TARGETS[:, 1] + 1.0)
 INTERCEPT = 0.230
 SLOPES = 0.169 + 1.03 * LAGS
 """Their printed law: a time is the intercept [s] plus the lag's slope [s/bit] times the bits."""
+PRESSES = 1500
+"""Number of presses at each target and lag."""
 _MOST = 40  # looks at a target, which nobody reaches
 _SHORTEST = 0.1  # as in the operator
-_PRESSES = 1500
-_RNG = np.random.default_rng(5).standard_normal((_PRESSES, _MOST, 6))
-_RNG.setflags(write=False)
+TIME, OFF, HIT, LOOKS, IS_HIT = range(5)
+"""Columns of a press: time of the first press [s], where it ended along the way relative to the middle of the target,
+time of the press that hits [s], submovements until the first press, and whether the first press hits."""
 
 
-class Pressed(NamedTuple):
-    """Presses of a model in cells.
-
-    Attributes:
-        time: Mean time of a press [s].
-        miss: Share of presses outside of the target.
-        looks: Mean number of submovements.
-        spread: Standard deviation of the end along the way, divided by the width.
-    """
-
-    time: Array
-    miss: Array
-    looks: Array
-    spread: Array
+@inner
+def _one_look(p: Array, width: float, lag: float, noise: Array, off: Array, seen: Array) -> bool:
+    """Make one submovement, then decide whether to press; the offset and the seen offset (3,) are written."""
+    eye, _, last, undershoot, per_speed, across, cost = p[:7]
+    far = math.sqrt(seen[0] * seen[0] + seen[1] * seen[1] + seen[2] * seen[2])
+    spread, ahead, doubt, square, passed = 0.0, 0.0, 0.0, 0.0, 0.0
+    if far > _SHORTEST * width:
+        passed = 1.0 - undershoot
+        spread = per_speed * passed * far / last
+        for i in range(int(p[7])):
+            ahead += noise[i] * seen[i] / far
+            doubt += noise[3 + i] * seen[i] / far
+    for i in range(int(p[7])):
+        along = seen[i] / max(far, 1e-12)
+        off[i] -= passed * seen[i] + spread * (ahead * along + across * (noise[i] - ahead * along))
+        seen[i] = off[i] + spread * (doubt * along + across * (noise[3 + i] - doubt * along))
+        square += seen[i] * seen[i]
+    beside, scale = math.sqrt(square), math.sqrt(2.0) * max(spread, 1e-12)
+    chance = math.erf((0.5 * width - beside) / scale) + math.erf((0.5 * width + beside) / scale)
+    return (1.0 - 0.5 * chance) * cost < last + lag + eye
 
 
 @kernel
 def look_and_move(p: Array, way: float, width: float, lag: float, noise: Array, found: Array) -> None:
-    """Simulate presses, by the rules of the operator, and write the fields of :class:`Pressed`.
+    """Simulate presses at a target, by the rules of the operator.
 
     Args:
-        p: eye, reaction, least_time, undershoot, noise, noise_across and error_cost of the operator, then the
-            number of dimensions, 1 to 3.
+        p: eye, reaction, least_time, undershoot, noise, noise_across and error_cost of the operator, then the number
+            of dimensions, 1 to 3.
         way: Distance of the target.
         width: Width of the target, in the same unit.
         lag: Lag with which the tip is seen [s].
         noise: Standard normal numbers (presses, looks, 6): of the submovement, then of what is seen of it.
-        found: Results (4,); written.
+        found: Presses (presses, 5), with the columns :data:`TIME` to :data:`IS_HIT`; written.
     """
-    eye, reaction, last, undershoot, per_speed, across, cost = p[:7]
-    n, off, seen = int(p[7]), np.zeros(3), np.zeros(3)
-    ends = ends_squared = 0.0
-    found[:] = 0.0
+    off, seen = np.zeros(3), np.zeros(3)
     for k in range(noise.shape[0]):
         off[:] = 0.0
         off[0] = way
         seen[:] = off
-        found[0] += reaction
+        time, is_first = p[1], True
         for j in range(noise.shape[1]):
-            far = math.sqrt(seen[0] * seen[0] + seen[1] * seen[1] + seen[2] * seen[2])
-            spread, ahead, doubt, square = 0.0, 0.0, 0.0, 0.0
-            if far > _SHORTEST * width:
-                spread = per_speed * (1.0 - undershoot) * far / last
-                for i in range(n):
-                    ahead += noise[k, j, i] * seen[i] / far
-                    doubt += noise[k, j, 3 + i] * seen[i] / far
-            for i in range(n):
-                along = seen[i] / max(far, 1e-12)
-                if spread > 0.0:
-                    off[i] -= (1.0 - undershoot) * seen[i]
-                off[i] -= spread * (ahead * along + across * (noise[k, j, i] - ahead * along))
-                seen[i] = off[i] + spread * (doubt * along + across * (noise[k, j, 3 + i] - doubt * along))
-                square += seen[i] * seen[i]
-            look = last + lag + eye
-            found[0] += look
-            found[2] += 1.0
-            scale = math.sqrt(2.0) * max(spread, 1e-12)
-            beside = math.sqrt(square)
-            chance = math.erf((0.5 * width - beside) / scale) + math.erf((0.5 * width + beside) / scale)
-            if (1.0 - 0.5 * chance) * cost < look:
+            time += p[2] + lag + p[0]
+            if not _one_look(p, width, lag, noise[k, j], off, seen) and j < noise.shape[1] - 1:
+                continue
+            is_hit = math.sqrt(off[0] * off[0] + off[1] * off[1] + off[2] * off[2]) <= 0.5 * width
+            if is_first:
+                found[k, TIME], found[k, OFF], found[k, LOOKS] = time, off[0], j + 1.0
+                found[k, IS_HIT] = 1.0 if is_hit else 0.0
+                is_first = False
+            found[k, HIT] = time
+            if is_hit:
                 break
-        if math.sqrt(off[0] * off[0] + off[1] * off[1] + off[2] * off[2]) > 0.5 * width:
-            found[1] += 1.0
-        ends += off[0]
-        ends_squared += off[0] * off[0]
-    for i in range(3):
-        found[i] /= noise.shape[0]
-    ends /= noise.shape[0]
-    found[3] = math.sqrt(max(ends_squared / noise.shape[0] - ends * ends, 0.0)) / width
+            time += p[1]
+            seen[:] = off
 
 
 FITTED = ("reaction", "least_time", "undershoot", "noise", "error_cost")
@@ -119,10 +105,9 @@ def constants(fitted: Array | None = None, dimensions: int = 2) -> Array:
     return np.array([*(values[name] for name in names), float(dimensions)])
 
 
-def presses(p: Array, targets: Array = TARGETS, lags: Array = LAGS, noise: Array = _RNG) -> Pressed:
-    """Presses by lag and target (lags, targets), by constants of :func:`constants`."""
-    found = np.empty((len(lags), len(targets), 4))
-    for i, lag in enumerate(lags):
-        for j, (way, width) in enumerate(targets):
-            look_and_move(p, way, width, lag, noise, found[i, j])
-    return Pressed(*np.moveaxis(found, -1, 0))
+def presses(p: Array, way: float, width: float, lag: float, seed: int = 1, count: int = PRESSES) -> Array:
+    """Presses (count, 5) at a target, by constants of :func:`constants`."""
+    found = np.empty((count, 5))
+    noise = np.random.default_rng(seed).standard_normal((count, _MOST, 6))
+    look_and_move(p, way, width, lag, noise, found)
+    return found

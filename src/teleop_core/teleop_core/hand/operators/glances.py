@@ -41,6 +41,10 @@ class Glances:
         while len(kept) > 2 and kept[1].time <= now - self._eye - STILL_TIME:
             kept.popleft()
 
+    def covers(self, when: float) -> bool:
+        """Whether the glance that can be used at a time [s] was taken."""
+        return bool(self._kept) and self._kept[0].time <= when - self._eye
+
     def at(self, when: float) -> Glance:
         """Glance that can be used at a time [s]: the data one eye delay earlier, interpolated between two glances."""
         at, kept = when - self._eye, self._kept

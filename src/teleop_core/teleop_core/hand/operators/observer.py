@@ -116,8 +116,10 @@ class Observer:
         if act != Act.PASS and self._is_worth_it(off, turn):
             self._press(when, act)
         elif off > _SHORTEST * width or turn > _SHORTEST * task[_TURN] or abs(way.missing) > _SHORTEST:
-            ahead = self._velocity() * self._time_of_look() if act == Act.PRESS else 0.0
-            self._begin(when, glance, way._replace(step=way.step + ahead))
+            ahead = self._velocity() * self._time_of_look() if act == Act.PRESS else np.zeros(3)
+            # Of the way that the goal will go meanwhile nothing is left on purpose.
+            step = way.step + ahead / (1.0 - self._p.undershoot)
+            self._begin(when, glance, way._replace(step=step))
             return True
         elif act != Act.PASS:  # inside, but not sure: look again
             self._next, self._doubt = when + self._time_of_look(), SURE
@@ -207,7 +209,8 @@ class Observer:
     def _is_at_rest(self, until: float) -> bool:
         """Whether the operator recently saw the tip at rest."""
         gone = self._gone(self._glances.at(until - STILL_TIME), self._glances.at(until))
-        return bool(length(gone) <= _STILL * self._seen.task[_WIDTH])
+        is_seen = self._glances.covers(until - STILL_TIME)
+        return is_seen and bool(length(gone) <= _STILL * self._seen.task[_WIDTH])
 
     def _is_felt(self, move: Move, when: float, until: float) -> bool:
         """Whether the force at rest already shows the result of a submovement, and not the force before it."""
@@ -255,30 +258,31 @@ class Observer:
         """Begin a submovement; bring the hand back instead if the hand or the arm is at the end of its range."""
         p = self._p
         gain = float(self._seen.state[STATE["gain"]]) or 1.0
-        if way.missing == 0.0:
-            way = way._replace(step=(1.0 - p.undershoot) * way.step, turn=(1.0 - p.undershoot) * way.turn)
-        distance, angle = float(length(way.step)), float(length(way.turn))
-        duration = max(p.least_time, distance / gain / p.fastest, angle / p.fastest_turn)
-        duration = max(duration, self._careful(seen.tip[:3], way.step))
-        step_noise = self._noise(way.step, duration)
-        turn_noise = self._noise(way.turn, duration) if angle else np.zeros(3)
-        ended = Way(way.step + step_noise, way.turn + turn_noise, way.lever)
-        step = product(self._hand_of_slave, ended.step) / gain
-        turn = self._turns_of_hand.of_hand(ended.turn, self._hand[3:]) if angle else way.turn
+        step = product(self._hand_of_slave, way.step) / gain
+        turn = self._turns_of_hand.of_hand(way.turn, self._hand[3:]) if way.turn.any() else way.turn
         was_back, fits = self._move is not None and self._move.is_clutched, self._room.share(self._hand, step, turn)
         has_stopped = self._seen.state[STATE["limit"]] in _ENDS and self._move is not None
         if ((has_stopped and math.isinf(self._half_seen)) or fits < 1.0) and not was_back:
             self._bring_back(now, seen, *(fits < 1.0) * np.stack((step, turn)))
             return
+        share = min(fits, 1.0 - p.undershoot) if way.missing == 0.0 else fits
+        way = Way(share * way.step, share * way.turn, way.lever)
+        distance, angle = float(length(way.step)), float(length(way.turn))
+        duration = max(p.least_time, distance / gain / p.fastest, angle / p.fastest_turn)
+        duration = max(duration, self._careful(seen.tip[:3], way.step))
+        ended = Way(way.step + self._noise(way.step, duration), way.turn + self._noise(way.turn, duration), way.lever)
+        step = product(self._hand_of_slave, ended.step) / gain
+        turn = self._turns_of_hand.of_hand(ended.turn, self._hand[3:]) if angle else way.turn
+        fits = max(self._room.share(self._hand, step, turn), 0.1)  # noise may lead beyond the room
         ended = Way(fits * ended.step, fits * ended.turn, way.lever)
         unseen = ended.both
         if self._move is not None and self._was_felt:
             seen, unseen = seen._replace(tip=self._move.seen.tip), unseen + self._move.unseen
         self._go(Move(now, duration, self._hand, fits * step, fits * turn, seen, ended, unseen))
         # As uncertain as the movement itself: the operator decides before it has seen all of the end.
-        turn_doubt = self._noise(way.turn, duration) if angle else SURE.turn
         spread = p.noise / duration
-        self._doubt = Doubt(self._noise(way.step, duration), turn_doubt, spread * distance, spread * angle)
+        doubts = self._noise(way.step, duration), self._noise(way.turn, duration)
+        self._doubt = Doubt(*doubts, spread * distance, spread * angle)
 
     def _careful(self, tip: Array, step: Array) -> float:
         """Duration [s] at which the noise of a step (3,) [m] does not reach walls or edges; 0 without walls and edges.
@@ -297,8 +301,10 @@ class Observer:
 
     def _noise(self, way: Array, duration: float) -> Array:
         """Error of the end (3,) of a displacement [m] or rotation [rad] that the hand makes in ``duration`` [s]."""
+        if not way.any():
+            return way
         p, distance, noise = self._p, float(length(way)), self._rng.standard_normal(3)
-        along = way / max(distance, 1e-12)
+        along = way / distance
         ahead = along * float(dot(along, noise))
         return p.noise * distance / duration * (ahead + p.noise_across * (noise - ahead))
 

@@ -24,12 +24,15 @@ class ObserverParameters:
         "time from a new goal, whose place is expected, to the first submovement",
         source=_FITTED,
     )
-    least_time: float = fixed(0.105, Within(0.02, 1.0, "s"), "shortest duration of a submovement", source=_FITTED)
+    least_time: float = fixed(0.102, Within(0.02, 1.0, "s"), "shortest duration of a submovement", source=_FITTED)
     undershoot: float = fixed(
-        0.325, Within(0.0, 0.9), "share of the distance to the goal that a submovement leaves on purpose", source=_FITTED
+        0.315,
+        Within(0.0, 0.9),
+        "share of the distance to the goal that a submovement leaves on purpose",
+        source=_FITTED,
     )
     noise: float = fixed(
-        0.02,
+        0.0194,
         Within(0.0, 0.5, "s"),
         "standard deviation of a submovement's end along its direction, divided by its mean speed",
         source=_FITTED + "; linear in speed: Meyer et al. 1988",
