@@ -29,9 +29,9 @@ PRESSES = 1500
 """Number of presses at each target and lag."""
 _MOST = 40  # looks at a target, which nobody reaches
 _SHORTEST = 0.1  # as in the operator
-TIME, OFF, HIT, LOOKS, IS_HIT = range(5)
+TIME, OFF, HIT, LOOKS, BESIDE = range(5)
 """Columns of a press: time of the first press [s], where it ended along the way relative to the middle of the target,
-time of the press that hits [s], submovements until the first press, and whether the first press hits."""
+time of the press that hits [s], submovements until the first press, and distance of the first press from the middle of the target."""
 
 
 @inner
@@ -67,7 +67,7 @@ def look_and_move(p: Array, way: float, width: float, lag: float, noise: Array, 
         width: Width of the target, in the same unit.
         lag: Lag with which the tip is seen [s].
         noise: Standard normal numbers (presses, looks, 6): of the submovement, then of what is seen of it.
-        found: Presses (presses, 5), with the columns :data:`TIME` to :data:`IS_HIT`; written.
+        found: Presses (presses, 5), with the columns :data:`TIME` to :data:`BESIDE`; written.
     """
     off, seen = np.zeros(3), np.zeros(3)
     for k in range(noise.shape[0]):
@@ -79,13 +79,13 @@ def look_and_move(p: Array, way: float, width: float, lag: float, noise: Array, 
             time += p[2] + lag + p[0]
             if not _one_look(p, width, lag, noise[k, j], off, seen) and j < noise.shape[1] - 1:
                 continue
-            is_hit = math.sqrt(off[0] * off[0] + off[1] * off[1] + off[2] * off[2]) <= 0.5 * width
+            beside = math.sqrt(off[0] * off[0] + off[1] * off[1] + off[2] * off[2])
             if is_first:
                 found[k, TIME], found[k, OFF], found[k, LOOKS] = time, off[0], j + 1.0
-                found[k, IS_HIT] = 1.0 if is_hit else 0.0
+                found[k, BESIDE] = beside
                 is_first = False
             found[k, HIT] = time
-            if is_hit:
+            if beside <= 0.5 * width:
                 break
             time += p[1]
             seen[:] = off

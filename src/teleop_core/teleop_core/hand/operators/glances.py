@@ -62,9 +62,33 @@ class Glances:
 
     def speed_of_goal(self, width: float) -> Array:
         """Velocity of the goal (3,) [m/s] since the goal last jumped by more than its width [m]."""
-        first = last = self._kept[-1]
+        seen = self._since_jump(width)
+        return _speed(seen[0], seen[-1])
+
+    def way_of_goal(self, width: float, time: float) -> Array:
+        """Way (3,) [m] that the goal will go in a time [s], if it goes on to accelerate as it was seen to do.
+
+        Args:
+            width: Width of the goal [m]; after a jump by more than this the memory begins anew.
+            time: Time from now on [s].
+        """
+        seen = self._since_jump(width)
+        first, middle, last = seen[0], seen[len(seen) // 2], seen[-1]
+        lasted = last.time - first.time
+        acceleration = (_speed(middle, last) - _speed(first, middle)) / max(0.5 * lasted, 1e-9)
+        now = _speed(first, last) + 0.5 * lasted * acceleration
+        return time * now + 0.5 * time * time * acceleration
+
+    def _since_jump(self, width: float) -> list[Glance]:
+        """Glances since the goal last jumped by more than its width [m]; at least one."""
+        seen = [self._kept[-1]]
         for glance in reversed(self._kept):
-            if float(length(first.goal - glance.goal)) > width:
+            if float(length(seen[-1].goal - glance.goal)) > width:
                 break
-            first = glance
-        return (last.goal - first.goal) / max(last.time - first.time, 1e-9)
+            seen.append(glance)
+        return seen[:0:-1] or seen
+
+
+def _speed(a: Glance, b: Glance) -> Array:
+    """Mean velocity of the goal (3,) [m/s] between two glances; zero if they are the same."""
+    return (b.goal - a.goal) / max(b.time - a.time, 1e-9)

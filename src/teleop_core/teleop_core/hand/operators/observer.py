@@ -116,10 +116,11 @@ class Observer:
         if act != Act.PASS and self._is_worth_it(off, turn):
             self._press(when, act)
         elif off > _SHORTEST * width or turn > _SHORTEST * task[_TURN] or abs(way.missing) > _SHORTEST:
-            ahead = self._velocity() * self._time_of_look() if act == Act.PRESS else np.zeros(3)
             # Of the way that the goal will go meanwhile nothing is left on purpose.
-            step = way.step + ahead / (1.0 - self._p.undershoot)
-            self._begin(when, glance, way._replace(step=step))
+            ahead = self._way_of_goal(max(self._lag, 0.0) + self._time_of_look()) - self._way_of_goal(
+                max(self._lag, 0.0)
+            )
+            self._begin(when, glance, way._replace(step=way.step + ahead / (1.0 - self._p.undershoot)))
             return True
         elif act != Act.PASS:  # inside, but not sure: look again
             self._next, self._doubt = when + self._time_of_look(), SURE
@@ -128,7 +129,7 @@ class Observer:
     def _is_worth_it(self, off: float, turn: float) -> bool:
         """Whether to press now, believed ``off`` [m] and ``turn`` [rad] beside the goal, rather than to look again."""
         p, task, doubt, width = self._p, self._seen.task, self._doubt, float(self._seen.task[_WIDTH])
-        extrapolated = p.noise / p.least_time * float(length(self._velocity())) * self._time_of_look()
+        extrapolated = p.noise / p.least_time * float(length(self._way_of_goal(self._time_of_look())))
         chance = chance_inside(off, math.hypot(doubt.spread, extrapolated), width)
         later = chance_inside(0.0, extrapolated, width)  # 1 for a goal at rest
         if task[_TURN] > 0.0:
@@ -139,18 +140,22 @@ class Observer:
         """Time of another submovement and of seeing its end [s]; a lag that is not known yet counts as none."""
         return self._p.least_time + max(self._lag, 0.0) + self._p.eye
 
-    def _velocity(self) -> Array:
-        """Velocity of a goal that moves (3,) [m/s]; zero for a goal of the jaw, which follows the block in a hand."""
-        is_led = int(self._seen.task[_ACT]) in (Act.PRESS, Act.PASS)
-        return self._glances.speed_of_goal(float(self._seen.task[_WIDTH])) if is_led else np.zeros(3)
+    def _way_of_goal(self, time: float) -> Array:
+        """Way (3,) [m] of a goal to press that moves; a goal of the jaw counts as at rest."""
+        if int(self._seen.task[_ACT]) != Act.PRESS:
+            return np.zeros(3)
+        return self._glances.way_of_goal(float(self._seen.task[_WIDTH]), time)
 
     def _way(self, glance: Glance) -> Way:
         """The motion to be made, from the data seen and, during a press, from the force felt."""
         p, task, turn, lever, missing = self._p, self._seen.task, np.zeros(3), 0.0, 0.0
         is_moving = int(task[_ACT]) == Act.PASS
         goal = glance.goal if is_moving else task[_GOAL : _GOAL + 3]
-        lead = p.eye + p.least_time if is_moving else max(self._lag, 0.0)
-        step = goal - glance.tip[:3] + self._doubt.place + lead * self._velocity()
+        step = goal - glance.tip[:3] + self._doubt.place
+        if is_moving:
+            step = step + self._glances.speed_of_goal(float(task[_WIDTH])) * (p.eye + p.least_time)
+        else:
+            step = step + self._way_of_goal(max(self._lag, 0.0))
         if task[_TURN] > 0.0:
             turn = self._turns_of_hand.of_tip(glance.tip[3:], task[_ATTITUDE : _ATTITUDE + 4]) + self._doubt.turn
             lever = float(task[_WIDTH] / task[_TURN])
