@@ -32,6 +32,8 @@ CHOICE = 0.2
 """Additional reaction to a target at an unknown place and time [s], assumed: a simple visual reaction of 0.22 s."""
 PIXEL = 1e-4
 """Size of a pixel in sessions of the scenario ``mouse`` [m]."""
+CHAIN = 0.012
+"""Lag of hand, pointer and frames of the scenarios ``mouse`` and ``stick`` without latency [s], measured."""
 _PERSONS = {"time": 0.15, "share": 0.5, "spread": 0.2, "distance": 0.25}  # spread between persons, divided by the mean
 _MODEL = {"time": 0.04, "share": 0.25, "spread": 0.06, "distance": 0.15}  # error of the fit, divided by the mean
 _BASE_ERROR = 0.015  # standard deviation of a base lag that is not known [s]
@@ -105,7 +107,7 @@ def straight(lag: float, radius: float, seeds: int = 4) -> tuple[Array, Array]:
             "task.catch.width": 2 * radius * PIXEL,
             "task.catch.acceleration": PIXEL / 0.0304**2,
             "operator.observer.reaction": lm.constants()[1] + CHOICE,
-            "teleop.delays": [f"slave/servo_cp={lag:.4f}", f"hand/jaw={lag:.4f}"],
+            "teleop.delays": [f"slave/servo_cp={max(lag - CHAIN, 0.0):.4f}", f"hand/jaw={lag:.4f}"],
         }
         recording = api.run("mouse", seed=seed, duration=40.0, settings=settings, keep={"task/state", "slave/true_cp"})
         both = recording.frame("task/state").join(recording.frame("slave/true_cp"), how="inner")
@@ -158,7 +160,7 @@ def rings(way: float, width: float, lag: float, seeds: int = 6) -> Array:
     """
     times = list[float]()
     for seed in range(1, seeds + 1):
-        settings = {"task.point.diameter": way / 0.985, "task.point.width": width, "display.latency": lag}
+        settings = {"task.point.diameter": way / 0.985, "task.point.width": width, "display.latency": lag - CHAIN}
         recording = api.run("stick", seed=seed, duration=30.0, settings=settings, keep={"task/state"})
         state = recording.frame("task/state")
         state.columns = [name.rpartition(".")[2] for name in state.columns]
@@ -263,7 +265,7 @@ def _measure(_: Bench) -> Findings:
         if "@" not in row.cell
     ]
     notes = (
-        "Nobody here has seen a result of these studies. The left number is the registered prediction, the right one what "
+        "Nobody here has seen a result of these studies. The left number is the registered one, the right one what "
         "the operator gives now. The studies one_click and teleoperated_ring, which need sessions, are left out: "
         "python -m teleop_lab.experiments.blind DIR predicts them too.",
     )

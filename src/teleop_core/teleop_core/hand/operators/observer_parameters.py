@@ -19,7 +19,7 @@ class ObserverParameters:
         source="published: 0.110 to 0.163 s in six studies of corrections by sight",
     )
     reaction: float = fixed(
-        0.02,
+        0.03,
         Within(0.0, 2.0, "s"),
         "time from a new goal, whose place is expected, to the first submovement",
         source=_FITTED,
