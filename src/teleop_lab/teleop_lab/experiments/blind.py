@@ -160,7 +160,11 @@ def rings(way: float, width: float, lag: float, seeds: int = 6) -> Array:
     """
     times = list[float]()
     for seed in range(1, seeds + 1):
-        settings = {"task.point.diameter": way / 0.985, "task.point.width": width, "display.latency": lag - CHAIN}
+        settings = {
+            "task.point.diameter": way / 0.985,
+            "task.point.width": width,
+            "display.latency": max(lag - CHAIN, 0.0),
+        }
         recording = api.run("stick", seed=seed, duration=30.0, settings=settings, keep={"task/state"})
         state = recording.frame("task/state")
         state.columns = [name.rpartition(".")[2] for name in state.columns]
