@@ -1,8 +1,8 @@
 """Operator models: three models of a person who points on a late screen, fitted to the same printed numbers.
 
 ``sure`` looks until it sees the tip inside, and then presses: the rules of `observer` until 0.6. ``doubt`` is
-`observer`: it presses as soon as the believed chance is worth it. ``capacity`` is a continuous motion whose spread halves at a
-constant rate after a first phase, and which stops where waiting pays no more.
+`observer`: it presses as soon as the believed chance is worth it. ``capacity`` is a continuous motion whose spread
+halves at a constant rate after a first phase, and which stops where waiting pays no more.
 
 Source:
     ``capacity``: after the WHo model of Gori and Rioul 2020, Biological Cybernetics 114, whose second phase loses

@@ -8,6 +8,8 @@ from teleop_core.kernels import Array, length
 
 STILL_TIME = 0.02
 """A motion is at rest if it changes little in this time [s]."""
+SETTLED_TIME = 0.1
+"""A motion that did not end where the hand felt it end is at rest if it changes little in this time [s]."""
 
 
 class Glance(NamedTuple):
@@ -38,7 +40,7 @@ class Glances:
         kept = self._kept
         if seen.slave[:3].any():  # otherwise no pose has been shown yet
             kept.append(Glance(now, seen.slave.copy(), goal.copy(), seen.force[:3].copy()))
-        while len(kept) > 2 and kept[1].time <= now - self._eye - STILL_TIME:
+        while len(kept) > 2 and kept[1].time <= now - self._eye - SETTLED_TIME:
             kept.popleft()
 
     def covers(self, when: float) -> bool:
@@ -80,10 +82,11 @@ class Glances:
         return time * now + 0.5 * time * time * acceleration
 
     def _since_jump(self, width: float) -> list[Glance]:
-        """Glances since the goal last jumped by more than its width [m]; at least one."""
+        """Latest glances, since the goal last jumped by more than its width [m]; at least one."""
         seen = [self._kept[-1]]
+        begin = seen[0].time - self._eye - STILL_TIME
         for glance in reversed(self._kept):
-            if float(length(seen[-1].goal - glance.goal)) > width:
+            if glance.time <= begin or float(length(seen[-1].goal - glance.goal)) > width:
                 break
             seen.append(glance)
         return seen[:0:-1] or seen

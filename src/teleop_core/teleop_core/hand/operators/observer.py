@@ -12,7 +12,7 @@ import numpy as np
 
 from teleop_core.graph import STATE, topics
 from teleop_core.hand.operators import Operator, Setting
-from teleop_core.hand.operators.glances import STILL_TIME, Glance, Glances
+from teleop_core.hand.operators.glances import SETTLED_TIME, STILL_TIME, Glance, Glances
 from teleop_core.hand.operators.hand_room import HandRoom, TurnsOfHand, turned
 from teleop_core.hand.operators.observer_parameters import ObserverParameters
 from teleop_core.hand.operators.shapes import minimum_jerk
@@ -204,12 +204,24 @@ class Observer:
         when = self._half_seen + 0.5 * move.duration
         if when > until or self._is_still:
             return when
-        gone = float(length(self._gone(self._glances.at(when), self._glances.at(when + STILL_TIME))))
-        self._is_still = gone <= _STILL * float(length(move.way.both))
+        self._is_still = self._has_ended(move, when)
         if not self._is_still:  # the tip still moves: the half is seen later
             self._half_seen += until - when + 1e-3
             return math.inf
         return when
+
+    def _has_ended(self, move: Move, when: float) -> bool:
+        """Whether a motion is seen at rest at a time [s]: for longer, if it is not where the hand felt it end.
+
+        An arm that overshoots stands still for a moment at its farthest point.
+        """
+        width = float(self._seen.task[_WIDTH])
+        now, most = self._glances.at(when), _STILL * min(float(length(move.way.both)), 2.0 * width)
+        if length(self._gone(now, self._glances.at(when + STILL_TIME))) > most:
+            return False
+        if length(self._gone(move.seen, now) - move.unseen) <= most:
+            return True
+        return bool(length(self._gone(self._glances.at(when - SETTLED_TIME), now)) <= most)
 
     def _is_at_rest(self, until: float) -> bool:
         """Whether the operator recently saw the tip at rest."""
