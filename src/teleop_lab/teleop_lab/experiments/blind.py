@@ -53,7 +53,8 @@ class Row(NamedTuple):
 
 def _row(study: str, cell: str, measure: str, value: float, persons: int, kind: str, late: float = 0.0) -> Row:
     """Row with the interval of the mean of ``persons``; ``late`` is the error of a lag not known, of the value."""
-    error = abs(value) * math.hypot(_PERSONS[kind] / math.sqrt(persons), _MODEL[kind], late)
+    scale = min(value, 1.0 - value) if kind == "share" else value
+    error = scale * math.hypot(_PERSONS[kind] / math.sqrt(persons), _MODEL[kind], late)
     if kind == "share":
         error = math.hypot(error, 0.01)
     most = 1.0 if kind == "share" else math.inf

@@ -54,6 +54,7 @@ class Observer:
         self._hand = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])  # pose at which the last submovement ends
         self._softness = p.softness  # last felt compliance: displacement per newton [m/N]
         self._move: Move | None = None
+        self._has_tried = False  # whether a submovement to the present goal was made
         self._turns = False  # whether the last submovement turns the stylus
         self._number = 0.0
         self._next = 0.0  # time before which the operator does not move [s]
@@ -106,7 +107,7 @@ class Observer:
         width, act = float(task[_WIDTH]), int(task[_ACT])
         if task[_NUMBER] != self._number and act != Act.PASS:
             self._number = float(task[_NUMBER])
-            self._next, self._doubt = now + p.reaction, SURE
+            self._next, self._doubt, self._has_tried = now + p.reaction, SURE, False
         when = max(self._next, self._seen_at(until), now)
         if when > until:
             return False
@@ -116,11 +117,11 @@ class Observer:
         if act != Act.PASS and self._is_worth_it(off, turn):
             self._press(when, act)
         elif off > _SHORTEST * width or turn > _SHORTEST * task[_TURN] or abs(way.missing) > _SHORTEST:
-            # Of the way that the goal will go meanwhile nothing is left on purpose.
-            ahead = self._way_of_goal(max(self._lag, 0.0) + self._time_of_look()) - self._way_of_goal(
-                max(self._lag, 0.0)
-            )
-            self._begin(when, glance, way._replace(step=way.step + ahead / (1.0 - self._p.undershoot)))
+            lag = max(self._lag, 0.0)
+            ahead = self._way_of_goal(lag + self._time_of_look()) - self._way_of_goal(lag)
+            # On the way to a goal that runs away nothing is left on purpose.
+            whole = 1.0 / (1.0 - self._p.undershoot) if length(ahead) > 0.5 * width else 1.0
+            self._begin(when, glance, way._replace(step=whole * (way.step + ahead)))
             return True
         elif act != Act.PASS:  # inside, but not sure: look again
             self._next, self._doubt = when + self._time_of_look(), SURE
@@ -129,6 +130,8 @@ class Observer:
     def _is_worth_it(self, off: float, turn: float) -> bool:
         """Whether to press now, believed ``off`` [m] and ``turn`` [rad] beside the goal, rather than to look again."""
         p, task, doubt, width = self._p, self._seen.task, self._doubt, float(self._seen.task[_WIDTH])
+        if off > 0.5 * width and not self._has_tried:  # nobody gives up a goal that runs away without a try
+            return False
         extrapolated = p.noise / p.least_time * float(length(self._way_of_goal(self._time_of_look())))
         chance = chance_inside(off, math.hypot(doubt.spread, extrapolated), width)
         later = chance_inside(0.0, extrapolated, width)  # 1 for a goal at rest
@@ -296,6 +299,7 @@ class Observer:
         if self._move is not None and self._was_felt:
             seen, unseen = seen._replace(tip=self._move.seen.tip), unseen + self._move.unseen
         self._go(Move(now, duration, self._hand, fits * step, fits * turn, seen, ended, unseen))
+        self._has_tried = True
         # As uncertain as the movement itself: the operator decides before it has seen all of the end.
         spread = p.noise / duration
         doubts = self._noise(way.step, duration), self._noise(way.turn, duration)
