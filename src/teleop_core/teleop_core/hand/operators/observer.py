@@ -31,6 +31,7 @@ _PRESS_TIME = 0.06  # duration of a press of the hand, and of the clutch's press
 _STILL = 0.05  # a tip that moves less than this share of its path in STILL_TIME is at rest
 _SHORTEST = 0.1  # displacements shorter than this share of a goal's width need no submovement
 _FELT = 0.03  # least force that is felt [N]
+_LEAST_SHARE = 0.1  # share of a submovement that a hand at the end of its room tries all the same
 _SURE = 2.0  # distance of a submovement's end from a wall, divided by the standard deviation of that end
 
 
@@ -285,6 +286,7 @@ class Observer:
         if ((has_stopped and math.isinf(self._half_seen)) or fits < 1.0) and not was_back:
             self._bring_back(now, seen, *(fits < 1.0) * np.stack((step, turn)))
             return
+        fits = max(fits, _LEAST_SHARE)
         share = min(fits, 1.0 - p.undershoot) if way.missing == 0.0 else fits
         way = Way(share * way.step, share * way.turn, way.lever)
         distance, angle = float(length(way.step)), float(length(way.turn))
@@ -293,7 +295,7 @@ class Observer:
         ended = Way(way.step + self._noise(way.step, duration), way.turn + self._noise(way.turn, duration), way.lever)
         step = product(self._hand_of_slave, ended.step) / gain
         turn = self._turns_of_hand.of_hand(ended.turn, self._hand[3:]) if angle else way.turn
-        fits = max(self._room.share(self._hand, step, turn), 0.1)  # noise may lead beyond the room
+        fits = max(self._room.share(self._hand, step, turn), _LEAST_SHARE)  # noise may lead beyond the room
         ended = Way(fits * ended.step, fits * ended.turn, way.lever)
         unseen = ended.both
         if self._move is not None and self._was_felt:

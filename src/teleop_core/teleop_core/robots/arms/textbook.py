@@ -134,7 +134,7 @@ def pointer(**geometry: float | str) -> Robot:
     ``computed_torque``, and without the reference filter, the pointer follows its command within 1 ms.
     """
     g = geometry_of({"x": 0.3}, geometry)
-    slide = {"lower": -0.5, "upper": 0.5}
+    slide = {"lower": -1.0, "upper": 1.0}
     rows = [{"name": "up", "a": g["x"], "d": "q", **slide}, {"name": "aside", "alpha": 90.0, "d": "-q", **slide}]
     drives = _drives(
         bandwidth=500.0,
