@@ -74,7 +74,7 @@ def test_a_person_who_sees_late_takes_as_long_as_people_did(lag: float) -> None:
     assert np.mean(means) == pytest.approx(PUBLISHED[lag], rel=0.09)
 
 
-@pytest.mark.parametrize(("lag", "missed"), zip(PUBLISHED, (0.036, 0.036, 0.049, 0.113), strict=True))
+@pytest.mark.parametrize(("lag", "missed"), [*zip(PUBLISHED, (0.036, 0.036, 0.049, 0.113), strict=True)])
 def test_a_person_who_sees_late_misses_as_often_as_people_did(lag: float, missed: float) -> None:
     presses = [(lm.presses(lm.constants(), way, width, lag, count=4000), width) for way in WAYS for width in WIDTHS]
     assert np.mean([(found[:, lm.BESIDE] > 0.5 * width).mean() for found, width in presses]) == pytest.approx(
@@ -84,9 +84,7 @@ def test_a_person_who_sees_late_misses_as_often_as_people_did(lag: float, missed
 
 
 @pytest.mark.parametrize(("lag", "way", "width"), [(0.008, 0.384, 0.012), (0.2, 0.192, 0.024)])
-def test_the_rules_without_an_arm_take_as_long_as_the_operator_at_a_screen(
-    lag: float, way: float, width: float
-) -> None:
+def test_the_rules_alone_take_as_long_as_the_operator_at_a_screen(lag: float, way: float, width: float) -> None:
     p = lm.constants(dimensions=1)
     alone = lm.presses(p, way, width, lag)[:, lm.TIME].mean()
     assert np.mean(pointing(lag, way, width, 150)[1:]) == pytest.approx(alone, rel=0.08)
