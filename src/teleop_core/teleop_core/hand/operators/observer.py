@@ -223,7 +223,7 @@ class Observer:
         now, most = self._glances.at(when), _STILL * min(float(length(move.way.both)), 2.0 * width)
         if length(self._gone(now, self._glances.at(when + STILL_TIME))) > most:
             return False
-        if length(self._gone(move.seen, now) - move.unseen) <= most:
+        if length(self._gone(move.seen, now) - move.unseen) <= 0.25 * width:
             return True
         return bool(length(self._gone(self._glances.at(when - SETTLED_TIME), now)) <= most)
 
