@@ -54,7 +54,7 @@ def _one_look(p: Array, width: float, lag: float, noise: Array, off: Array, seen
         square += seen[i] * seen[i]
     beside, scale = math.sqrt(square), math.sqrt(2.0) * max(spread, 1e-12)
     chance = math.erf((0.5 * width - beside) / scale) + math.erf((0.5 * width + beside) / scale)
-    return (1.0 - 0.5 * chance) * cost < last + lag + eye
+    return beside <= 0.5 * width and (1.0 - 0.5 * chance) * cost < last + lag + eye
 
 
 @kernel

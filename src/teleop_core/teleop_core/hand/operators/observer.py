@@ -131,9 +131,9 @@ class Observer:
     def _is_worth_it(self, off: float, turn: float) -> bool:
         """Whether to press now, believed ``off`` [m] and ``turn`` [rad] beside the goal, rather than to look again."""
         p, task, doubt, width = self._p, self._seen.task, self._doubt, float(self._seen.task[_WIDTH])
-        if off > 0.5 * width and not self._has_tried:  # nobody gives up a goal that runs away without a try
-            return False
         extrapolated = p.noise / p.least_time * float(length(self._way_of_goal(self._time_of_look())))
+        if off > 0.5 * width and not (self._has_tried and extrapolated > 0.0):  # only a goal that runs away is given up
+            return False
         chance = chance_inside(off, math.hypot(doubt.spread, extrapolated), width)
         later = chance_inside(0.0, extrapolated, width)  # 1 for a goal at rest
         if task[_TURN] > 0.0:
