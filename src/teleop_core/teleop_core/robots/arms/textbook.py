@@ -128,7 +128,7 @@ def five_axis(**geometry: float | str) -> Robot:
 
 
 def pointer(**geometry: float | str) -> Robot:
-    """Pointer of a screen, as of a mouse: it slides along z and y of its base, without friction or weight.
+    """Pointer of a screen, as of a mouse: it slides along z and y of its base, nearly without friction.
 
     ``x`` is the distance of the screen from the base [m]. With a control law that feeds the reference forward, such as
     ``computed_torque``, and without the reference filter, the pointer follows its command within 1 ms.
@@ -139,8 +139,8 @@ def pointer(**geometry: float | str) -> Robot:
     drives = _drives(
         bandwidth=500.0,
         inertia=(0.1, 0.1),
-        viscous=(0.0, 0.0),
-        coulomb=(0.0, 0.0),
+        viscous=(1e-3, 1e-3),
+        coulomb=(1e-3, 1e-3),
         friction_speed=(1e-3, 1e-3),
         effort_limit=(1e3, 1e3),
         speed_limit=(20.0, 20.0),
