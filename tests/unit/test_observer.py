@@ -38,13 +38,20 @@ def looker(p: ObserverParameters, seed: int = 1) -> tuple[tc.Seen, Observer]:
 
 def pointing(lag: float, way: float, width: float, trials: int, seed: int = 1) -> list[float]:
     """Times [s] from target to target of an observer whose pointer is seen late, to and fro."""
-    seen, person = looker(ObserverParameters(fastest=10.0, noise_across=0.0, axes=("+x", "+y", "+z")), seed)
+    return pressed(lag, way, width, trials, seed)[0]
+
+
+def pressed(
+    lag: float, way: float, width: float, trials: int, seed: int = 1, across: float = 0.0
+) -> tuple[list[float], list[float]]:
+    """Times [s] and distances from the target's middle [m] of the presses of an observer who sees late."""
+    seen, person = looker(ObserverParameters(fastest=10.0, noise_across=across, axes=("+x", "+y", "+z")), seed)
     late = round(lag / TICK)
     begins = np.array([0.3, -0.2, 0.0])  # of the pointer: a tip at 0 is one that nobody told
     seen.slave[:3] = begins
     pointer = deque([begins] * (late + 1), maxlen=late + 1)
     task, begin, closed = seen.task, 0.0, 0.0
-    times: list[float] = []
+    times, beside = list[float](), list[float]()
     task[COLUMN["number"]], task[COLUMN["width"]] = 1.0, width
     goal = task[COLUMN["goal_x"] : COLUMN["goal_x"] + 3]
     goal[:] = begins + np.array([way, 0.0, 0.0])
@@ -56,13 +63,14 @@ def pointing(lag: float, way: float, width: float, trials: int, seed: int = 1) -
             pointer.append(begins + row[:3])
             if row[12] > closed:
                 times.append(time - begin)
+                beside.append(float(np.linalg.norm(pointer[-1] - goal)))
                 begin = time
                 task[COLUMN["number"]] += 1.0
                 goal[0] = begins[0] + (way if goal[0] == begins[0] else 0.0)
             closed = row[12]
         seen.slave[:3] = pointer[0]
         tick += AHEAD
-    return times
+    return times, beside
 
 
 @pytest.mark.parametrize("lag", PUBLISHED)
@@ -88,6 +96,27 @@ def test_the_rules_alone_take_as_long_as_the_operator_at_a_screen(lag: float, wa
     p = lm.constants(dimensions=1)
     alone = lm.presses(p, way, width, lag)[:, lm.TIME].mean()
     assert np.mean(pointing(lag, way, width, 150)[1:]) == pytest.approx(alone, rel=0.08)
+
+
+def test_an_operator_at_a_screen_misses_as_often_as_the_rules_alone() -> None:
+    found = lm.presses(lm.constants(dimensions=1), 0.2, 0.02, 0.2)
+    beside = np.array(pressed(0.2, 0.2, 0.02, 300)[1])
+    assert (beside > 0.01).mean() == pytest.approx((found[:, lm.BESIDE] > 0.01).mean(), abs=0.045)
+
+
+def test_only_a_goal_that_is_believed_inside_is_pressed_however_late_the_screen_is() -> None:
+    beside = np.array(pressed(1.0, 0.2, 0.02, 60)[1])
+    assert (beside > 0.01).mean() < 0.35
+
+
+def test_a_goal_that_runs_away_is_tried_before_it_is_pressed() -> None:
+    bench = Bench(ObserverParameters(**PLAIN))
+    bench.ask(np.array([0.1, 0.0, 0.0]), Act.PRESS, 0.01)
+    while not bench.rows or bench.rows[-1][12] == 0.0:
+        assert len(bench.rows) < 3000, "it never presses"
+        bench.seen.task[COLUMN["goal_x"]] += 0.4 * 0.016
+        bench.go_on(0.016)
+    assert np.linalg.norm(bench.tip[:3] - np.array([0.3, -0.2, 0.0])) > 0.1
 
 
 def test_who_fears_errors_more_looks_more_often_and_misses_less() -> None:
