@@ -120,8 +120,10 @@ class Observer:
         elif off > _SHORTEST * width or turn > _SHORTEST * task[_TURN] or abs(way.missing) > _SHORTEST:
             lag = max(self._lag, 0.0)
             ahead = self._way_of_goal(lag + self._time_of_look()) - self._way_of_goal(lag)
-            # On the way to a goal that runs away nothing is left on purpose.
-            whole = 1.0 / (1.0 - self._p.undershoot) if length(ahead) > 0.5 * width else 1.0
+            gone = float(length(self._glances.speed_of_goal(width))) * self._time_of_look()
+            # On the way to a goal that moves nothing is left on purpose.
+            runs = act in (Act.PRESS, Act.PASS) and gone > 0.25 * width
+            whole = 1.0 / (1.0 - self._p.undershoot) if runs else 1.0
             self._begin(when, glance, way._replace(step=whole * (way.step + ahead)))
             return True
         elif act != Act.PASS:  # inside, but not sure: look again
