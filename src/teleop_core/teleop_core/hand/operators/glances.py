@@ -1,5 +1,6 @@
 """Glances: data that a visually guided operator has recently seen and felt, interpolated in time."""
 
+import math
 from collections import deque
 from typing import NamedTuple
 
@@ -90,6 +91,18 @@ class Glances:
                 break
             seen.append(glance)
         return seen[:0:-1] or seen
+
+
+def crossing(seen: list[tuple[float, float]], level: float) -> float:
+    """Time [s] at which values rise to a level, interpolated between pairs of time and value; infinite if never."""
+    before: tuple[float, float] | None = None
+    for time, value in seen:
+        if value >= level:
+            if before is None or value <= before[1]:
+                return time
+            return before[0] + (level - before[1]) / (value - before[1]) * (time - before[0])
+        before = (time, value)
+    return math.inf
 
 
 def _speed(a: Glance, b: Glance) -> Array:

@@ -12,27 +12,33 @@ import numpy as np
 
 from teleop_core.graph import STATE, topics
 from teleop_core.hand.operators import Operator, Setting
-from teleop_core.hand.operators.glances import SETTLED_TIME, STILL_TIME, Glance, Glances
+from teleop_core.hand.operators.glances import SETTLED_TIME, STILL_TIME, Glance, Glances, crossing
 from teleop_core.hand.operators.hand_room import HandRoom, TurnsOfHand, turned
 from teleop_core.hand.operators.observer_parameters import ObserverParameters
-from teleop_core.hand.operators.shapes import minimum_jerk
-from teleop_core.hand.operators.submovement import SURE, Doubt, Move, Way, chance_inside
+from teleop_core.hand.operators.submovement import (
+    PRESS_TIME,
+    SURE,
+    Doubt,
+    Move,
+    Way,
+    careful_time,
+    chance_inside,
+    draw,
+    end_noise,
+)
 from teleop_core.hand.tasks import Act
 from teleop_core.kernels import Array, dot, length, product
 from teleop_core.kernels.axes import axis_map
 
 AHEAD = 16
 """Number of ticks per request of the motion, about one frame; the delay of the eye is longer, so this adds no delay."""
-_COLUMNS = ("number", "act", "goal_x", "width", "goal_qw", "turn", "force", "clearance")
-_NUMBER, _ACT, _GOAL, _WIDTH, _ATTITUDE, _TURN, _FORCE, _CLEARANCE = map(topics.TASK_STATE.columns.index, _COLUMNS)
-_BOX, _SIZE = STATE["fixture_center_x"], STATE["fixture_size_x"]
+_COLUMNS = ("number", "act", "goal_x", "width", "goal_qw", "turn", "force")
+_NUMBER, _ACT, _GOAL, _WIDTH, _ATTITUDE, _TURN, _FORCE = map(topics.TASK_STATE.columns.index, _COLUMNS)
 _ENDS = (topics.Limit.JOINT, topics.Limit.WORKSPACE)
-_PRESS_TIME = 0.06  # duration of a press of the hand, and of the clutch's press before and after a motion [s]
 _STILL = 0.05  # a tip that moves less than this share of its path in STILL_TIME is at rest
 _SHORTEST = 0.1  # displacements shorter than this share of a goal's width need no submovement
 _FELT = 0.03  # least force that is felt [N]
 _LEAST_SHARE = 0.1  # share of a submovement that a hand at the end of its room tries all the same
-_SURE = 2.0  # distance of a submovement's end from a wall, divided by the standard deviation of that end
 
 
 class Observer:
@@ -71,32 +77,16 @@ class Observer:
         now, until = float(times[0]), float(times[-1])
         self._glances.take(now, self._seen, self._seen.task[_GOAL : _GOAL + 3])
         rows = np.zeros((len(times), 13))
-        self._draw(times, rows)
+        draw(self._move, self._turns, times, rows)
         if self._seen.task[_NUMBER] > 0.0 and self._glances and self._decide(now, until):
-            self._draw(times, rows)
+            draw(self._move, self._turns, times, rows)
         if now < self._since <= until:
             rows[:, 12] = (times >= self._since) == self._holds
         else:
             rows[:, 12] = (now >= self._since) == self._holds
-        if self._close <= until and now < self._close + _PRESS_TIME:
-            rows[(times >= self._close) & (times < self._close + _PRESS_TIME), 12] = 1.0
+        if self._close <= until and now < self._close + PRESS_TIME:
+            rows[(times >= self._close) & (times < self._close + PRESS_TIME), 12] = 1.0
         return rows
-
-    def _draw(self, times: Array, rows: Array) -> None:
-        """Write the present submovement into ``rows``, from its beginning on."""
-        if (move := self._move) is None:
-            return
-        if not move.is_clutched and not self._turns and move.begin + move.duration < times[0]:
-            rows[:, :3] = move.start[:3] + move.step  # the submovement is over
-            return
-        share, has_begun = minimum_jerk((times - move.begin) / move.duration), times >= move.begin
-        moved = move.start[:3] + share[:, None] * move.step
-        rows[:, :3] = np.where(has_begun[:, None], moved, rows[:, :3])
-        if self._turns:
-            turns = np.array([turned(move.start[3:], s * move.turn)[1] for s in share])
-            rows[:, 3:6] = np.where(has_begun[:, None], turns, rows[:, 3:6])
-        if move.is_clutched:
-            rows[:, 6] = (times >= move.begin - _PRESS_TIME) & (times < move.begin + move.duration + _PRESS_TIME)
 
     def _decide(self, now: float, until: float) -> bool:
         """Begin the next submovement or press, if it is due before ``until``.
@@ -256,19 +246,15 @@ class Observer:
         """Time at which the tip was seen at half of the path [s]; infinite if this was not before ``until``."""
         unseen, whole = move.unseen, float(dot(move.unseen, move.unseen))
         half = 1.0 - 0.5 * float(length(move.way.both)) / math.sqrt(whole)
-        before: tuple[float, float] | None = None
-        for glance in self._glances.since(move.begin, until):
-            gone = float(dot(self._gone(move.seen, glance), unseen)) / whole
-            if gone >= half:
-                at = glance.time
-                if before is not None and gone > before[1]:
-                    share = (half - before[1]) / (gone - before[1])
-                    at = before[0] + share * (at - before[0])
-                late = at - move.begin - 0.5 * move.duration
-                self._lag = max(late, 0.0)
-                return at + self._p.eye
-            before = (glance.time, gone)
-        return math.inf
+        gone = [
+            (glance.time, float(dot(self._gone(move.seen, glance), unseen)) / whole)
+            for glance in self._glances.since(move.begin, until)
+        ]
+        at = crossing(gone, half)
+        if math.isinf(at):
+            return at
+        self._lag = max(at - move.begin - 0.5 * move.duration, 0.0)
+        return at + self._p.eye
 
     def _patience(self) -> float:
         """Time for which the operator waits, after the end of a motion, until the motion becomes visible [s]."""
@@ -293,8 +279,12 @@ class Observer:
         way = Way(share * way.step, share * way.turn, way.lever)
         distance, angle = float(length(way.step)), float(length(way.turn))
         duration = max(p.least_time, distance / gain / p.fastest, angle / p.fastest_turn)
-        duration = max(duration, self._careful(seen.tip[:3], way.step))
-        ended = Way(way.step + self._noise(way.step, duration), way.turn + self._noise(way.turn, duration), way.lever)
+        duration = max(duration, careful_time(p, self._seen, seen.tip[:3], way.step))
+        ended = Way(
+            way.step + end_noise(p, self._rng, way.step, duration),
+            way.turn + end_noise(p, self._rng, way.turn, duration),
+            way.lever,
+        )
         step = product(self._hand_of_slave, ended.step) / gain
         turn = self._turns_of_hand.of_hand(ended.turn, self._hand[3:]) if angle else way.turn
         fits = max(self._room.share(self._hand, step, turn), _LEAST_SHARE)  # noise may lead beyond the room
@@ -306,32 +296,8 @@ class Observer:
         self._has_tried = True
         # As uncertain as the movement itself: the operator decides before it has seen all of the end.
         spread = p.noise / duration
-        doubts = self._noise(way.step, duration), self._noise(way.turn, duration)
+        doubts = end_noise(p, self._rng, way.step, duration), end_noise(p, self._rng, way.turn, duration)
         self._doubt = Doubt(*doubts, spread * distance, spread * angle)
-
-    def _careful(self, tip: Array, step: Array) -> float:
-        """Duration [s] at which the noise of a step (3,) [m] does not reach walls or edges; 0 without walls and edges.
-
-        The fixture's walls are those of its box. The operator aims no more exactly than the goal requires.
-        """
-        p, state, task = self._p, self._seen.state, self._seen.task
-        across, slowest = p.noise_across, 0.0
-        if task[_CLEARANCE] > 0.0:
-            slowest = across * float(length(step)) / float(task[_CLEARANCE])
-        if state[STATE["is_fixture_on"]] > 0.0 and state[_SIZE] > 0.0:
-            gap = 0.5 * state[_SIZE : _SIZE + 3] - np.abs(tip + step - state[_BOX : _BOX + 3])
-            lean = np.sqrt(step * step * (1.0 - across**2) + across**2 * float(dot(step, step)))
-            slowest = max(slowest, float((lean / np.maximum(gap, 0.5 * task[_WIDTH])).max()))
-        return _SURE * p.noise * slowest
-
-    def _noise(self, way: Array, duration: float) -> Array:
-        """Error of the end (3,) of a displacement [m] or rotation [rad] that the hand makes in ``duration`` [s]."""
-        if not way.any():
-            return way
-        p, distance, noise = self._p, float(length(way)), self._rng.standard_normal(3)
-        along = way / distance
-        ahead = along * float(dot(along, noise))
-        return p.noise * distance / duration * (ahead + p.noise_across * (noise - ahead))
 
     def _bring_back(self, now: float, seen: Glance, step: Array, turn: Array) -> None:
         """Clutch, and bring the hand to the pose with most room for a step (3,) [m] and a turn (3,) [rad]."""
@@ -339,8 +305,8 @@ class Observer:
         way, angle = self._room.back(self._hand, step, turn)
         duration = max(p.least_time, float(length(way)) / p.fastest, float(length(angle)) / p.fastest_turn)
         nothing = Way(np.zeros(3), np.zeros(3), 0.0)
-        self._go(Move(now + _PRESS_TIME, duration, self._hand, way, angle, seen, nothing, nothing.both, True))
-        self._next += 2.0 * _PRESS_TIME
+        self._go(Move(now + PRESS_TIME, duration, self._hand, way, angle, seen, nothing, nothing.both, True))
+        self._next += 2.0 * PRESS_TIME
 
     def _go(self, move: Move) -> None:
         """Store a submovement as the present one."""
