@@ -1,4 +1,4 @@
-"""Live: sessions by side, in one process and apart, beside bare relay chains, in one run.
+"""Live: sessions of four graphs, by side and in one process, beside bare relay chains, in one run.
 
 A chain is source -> 2 relays -> sink, PoseStamped at 1 kHz: as many hops as a master's sample
 takes to the slave's command (haptic_master -> motion_scaling -> inverse_kinematics -> reader),
@@ -8,12 +8,14 @@ without any work on the way. Seconds differ between machines and hours; the rati
 import argparse
 import json
 import os
+import re
 import resource
 import subprocess
 import sys
 import tempfile
 import time
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +24,17 @@ import psutil
 
 RELAYS = 2
 _FAIR = ("--set", "real_time.priority=0")
+_NETWORK = ("--set", "network.preset=delay_100", "teleop.stages=[display,task,network]")
+_TANK = ("--set", "teleop.stages=[network,passivity]", "reflection.passivity=tank", "network.preset=delay_100")
+GRAPHS = {
+    "plain (coarse_box)": ("coarse_box",),
+    "display and task (point)": ("point",),
+    "the same, with a network": ("point", *_NETWORK),
+    "network and tank (palpation)": ("palpation", *_TANK),
+}
+"""Sessions: scenario and options."""
+WAYS = {"by side": (), "one process": ("--composed",)}
+BUSY = 4  # processes that compete for the processors
 
 
 def chain(seconds: float, style: str) -> dict[str, float]:
@@ -124,30 +137,37 @@ def source(style: str) -> None:
         publisher.publish(message)
 
 
-def live(seconds: float, *options: str) -> dict[str, float]:
-    """Run a live session for some seconds; the same numbers from its recording."""
+def live(seconds: float, scenario: str, *options: str) -> dict[str, float]:
+    """Run a live session for some seconds; numbers from its recording, and the shares of its processes [%]."""
     with tempfile.TemporaryDirectory() as folder:
         bag = Path(folder) / "bag"
-        command = [sys.executable, "-u", "-m", "teleop_core.commands.cli", "live", "--scenario"]
-        command += ["coarse_box", "--duration", str(seconds), "--out", str(bag), *options]
+        command = [sys.executable, "-u", "-m", "teleop_core.commands.cli", "live", "--scenario", scenario]
+        command += ["--duration", str(seconds), "--out", str(bag), *options]
         with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
-            cpu = _watch(process)
+            watched = _watch(process)
         if process.returncode:
             raise SystemExit("teleop live failed")
-        return {**score(bag), "cpu": cpu}
+        return {**score(bag), **watched}
 
 
-def _watch(process: "subprocess.Popen[str]") -> float:
-    """Processor share [%] of the nodes, from the first status line to the last."""
-    samples = []
+def _watch(process: "subprocess.Popen[str]") -> dict[str, float]:
+    """Processor share of the stages' processes and of the recorder [%], late ticks [%], refused messages.
+
+    Between the first status line and the last one.
+    """
+    samples, counts = [], []
     assert process.stdout is not None
     for line in process.stdout:
         if " Hz" in line:
-            nodes = psutil.Process(process.pid).children(recursive=True)
-            used = sum(sum(node.cpu_times()[:2]) for node in nodes)
+            used = {True: 0.0, False: 0.0}
+            for node in psutil.Process(process.pid).children(recursive=True):
+                used["recorder" in node.cmdline()] += sum(node.cpu_times()[:2])
             samples.append((time.monotonic(), used))
+            counts.append([sum(map(float, re.findall(rf"{name} (\d+)", line))) for name in ("late", "refused")])
     (begin, first), (end, last) = samples[0], samples[-1]
-    return 100.0 * (last - first) / (end - begin)
+    stages, recorder = (100.0 * (last[of] - first[of]) / (end - begin) for of in (False, True))
+    late = 100.0 * (counts[-1][0] - counts[0][0]) / (1e3 * (end - begin))
+    return {"cpu": stages, "recorder": recorder, "late": late, "refused": counts[-1][1]}
 
 
 def score(bag: Path, since_ns: int = 0, until_ns: int = 2**63 - 1) -> dict[str, float]:
@@ -179,7 +199,7 @@ def score(bag: Path, since_ns: int = 0, until_ns: int = 2**63 - 1) -> dict[str, 
     span = (steps[-1] - steps[0]) * 1e-9
     return {
         "median": float(np.median(delay)), "p99": float(np.percentile(delay, 99)),
-        "lost": 100.0 * missing / (count + missing), "steps": (len(steps) - 1) / span,
+        "lost": 100.0 * missing / (count + missing), "missing": missing, "steps": (len(steps) - 1) / span,
         "made_up": 100.0 * (whole.ticks.made_up or 0) / whole.ticks.executed,
     }  # fmt: skip
 
@@ -200,6 +220,24 @@ def medians(run: Callable[[], dict[str, float]], runs: int) -> dict[str, float]:
     return {key: float(np.median([one[key] for one in found])) for key in found[0]}
 
 
+def graphs(seconds: float, runs: int, busy: int) -> None:
+    """Print a table of all graphs, both ways, beside some busy processes; numbers after the first status line."""
+    beside = f", beside {busy} busy processes" if busy else ""
+    print(f"\n{'master sample -> setpoint' + beside:44}{'median':>8}{'p99':>8}{'late':>8}{'made up':>9}", end="")
+    print(f"{'missing':>9}{'refused':>9}{'stages':>8}{'recorder':>10}")
+    print(f"{'':44}{'ms':>8}{'ms':>8}{'%':>8}{'%':>9}{'':18}{'% of a core':>18}", flush=True)
+    others = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(busy)]
+    for name, options in GRAPHS.items():
+        for way, more in WAYS.items():
+            found = medians(partial(live, seconds, *options, *more), runs)
+            print(f"{f'{name}, {way}':44}{found['median']:8.2f}{found['p99']:8.2f}{found['late']:8.2f}", end="")
+            print(f"{found['made_up']:9.2f}{found['missing']:9.0f}{found['refused']:9.0f}", end="")
+            print(f"{found['cpu']:8.0f}{found['recorder']:10.0f}", flush=True)
+    for one in others:
+        one.kill()
+        one.wait()
+
+
 def compare(seconds: float, runs: int) -> None:
     """Print everything side by side, medians of some runs, as ratios to the raw chain too."""
     of = f", medians of {runs} runs" if runs > 1 else ""
@@ -212,13 +250,13 @@ def compare(seconds: float, runs: int) -> None:
         ("bare sleep loop, lateness", lambda: lateness(min(seconds, 10.0))),
         ("bare relay chain, typed, reliable", lambda: chain(seconds, "typed")),
         ("bare relay chain, raw, best effort", lambda: chain(seconds, "raw")),
-        ("by side", lambda: live(seconds)),
-        ("the same, fair shares", lambda: live(seconds, *_FAIR)),
-        ("one process", lambda: live(seconds, "--composed")),
-        ("the same, fair shares", lambda: live(seconds, "--composed", *_FAIR)),
-        ("a process for each node, fair shares", lambda: live(seconds, "--processes", "nodes")),
-        ("by side, a busy process beside", lambda: live(seconds)),
-        ("one process, a busy process beside", lambda: live(seconds, "--composed")),
+        ("by side", lambda: live(seconds, "coarse_box")),
+        ("the same, fair shares", lambda: live(seconds, "coarse_box", *_FAIR)),
+        ("one process", lambda: live(seconds, "coarse_box", "--composed")),
+        ("the same, fair shares", lambda: live(seconds, "coarse_box", "--composed", *_FAIR)),
+        ("a process for each node, fair shares", lambda: live(seconds, "coarse_box", "--processes", "nodes")),
+        ("by side, a busy process beside", lambda: live(seconds, "coarse_box")),
+        ("one process, a busy process beside", lambda: live(seconds, "coarse_box", "--composed")),
     ):
         beside = subprocess.Popen([sys.executable, "-c", spin]) if "busy" in name else None
         found = medians(run, runs)
@@ -239,6 +277,8 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seconds", type=float, default=60.0, help="length of each part")
     parser.add_argument("--runs", type=int, default=1, help="runs of each part")
+    parser.add_argument("--only-graphs", action="store_true", help="leave out the bare chains")
+    parser.add_argument("--busy", type=int, default=-1, help=f"busy processes beside (default: none, then {BUSY})")
     parser.add_argument("--role", choices=("relay", "sink", "source"), help=argparse.SUPPRESS)
     parser.add_argument("--position", type=int, default=0, help=argparse.SUPPRESS)
     parser.add_argument("--style", choices=("raw", "typed"), help=argparse.SUPPRESS)
@@ -253,7 +293,10 @@ def main() -> None:
     elif arguments.role == "source":
         source(arguments.style)
     else:
-        compare(arguments.seconds, max(1, arguments.runs))
+        if not arguments.only_graphs:
+            compare(arguments.seconds, max(1, arguments.runs))
+        for busy in (0, BUSY) if arguments.busy < 0 else (arguments.busy,):
+            graphs(arguments.seconds, max(1, arguments.runs), busy)
 
 
 if __name__ == "__main__":

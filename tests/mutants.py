@@ -203,13 +203,12 @@ MUTANTS = (
     _mutant("clock_unnoticed", "a stepped clock is none", _SLAVE,
             "> _CLOCK_STEP_NS:", "> 10**30:", "clock_ahead", "clock_back"),
     _mutant("second_publishers", "messages of all publishers are taken (as in ros2_control #870)",
-            "nodes/sender.py",
-            "if self._owner and now_ns", "if False and now_ns",
+            "nodes/wire.py", "if r.has_owner and now_ns - r.heard_ns <= r.silence_ns:", "if False:",
             "second_master", "second_commander", composed=("second_master",),
             schedule=Schedule("owner", ((2.0, "intruder", "", 1.0, 0.5),))),
     _mutant("old_messages", "messages older than the last one are taken (axol #187)",
-            "nodes/streams.py", "check(self.topic.kind, stamp_ns, values, last_ns)",
-            "check(self.topic.kind, stamp_ns, values, None)", "replayed", "stamps_frozen"),
+            "nodes/wire.py", "return _NOT_NEWER if has_last and stamp_ns <= last_ns else 0", "return 0",
+            "replayed", "stamps_frozen"),
     _mutant("plausibility_off", "a hand may be anywhere at once", "coupling/mapping/plausibility.py",
             "    if not is_sound:\n", "    is_sound = True\n    if not is_sound:\n",
             "teleport", "infinite"),
@@ -228,11 +227,11 @@ MUTANTS = (
     Mutant("commands_queued", "commands that waited during an outage run after it (as in "
            "stretch_web_teleop #3)",
            (("nodes/streams.py", "_WAITING = 20", "_WAITING = 20_000"),
-            ("nodes/streams.py", "(has_buttons and self._target.tobytes() != before)", "True")),
+            ("nodes/streams.py", "while self._pressed() == before and self.take():", "while False:")),
            (), schedule=Schedule("age", ((2.0, "standstill", "slave_side", 3.0, 0.5),))),
     Mutant("queue_kept", "a queue grows for as long as its reader stands still",
            (("nodes/streams.py", "_WAITING = 20", "_WAITING = 20_000"),
-            ("nodes/streams.py", "(has_buttons and self._target.tobytes() != before)", "True")),
+            ("nodes/streams.py", "while self._pressed() == before and self.take():", "while False:")),
            (), schedule=Schedule("queues", ((2.0, "standstill", "slave_side", 4.5, 0.5),))),
     _mutant("engage_jumps", "who engages leads on from where the hand was (as in moveit2 #3378 and "
             "IsaacTeleop #730)", "coupling/mapping/motion_scaling.py",
@@ -241,11 +240,14 @@ MUTANTS = (
             "        s.must_latch = 1 - s.is_engaged\n",
             "master_silent", "stop_topic"),
     Mutant("late_teleoperator", "who publishes later is never heard (as in lerobot #4166)",
-           (("nodes/sender.py", "now_ns - self._heard_ns <= self._silence_ns",
-             "now_ns - self._heard_ns <= 10**18"),
-            ("nodes/sender.py", 'no longer exists."""\n        self._owner = b""', 'no longer exists."""')),
+           (("nodes/wire.py", "now_ns - r.heard_ns <= r.silence_ns", "now_ns - r.heard_ns <= 10**18"),
+            ("nodes/sender.py", 'no longer exists."""\n        self._cells["has_owner"] = 0',
+             'no longer exists."""')),
            ("kill_motion_scaling",), composed=(),
            schedule=Schedule("recovery", ((2.0, "kill", "hand_side", 1.0, 0.5),))),
+    _mutant("never_gives_way", "a loop that cannot keep up keeps its real-time priority", "nodes/strain.py",
+            "            self._world.give_way()\n", "",
+            schedule=Schedule("way", ((2.0, "slow turns", "slave_side", 6.0, 0.9),))),
     _mutant("drive_goes_on", "a joint goes on at its last speed when the link is lost (as in "
             "turtlebot3 #1154)", "slave/velocity.py",
             "is_stale = now_ns - s.driven_ns > p.timeout_ns",
@@ -268,9 +270,8 @@ MUTANTS = (
             schedule=Schedule("motion", (
                 (1.0, "command", "", 0.1, 0.28), (1.15, "press", "", 0.5, 0.5)))),
     _mutant("garbage_ends", "bytes that are no message end the node that reads them",
-            "nodes/streams.py", "            if not isinstance(found, messages.Refusal):\n"
-            "                "
-            "return found\n", "            return found\n",
+            "nodes/streams.py", "        if isinstance(found, messages.Refusal):\n"
+            "            self._refuse(found)\n            return None\n", "",
             schedule=Schedule("ends", (
                 (1.0, "kill", "hand_side", 1.5, 0.5), (2.0, "garbage", "", 0.5, 0.5)))),
     _mutant("saved_all", "a recorder whose disk is gone says that all is safe",

@@ -36,6 +36,8 @@ class Layout:
         width: Number of values in one message, which is the number of columns.
         template: One message whose numbers are zero, shape (size,).
         mask: Bits that are equal in all messages, shape (size,).
+        places: Place of each value, shape (width,), among the float64 numbers of a message, counted after the
+            encapsulation header; for buttons among its int32 numbers, counted from the beginning.
     """
 
     def __init__(self, kind: Kind, joint_names: tuple[str, ...], frame_id: str) -> None:
@@ -49,6 +51,10 @@ class Layout:
         mask.flags.writeable = False
         self.mask: Bytes = mask
         self._columns = [columns for *_, columns in cdr.gaps[2:]]
+        self.places = np.zeros(self.width, np.int64)
+        for at, code, count, columns in cdr.gaps[2:]:
+            first = (at - 4) // 8 if code == "d" else at // 4
+            self.places[columns] = np.arange(first, first + count)
         self._dtype = np.dtype(
             {
                 "names": ["sec", "nanosec", *(f"part{i}" for i in range(len(self._columns)))],

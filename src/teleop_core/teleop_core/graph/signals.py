@@ -14,6 +14,7 @@ from typing import Any
 from teleop_core.graph.topics import TELEOP_STATE, Kind, Topic
 from teleop_core.kernels import Array, kernel, records
 from teleop_core.kernels.fields import Field
+from teleop_core.kernels.layout import COUNT, PerJoints
 
 TICK_NS = 1_000_000
 """Control period of every stage unless a session says otherwise [ns]."""
@@ -28,7 +29,8 @@ def topic_fields(topics: Iterable[Topic], joints: int) -> list[Field]:
     """Fields of values and stamps of some topics, for a robot with this many joints."""
     fields: list[Field] = []
     for topic in topics:
-        fields.append((topic.field, "f8", (topic.width(joints),)))
+        width, each = topic.width(joints), topic.width(1)
+        fields.append((topic.field, "f8", (PerJoints(joints, each) if topic.kind.has_joints else width,)))
         fields.append((f"{topic.field}_ns", "i8"))
     return fields
 
@@ -55,6 +57,8 @@ def make_signals(topics: Iterable[Topic], joints: int, notes: Iterable[Field] = 
 def assign(target: Any, source: Any) -> None:
     """Set all fields of ``target`` to the values of ``source``, a record of the same type, or to 0."""
     for name in target.dtype.names:
+        if name == COUNT:
+            continue
         target[name] = source if isinstance(source, int) else source[name]
 
 

@@ -16,7 +16,7 @@ import numpy as np
 from teleop_core.base import PartError, Registry, Value, specs, values_of
 from teleop_core.graph.signals import DT, assign, make_signals
 from teleop_core.graph.topics import Topic
-from teleop_core.kernels import Fields, bound, fields_of, raise_pending, records
+from teleop_core.kernels import Fields, fields_of, held, raise_pending, records
 from teleop_core.kernels.fields import Field
 
 __all__ = ["STAGES", "Runner", "RunningStage", "Stage", "joints_of", "register_stage"]
@@ -279,7 +279,7 @@ class RunningStage:
     def load(self) -> Callable[[], object]:
         """Compile the kernel or load it from disk, which takes longer than many ticks."""
         if self._bound is None:
-            self._bound = bound(self.kernel, *self.arguments, self.signals, self.dt)
+            self._bound = held(self.kernel, *self.arguments, self.signals, self.dt)
         return self._bound
 
 

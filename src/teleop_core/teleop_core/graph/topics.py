@@ -144,11 +144,14 @@ class Stamp:
         of: Name of the topic whose stamp is passed on; empty if the stamp is the time of sampling.
         is_in_force: Whether the writer itself chooses the command whose stamp is passed on, because an older command
             may still be in force. Such a stamp may repeat, and is :data:`NO_COMMAND_NS` before the first command.
+        may_skip: Whether stamps of ``of`` may be missing although nothing was lost here: a network loses packets, and
+            packets that others have overtaken are not used.
     """
 
     text: str
     of: str = ""
     is_in_force: bool = False
+    may_skip: bool = False
 
 
 NO_COMMAND_NS = 1
@@ -168,7 +171,7 @@ def in_force(topic: str) -> Stamp:
 
 def arrived(topic: str) -> Stamp:
     """Rule: the stamp is copied from the newest message of ``topic`` that came through the network."""
-    return Stamp(f"of the {topic} that arrived last", topic, is_in_force=True)
+    return Stamp(f"of the {topic} that arrived last", topic, is_in_force=True, may_skip=True)
 
 
 SELDOM_NS = 20_000_000

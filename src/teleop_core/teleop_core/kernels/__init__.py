@@ -18,8 +18,7 @@ through them, coverage counts their lines, and everything is some hundred times 
 """
 
 import linecache
-from collections.abc import Callable, Iterable, Mapping
-from difflib import get_close_matches
+from collections.abc import Callable, Mapping
 from functools import cache, partial
 from types import FunctionType
 from typing import TYPE_CHECKING, Any, ParamSpec, Protocol, TypeVar, cast
@@ -30,6 +29,7 @@ import numpy as np
 
 from teleop_core.kernels.callables import raise_pending
 from teleop_core.kernels.dependencies import Tokens, hexdigest
+from teleop_core.kernels.layout import record_dtype, records
 
 __all__ = [
     "IS_COMPILED",
@@ -65,7 +65,7 @@ def check_version(found: str = numba.__version__) -> None:
 
 
 _config: Any = numba.config
-IS_COMPILED = not _config.DISABLE_JIT
+IS_COMPILED: bool = not _config.DISABLE_JIT
 """Whether kernels are compiled; False in pure-Python mode."""
 
 if IS_COMPILED:
@@ -188,19 +188,6 @@ def pointer(function: Callable[P, R], signature: Any) -> Callable[P, R]:
     return _compiler.c_function(function, signature) if IS_COMPILED else function
 
 
-def records(fields: Any, count: int = 1) -> Any:
-    """Zeroed records (count,) whose fields are attributes, for kernels and for plain Python.
-
-    Args:
-        fields: Pairs of name and type, or a dtype, as for :class:`numpy.dtype`.
-        count: Number of records.
-
-    Returns:
-        Array of :class:`~teleop_core.kernels.Record`; take ``[0]`` for one record that shares its memory.
-    """
-    return np.zeros(count, record_dtype(fields))
-
-
 def bound(compiled: Callable[P, R], *arguments: P.args, **_: P.kwargs) -> Callable[[], R]:
     """Kernel with bound arguments, whose types are therefore not checked at each call.
 
@@ -217,7 +204,7 @@ def bound(compiled: Callable[P, R], *arguments: P.args, **_: P.kwargs) -> Callab
     """
     if isinstance(compiled, FunctionType) or not is_kernel(compiled):
         return partial(compiled, *arguments)
-    return partial(_compiler.entry(compiled, _types(arguments)), *map(_memory, arguments))
+    return partial(_compiler.entry(compiled, types_of(arguments)), *map(_memory, arguments))
 
 
 def _memory(value: Any) -> Any:
@@ -266,11 +253,12 @@ def apart(compiled: Callable[..., R], *arguments: object) -> Callable[..., R]:
     Raises:
         KernelError: The kernel cannot be compiled for these arguments.
     """
-    code: Any = _compiler.Code(compiled, _types(arguments)) if IS_COMPILED else compiled
+    code: Any = _compiler.Code(compiled, types_of(arguments)) if IS_COMPILED else compiled
     return cast("Callable[..., R]", code)
 
 
-def _types(arguments: tuple[object, ...]) -> tuple[Any, ...]:
+def types_of(arguments: tuple[object, ...]) -> tuple[Any, ...]:
+    """Types of arguments for the compiler."""
     return tuple(_type_of(bare(argument)) for argument in arguments)
 
 
@@ -307,58 +295,15 @@ def bare(value: Any) -> Any:
     return value
 
 
-_NUMPY_RECORD: Any = np.record  # numpy's type stubs declare its parents final
-
-
-class Record(_NUMPY_RECORD):
-    """One record whose fields have priority over other attributes of the same name.
-
-    With :class:`numpy.record`, the name ``size``, ``min`` or ``data`` returns NumPy's own attribute instead of a field
-    with that name. Compiled kernels always use the field.
-    """
-
-    def __getattribute__(self, name: str) -> Any:
-        """Value of a field, or, if there is no such field, NumPy's attribute of that name."""
-        fields = np.void.__getattribute__(self, "dtype").fields
-        if name in fields:
-            return self[name]
-        try:
-            return super().__getattribute__(name)
-        except AttributeError:
-            raise AttributeError(_missing(name, fields)) from None
-
-    def __setattr__(self, name: str, value: Any) -> None:
-        """Set a field; a record has no other attributes that can be set."""
-        fields = np.void.__getattribute__(self, "dtype").fields
-        if name not in fields:
-            raise AttributeError(_missing(name, fields))
-        self[name] = value
-
-
-def _missing(name: str, fields: Iterable[str]) -> str:
-    """Message for a field that does not exist, with the same text as the compiler's message."""
-    known = list(fields)
-    near = get_close_matches(name, known, n=1)
-    hint = f"; did you mean {near[0]!r}?" if near else ""
-    return f"record has no field {name!r}{hint} (fields: {', '.join(known)})"
-
-
-def record_dtype(fields: Any) -> np.dtype[Any]:
-    """Type of records whose fields are attributes.
-
-    Args:
-        fields: Pairs of name and type, or a dtype, as for :class:`numpy.dtype`.
-    """
-    return np.dtype((Record, np.dtype(fields)))
-
-
 if TYPE_CHECKING:
+    from teleop_core.kernels.addresses import *  # noqa: F403
     from teleop_core.kernels.fields import *  # noqa: F403
     from teleop_core.kernels.geometry import *  # noqa: F403
     from teleop_core.kernels.parts import *  # noqa: F403
     from teleop_core.kernels.portable import *  # noqa: F403
 else:  # imported when they are first used
     _NAMES = {
+        "addresses": ("Addressed", "addressed", "call_address", "held"),
         "fields": ("Fields", "IntegerPerJoint", "Integers", "PerJoint", "PoseRow", "Quaternion", "Vector3", "Wrench",
             "fields_of", "record", "record_array"),
         "geometry": ("Array", "checked_array", "is_rigid", "multiply_quaternions", "pose_from_transform", "rotation",

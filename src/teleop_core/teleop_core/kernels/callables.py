@@ -47,6 +47,8 @@ def entry({names}):
 """
 
 _pending = threading.local()
+_stored: set[int] = set()
+"""Threads with a stored exception; looked up first, because a look-up in ``_pending`` takes 0.3 µs."""
 
 
 def raise_pending() -> None:
@@ -55,9 +57,12 @@ def raise_pending() -> None:
     Must be called after each block of ticks, in the thread that ran the block, because every thread stores its own
     exceptions. In pure-Python mode exceptions are raised at once, and this function does nothing.
     """
+    if not _stored:
+        return
     error: BaseException | None = getattr(_pending, "error", None)
     if error is not None:
         _pending.error = None
+        _stored.discard(threading.get_ident())
         raise error
 
 
@@ -88,7 +93,7 @@ def entry_of(function: Callable[..., Any], arguments: tuple[Any, ...], result: A
     space = {
         "function": function,
         "converted": converted,
-        "keep": _keep,
+        "keep": keep,
         "view": _views(),
         "c_type": ctypes.CFUNCTYPE(c_result, *c_arguments),
     }
@@ -96,9 +101,11 @@ def entry_of(function: Callable[..., Any], arguments: tuple[Any, ...], result: A
     return space["entry"]
 
 
-def _keep(error: BaseException) -> None:
+def keep(error: BaseException) -> None:
+    """Store an exception for :func:`raise_pending`, unless one is stored."""
     if getattr(_pending, "error", None) is None:
         _pending.error = error
+        _stored.add(threading.get_ident())
 
 
 def _views() -> Callable[..., Array]:

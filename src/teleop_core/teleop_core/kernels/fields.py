@@ -19,8 +19,8 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar, cast, get_args, get_o
 import numpy as np
 from numpy.typing import NDArray
 
-from teleop_core.kernels import records
 from teleop_core.kernels.geometry import Array
+from teleop_core.kernels.layout import PerJoints, records
 
 Field = tuple[str, str] | tuple[str, str, tuple[int, ...]]
 """Name and type of a field, and its shape if it is an array."""
@@ -91,7 +91,7 @@ def _field(name: str, hint: Any, joints: int) -> Field:
     if get_origin(hint) is not Annotated:
         return name, "i8" if hint is int else "f8"
     array, *shape = get_args(hint)
-    sizes = tuple(joints if size == "joints" else size for size in shape)
+    sizes = tuple(PerJoints(joints) if size == "joints" else size for size in shape)
     return name, "i8" if array == Integers else "f8", sizes
 
 

@@ -29,7 +29,7 @@ from numba.extending import overload
 from numba.np import arrayobj
 
 from teleop_core import __version__
-from teleop_core.kernels import borrowing, room, store
+from teleop_core.kernels import borrowing, joint_records, layout, room, store
 from teleop_core.kernels.borrowing import Pipeline
 from teleop_core.kernels.callables import entry_of
 from teleop_core.kernels.dependencies import digest, source_digest
@@ -154,8 +154,10 @@ class InnerDispatcher(Dispatcher):
         raise TypeError(f"{self.py_func.__name__} is called by kernels only: decorate it with kernel")
 
 
-def dispatcher(function: Callable[..., Any], *, is_inner: bool = False) -> Any:
+def dispatcher(function: Callable[..., Any], *, is_inner: bool = False, keeps_lock: bool = False) -> Any:
     """Kernel that is compiled when it is first called."""
+    if keeps_lock:
+        return Dispatcher(function, targetoptions={**_OPTIONS, "nogil": False}, pipeline_class=Pipeline)
     if is_inner:
         options = {**_OPTIONS, "no_cpython_wrapper": True}
         return InnerDispatcher(function, targetoptions=options, pipeline_class=Pipeline)
@@ -290,7 +292,8 @@ class _Cache(FunctionCache):
 
 def _cache(function: Any) -> Any:
     """Cache on disk of a function; None if the function has no source file."""
-    files = (__file__, borrowing.__file__, room.__file__, digest.__code__.co_filename)
+    own_types = (joint_records.__file__, layout.__file__)
+    files = (__file__, borrowing.__file__, room.__file__, *own_types, digest.__code__.co_filename)
     own = [source_digest(file) for file in files]
     config: Any = numba.config
     checked = str(config.BOUNDSCHECK)  # NUMBA_BOUNDSCHECK=1 gives different code

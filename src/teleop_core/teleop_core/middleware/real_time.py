@@ -54,6 +54,11 @@ def is_priority_granted(priority: int) -> bool:
         return not pool.submit(_take, priority).result()
 
 
+def give_way() -> None:
+    """Take the real-time priority from the calling thread."""
+    os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
+
+
 def _priority(priority: int) -> list[str]:
     if refusal := _take(priority):
         return [

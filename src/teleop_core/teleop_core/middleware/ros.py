@@ -12,15 +12,15 @@ from typing import Any
 import rclpy
 import rclpy.utilities
 from rclpy.context import Context
-from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 
 from teleop_core.bags.background import SYSTEM, Background
 from teleop_core.graph.layers import RealTimeParameters
-from teleop_core.middleware import real_time, ros_lifecycle, ros_node, world
+from teleop_core.middleware import real_time, ros_lifecycle, ros_node, ros_taking, world
 from teleop_core.middleware.domains import checked_domain, domain_of_environment
+from teleop_core.middleware.ros_executor import RosExecutor
 from teleop_core.middleware.world import Node as LocalNode
 
 BAD_ARGUMENTS = (
@@ -48,7 +48,11 @@ class RosWorld:
     time_ns = staticmethod(time.time_ns)
     sleep = staticmethod(time.sleep)
     thread_ident = staticmethod(threading.get_ident)
+    thread_time_ns = staticmethod(time.thread_time_ns)
+    give_way = staticmethod(real_time.give_way)
     take_real_time: Callable[[RealTimeParameters], list[str]] = staticmethod(real_time.apply_options)
+
+    functions = staticmethod(ros_taking.functions)
 
     def lock(self) -> world.Lock:
         """See :class:`~teleop_core.middleware.world.World`."""
@@ -112,36 +116,6 @@ class RosWorld:
     def ok(self) -> bool:
         """Whether the middleware still works."""
         return bool(rclpy.utilities.ok(context=self._context))
-
-
-class RosExecutor:
-    """See :class:`~teleop_core.middleware.world.Executor`."""
-
-    def __init__(self, context: Context | None) -> None:
-        self._own = SingleThreadedExecutor(context=context)
-
-    def add_node(self, node: Any) -> None:
-        """Add a node of :class:`RosWorld` to the nodes that this executor serves."""
-        self._own.add_node(node.own)
-
-    def spin_once(self, timeout_sec: float | None = None) -> None:
-        """Serve one event, or nothing if no event comes within the time [s]; raises WorldEndedError."""
-        try:
-            self._own.spin_once(timeout_sec)
-        except ExternalShutdownException as error:
-            raise world.WorldEndedError from error
-
-    def wake(self) -> None:
-        """Let :meth:`spin_once` return; may be called from any thread."""
-        self._own.create_task(_nothing)
-
-    def shutdown(self) -> None:
-        """Stop serving the nodes."""
-        self._own.shutdown()
-
-
-def _nothing() -> None:
-    """Do nothing: this empty task makes the executor return."""
 
 
 class _Listener:

@@ -5,15 +5,14 @@ from typing import Any
 
 from rclpy.client import Client
 from rclpy.duration import Duration
-from rclpy.guard_condition import GuardCondition
 from rclpy.lifecycle import LifecyclePublisher
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.service import Service
 from rclpy.subscription import Subscription
-from rclpy.timer import Timer
 
+from teleop_core.middleware.agenda import Agenda, Guard, Timer
 from teleop_core.middleware.ros_taking import RosTaker
 from teleop_core.middleware.world import Endpoint, Qos
 
@@ -23,8 +22,6 @@ _DESTROY = {
     Subscription: "destroy_subscription",
     Service: "destroy_service",
     Client: "destroy_client",
-    Timer: "destroy_timer",
-    GuardCondition: "destroy_guard_condition",
 }
 
 
@@ -51,6 +48,19 @@ class RosPublisher:
         self._is_managed = isinstance(own, LifecyclePublisher)
         self.publish: Callable[[Any], None] = own.publish
         self.get_subscription_count: Callable[[], int] = own.get_subscription_count
+
+    @property
+    def pointer(self) -> int:
+        """Address of the publisher in rcl, for kernels; 0 while the node is not active."""
+        return 0 if self._is_managed and not self.own.is_activated else int(self._handle.pointer)
+
+    def hold(self) -> None:
+        """Keep the publisher in memory until :meth:`release`: kernels publish without the interpreter's lock."""
+        self._handle.__enter__()
+
+    def release(self) -> None:
+        """Let the publisher be destroyed."""
+        self._handle.__exit__(None, None, None)
 
     def send(self, data: bytes) -> None:
         """Send bytes, if the node is active."""
@@ -79,8 +89,7 @@ class RosNode:
         self.resolve_topic_name = self.own.resolve_topic_name
         self.create_service = self.own.create_service
         self.create_client = self.own.create_client
-        self.create_timer = self.own.create_timer
-        self.create_guard_condition = self.own.create_guard_condition
+        self.agenda = Agenda()
         self.count_publishers = self.own.count_publishers
         self.get_topic_names_and_types = self.own.get_topic_names_and_types
         self.get_service_names_and_types = self.own.get_service_names_and_types
@@ -98,17 +107,29 @@ class RosNode:
         """Subscription whose messages the executor passes to ``callback``."""
         return self.own.create_subscription(kind, name, callback, profile_of(qos))
 
+    def create_timer(self, period: float, callback: Callable[[], None]) -> Timer:
+        """Timer whose function the executor calls."""
+        return self.agenda.timer(period, callback)
+
+    def create_guard_condition(self, callback: Callable[[], None]) -> Guard:
+        """Guard whose function the executor calls."""
+        return Guard(self.agenda, callback)
+
     def destroy(self, entity: Any) -> None:
         """Destroy an object that one of the methods above has made."""
+        if isinstance(entity, Timer):
+            self.agenda.drop(entity)
+            return
+        if isinstance(entity, Guard):
+            entity.cancel()
+            return
         own = entity.own if isinstance(entity, RosPublisher) else entity
         destroy = next(name for kind, name in _DESTROY.items() if isinstance(own, kind))
         getattr(self.own, destroy)(own)
 
     def defer(self, work: Callable[..., object], *arguments: object) -> None:
-        """Let the executor call ``work`` soon; without an executor nothing happens. May be called from any thread."""
-        executor = self.own.executor
-        if executor is not None:
-            executor.create_task(work, *arguments)
+        """Let the executor call ``work`` soon. May be called from any thread."""
+        self.agenda.defer(work, *arguments)
 
     def publishers(self, name: str) -> list[Endpoint]:
         """Discovered publishers of a topic."""

@@ -23,6 +23,19 @@ _ROOM = 64  # initial size of the buffer [bytes]; rcl enlarges it
 _GID = 16
 
 
+def functions() -> dict[str, int]:
+    """Addresses of the C functions by which kernels take, publish, and read the clock."""
+    rcl, rcutils, system = ctypes.PyDLL("librcl.so"), ctypes.PyDLL("librcutils.so"), ctypes.PyDLL(None)
+    found = {
+        "take": rcl.rcl_take_serialized_message,
+        "forget_error": rcutils.rcutils_reset_error,
+        "publish": rcl.rcl_publish_serialized_message,
+        "matched": rcl.rcl_publisher_get_subscription_count,
+        "clock": system.clock_gettime,
+    }
+    return {name: ctypes.cast(own, ctypes.c_void_p).value or 0 for name, own in found.items()}
+
+
 class _Allocator(ctypes.Structure):
     """rcutils_allocator_t."""
 
@@ -83,6 +96,11 @@ class RosTaker:
         handle: Handle of the subscription in rcl.
     """
 
+    @property
+    def places(self) -> tuple[int, int, int]:
+        """Addresses of the subscription, of the buffer for a message, and of the information about it."""
+        return (int(self.handle.pointer), *self._places)
+
     def __init__(self, node: Node, kind: Any, name: str, profile: QoSProfile) -> None:
         self.type, self._node = kind, node
         self._own = node.create_subscription(
@@ -105,6 +123,7 @@ class RosTaker:
         self._take = rcl.rcl_take_serialized_message
         self._take.argtypes, self._take.restype = [ctypes.c_void_p] * 4, ctypes.c_int
         self._places = ctypes.addressof(self._bytes), ctypes.addressof(self._info)
+        self.handle.__enter__()  # kernels take without the interpreter's lock: it must not be destroyed meanwhile
         self._gid = self._places[1] + _Info.gid.offset
         self._is_open = True
 
@@ -121,6 +140,10 @@ class RosTaker:
         if answer != _OK:
             self._forget_error()
             return None
+        return self.taken()
+
+    def taken(self) -> Taken:
+        """The last message that was taken, also by a kernel."""
         found, info = self._bytes, self._info
         return Taken(
             ctypes.string_at(found.buffer, found.length),
@@ -165,6 +188,7 @@ class RosTaker:
             self.__dict__.pop("_loss", None)
             self.__dict__.pop("_waiting", None)
             self._free(ctypes.byref(self._bytes))
+            self.handle.__exit__(None, None, None)
             self._node.destroy_subscription(self._own)
 
 

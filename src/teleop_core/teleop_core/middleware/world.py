@@ -117,7 +117,7 @@ class Thread(Protocol):
 class Line(Protocol):
     """Connection for bytes between two processes of one machine; its methods never wait."""
 
-    def send(self, data: bytes | bytearray) -> int:
+    def send(self, data: bytes | bytearray | memoryview) -> int:
         """Write as many bytes as the connection accepts now; return the number of bytes written.
 
         Raises:
@@ -391,6 +391,12 @@ class World(Protocol):
     def background(self) -> Background:
         """Functions for writing recordings."""
 
+    def functions(self) -> Mapping[str, int]:
+        """Addresses of the C functions by which kernels reach the middleware and the clock; empty if there are none.
+
+        The names are the fields of :class:`teleop_core.nodes.wire.Calls`.
+        """
+
     def monotonic_ns(self) -> int:
         """Time of a monotonic clock [ns]."""
 
@@ -411,6 +417,12 @@ class World(Protocol):
 
     def take_real_time(self, options: RealTimeParameters) -> list[str]:
         """Apply real-time options to the calling thread; returns one line for each refused option."""
+
+    def give_way(self) -> None:
+        """Take the real-time priority from the calling thread."""
+
+    def thread_time_ns(self) -> int:
+        """Processor time that the calling thread has used [ns]."""
 
     def tidy(self) -> None:
         """Free the memory of objects that remain from the start, before the loops run."""

@@ -38,7 +38,7 @@ class AnsweringNode(CoreNode):
         self._question.subscription.wait(DT if self._question.delay else 0.1)
         self.work(self.send_report)
 
-    def tick(self, tick_ns: int) -> None:
+    def step(self, tick_ns: int) -> None:
         """Answer the received messages. A session calls this method, and :meth:`tell` later."""
         self.work()
 

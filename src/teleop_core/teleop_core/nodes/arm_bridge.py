@@ -45,7 +45,6 @@ class ArmBridgeNode(TickingNode):
 
     def work(self, ticks: Iterable[int], report: Callable[[int], None] | None = None) -> None:
         """Pass on the arm's measurements, and command the arm if a command is due in one of the ticks."""
-        self.read_ports()
         now_ns = self.epoch_ns + max(ticks)
         with self.lock:
             self._listen()
@@ -68,7 +67,7 @@ class ArmBridgeNode(TickingNode):
                 stamp_ns = taken.sent_ns
             sample = Sample(message.name, message.position, message.velocity, message.effort, stamp_ns)
             if self.stage.hear(sample, self.world.time_ns()) and self._has_server:
-                self._output.send(stamp_ns)
+                self.ports.send_now(self._output, stamp_ns)
 
     def _command(self, now_ns: int) -> Command | None:
         is_led = self.input(SLAVE_OPERATION).stamp_ns is not None

@@ -3,6 +3,7 @@
 import traceback
 from collections.abc import Callable
 from concurrent.futures import Future
+from dataclasses import replace
 from typing import Any
 
 from teleop_core.bags.reports import read_reports
@@ -18,7 +19,8 @@ from teleop_core.nodes.loop import Loop
 from teleop_core.nodes.news import Commanders, introduction
 from teleop_core.nodes.ports import NO_PORTS, Ports
 from teleop_core.nodes.quality import profile
-from teleop_core.nodes.rate import REPORT_PERIOD, Recent, Schedule, TickCounts, report_phase
+from teleop_core.nodes.rate import REPORT_PERIOD, Phases, Recent, Schedule, TickCounts, report_phase
+from teleop_core.nodes.strain import Strain
 from teleop_core.nodes.streams import Input, message_type
 from teleop_core.nodes.tuned import TunedNode
 from teleop_core.session.reports import report_of
@@ -52,6 +54,10 @@ class CoreNode(TunedNode):
         """Time without progress after which the loop counts as hung [s]; 0: never."""
         self.has_own_loop = True
         """Whether the node works in its own thread; False if it works in the thread of a whole session."""
+        self.phases: Phases | None = None
+        """Time that the phases of a session's ticks took; its last node reports them."""
+        self.tells_strain = True
+        """Whether the reports of this node say that its loop has given way; one node of a session does."""
         self.is_at_work = self.has_worked = False
         self._loop: Loop | None = None
         self._feed: Feed | None = None
@@ -91,7 +97,10 @@ class CoreNode(TunedNode):
         """Do one round of work; blocks for a tenth of a second at most."""
         raise NotImplementedError
 
-    def tick(self, tick_ns: int) -> None:
+    def take(self) -> None:
+        """Read what came from other processes; a session calls this method of all its nodes before :meth:`step`."""
+
+    def step(self, tick_ns: int) -> None:
         """Work for one tick [ns, monotonic]; a session calls this method of all its nodes in turn."""
         raise NotImplementedError
 
@@ -247,14 +256,14 @@ class CoreNode(TunedNode):
 
     def _open_feed(self) -> None:
         """Feed the node's messages to the recorder of this machine, if there is one."""
-        outputs = {topic.name: output for topic, output in self.ports.outputs.items()}
-        if not outputs:
-            return
-        self._feed = Feed(outputs, self.world)
-        for name, output in outputs.items():
-            output.tap = self._feed.channels[name].give
-            self._feed.channels[name].join(True)
-        self._feed.flush()  # send fed messages before the middleware publishes the first message
+        names = [topic.name for topic in self.ports.outputs]
+        self._feed = Feed(names, self.world) if names else None
+        channels = self._feed.channels if self._feed is not None else {}
+        self.ports.connect(channels, self._feed)
+        if self._feed is not None:
+            for channel in channels.values():
+                channel.join(True)
+            self._feed.flush()  # send fed messages before the middleware publishes the first message
 
     def _fed_turn(self) -> None:
         self.turn()
@@ -304,8 +313,19 @@ class CoreNode(TunedNode):
 
     def prepare(self) -> None:
         """Apply the real-time options to the calling thread; log the options that the system refuses."""
-        for refusal in self.world.take_real_time(self.options.real_time):
+        options = self.options.real_time
+        refusals = self.world.take_real_time(options)
+        for refusal in refusals:
             self.ros.get_logger().warning(refusal)
+        if options.priority > 0 and not any("priority" in refusal for refusal in refusals):
+            self.schedule.strain = self.strain()
+
+    def strain(self) -> Strain:
+        """New judge of the loop that calls this method, which has real-time priority."""
+        again = replace(self.options.real_time, cpus=(), lock_memory=False, freeze_gc=False)
+        warn = self.ros.get_logger().warning
+        # A log line takes milliseconds, too long for the loop.
+        return Strain(self.world, lambda: self.world.take_real_time(again), lambda text: self.ros.defer(warn, text))
 
     def fail(self, reason: str, is_expected: bool) -> None:
         """End the work from within the loop: the outputs fall silent, and the process ends."""
@@ -368,6 +388,8 @@ class CoreNode(TunedNode):
         is_active = self._word == "active"
         concerns = self._reporter.input_concerns(inputs)
         concerns += self.ports.concerns()
+        if self.tells_strain and (strain := self.schedule.strain) is not None and strain.is_over:
+            concerns.append(strain.concern())
         if is_active:
             concerns += self.overrides.concerns() + self.concerns()
             concerns += self.runner.concerns() if self.runner is not None else []
@@ -375,6 +397,9 @@ class CoreNode(TunedNode):
             concerns.append("failed; see its log")
         rate = self._reporter.rate(self.counts.ticks)
         values = tick_values(self._word, rate, self.counts, TICK_NS * 1e-6)
+        if self.phases is not None:
+            values |= self.phases.values()
+        values["gave_way"] = str(self.schedule.strain.times if self.schedule.strain is not None else 0)
         values |= input_values(inputs) | self._reporter.rates(inputs)
         values |= {f"sent.{t.name}": str(o.sent) for t, o in self.ports.outputs.items()}
         if step := self._reporter.clock_step():

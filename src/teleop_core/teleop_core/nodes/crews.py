@@ -1,6 +1,6 @@
 """Crews: the processes of a live session, and the nodes in each process."""
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from enum import StrEnum
 
 from teleop_core.base.errors import UnknownNameError
@@ -8,6 +8,8 @@ from teleop_core.graph.graph import RECORDER_NAME, Graph
 from teleop_core.nodes.start import SESSION
 
 _SIDES = ("hand_side", "slave_side")
+_FREE = ("display", "task")
+"""Stages that may run on either side."""
 Crew = dict[str, tuple[str, ...]]
 """Processes that are started together, each with its nodes."""
 
@@ -38,17 +40,36 @@ def crews(graph: Graph, processes: Processes = Processes.SIDES, without: Collect
     for name in without:
         if name not in names:
             raise UnknownNameError("node of the session", name, names)
-    own = {name: _process_of(graph, name, processes) for name in names if name not in without}
+    sides = _sides(graph)
+    own = {name: _process_of(name, processes, sides) for name in names if name not in without}
     shared = {process: tuple(name for name in own if own[name] == process) for process in dict.fromkeys(own.values())}
     return ({RECORDER_NAME: (RECORDER_NAME,)}, shared)
 
 
-def _process_of(graph: Graph, name: str, processes: Processes) -> str:
+def _process_of(name: str, processes: Processes, sides: Mapping[str, str]) -> str:
     """Name of the process that runs a node."""
     if processes is Processes.NODES:
         return name
-    if processes is Processes.ONE:
-        return SESSION
-    stages = [member.stage.name for member in graph.members if member.arm == name.rpartition("/")[0]]
-    place = stages.index(name.rpartition("/")[2])
-    return _SIDES[place >= stages.index("slave")]
+    return SESSION if processes is Processes.ONE else sides[name]
+
+
+def _sides(graph: Graph) -> dict[str, str]:
+    """Side of each node.
+
+    Stages up to inverse kinematics are at the hand, the slave and what simulates it at the arm. Any other stage, such
+    as a display or a task, is where fewer topics cross between the processes.
+    """
+    found: dict[str, str] = {}
+    for member in graph.members:
+        stages = [one.stage.name for one in graph.members if one.arm == member.arm]
+        found[member.name] = _SIDES[stages.index(member.stage.name) >= stages.index("slave")]
+    for member in graph.members:
+        if member.stage.name in _FREE:
+            found[member.name] = min(_SIDES[::-1], key=lambda side: _crossing(graph, found | {member.name: side}))
+    return found
+
+
+def _crossing(graph: Graph, sides: Mapping[str, str]) -> int:
+    """Number of topics that a process publishes for the other one."""
+    links = [link for member in graph.members for link in graph.links_of(member)]
+    return len({link.topic.name for link in links if sides[link.writer.name] != sides[link.reader.name]})

@@ -10,15 +10,24 @@ import json
 import struct
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
-from typing import Protocol
+from typing import Any, Protocol
 
+import numpy as np
+
+from teleop_core.kernels import records
+from teleop_core.kernels.fields import fields_of
 from teleop_core.middleware.world import Line, Listener, World
+from teleop_core.nodes.wire import Block
 
 MOST = 16 << 20
 """Largest queue for a recorder that reads nothing [bytes]; about 7 s of a session of one arm."""
 _HEAD = struct.Struct("<IHHIq")  # head of a frame: size, topic, word, number, time [ns]
 _NAMES, _MESSAGE, _JOINED, _LEFT, _END = 0, 1, 2, 3, 4
 _AGAIN_NS = 1_000_000_000  # time between two searches for a recorder
+_BLOCK = 1 << 16
+"""Size of the block that kernels fill [bytes]: some twenty ticks of a session."""
+NO_BLOCK: Any = records(fields_of(Block))[0]
+"""Block of a loop that feeds no recorder."""
 _READ = 1 << 20  # largest number of bytes per read
 
 
@@ -28,17 +37,21 @@ class Channel:
     Args:
         feed: Feed of the loop.
         index: Index of the topic in the feed.
+
+    Attributes:
+        index: As given.
+        number: Number of the last message of the topic, if kernels do not feed it.
     """
 
     def __init__(self, feed: "Feed", index: int) -> None:
-        self._feed, self._index = feed, index
-        self._number, self._is_inside = 0, False
+        self._feed, self.index = feed, index
+        self.number, self._is_inside = 0, False
 
     def give(self, data: bytes, sent_ns: int) -> None:
         """Feed a message that was sent at a time [ns]."""
-        self._number += 1
+        self.number += 1
         if self._feed.is_open and len(self._feed.waiting) < MOST:
-            self._feed.put(self._index, _MESSAGE, data, self._number, sent_ns)
+            self._feed.put(self.index, _MESSAGE, data, self.number, sent_ns)
 
     def join(self, is_inside: bool) -> None:
         """Tell the recorder whether this process sends the topic; False if another process does."""
@@ -50,7 +63,7 @@ class Channel:
         """Tell a new recorder whether this process sends the topic."""
         if self._feed.is_open:
             word = _JOINED if self._is_inside else _LEFT
-            self._feed.put(self._index, word, time_ns=self._feed.world.time_ns())
+            self._feed.put(self.index, word, time_ns=self._feed.world.time_ns())
 
 
 class Feed:
@@ -64,18 +77,35 @@ class Feed:
         world: As given.
         channels: Channel of each topic, by its name.
         waiting: Queued bytes that are not written yet.
-        is_open: Whether a recorder listens.
+        block: Record of :class:`~teleop_core.nodes.wire.Block`: messages that kernels have fed since the last flush.
     """
 
     def __init__(self, names: Iterable[str], world: World) -> None:
         self._names, self.world = tuple(names), world
         self._line: Line | None = None
         self._looked_ns = -_AGAIN_NS
-        self.waiting, self.is_open = bytearray(), False
+        self.waiting = bytearray()
+        self.block: Any = records(fields_of(Block))[0]
+        self._bytes = np.zeros(_BLOCK, np.uint8)
+        self._view, self._fill = self._bytes.data, np.asarray(self.block)["fill"]
+        self.block["at"], self.block["room"] = self._bytes.ctypes.data, _BLOCK
         self.channels = {name: Channel(self, index) for index, name in enumerate(self._names)}
+
+    @property
+    def is_open(self) -> bool:
+        """Whether a recorder listens."""
+        return bool(self.block["is_open"])
+
+    def spill(self) -> None:
+        """Move the messages of the block to the queue."""
+        fill = int(self._fill)
+        if fill and len(self.waiting) < MOST:
+            self.waiting += self._view[:fill]
+        self._fill[...] = 0
 
     def put(self, index: int, word: int, data: bytes = b"", number: int = 0, time_ns: int = 0) -> None:
         """Append a frame to the queue."""
+        self.spill()
         self.waiting += _HEAD.pack(len(data), index, word, number, time_ns)
         self.waiting += data
 
@@ -86,14 +116,23 @@ class Feed:
             if now_ns - self._looked_ns > _AGAIN_NS:
                 self._looked_ns = now_ns
                 self._connect()
-        if self._line is not None and self.waiting:
-            try:
-                written = self._line.send(self.waiting)
-            except BlockingIOError:
-                return
-            except OSError:  # the recorder has ended; a new recorder may start
-                self.close()
-                return
+        fill = int(self._fill)
+        if self._line is None or not (fill or self.waiting):
+            return
+        is_straight = not self.waiting  # nothing has to be copied if the socket accepts everything
+        if not is_straight:
+            self.spill()
+        try:
+            written = self._line.send(self._view[:fill] if is_straight else self.waiting)
+        except BlockingIOError:
+            return
+        except OSError:  # the recorder has ended; a new recorder may start
+            self.close()
+            return
+        if is_straight and written == fill:
+            self._fill[...] = 0
+        else:
+            self.spill()
             del self.waiting[:written]
 
     def close(self) -> None:
@@ -103,7 +142,7 @@ class Feed:
             with suppress(OSError):
                 self._line.send(self.waiting)
             self._line.close()
-        self._line, self.is_open = None, False
+        self._line, self.block["is_open"], self.block["fill"] = None, 0, 0
         self.waiting.clear()
 
     def _connect(self) -> None:
@@ -111,7 +150,7 @@ class Feed:
             line = self.world.connect(self.world.feed_place())
         except OSError:  # no recorder listens
             return
-        self._line, self.is_open = line, True
+        self._line, self.block["is_open"] = line, 1
         self.put(0, _NAMES, json.dumps(self._names).encode())
         for channel in self.channels.values():
             channel.tell()

@@ -51,14 +51,13 @@ class MasterBridgeNode(TickingNode):
 
     def work(self, ticks: Iterable[int], report: Callable[[int], None] | None = None) -> None:
         """Pass on the device's messages, and send it the force of the newest tick."""
-        self.read_ports()
         now_ns = self.epoch_ns + max(ticks)
         with self.lock:
             is_new = self._listen()
             is_heard = self.stage.is_heard(self.world.time_ns())
             force = self.stage.force(self.input(MASTER_SERVO_CF).age(), self.world.time_ns())
         if is_new or (is_heard and now_ns - self._said_ns >= _BUTTONS_AGAIN_NS):
-            self._buttons_out.send(now_ns)
+            self.ports.send_now(self._buttons_out, now_ns)
             self._said_ns = now_ns
         self._trouble.tell(self.stage.concerns())
         if self._forces is not None:
@@ -75,7 +74,7 @@ class MasterBridgeNode(TickingNode):
             has_stamp = self.parameters.pose_stamps == "header" and hasattr(message, "header")
             stamp_ns = _nanoseconds(message.header.stamp) if has_stamp else taken.sent_ns
             if self._hear(message, stamp_ns):
-                self._pose_out.send(stamp_ns)
+                self.ports.send_now(self._pose_out, stamp_ns)
         is_new = False
         while self._presses is not None and (taken := self._presses.take()) is not None:
             before = self.stage.signals[MASTER_BUTTONS.field].copy()

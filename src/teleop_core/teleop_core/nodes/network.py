@@ -1,7 +1,5 @@
 """Node ``network``: delays and loses messages between both sides, whichever node publishes them."""
 
-from typing import Any
-
 from teleop_core.coupling.network.network import BACK, THERE
 from teleop_core.coupling.network.presets import NetworkParameters
 from teleop_core.graph import topics
@@ -21,7 +19,13 @@ class NetworkNode(TickingNode):
     def setup(self, parameters: NetworkParameters) -> None:
         """Make the network, and open its topics."""
         super().setup(parameters)
-        self._passed = {topic: 0 for topic in self.description.writes if topic is not topics.NETWORK_STATE}
+        passed = [topic for topic in self.description.writes if topic is not topics.NETWORK_STATE]
+        # For each output that passes something on: output, direction, field of its stamp, and whether it may repeat.
+        self._passed = [
+            (self.ports.output(t), THERE if t in _THERE else BACK, f"{t.field}_ns", t is topics.NETWORK_SETPOINT_CP)
+            for t in passed
+        ]
+        self._last_ns = [0] * len(passed)
 
     def turn(self) -> None:
         """Make all steps that are due; a packet counts as sent when this node reads it, even if this node is late."""
@@ -34,14 +38,11 @@ class NetworkNode(TickingNode):
 
     def send(self, now_ns: int) -> None:
         """Send the messages that arrived in the step and, at intervals, the counts."""
-        has_come = self.stage.state["arrived"]
-        silent = {topic.name for topic in self._passed if not self._is_due(topic, has_come)}
-        self.ports.send(now_ns, silent)
-
-    def _is_due(self, topic: topics.Topic, has_come: Any) -> bool:
-        """Whether a new message of a topic arrived."""
-        if not has_come[THERE if topic in _THERE else BACK]:
-            return False
-        before_ns, stamp_ns = self._passed[topic], self.row[f"{topic.field}_ns"]
-        self._passed[topic] = stamp_ns
-        return stamp_ns != before_ns or topic is topics.NETWORK_SETPOINT_CP
+        has_come, row = self.stage.state["arrived"].tolist(), self.row
+        for i, (output, way, stamp, may_repeat) in enumerate(self._passed):
+            is_due, stamp_ns = False, self._last_ns[i]
+            if has_come[way]:
+                self._last_ns[i] = row[stamp]
+                is_due = may_repeat or row[stamp] != stamp_ns
+            output.is_silent = not is_due
+        self.ports.send(now_ns)

@@ -8,6 +8,7 @@ from std_msgs.msg import Bool
 from std_srvs.srv import Trigger
 
 from teleop_core.middleware.world import Owner, Qos
+from teleop_core.nodes.streams import RareTakers
 from teleop_core.slave.operation.presses import Presses
 from teleop_core.slave.operation.states import COMMANDS, Answer
 
@@ -79,11 +80,12 @@ class StopButton:
 class StopInput:
     """Reader of the emergency stop in every tick; reading takes 1 µs and needs no executor.
 
-    The first reader is read in every tick, the other two in every fourth tick. No press is lost: readers keep all
-    messages, and missing messages count as a press (:class:`~teleop_core.slave.operation.presses.Presses`). Missing
-    messages are found by the message numbers and by the loss count of the first reader, which receives all reliable
-    senders. The second reader also receives earlier states. A button that exists but sends nothing counts as pressed
-    after half a second, because it may have been pressed before its discovery.
+    The first reader is read in every tick; the other two, and the count of lost messages, in every fourth tick. No
+    press is lost: readers keep all messages, and missing messages count as a press
+    (:class:`~teleop_core.slave.operation.presses.Presses`). Missing messages are found by the message numbers and by
+    the loss count of the first reader, which receives all reliable senders. The second reader also receives earlier
+    states. A button that exists but sends nothing counts as pressed after half a second, because it may have been
+    pressed before its discovery.
 
     Args:
         owner: Node that owns it; its executor looks for buttons that send nothing.
@@ -99,6 +101,7 @@ class StopInput:
         self._silent: tuple[bytes, ...] = ()
         self._timer = self._ros.create_timer(_LOOK, self._look_for_silent)
         self._takers = [self._ros.create_taker(Bool, STOP_TOPIC, qos) for qos in READERS]
+        self._rare = RareTakers(owner.world, self._takers)
         self._presses, self._ticks = Presses(), 0
         self._names: dict[bytes, str] = {}
 
@@ -111,19 +114,21 @@ class StopInput:
         """
         found: list[bool] = []
         self._ticks += 1
-        presses, best_effort = self._presses, self._takers[-1]
+        presses, best_effort = self._presses, len(self._takers) - 1
         looks_at_all = self._ticks % _EVERY == 0
-        for taker in self._takers if looks_at_all else self._takers[:1]:
-            while (taken := taker.take()) is not None:
-                if len(taken.data) < _BYTES:
-                    continue
-                self.has_new = self.has_new or not presses.knows(taken.sender)
-                is_pressed = taken.data[_BYTES - 1] != 0
-                if taker is best_effort:
-                    found += presses.overhear(taken.sender, now_ns, is_pressed=is_pressed)
-                else:
-                    found += presses.take(taken.sender, taken.number, now_ns, is_pressed=is_pressed, is_idle=is_idle)
-        if looks_at_all and self._silent:  # look for silent buttons after all messages are read
+        while (one := self._rare.next(len(self._takers) if looks_at_all else 1)) is not None:
+            index, taken = one
+            if len(taken.data) < _BYTES:
+                continue
+            self.has_new = self.has_new or not presses.knows(taken.sender)
+            is_pressed = taken.data[_BYTES - 1] != 0
+            if index == best_effort:
+                found += presses.overhear(taken.sender, now_ns, is_pressed=is_pressed)
+            else:
+                found += presses.take(taken.sender, taken.number, now_ns, is_pressed=is_pressed, is_idle=is_idle)
+        if not looks_at_all:
+            return found
+        if self._silent:  # look for silent buttons after all messages are read
             found += [said for one in self._silent for said in presses.doubt(one)]
         return [*presses.lose(self._takers[0].lost), *found]
 

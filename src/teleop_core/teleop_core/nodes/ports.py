@@ -1,6 +1,6 @@
 """Ports: connect the topics that a node reads and writes to the fields of its stage's signals."""
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -12,11 +12,14 @@ from teleop_core.base.parameters import NoParameters
 from teleop_core.graph.graph import BUILT_IN
 from teleop_core.graph.signals import make_signals
 from teleop_core.graph.stage import Stage
-from teleop_core.graph.topics import BY_NAME, PORTS_BETWEEN_ARMS, SELDOM_NS, Kind, Topic
+from teleop_core.graph.topics import BY_NAME, PORTS_BETWEEN_ARMS, Kind, Quality, Topic
+from teleop_core.kernels import held, records
 from teleop_core.kernels.fields import Cells
 from teleop_core.kernels.geometry import Array
-from teleop_core.middleware.world import Publisher
-from teleop_core.nodes.streams import Input, Output
+from teleop_core.middleware.world import Publisher, World
+from teleop_core.nodes import wire
+from teleop_core.nodes.feed import NO_BLOCK, Feed
+from teleop_core.nodes.streams import READING, WRITING, Calls, Input, Output, Tap
 
 Feeds = Callable[[str], list[tuple[str, float]]]
 """Function from a port to the topics that feed it, each with its delay [s]."""
@@ -53,37 +56,77 @@ class Ports:
         buttons: tuple[int, ...] = BUTTONS,
     ) -> None:
         self._arm, self._stage, self.row = arm, stage, Cells(signals)
+        self._world: World | None = owner.world if owner is not None else None
         self._must_check = stage.name not in BUILT_IN
         self.refused = 0
         """Number of steps whose outputs were not sent because they contained NaN or infinity."""
+        self.waits = False
+        """Whether messages stay in their buffers until :meth:`publish`; a session publishes after all its stages."""
         self.inputs: dict[str, list[Input]] = {}
         self.outputs: dict[Topic, Output] = {}
         self._summed: list[tuple[str, list[Array]]] = []
-        for port in stage.reads:
-            given = feeds(port.name)
-            own, heard = signals[port.field], _heard if port == stage.trigger else _seen
-            targets = [own] if len(given) == 1 else [own.copy() for _ in given]
-            self.inputs[port.name] = [
-                Input(owner, heard(port, name, arm), _name_for(owner, name), joint_names, target, delay, buttons)
-                for (name, delay), target in zip(given, targets, strict=True)
-            ]
+        self._base = np.asarray(signals).ctypes.data, signals.dtype.fields
+        self._make_inputs(owner, signals, feeds, joint_names, buttons)
+        self._make_outputs(owner, signals, publisher, joint_names)
+        self._calls = Calls(self._world) if self._world is not None else None
+        self._feed: Feed | None = None
+        # First input to read, and the port to leave out; first output to write, and the stamp of samples [ns].
+        self._reading, self._writing = np.array((0, -1)), np.zeros(2, np.int64)
+        self._times = np.zeros(2, np.int64)
+        self._has_clock = self._calls is not None and bool(self._calls.own["clock"])
+        if self._calls is not None:
+            self._bind(self._calls.own)
+
+    def _make_inputs(
+        self, owner: Any, signals: Any, feeds: Feeds, joint_names: tuple[str, ...], buttons: tuple[int, ...]
+    ) -> None:
+        given = {port: feeds(port.name) for port in self._stage.reads}
+        self._read_records = records(READING, max(1, sum(map(len, given.values()))))
+        self._entries: list[Input] = []
+        for number, (port, found) in enumerate(given.items()):
+            own, heard = signals[port.field], _heard if port == self._stage.trigger else _seen
+            targets = [own] if len(found) == 1 else [own.copy() for _ in found]
+            for (name, delay), target in zip(found, targets, strict=True):
+                into = self._read_records[len(self._entries)]
+                topic, full_name = heard(port, name, self._arm), _name_for(owner, name)
+                self._entries.append(Input(owner, topic, full_name, joint_names, target, delay, buttons, into))
+                into["port"] = number
+                self._entries[-1].is_trigger = port == self._stage.trigger
+            own_entries = self.inputs[port.name] = self._entries[-len(found) :]
+            own_entries[0].own["stamp_at"] = self._place(f"{port.field}_ns")
             if len(targets) > 1:
                 self._summed.append((port.field, targets))
-        # Built once, because every tick uses them, a thousand times a second.
-        self._ports = [(p.name, f"{p.field}_ns", self.inputs[p.name]) for p in stage.reads]
-        self._stamped: list[tuple[Output, str]] = []
-        self._passed_on: dict[Output, int] = {}  # last sent stamp of each output
-        self._seldom: dict[Output, tuple[bytes, int]] = {}  # last sent values of each output, and their stamp
-        for topic in stage.writes:
-            if topic.kind is not Kind.REPORT:
-                form = layout(topic.of_arm(arm), joint_names)
-                output = Output(owner, publisher(topic), form, signals[topic.field], topic.name)
-                self.outputs[topic.of_arm(arm)] = output
-                self._stamped.append((output, self._stamp_field(topic)))
-                if topic.stamp.of and not topic.stamp.is_in_force:
-                    self._passed_on[output] = 0
-                if topic.is_seldom:
-                    self._seldom[output] = b"", 0
+        self._read_records = self._read_records[: len(self._entries)]
+        self._numbers = {port.name: number for number, port in enumerate(given)}
+
+    def _make_outputs(
+        self, owner: Any, signals: Any, publisher: Callable[[Topic], Publisher], joint_names: tuple[str, ...]
+    ) -> None:
+        written = [topic for topic in self._stage.writes if topic.kind is not Kind.REPORT]
+        self._write_records = records(WRITING, len(written))
+        for topic, into in zip(written, self._write_records, strict=True):
+            form = layout(topic.of_arm(self._arm), joint_names)
+            self.outputs[topic.of_arm(self._arm)] = Output(
+                owner, publisher(topic), form, signals[topic.field], topic.name, into
+            )
+            field = self._stamp_field(topic)
+            into["stamp_at"] = self._place(field) if field else 0
+            into["passes_on"] = bool(topic.stamp.of) and not topic.stamp.is_in_force
+            into["is_seldom"], into["is_latched"] = topic.is_seldom, topic.quality is not Quality.STREAM
+        self._sent = list(self.outputs.values())
+
+    def _place(self, field: str) -> int:
+        """Address of a field of the signals."""
+        base, fields = self._base
+        return int(base + fields[field][1])
+
+    def _bind(self, calls: Any) -> None:
+        """Bind the kernels to their records."""
+        block = self._feed.block if self._feed is not None else NO_BLOCK
+        self._read_all = held(wire.read_all, self._read_records, calls, self._reading)
+        self._write_all = held(wire.write_all, self._write_records, calls, self._writing, self._times)
+        self._are_sound = held(wire.are_sound, self._write_records, self._writing)
+        self._send_all = held(wire.send_all, self._write_records, calls, block, self._writing)
 
     def _stamp_field(self, written: Topic) -> str:
         """Field of the stamp that an output passes on; empty for the time of sampling."""
@@ -106,50 +149,96 @@ class Ports:
 
     def read(self, trigger: Topic | None = None) -> None:
         """Update the signals of all ports except the trigger's port."""
-        own = trigger.name if trigger is not None else ""
-        for name, stamp_field, entries in self._ports:
-            if name != own:
-                for entry in entries:
-                    entry.newest()
-                stamp_ns = entries[0].stamp_ns
-                if stamp_ns is not None:
-                    self.row[stamp_field] = stamp_ns
+        place, count = self._reading, len(self._entries)
+        place[0], place[1] = 0, -1 if trigger is None else self._numbers[trigger.name]
+        self._read_all()
+        while (index := place.item(0)) < count:
+            self._entries[index].finish()
+            place[0] = index + 1
+            self._read_all()
+        self.add_up()
+
+    def add_up(self) -> None:
+        """Update the signals of ports that several topics feed."""
         for name, parts in self._summed:
             self.row[name] = np.sum(parts, axis=0)
 
-    def send(self, now_ns: int, silent: Collection[str] = ()) -> None:
-        """Send the stage's outputs, except the topics in ``silent``.
-
-        Each output gets the stamp that its topic declares.
+    def send(self, now_ns: int) -> None:
+        """Send the stage's outputs, each with the stamp that its topic declares.
 
         An output whose stamp was already sent is not a new answer and is not sent. Values of a user's stage that are
         not finite are not sent either.
         """
-        row = self.row
-        if self._must_check and not all(output.is_sound() for output, _ in self._stamped):
-            self.refused += 1
-            return
-        for output, stamp_field in self._stamped:
-            if output.name in silent:
-                continue
-            self.send_one(output, row[stamp_field] if stamp_field else now_ns)
+        place, count = self._writing, len(self._sent)
+        if self._must_check:
+            self._are_sound()
+            if not place[0]:
+                self.refused += 1
+                return
+        self._read_clocks()
+        place[0], place[1] = 0, now_ns
+        self._write_all()
+        while (index := place.item(0)) < count:
+            self.publish()  # a message of the same tick is still in the buffer
+            place[0] = index
+            self._write_all()
+        if not self.waits:
+            self.publish()
 
     def send_one(self, output: Output, stamp_ns: int) -> None:
-        """Send the current values of one output with a stamp [ns], as :meth:`send` does."""
-        if output in self._passed_on:
-            if self._passed_on[output] == stamp_ns:
-                return
-            self._passed_on[output] = stamp_ns
-        if output in self._seldom:
-            values, (before, last_ns) = output.bits(), self._seldom[output]
-            if values == before and stamp_ns - last_ns < SELDOM_NS:
-                return
-            self._seldom[output] = values, stamp_ns
-        output.send(stamp_ns)
+        """Send the current values of one output with a stamp [ns], if :meth:`send` would."""
+        if output.is_due(stamp_ns):
+            self.send_now(output, stamp_ns)
+
+    def send_now(self, output: Output, stamp_ns: int) -> None:
+        """Send the current values of one output with a stamp [ns]."""
+        assert self._world is not None
+        if output.is_pending:
+            self.publish()
+        output.write(stamp_ns, self._world.monotonic_ns(), self._world.time_ns())
+        if not self.waits:
+            self.publish()
+
+    def publish(self) -> None:
+        """Publish and record what is written."""
+        place, count = self._writing, len(self._sent)
+        place[0] = 0
+        self._send_all()
+        while (index := place.item(0)) < count:
+            if self._sent[index].is_direct:
+                assert self._feed is not None
+                self._feed.spill()  # the recorder's block is full
+            else:
+                self._sent[index].publish()
+            place[0] = index
+            self._send_all()
+
+    def _read_clocks(self) -> None:
+        """Read the clocks for kernels that cannot read them."""
+        if not self._has_clock and self._world is not None:
+            self._times[:] = self._world.monotonic_ns(), self._world.time_ns()
+
+    def connect(self, taps: Mapping[str, Tap], feed: Feed | None) -> None:
+        """Give the bytes of all messages to the recorder.
+
+        Args:
+            taps: Receivers of the messages, by the name of the topic; topics without one are only published.
+            feed: Feed of the loop to the recorder, to which its channels in ``taps`` belong.
+        """
+        self._feed = feed
+        for topic, output in self.outputs.items():
+            output.connect(taps.get(topic.name))
+        if self._calls is not None:
+            self._bind(self._calls.own)
 
     def mute(self) -> None:
         """Send nothing from now on, because another node publishes these topics."""
-        self._stamped, self.outputs = [], {}
+        for output in self.outputs.values():
+            output.close()
+        self.outputs, self._sent = {}, []
+        self._write_records = self._write_records[:0]
+        if self._calls is not None:
+            self._bind(self._calls.own)
 
     def concerns(self) -> list[str]:
         """Texts about problems of the stage's outputs."""
@@ -157,9 +246,11 @@ class Ports:
         return [lost] if self.refused else []
 
     def close(self) -> None:
-        """Close all inputs."""
+        """Close all inputs and outputs."""
         for entry in self.all_inputs():
             entry.close()
+        for output in self.outputs.values():
+            output.close()
 
 
 def _heard(port: Topic, name: str, arm: str) -> Topic:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from teleop_core.graph.signals import TICK_NS
+from teleop_core.nodes.strain import Strain
 
 REPORT_PERIOD = 1.0
 """Time between two reports of a node [s]."""
@@ -47,29 +48,57 @@ class TickCounts:
     dropped: int = 0
 
 
+class Phases:
+    """Time that a loop has spent in each phase of its ticks since it began.
+
+    Attributes:
+        ticks: Number of ticks.
+        used_ns: Time in each phase [ns], by its name.
+    """
+
+    def __init__(self, *names: str) -> None:
+        self.ticks, self.used_ns = 0, dict.fromkeys(names, 0)
+
+    def put(self, *times_ns: int) -> None:
+        """Add a tick: its begin and the end of each of its phases, by a monotonic clock [ns]."""
+        self.ticks += 1
+        for name, begin_ns, end_ns in zip(self.used_ns, times_ns, times_ns[1:], strict=False):
+            self.used_ns[name] += end_ns - begin_ns
+
+    def values(self) -> dict[str, str]:
+        """Names and texts for a report: ticks, and the time of each phase [µs]."""
+        return {f"phase_us.{name}": str(used_ns // 1000) for name, used_ns in self.used_ns.items()} | {
+            "phase_ticks": str(self.ticks)
+        }
+
+
 class Recent:
     """The last numbers of a stream, for their median and extremes.
 
     Args:
         size: Number of values that are stored.
+
+    Attributes:
+        numbers: Memory of the numbers (size,), which kernels also write.
+        count: Number of values that were put so far, (1,).
     """
 
     def __init__(self, size: int = 1000) -> None:
-        self._numbers = np.zeros(size)
-        self._count = 0
+        self.numbers, self.count = np.zeros(size), np.zeros(1, np.int64)
 
     def put(self, number: float) -> None:
         """Add a number, which replaces the oldest number."""
-        self._numbers[self._count % len(self._numbers)] = number
-        self._count += 1
+        count = self.count.item()
+        self.numbers[count % len(self.numbers)] = number
+        self.count[0] = count + 1
 
     def clear(self) -> None:
         """Delete all numbers."""
-        self._count = 0
+        self.count[0] = 0
 
     def summary(self) -> tuple[float, float, float]:
         """Median, 99th percentile and maximum; zeros without numbers."""
-        kept = self._numbers[: self._count]
+        kept = self.numbers[: self.count.item()]
         if not len(kept):
             return 0.0, 0.0, 0.0
         median, high = np.percentile(kept, (50.0, 99.0))
@@ -100,6 +129,8 @@ class Schedule:
         self._clock, self._sleep = clock, sleep
         self._max_catch_up, self._period_ns = max_catch_up, period_ns
         self._phase_ns = phase_ns
+        self.strain: Strain | None = None
+        """Judges whether the loop must give way; None for a loop without real-time priority."""
         self.counts = TickCounts()
         self.lateness = Recent()
         """Delay of each wake-up after the time of its tick, [ns]."""
@@ -110,6 +141,8 @@ class Schedule:
         self._next_ns = self._clock() + self._period_ns
         if self._phase_ns is not None:
             self._next_ns += (self._phase_ns - self._next_ns) % self._period_ns
+        if self.strain is not None:
+            self.strain.start()
 
     def due(self) -> range:
         """Sleep until the next tick is due.
@@ -123,10 +156,13 @@ class Schedule:
             now_ns = self._clock()
         late_ns = now_ns - self._next_ns
         missed = late_ns // self._period_ns
-        dropped = max(0, missed - self._max_catch_up)
+        has_given_way = self.strain is not None and self.strain.is_over
+        dropped = missed if has_given_way else max(0, missed - self._max_catch_up)
         first_ns = self._next_ns + dropped * self._period_ns
         self._next_ns += (missed + 1) * self._period_ns
         self._count(late_ns, missed, dropped)
+        if self.strain is not None:
+            self.strain.note(now_ns, is_late=late_ns > self._period_ns // 2)
         return range(first_ns, self._next_ns, self._period_ns)
 
     def _count(self, late_ns: int, missed: int, dropped: int) -> None:

@@ -19,6 +19,7 @@ _SELDOM = 10
 """Number of turns between two checks of clocks and publishers."""
 _ANSWERS = 50
 """Largest number of the arm's samples that are answered in one turn, so that a turn takes less than a tick."""
+_DISABLED = float(State.DISABLED)
 _CLOCK_STEP_NS = 100_000_000
 """Largest change of the system clock relative to the monotonic clock that does not count as a step [ns]."""
 
@@ -50,22 +51,28 @@ class SlaveNode(TickingNode):
     def start(self) -> None:
         """Store the offset between the clocks, so that later steps of the system clock are detected."""
         super().start()
-        self._is_told = False
+        self._is_told = self._is_ready = False
         self._offset_ns, self._turns, self._floods = self.epoch_ns, 0, 0
         self._seen, self._missed = self.counts, self.counts.missed
 
-    def work(self, ticks: Iterable[int], report: Callable[[int], None] | None = None) -> None:
-        """Read the newest command and make the steps of some ticks [ns, monotonic]."""
-        if not self._is_told:
-            self.read_ports()
-            self._is_told = self.input(SLAVE_MEASURED_JS).stamp_ns is not None
-            self._seen, self._missed = self.counts, self.counts.missed
+    def take(self) -> None:
+        """Read the newest command and the arm's samples; look for faults."""
+        self._is_ready, self._before_ns = self._is_told, self.row["slave_setpoint_js_ns"]
+        if self._is_ready:
+            self._look()
+            super().take()
             return
-        before_ns = self.row["slave_setpoint_js_ns"]
-        self._look()
+        self.read_ports()
+        self._is_told = self.input(SLAVE_MEASURED_JS).stamp_ns is not None
+        self._seen, self._missed = self.counts, self.counts.missed
+
+    def work(self, ticks: Iterable[int], report: Callable[[int], None] | None = None) -> None:
+        """Make the steps of some ticks [ns, monotonic], if the position of the arm is known."""
+        if not self._is_ready:
+            return
         super().work(ticks, report)
         stamp_ns = self.row["slave_setpoint_js_ns"]
-        if stamp_ns != before_ns:
+        if stamp_ns != self._before_ns:
             self.delay.put(self.world.time_ns() - stamp_ns)
 
     def read_ports(self, trigger: Topic | None = None) -> None:
@@ -94,7 +101,7 @@ class SlaveNode(TickingNode):
     def advance(self, now_ns: int) -> None:
         """Read the emergency stop, then make one step. Several late steps also read the stop before each step."""
         with self.lock:  # locked for both: a reset in between would treat a silent button as released
-            is_idle = self._state[0] == State.DISABLED
+            is_idle = self._state[0] == _DISABLED
             for is_pressed in self._stop.take(now_ns, is_idle=is_idle):
                 heard_ns = self._stop.heard_ns
                 self.stage.press(is_pressed=is_pressed, heard_ns=now_ns if heard_ns is None else heard_ns)

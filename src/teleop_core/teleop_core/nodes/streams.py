@@ -1,30 +1,37 @@
 """Streams: transfer raw messages to and from the signals of a stage, without executor and conversion.
 
-A message with exactly the layout of this package's nodes is decoded at fixed positions. Any other message of the type
-(another frame, other names, another order) is deserialised and read by name. Both give the same values.
+A message with exactly the layout of this package's nodes is decoded at fixed positions, by the kernels of
+:mod:`teleop_core.nodes.wire`. Any other message of the type (another frame, other names, another order) is
+deserialised and read by name. Both give the same values.
 """
 
 from collections import Counter, deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from functools import cache
 from importlib import import_module
-from typing import Any
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
 from teleop_core.bags import messages
 from teleop_core.base.errors import MessageTypeError
-from teleop_core.graph.topics import NO_COMMAND_NS, Kind, Topic
+from teleop_core.graph.topics import Kind, Topic
+from teleop_core.kernels import held, record_dtype, records
+from teleop_core.kernels.fields import Cells, fields_of
 from teleop_core.kernels.geometry import Array
-from teleop_core.middleware.world import Owner, Publisher, Taken
+from teleop_core.kernels.memory import integers, octets
+from teleop_core.middleware.world import Owner, Publisher, Taken, Taker, World
+from teleop_core.nodes import wire
+from teleop_core.nodes.feed import Channel
 from teleop_core.nodes.quality import NO_OVERRIDES, QualityOverrides
 from teleop_core.nodes.quality import profile as profile  # noqa: PLC0414  for importers of both
 from teleop_core.nodes.sender import Sender
 
-SILENCE_NS = 2_000_000_000
-"""After this time without a valid message, a sender may restart with any stamp [ns]."""
 _WAITING = 20
 """Smallest queue length for a late reader [messages]. A longer queue is used if a late sender may catch up more ticks
 than this in one wake-up."""
+_SPARE = 64
+"""A message of the known form may be longer by so many bytes of padding [bytes]."""
 _PRESSES = 500
 """Queue length for buttons [messages]: a press is not lost even if the reader reads nothing for half a second."""
 
@@ -67,10 +74,95 @@ class Subscription:
         own = owner.ros.create_taker(self.type, name, wanted)
         self.take: Callable[[], Taken | None] = own.take
         """Return the oldest queued message; None if the queue is empty."""
+        self.places: tuple[int, int, int] | None = getattr(own, "places", None)
+        """Addresses for kernels that take messages themselves; see :class:`RosTaker`; None in other worlds."""
         self.wait: Callable[[float], None] = own.wait
         """Wait for a message, at most for some time [s]."""
         self.close: Callable[[], None] = own.close
         """Stop listening."""
+
+
+READING, WRITING = (record_dtype(fields_of(kind)) for kind in (wire.Reading, wire.Writing))
+"""Types of the records of an input and of an output."""
+
+
+def describe(cells: Cells, form: messages.Layout) -> None:
+    """Write the form of a stream's messages into the record of an input or output."""
+    cells["has_form"], cells["is_pose"] = 1, form.kind is Kind.POSE
+    cells["is_whole"], cells["width"], cells["size"] = form.kind is Kind.BUTTONS, form.width, form.size
+    cells["template_at"], cells["mask_at"] = form.template.ctypes.data, form.mask.ctypes.data
+    cells["places_at"] = form.places.ctypes.data
+
+
+@cache
+def load() -> None:
+    """Load the kernels that Python calls one by one, which takes ms at their first call."""
+    reading, writing = (records(kind)[0] for kind in (READING, WRITING))
+    sender, row, count = Sender(into=reading), np.zeros(1), np.zeros(1, np.int64)
+    for cells in map(Cells, (reading, writing)):
+        for name in ("template_at", "mask_at", "places_at"):
+            cells[name] = row.ctypes.data
+    for name in ("target_at", "row_at"):
+        reading[name] = row.ctypes.data
+    for name in ("source_at", "kept_at", "readers_at"):
+        writing[name] = row.ctypes.data
+    sender.admit(b"", 0, 0)
+    sender.note_old(0, 0)
+    wire.read(reading, count.ctypes.data, 8)
+    wire.accept(reading, 0, 0, 0)
+    wire.is_due(writing, 0)
+    buffer = np.zeros(16, np.uint8)
+    writing["buffer_at"], writing["size"] = buffer.ctypes.data, len(buffer)
+    wire.write_one(writing, 0, 0, 0)
+
+
+class Calls:
+    """C functions of a world for the kernels of its nodes.
+
+    Args:
+        world: World of the nodes.
+
+    Attributes:
+        own: Record of :class:`~teleop_core.nodes.wire.Calls`.
+    """
+
+    def __init__(self, world: World) -> None:
+        self.own: Any = records(fields_of(wire.Calls))[0]
+        self._time, self._count = np.zeros(2, np.int64), np.zeros(1, np.int64)
+        for name, address in world.functions().items():
+            self.own[name] = address
+        self.own["time_at"], self.own["count_at"] = self._time.ctypes.data, self._count.ctypes.data
+
+
+class RareTakers:
+    """Subscriptions that seldom have a message, so that a look at all of them must cost little.
+
+    Args:
+        world: World of the subscriptions.
+        own: The subscriptions.
+    """
+
+    def __init__(self, world: World, own: Sequence[Taker]) -> None:
+        self._own, self._count = own, np.zeros(1, np.int64)
+        found = [getattr(taker, "places", None) for taker in own]
+        self._look: Callable[[], None] | None = None
+        if all(places is not None for places in found):
+            self._look = held(wire.take_raw, np.array(found, np.int64), Calls(world).own, self._count)
+
+    def next(self, count: int) -> tuple[int, Taken] | None:
+        """Index of one of the first ``count`` subscriptions, and its oldest message; None if none has a message."""
+        if self._look is None:
+            for index, taker in enumerate(self._own[:count]):
+                if (taken := taker.take()) is not None:
+                    return index, taken
+            return None
+        self._count[0] = count
+        self._look()
+        index = self._count.item()
+        if index == count:
+            return None
+        own: Any = self._own[index]
+        return index, own.taken()
 
 
 class Input:
@@ -84,12 +176,10 @@ class Input:
         target: Array into which the values are written, shape (width,).
         delay: Time for which each message is delayed, as on a slow link [s].
         buttons: Indices of clutch, fixture and mode among a message's buttons; -1 if the message lacks a button.
+        into: Record of :class:`~teleop_core.nodes.wire.Reading` for the input; None for a record of its own.
 
     Attributes:
-        stamp_ns: Stamp of the newest valid message; None before the first.
-        arrival_ns: Monotonic time at which that message was read [ns].
-        received: Number of messages read, valid or not.
-        refused: Number of invalid messages, by reason.
+        own: The record.
         sender: Data about the sender of the messages.
     """
 
@@ -102,26 +192,67 @@ class Input:
         target: Array,
         delay: float = 0.0,
         buttons: tuple[int, ...] = messages.BUTTONS,
+        into: Any = None,
     ) -> None:
         self.topic, self._owner, self._name = topic, owner, name
         self._world, options = owner.world, getattr(owner, "options", None)
         burst = options.max_catch_up if options is not None else 0
         self._waiting = max(_PRESSES if topic.kind is Kind.BUTTONS else _WAITING, burst)
-        self.subscription: Subscription | None = Subscription(owner, topic, name, self._waiting)
-        self._is_new = False
-        self._joint_names, self._target = topic.names(joint_names), target
+        self._joint_names, self._target, self._row = topic.names(joint_names), target, np.zeros(len(target))
         is_report = topic.kind is Kind.REPORT
         self._layout = None if is_report else messages.layout(topic, joint_names)
         self._buttons = buttons
-        self._has_own_order = topic.kind is not Kind.BUTTONS or buttons == messages.BUTTONS
         messages.read_reports(messages.report(0, "", 0, "", {}))  # loads the message types, which takes 60 ms
         self._delay_ns = round(delay * 1e9)
         self._held: deque[tuple[int, int, messages.Values]] = deque()
-        self.received, self.refused = 0, Counter[messages.Refusal]()
-        self.sender = options.sender() if options is not None else Sender()
+        own = records(READING)[0] if into is None else into
+        self.sender = options.sender(own) if options is not None else Sender(into=own)
         self._is_fault = options is not None and options.second_publisher == "fault"
-        self.stamp_ns: int | None = None
-        self.arrival_ns = 0
+        self.own, self._cells = own, Cells(own)
+        load()
+        self._describe()
+        self._bytes = bytearray(self._cells["size"] + _SPARE)
+        self._bytes_at = np.frombuffer(self._bytes, np.uint8).ctypes.data
+        calls = Calls(self._world)
+        kernels = wire.answer_take, wire.answer_newest
+        self._take, self._newest = (held(kernel, own, calls.own) for kernel in kernels)
+        self.is_trigger = False
+        """Whether each message of the topic is a step of the stage."""
+        self.subscription: Subscription | None = None
+        self._listen()
+
+    def _describe(self) -> None:
+        cells, topic = self._cells, self.topic
+        if self._layout is not None and (topic.kind is not Kind.BUTTONS or self._buttons == messages.BUTTONS):
+            describe(cells, self._layout)
+        cells["width"], cells["is_pose"] = len(self._row), topic.kind is Kind.POSE
+        cells["target_at"], cells["row_at"] = self._target.ctypes.data, self._row.ctypes.data
+        cells["is_buttons"] = topic.kind is Kind.BUTTONS
+        cells["may_repeat"] = topic.stamp.is_in_force or self._layout is None
+
+    def _listen(self) -> None:
+        """Open the subscription."""
+        self.subscription = Subscription(self._owner, self.topic, self._name, self._waiting)
+        places = self.subscription.places
+        if places is not None:
+            self._cells["reader"], self._cells["message_at"], self._cells["info_at"] = places
+        self._cells["needs_python"] = places is None or bool(self._delay_ns)
+
+    @property
+    def stamp_ns(self) -> int | None:
+        """Stamp of the newest valid message; None before the first."""
+        return int(self._cells["stamp_ns"]) if self._cells["has_stamp"] else None
+
+    @property
+    def received(self) -> int:
+        """Number of messages read, valid or not."""
+        return int(self._cells["received"])
+
+    @property
+    def refused(self) -> Counter[messages.Refusal]:
+        """Number of invalid messages, by reason."""
+        counts = self._cells["refused"].tolist()
+        return Counter({reason: count for reason, count in zip(wire.REASONS, counts, strict=False) if count})
 
     @property
     def conflict(self) -> bool:
@@ -135,49 +266,99 @@ class Input:
 
     def take(self) -> bool:
         """Write the next valid message in the queue into the signals; return whether there was one."""
-        if self._delay_ns:
-            return self._take_held()
-        if self.subscription is None:
-            is_new, self._is_new = self._is_new, False
-            return is_new
-        while (found := self._next()) is not None:
-            if self._accept(*found):
+        if self._cells["needs_python"]:
+            return self._take_held() if self._delay_ns else self._take_in_python()
+        self._take()
+        while (answer := self._cells["answer"]) == wire.FOREIGN:
+            if self._take_foreign():
                 return True
-        return False
+            self._take()
+        return bool(answer == wire.NEW)
 
     def newest(self) -> bool:
         """Write the newest valid message into the signals; return whether there was one.
 
         For buttons, the first message that presses or releases a button is written, so that no press is missed.
         """
-        has_buttons = self.topic.kind is Kind.BUTTONS
-        before = self._target.tobytes() if has_buttons else b""
-        is_new = self.take()
+        before = self._pressed()
+        if self._cells["needs_python"]:
+            return self._newest_after(self.take(), before)
+        self._newest()
+        answer = self._cells["answer"]
+        return self._newest_after_foreign() if answer == wire.FOREIGN else bool(answer == wire.NEW)
+
+    def finish(self) -> None:
+        """Read the newest message for :func:`~teleop_core.nodes.wire.read_all`, which needs Python for it."""
+        if self._cells["needs_python"]:
+            self.newest()
+        else:
+            self._newest_after_foreign()
+        if self._cells["stamp_at"] and self._cells["has_stamp"]:
+            integers(self._cells["stamp_at"], 1)[0] = self._cells["stamp_ns"]
+
+    def _newest_after_foreign(self) -> bool:
+        """As :meth:`newest`, after a kernel has found a message of another form."""
+        before, has_found = self._pressed(), bool(self._cells["has_found"])
+        return self._newest_after(self._take_foreign() or self.take(), before) or has_found
+
+    def _newest_after(self, is_new: bool, before: bytes) -> bool:
+        """Write the newest message into the signals, after the first one was written if ``is_new``."""
         if is_new and (self.subscription is not None or self._delay_ns):
-            while not (has_buttons and self._target.tobytes() != before) and self.take():
+            while self._pressed() == before and self.take():
                 pass
         return is_new
 
-    def _next(self) -> tuple[int, messages.Values] | None:
-        """Next message of the subscription that can be read."""
-        while self.subscription is not None and (taken := self.subscription.take()) is not None:
-            self.received += 1
-            if reason := self.sender.admit(taken.sender, taken.number, self._world.monotonic_ns()):
-                self.refused[reason] += 1
-                continue
-            known = None
-            if self._layout is not None and self._has_own_order:
-                known = self._layout.decode_one(taken.data)
-            found = known or self._read(taken.data)
-            if not isinstance(found, messages.Refusal):
-                return found
-            self.refused[found] += 1
-        return None
+    def _pressed(self) -> bytes:
+        """State of the buttons; empty for an input without buttons."""
+        return self._target.tobytes() if self.topic.kind is Kind.BUTTONS else b""
+
+    # -- in Python: what is rare, and everything in a world whose middleware kernels cannot reach -----
+
+    def _take_in_python(self) -> bool:
+        assert self.subscription is not None
+        while (taken := self.subscription.take()) is not None:
+            if self._admit(taken) and self._accept_bytes(taken.data):
+                return True
+        return False
+
+    def _admit(self, taken: Taken) -> bool:
+        self._cells["received"] += 1
+        reason = self.sender.admit(taken.sender, taken.number, self._world.monotonic_ns())
+        if reason is not None:
+            self._refuse(reason)
+        return reason is None
+
+    def _accept_bytes(self, data: bytes) -> bool:
+        found = self._values(data)
+        return found is not None and self._accept(*found)
+
+    def _take_foreign(self) -> bool:
+        """Accept the message of another form that a kernel has taken."""
+        at, length = integers(self._cells["message_at"], 2).tolist()
+        found = self._read(octets(at, length).tobytes())
+        if isinstance(found, messages.Refusal):
+            self._refuse(found)
+            return False
+        return self._accept(*found)
+
+    def _values(self, data: bytes) -> tuple[int, messages.Values] | None:
+        """Stamp and values of a message; None if it was refused."""
+        if len(data) <= len(self._bytes):
+            self._bytes[: len(data)] = data
+            stamp_ns = wire.read(self.own, self._bytes_at, len(data))
+            if stamp_ns >= 0:
+                return stamp_ns, self._row
+        found = self._read(data)
+        if isinstance(found, messages.Refusal):
+            self._refuse(found)
+            return None
+        return found
 
     def _take_held(self) -> bool:
         """Write the next valid delayed message that is due into the signals; return whether there was one."""
-        while (found := self._next()) is not None:
-            self._held.append((self._world.monotonic_ns() + self._delay_ns, *found))
+        while self.subscription is not None and (taken := self.subscription.take()) is not None:
+            if self._admit(taken) and (found := self._values(taken.data)) is not None:
+                self._held.append((self._world.monotonic_ns() + self._delay_ns, found[0], found[1].copy()))
         now_ns = self._world.monotonic_ns()
         while self._held and self._held[0][0] <= now_ns:
             _, stamp_ns, values = self._held.popleft()
@@ -186,25 +367,11 @@ class Input:
         return False
 
     def _accept(self, stamp_ns: int, values: messages.Values) -> bool:
-        now_ns, last_ns = self._world.monotonic_ns(), self.stamp_ns
-        may_repeat = self.topic.stamp.is_in_force or self._layout is None
-        if now_ns - self.arrival_ns > SILENCE_NS or (may_repeat and stamp_ns <= NO_COMMAND_NS):
-            last_ns = None
-        elif may_repeat and last_ns is not None:
-            last_ns -= 1
-        reason = messages.check(self.topic.kind, stamp_ns, values, last_ns)
-        if reason is not None:
-            self.refused[reason] += 1
-            if reason is messages.Refusal.NOT_NEWER and last_ns is not None:
-                self.sender.note_old(stamp_ns, last_ns)
-            return False
-        if may_repeat:
-            self.sender.fault = None
-        else:
-            self.sender.note_stamp(stamp_ns, self._world.time_ns())
-        self._target[:] = values
-        self.stamp_ns, self.arrival_ns = stamp_ns, now_ns
-        return True
+        self._row[:] = values
+        return bool(wire.accept(self.own, stamp_ns, self._world.monotonic_ns(), self._world.time_ns()))
+
+    def _refuse(self, reason: messages.Refusal) -> None:
+        self._cells["refused"][wire.REASONS.index(reason)] += 1
 
     def _read(self, data: bytes) -> tuple[int, messages.Values] | messages.Refusal:
         """Stamp and values of a message with another layout than this package's, or of a report."""
@@ -214,9 +381,9 @@ class Input:
 
     def age(self) -> float:
         """Time since the last valid message was read [s]; infinite before the first."""
-        if self.stamp_ns is None:
+        if not self._cells["has_stamp"]:
             return float("inf")
-        return (self._world.monotonic_ns() - self.arrival_ns) * 1e-9
+        return float((self._world.monotonic_ns() - self._cells["arrival_ns"]) * 1e-9)
 
     def forget(self) -> None:
         """Discard the queue and restart: the next message may have any stamp."""
@@ -224,9 +391,8 @@ class Input:
             pass
         self._held.clear()
         self.sender.forget()
-        self._is_new = False
-        self.stamp_ns = None
-        self.arrival_ns = 0
+        for name in ("is_new", "has_stamp", "stamp_ns", "arrival_ns"):
+            self._cells[name] = 0
 
     def zero(self) -> None:
         """Overwrite the newest values with zeros, for example for a force that ended."""
@@ -239,24 +405,30 @@ class Input:
     # -- within a process that holds the sender too ----------------------------------------------
 
     def join(self, is_inside: bool) -> None:
-        """Receive values only from :meth:`give` if ``is_inside``, otherwise only from the topic."""
+        """Receive values only from a sender in this process if ``is_inside``, otherwise only from the topic."""
         if is_inside and self.subscription is not None:
             self.close()
         elif not is_inside and self.subscription is None:
-            self.subscription = Subscription(self._owner, self.topic, self._name, self._waiting)
+            self._listen()
 
-    def give(self, stamp_ns: int, values: messages.Values) -> None:
-        """Receive a valid sample from a sender in this process."""
-        self.received += 1
-        if self._delay_ns:
-            self._held.append((self._world.monotonic_ns() + self._delay_ns, stamp_ns, values.copy()))
-            return
-        self._target[:] = values
-        self.stamp_ns, self.arrival_ns = stamp_ns, self._world.monotonic_ns()
-        self._is_new = True
+    @property
+    def place(self) -> tuple[int, int, int]:
+        """Addresses at which a sender in this process writes.
+
+        Of the values, of five fields from ``received``, and of the stamp in the signals of a stage that has its own
+        clock; 0 for the trigger of a stage, whose stamp changes with each answer.
+        """
+        received: Any = np.asarray(self.own)["received"]
+        return self._target.ctypes.data, received.ctypes.data, 0 if self.is_trigger else self._cells["stamp_at"]
+
+    def hold(self, stamp_ns: int, values: messages.Values) -> None:
+        """Receive a sample of a sender in this process, on a link with a delay."""
+        self._cells["received"] += 1
+        self._held.append((self._world.monotonic_ns() + self._delay_ns, stamp_ns, values.copy()))
 
     def close(self) -> None:
         """Stop listening to the topic."""
+        self._cells["reader"], self._cells["needs_python"] = 0, bool(self._delay_ns)
         if self.subscription is not None:
             self.subscription.close()
             self.subscription = None
@@ -271,46 +443,125 @@ class Output:
         form: Layout of the messages.
         source: Array with the values, shape (width,).
         name: Name of the topic, below the node's namespace.
+        into: Record of :class:`~teleop_core.nodes.wire.Writing` for the output; None for a record of its own.
 
     Attributes:
-        sent: Number of sent messages.
-        inputs: Readers of the topic in this process, which get the values directly.
-        tap: Function that is called with the bytes of every message and the time of sending [ns]; it replaces a
-            subscription in this process.
-        pending: Queue of messages that the session will :meth:`publish`; None to publish at once.
+        own: The record.
+        name: As given.
     """
 
     def __init__(
-        self, owner: Owner, publisher: Publisher, form: messages.Layout, source: Array, name: str = ""
+        self, owner: Owner, publisher: Publisher, form: messages.Layout, source: Array, name: str = "", into: Any = None
     ) -> None:
-        self.name, self._time_ns, self._send = name, owner.world.time_ns, publisher.send
-        self._encode, self._source = form.encode_one, source
-        self.sent = 0
-        self.inputs: list[Input] = []
-        self.tap: Callable[[bytes, int], None] | None = None
-        self.pending: list[tuple[Output, bytes, int]] | None = None
+        self.name, self._publisher, self._source = name, publisher, source
+        self.own = records(WRITING)[0] if into is None else into
+        self._cells, self._held = Cells(self.own), list[Input]()
+        describe(self._cells, form)
+        self._buffer, self._kept = np.array(form.template), np.zeros(form.width)
+        self._message = np.zeros(8, np.int64)  # rcutils_uint8_array_t: buffer, length, capacity, allocator
+        self._message[:3] = self._buffer.ctypes.data, form.size, form.size
+        self._readers = np.zeros(1, np.int64)
+        self._cells["source_at"], self._cells["buffer_at"] = source.ctypes.data, self._buffer.ctypes.data
+        self._cells["kept_at"], self._cells["message_at"] = self._kept.ctypes.data, self._message.ctypes.data
+        self._cells["readers_at"] = self._readers.ctypes.data
+        self._tap: Tap | None = None
+        self._is_kept = isinstance(publisher, Kept)
+        if isinstance(publisher, Kept):
+            publisher.hold()
+        self.connect(None)
 
-    def send(self, stamp_ns: int) -> None:
-        """Send the current values with a stamp [ns], first to the readers in this process."""
-        for entry in self.inputs:
-            entry.give(stamp_ns, self._source)
-        data = self._encode(stamp_ns, self._source)  # the next sample may be of the same tick
-        if self.pending is None:
-            self.publish(data, 0 if self.tap is None else self._time_ns())
-        else:
-            self.pending.append((self, data, self._time_ns()))
+    @property
+    def sent(self) -> int:
+        """Number of sent messages."""
+        return int(self._cells["sent"])
 
-    def publish(self, data: bytes, sent_ns: int) -> None:
-        """Publish a message that was already sent within the process at ``sent_ns`` [ns]."""
-        self._send(data)
-        if self.tap is not None:
-            self.tap(data, sent_ns)
-        self.sent += 1
+    @property
+    def is_pending(self) -> bool:
+        """Whether a written message is still to be sent."""
+        return bool(self._cells["is_pending"])
 
-    def bits(self) -> bytes:
-        """The current values as bytes, for comparison."""
-        return self._source.tobytes()
+    @property
+    def is_direct(self) -> bool:
+        """Whether kernels send the messages."""
+        return bool(self._cells["writer"])
 
-    def is_sound(self) -> bool:
-        """Whether the current values are finite."""
-        return bool(np.isfinite(self._source).all())
+    @property
+    def is_silent(self) -> bool:
+        """Whether nothing is written; can be set."""
+        return bool(self._cells["is_silent"])
+
+    @is_silent.setter
+    def is_silent(self, value: bool) -> None:
+        self._cells["is_silent"] = value
+
+    def is_due(self, stamp_ns: int) -> bool:
+        """Whether values with a stamp [ns] are to be sent; see :func:`~teleop_core.nodes.wire.write_all`."""
+        return bool(wire.is_due(self.own, stamp_ns))
+
+    def write(self, stamp_ns: int, now_ns: int, time_ns: int) -> None:
+        """Write the present values into the buffer, as :func:`~teleop_core.nodes.wire.write_one`."""
+        wire.write_one(self.own, stamp_ns, now_ns, time_ns)
+
+    def serve(self, inputs: Sequence[Input]) -> None:
+        """Pass the values of each message to readers in this process."""
+        self._held = [entry for entry in inputs if entry.delay]
+        places = [entry.place for entry in inputs if not entry.delay]
+        self._readers = np.array(places or [(0, 0, 0)], np.int64).ravel()
+        self._cells["readers_at"], self._cells["readers"] = self._readers.ctypes.data, len(places)
+
+    def connect(self, tap: "Tap | None") -> None:
+        """Give the bytes of each message to the recorder, or to nobody; this replaces a subscription in this process.
+
+        Kernels publish and feed by themselves if they can reach both the middleware and the recorder's block.
+        """
+        if isinstance(self._tap, Channel) and self._cells["writer"]:
+            self._tap.number = self._cells["fed"]
+        self._tap, is_fed = tap, isinstance(tap, Channel)
+        is_reached = isinstance(self._publisher, Kept) and not self._held and (tap is None or is_fed)
+        self._cells["writer"] = self._publisher.pointer if is_reached and isinstance(self._publisher, Kept) else 0
+        self._cells["is_fed"] = is_fed
+        if isinstance(tap, Channel):
+            self._cells["fed_index"], self._cells["fed"] = tap.index, tap.number
+
+    def close(self) -> None:
+        """Send nothing from now on."""
+        self._cells["is_silent"], self._cells["writer"], self._cells["is_pending"] = 1, 0, 0
+        if self._is_kept and isinstance(self._publisher, Kept):
+            self._publisher.release()
+        self._is_kept = False
+
+    def publish(self) -> None:
+        """Send the message in the buffer in Python, if it is still to be sent."""
+        if not self._cells["is_pending"]:
+            return
+        stamp = self._buffer[4:12].view(np.uint32).tolist()
+        for entry in self._held:
+            entry.hold(stamp[0] * wire.SECOND_NS + stamp[1], self._source)
+        data, sent_ns = self._buffer.tobytes(), self._cells["pending_ns"]
+        self._publisher.send(data)
+        if self._tap is not None:
+            self._tap.give(data, sent_ns)
+        self._cells["is_pending"] = 0
+        self._cells["sent"] += 1
+
+
+@runtime_checkable
+class Kept(Protocol):
+    """Publisher that kernels can reach."""
+
+    @property
+    def pointer(self) -> int:
+        """Address of the publisher; 0 while it sends nothing."""
+
+    def hold(self) -> None:
+        """Keep the publisher in memory until :meth:`release`."""
+
+    def release(self) -> None:
+        """Let the publisher be destroyed."""
+
+
+class Tap(Protocol):
+    """Receiver of the bytes of all messages of a topic in this process."""
+
+    def give(self, data: bytes, sent_ns: int) -> None:
+        """Receive a message that was sent at a time [ns]."""

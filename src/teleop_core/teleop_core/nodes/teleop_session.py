@@ -21,9 +21,8 @@ from teleop_core.nodes.feed import Feed
 from teleop_core.nodes.files import graph_of
 from teleop_core.nodes.loop import Loop
 from teleop_core.nodes.making import make_node
-from teleop_core.nodes.rate import Schedule
+from teleop_core.nodes.rate import Phases, Schedule
 from teleop_core.nodes.recorder import RecorderNode
-from teleop_core.nodes.streams import Output
 from teleop_core.session.links import link_texts
 
 _AFTER_NS = 700_000
@@ -68,6 +67,7 @@ class TeleopSession:
         self._gate = world.lock()
         for node in self._stages:
             node.has_own_loop, node.gate = False, self._gate
+            node.tells_strain = node is self._stages[-1]
         last = self._stages[-1]
         self._schedule = Schedule(
             world.monotonic_ns,
@@ -75,8 +75,8 @@ class TeleopSession:
             last.options.max_catch_up,
             phase_ns=0 if members[0] is graph.members[0] else _AFTER_NS,
         )
+        self._phases = last.phases = Phases("take", "step", "give", "tell")
         self._at_work: tuple[bool, ...] = ()
-        self._pending: list[tuple[Output, bytes, int]] = []
         self._ticks = 0
         self._loop = Loop(world, "session", self._turn, last.fail, patience=last.patience)
         self._loop.start()
@@ -100,15 +100,18 @@ class TeleopSession:
 
     def _turn(self) -> None:
         """Run all stages for each tick that is due."""
-        if not self._loop.is_ready and self._are_all_there():
+        is_first = not self._loop.is_ready and self._are_all_there()
+        if is_first:
             self._stages[-1].prepare()  # give the loop its priority after all kernels are compiled
-            self._schedule.start()  # ticks that passed meanwhile must not be caught up
+            self._schedule.strain = self._stages[-1].schedule.strain
             self._loop.is_ready = True
         with self._gate:
             at_work = tuple(node.is_at_work for node in self.nodes)
             if at_work != self._at_work:
                 self._link()
                 self._at_work = at_work
+        if is_first:
+            self._schedule.start()  # ticks that passed meanwhile must not be caught up
         if not self._loop.is_ready or not any(at_work):
             self._world.sleep(0.01)
             self._schedule.start()
@@ -124,23 +127,27 @@ class TeleopSession:
         return any(n.has_worked for n in self.nodes) and all(n.has_worked for n in waited_for)
 
     def _tick(self, tick_ns: int) -> None:
-        """Make one tick [ns, monotonic]. The gate keeps all nodes open until all messages are published."""
+        """Make one tick [ns, monotonic]: take, step, give, tell. The gate keeps all nodes open until it is over."""
+        clock = self._world.monotonic_ns
         self._ticks += 1
-        waiting: list[tuple[Output, bytes, int]] = []
         with self._gate:
-            for node in self._stages:
-                if node.is_at_work:
-                    node.tick(tick_ns)
-                    # Messages with the longest path to their reader are sent first: the slave's setpoint first, the
-                    # master's sample last.
-                    waiting[:0] = self._pending
-                    self._pending.clear()
-            for output, data, sent_ns in waiting:
-                output.publish(data, sent_ns)
+            at_work = [node for node in self._stages if node.is_at_work]
+            begin_ns = clock()
+            for node in at_work:
+                node.take()
+            taken_ns = clock()
+            for node in at_work:
+                node.step(tick_ns)
+            stepped_ns = clock()
+            # Messages with the longest path to their reader are sent first: the slave's setpoint first, the master's
+            # sample last.
+            for node in reversed(at_work):
+                node.ports.publish()
             self._feed.flush()
-            for node in self._stages:
-                if node.is_at_work:
-                    node.tell()
+            given_ns = clock()
+            for node in at_work:
+                node.tell()
+            self._phases.put(begin_ns, taken_ns, stepped_ns, given_ns, clock())
 
     def _link(self) -> None:
         """Connect every stage's output to its readers in this process, if both are at work."""
@@ -153,12 +160,13 @@ class TeleopSession:
         channels: dict[str, Any] = dict(self._feed.channels)
         for recorder in self._recorder:
             channels |= recorder.channels
-        for name, out in outputs.items():
-            out.inputs = [entry for entry in inputs if entry.topic.name == name]
-            channel = channels.get(name)
-            out.tap, out.pending = channel.give if channel else None, self._pending
         for entry in inputs:
             entry.join(entry.topic.name in outputs)
+        for name, out in outputs.items():
+            out.serve([entry for entry in inputs if entry.topic.name == name])
+        for node in active:
+            node.ports.waits = True
+            node.ports.connect(channels, self._feed)
         for name, channel in channels.items():
             channel.join(name in outputs)
         self._feed.flush()  # send fed messages before the middleware publishes the first message

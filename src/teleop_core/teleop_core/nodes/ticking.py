@@ -14,20 +14,26 @@ class TickingNode(CoreNode):
 
     def turn(self) -> None:
         """Make all steps that are due."""
-        self.work(self.schedule.due(), self.send_report)
+        ticks = self.schedule.due()
+        self.take()
+        self.work(ticks, self.send_report)
 
-    def tick(self, tick_ns: int) -> None:
+    def take(self) -> None:
+        """Read the received messages."""
+        self.read_ports()
+
+    def step(self, tick_ns: int) -> None:
         """Make the step of one tick [ns, monotonic]; the session calls :meth:`tell` later."""
         self.work((tick_ns,))
 
     def work(self, ticks: Iterable[int], report: Callable[[int], None] | None = None) -> None:
-        """Read the received messages, then make the steps of some ticks [ns, monotonic].
+        """Make the steps of some ticks with the messages already read.
 
         Args:
             ticks: Times of the ticks [ns, monotonic].
             report: Called with the stamp of each step [ns] when all its topics are sent.
         """
-        self.read_ports()
+        self.ports.add_up()
         for tick_ns in ticks:
             self.make_tick(tick_ns, report)
 

@@ -60,9 +60,9 @@ class NodeParameters:
     )
     real_time: RealTimeParameters = field(default_factory=RealTimeParameters)
 
-    def sender(self) -> Sender:
-        """New object that checks the sender of an input topic."""
-        return Sender(self.flood_rate, self.owner_silence)
+    def sender(self, into: Any = None) -> Sender:
+        """New object that checks the sender of an input topic; ``into`` is its record."""
+        return Sender(self.flood_rate, self.owner_silence, into)
 
     def feeds(self, port: str) -> list[tuple[str, float]]:
         """Topics that feed a port, each with its delay [s].

@@ -1,14 +1,12 @@
-"""Compose: the tick of a graph as one compiled kernel, from generated source.
+"""Compose: the tick of a graph as a program of copies and calls.
 
-The source is a loop over ticks. It copies values from record to record along the links, calls the kernel of each stage,
-stamps the topics that the stage wrote and copies them to the row that is recorded. Stages in plain Python divide the
-source into segments and are called between the segments. Compiled kernels are stored on disk, where later sessions of
-the same graph load them.
+In each tick the program copies values from record to record along the links, calls the kernel of each stage, stamps the
+topics that the stage wrote and copies them to the row that is recorded. One compiled loop runs the programs of all
+graphs (:mod:`teleop_core.kernels.program`).
 """
 
 import traceback
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -17,8 +15,10 @@ import numpy as np
 from teleop_core import kernels
 from teleop_core.base.errors import PartError, TeleopError
 from teleop_core.graph.graph import Graph, Link, Member
-from teleop_core.graph.signals import add, copy, topic_fields
+from teleop_core.graph.signals import add, topic_fields
 from teleop_core.graph.stage import Runner
+from teleop_core.kernels.fields import Integers
+from teleop_core.kernels.program import Program
 
 __all__ = ["Tick", "block_dtype", "compose"]
 
@@ -32,75 +32,36 @@ def block_dtype(graph: Graph, joints: Mapping[str, int]) -> Any:
     """
     fields: list[Any] = [("now_ns", "i8")]
     for member in graph.members:
-        fields += topic_fields(member.writes, joints[member.arm])
+        for name, kind, *shape in topic_fields(member.writes, joints[member.arm]):
+            fields.append((name, kind, *(tuple(map(int, one)) for one in shape)))  # the arms differ in their joints
         prefix = f"{member.arm}_" if member.arm else ""
         fields += [(prefix + note[0], *note[1:]) for note in member.stage.notes]
     return kernels.record_dtype(fields)
 
 
-Segment = list[str]
-"""Lines of source that become one kernel."""
-Call = Callable[[], None]
-
-
-@dataclass
-class _Text:
-    """Source under construction: segments, and calls of plain-Python stages between the segments."""
-
-    parts: list[Segment | Call] = field(default_factory=lambda: [[]])
-    objects: dict[str, Any] = field(default_factory=dict)
-
-    def say(self, *lines: str) -> None:
-        """Add lines to the current segment."""
-        segment = self.parts[-1]
-        assert isinstance(segment, list)
-        segment += lines
-
-    def call(self, call: Call) -> None:
-        """End the current segment, add a call of a plain-Python stage and begin a new segment."""
-        self.parts += [call, []]
-
-
 _PACKAGE = Path(__file__).resolve().parents[1]
-Rings = dict[tuple[str, str, str], Any]
-"""Past values on delayed links, by topic, reader and port."""
-_CLOCK = [("first_ns", "i8"), ("tick_ns", "i8"), ("count", "i8")]
+Rings = dict[tuple[str, str, str], Integers]
+"""Past values on delayed links, by topic, reader and port; see :func:`_delay`."""
+Views = Mapping[str, Any]
+"""Arrays over the memory of a record's fields, by name."""
 
 
 class Tick:
     """The composed tick of a graph; :meth:`run` executes it for each row.
 
-    Kernels are bound once to the buffers of this object. A check of the types of all arguments in each call would take
-    as long as a hundred ticks.
-
     Args:
-        text: Generated source of the graph, with its objects.
         dtype: Record type from :func:`block_dtype`.
-        dt: Length of a tick [s].
-        size: Largest number of ticks per call of the kernel.
+        size: Largest number of ticks per call of the compiled loop.
 
     Attributes:
-        source: The generated source, for inspection.
+        program: Copies and calls of a tick.
+        samples: Rows (size,) that played stages read.
+        rows: Rows (size,) that the program writes.
     """
 
-    def __init__(self, text: _Text, dtype: Any, dt: float, size: int) -> None:
-        self._is_whole = len(text.parts) == 1
-        self._size = size if self._is_whole else 1
-        self._clock = kernels.records(_CLOCK)[0]
-        self._samples, self._rows = (kernels.records(dtype, self._size), kernels.records(dtype, self._size))
-        given = tuple(text.objects.values())
-        known = {"copy": copy, "add": add}
-        sources = [_source(text.objects, part) for part in text.parts if isinstance(part, list)]
-        self.source = "\n\n".join(sources)
-        made = iter(sources)
-        self._calls: list[Callable[[], object]] = [
-            kernels.bound(
-                kernels.kernel_from_source(next(made), "tick", known), given, self._clock, dt, self._samples, self._rows
-            )
-            if isinstance(part, list)
-            else part
-            for part in text.parts
-        ]
+    def __init__(self, dtype: Any, size: int) -> None:
+        self.program, self._size = Program(), size
+        self.samples, self.rows = kernels.records(dtype, size), kernels.records(dtype, size)
 
     def run(self, first_ns: int, tick_ns: int, samples: Any, block: Any) -> None:
         """Run one tick for each row of ``block`` and write the results into ``block``.
@@ -115,20 +76,19 @@ class Tick:
         Raises:
             TeleopError: A part in plain Python raised an exception, which is the cause of this error.
         """
-        clock, rows, found = self._clock, _bytes(self._rows), _bytes(block)
+        clock, rows, found = self.program.clock, _bytes(self.rows), _bytes(block)
         clock["tick_ns"] = tick_ns
         for begin in range(0, len(block), self._size):
             count = min(self._size, len(block) - begin)
             clock["first_ns"], clock["count"] = first_ns + begin * tick_ns, count
             if samples is not None:
-                self._samples[:count] = samples[begin : begin + count]
+                self.samples[:count] = samples[begin : begin + count]
             self._step()
             found[begin : begin + count] = rows[:count]
 
     def _step(self) -> None:
         try:
-            for call in self._calls:
-                call()
+            self.program.run()
             kernels.raise_pending()
         except TeleopError:
             raise
@@ -154,19 +114,6 @@ def raised_by(error: Exception) -> PartError:
     return PartError("part", trace.name, f"{text}({Path(trace.filename).name}:{trace.lineno})")
 
 
-def _source(given: Iterable[str], lines: Sequence[str]) -> str:
-    """Source of one segment: a loop over the rows."""
-    head = [
-        "def tick(given, clock, dt, samples, rows):",
-        *(f"    {name} = given[{i}]" for i, name in enumerate(given)),
-        "    for i in range(clock.count):",
-        "        now_ns = clock.first_ns + i * clock.tick_ns",
-        "        row, sample = rows[i], samples[i]",
-        "        row.now_ns = now_ns",
-    ]
-    return "\n".join([*head, *(f"        {line}" for line in lines)])
-
-
 def compose(
     graph: Graph, runners: Mapping[str, Runner], dtype: Any, dt: float, size: int, played: frozenset[str], rings: Rings
 ) -> Tick:
@@ -177,72 +124,89 @@ def compose(
         runners: Running stages, by the names of their members.
         dtype: Record type from :func:`block_dtype`.
         dt: Length of a tick [s].
-        size: Largest number of ticks per call of the kernel.
+        size: Largest number of ticks per call of the compiled loop.
         played: Members whose topics come from recorded samples; they need no runner.
         rings: Values in transit on delayed links. Pass the rings of an earlier tick to keep these values; missing
             rings are added.
     """
-    text = _Text()
+    tick = Tick(dtype, size)
+    program, rows = tick.program, np.asarray(tick.rows)
+    program.copy(program.now_ns, rows["now_ns"], to_rows=True)
+    views = {m.name: _played_views(m, rows) if m.name in played else _views(runners[m.name]) for m in graph.members}
     places = {member.name: i for i, member in enumerate(graph.members)}
-    for number, member in enumerate(graph.members):
+    for member in graph.members:
+        own = views[member.name]
         if member.name in played:
-            _say_played(text, member)
-            continue
-        runner = runners[member.name]
-        text.objects |= {f"r{number}": runner.signals, f"a{number}": runner.arguments}
-        is_compiled = kernels.is_kernel(runner.kernel)
-        if is_compiled:
-            text.objects[f"k{number}"] = kernels.apart(runner.kernel, *runner.arguments, runner.signals, dt)
-        for link in graph.links_of(member):
-            _say_link(text, link, places, runners, played, dt, rings)
-        text.say(f"r{number}.now_ns = now_ns")
-        if not is_compiled:
-            text.call(_caller(member, runner, dt))
-        _say_step(text, number, member, len(runner.arguments), is_compiled=is_compiled)
-    return Tick(text, dtype, dt, size)
+            _add_played(program, own, np.asarray(tick.samples), member)
+        else:
+            for link in graph.links_of(member):
+                is_after = places[link.writer.name] > places[member.name]  # the value is one tick old
+                ticks = round(link.delay / dt) + link.is_late - is_after
+                _add_link(program, link, views, max(ticks, 0), rings)
+            _add_step(program, member, runners[member.name], own, dt)
+        _add_rows(program, member, own, rows)
+    return tick
 
 
-def _say_played(text: _Text, member: Member) -> None:
-    for topic in member.writes:
-        text.say(f"copy(sample.{topic.field}, row.{topic.field})", f"row.{topic.field}_ns = sample.{topic.field}_ns")
+def _views(runner: Runner) -> Views:
+    """Arrays of the signals of a stage."""
+    whole = np.asarray(runner.signals)
+    return {name: whole[name] for name in whole.dtype.names or ()}
 
 
-def _say_link(
-    text: _Text,
-    link: Link,
-    places: Mapping[str, int],
-    runners: Mapping[str, Runner],
-    played: frozenset[str],
-    dt: float,
-    rings: Rings,
-) -> None:
-    """Add the lines that copy a value to its reader's port; a delayed value passes through a ring of past values."""
-    reader, port = f"r{places[link.reader.name]}", link.port.field
-    writer, plain = places[link.writer.name], _plain_field(link)
-    source, stamp = f"r{writer}.{plain}", f"r{writer}.{plain}_ns"
-    if link.writer.name in played:
-        source, stamp = f"row.{link.topic.field}", f"row.{link.topic.field}_ns"
-    is_after = writer > places[link.reader.name]  # the value is one tick old
-    ticks = round(link.delay / dt) + link.is_late - is_after
-    how = "add" if link.adds else "copy"
-    if ticks <= 0:
-        text.say(f"{how}({source}, {reader}.{port})")
-    else:
-        ring = f"d{len(text.objects)}"
+def _played_views(member: Member, rows: Any) -> Views:
+    """Arrays for the topics of a member without a runner."""
+    found: dict[str, Any] = {}
+    for topic, plain in zip(member.writes, member.stage.writes, strict=True):
+        found[plain.field] = np.zeros(rows[topic.field].shape[1:])
+        found[f"{plain.field}_ns"] = np.zeros((), np.int64)
+    return found
+
+
+def _add_played(program: Program, own: Views, samples: Any, member: Member) -> None:
+    """Copy recorded samples to the topics of a member."""
+    for topic, plain in zip(member.writes, member.stage.writes, strict=True):
+        for end in ("", "_ns"):
+            program.copy(samples[topic.field + end], own[plain.field + end], from_rows=True)
+
+
+def _add_link(program: Program, link: Link, views: Mapping[str, Views], ticks: int, rings: Rings) -> None:
+    """Copy a topic to its reader's port, or add it there; a delayed value passes through a ring of past values."""
+    writer, reader = views[link.writer.name], views[link.reader.name]
+    plain, port = _plain_field(link), link.port.field
+    source, stamp = writer[plain], writer[f"{plain}_ns"]
+    if ticks:
         key = (link.topic.name, link.reader.name, link.port.name)
-        text.objects[ring] = rings.setdefault(key, _ring(ticks, link, runners))
-        past = f"past_{ring}"
-        text.say(
-            f"{past} = {ring}[{ring}[0].at]",
-            f"{how}({past}.values, {reader}.{port})",
-            f"{past}_ns = {past}.stamp_ns",
-            f"copy({source}, {past}.values)",
-            f"{past}.stamp_ns = {stamp}",
-            f"{ring}[0].at = ({ring}[0].at + 1) % {ring}.shape[0]",
-        )
-        stamp = f"{past}_ns"
-    if not link.adds:
-        text.say(f"{reader}.{port}_ns = {stamp}")
+        if key not in rings:
+            begin = source if "now_ns" in writer else reader[port]  # played members have no beginning
+            rings[key] = np.zeros((ticks + 1, source.size + 1), np.int64)
+            rings[key][1:, :-1] = begin.view(np.int64)
+        late = np.zeros(source.size + 1, np.int64)
+        program.call(_delay, rings[key], source.view(np.int64), stamp.reshape(1), late)
+        source, stamp = late[:-1].view(np.float64), late[-1:]
+    if link.adds:
+        program.call(add, source, reader[port])
+    else:
+        program.copy(source, reader[port])
+        program.copy(stamp, reader[f"{port}_ns"])
+
+
+@kernels.kernel
+def _delay(ring: Integers, source: Integers, stamp: Integers, late: Integers) -> None:
+    """Exchange the oldest value of a ring for the newest one.
+
+    Args:
+        ring: Row 0 begins with the index of the oldest value; rows (ticks, n + 1) of bits of values and a stamp [ns]
+            follow.
+        source: Bits of the newest value (n,).
+        stamp: Its stamp (1,) [ns].
+        late: Bits of the oldest value, and its stamp (n + 1,); written.
+    """
+    at, n = ring[0, 0] + 1, source.shape[0]
+    for i in range(n):
+        late[i], ring[at, i] = ring[at, i], source[i]
+    late[n], ring[at, n] = ring[at, n], stamp[0]
+    ring[0, 0] = at % (ring.shape[0] - 1)
 
 
 def _plain_field(link: Link) -> str:
@@ -251,51 +215,32 @@ def _plain_field(link: Link) -> str:
     return own[link.topic.name].field
 
 
-def _ring(ticks: int, link: Link, runners: Mapping[str, Runner]) -> Any:
-    """Ring of past values of a link, filled with the writer's initial value."""
-    writer = runners.get(link.writer.name)
-    reader = runners[link.reader.name].signals[link.port.field]
-    begin = writer.signals[_plain_field(link)] if writer is not None else reader
-    ring = kernels.records([("values", "f8", begin.shape), ("stamp_ns", "i8"), ("at", "i8")], ticks)
-    ring["values"] = begin
-    return ring
+def _add_step(program: Program, member: Member, runner: Runner, own: Views, dt: float) -> None:
+    """Call the kernel if its trigger is new, and stamp its outputs."""
+    stage = member.stage
+    program.copy(program.now_ns, own["now_ns"])
+    if stage.trigger is None:
+        _add_call(program, member, runner, own, dt)
+        return
+    with program.unless_equal(own[f"{stage.trigger.field}_ns"], own["answered_ns"]):
+        _add_call(program, member, runner, own, dt)
 
 
-def _say_step(text: _Text, number: int, member: Member, count: int, *, is_compiled: bool) -> None:
-    """Add the lines that call the kernel if its trigger is new, and stamp and record its outputs."""
-    stage, row = member.stage, f"r{number}"
-    lines = []
-    if is_compiled:
-        arguments = "".join(f"a{number}[{i}], " for i in range(count))
-        lines.append(f"k{number}({arguments}{row}, dt)")
-    for topic in stage.writes:
+def _add_call(program: Program, member: Member, runner: Runner, own: Views, dt: float) -> None:
+    program.call(runner.kernel, *runner.arguments, runner.signals, dt)
+    for topic in member.stage.writes:
         if topic.stamp.is_in_force:
             continue
-        of = next((t.field for t in stage.reads if t.name == topic.stamp.of), None)
-        lines.append(f"{row}.{topic.field}_ns = " + (f"{row}.{of}_ns" if of else "now_ns"))
-    if stage.trigger is not None:
-        trigger = f"{row}.{stage.trigger.field}_ns"
-        lines.insert(0, f"{row}.answered_ns = {trigger}")
-        text.say(f"if {trigger} != {row}.answered_ns:", *(f"    {line}" for line in lines))
-    else:
-        text.say(*lines)
+        of = next((f"{t.field}_ns" for t in member.stage.reads if t.name == topic.stamp.of), "now_ns")
+        program.copy(own[of], own[f"{topic.field}_ns"])
+
+
+def _add_rows(program: Program, member: Member, own: Views, rows: Any) -> None:
+    """Copy the topics and notes of a member to the row that is recorded."""
+    for topic, plain in zip(member.writes, member.stage.writes, strict=True):
+        for end in ("", "_ns"):
+            program.copy(own[plain.field + end], rows[topic.field + end], to_rows=True)
     prefix = f"{member.arm}_" if member.arm else ""
-    for topic, plain in zip(member.writes, stage.writes, strict=True):
-        text.say(f"copy({row}.{plain.field}, row.{topic.field})", f"row.{topic.field}_ns = {row}.{plain.field}_ns")
-    for note in stage.notes:
-        value = f"{row}.{note[0]}"
-        is_row = len(note) > 2
-        target = f"row.{prefix}{note[0]}"
-        text.say(f"copy({value}, {target})" if is_row else f"{target} = {value}")
-
-
-def _caller(member: Member, runner: Runner, dt: float) -> Callable[[], None]:
-    """Function that calls a plain-Python stage if its trigger is new."""
-    trigger = member.stage.trigger
-    arguments, row, step = runner.arguments, runner.signals, runner.kernel
-
-    def call() -> None:
-        if trigger is None or row[f"{trigger.field}_ns"] != row["answered_ns"]:
-            step(*arguments, row, dt)
-
-    return call
+    for note in member.stage.notes:
+        if note[0] in own:  # played members have no notes
+            program.copy(own[note[0]], rows[prefix + note[0]], to_rows=True)

@@ -85,11 +85,6 @@ class VirtualTime:
         return max(stage.lead for stage in self.stages.values())
 
     @property
-    def source(self) -> str:
-        """Generated source of the tick."""
-        return self._tick.source
-
-    @property
     def needed_topics(self) -> tuple[topics.Topic, ...]:
         """Topics of :attr:`played_topics` that a recording must contain for a replay."""
         members = [m for m in self.graph.members if m.stage.name == self._last_played]

@@ -51,7 +51,12 @@ _AFTER_STEP_NS = 5_000_000_000
 """Time after a step of the clock in which stamps from before the step may arrive [ns]."""
 _QUEUES = 2500
 """Largest number of messages that may wait in any queue; it is somewhat more than the recorder's longest queue."""
-LAWS = ("speed", "tool speed", "motion", "told", "stop", "owner", "age", "ends", "queues", "recorded", "recovery")
+_SLOW_NS, _GIVEN_WAY_NS = 1_500_000, 4_500_000_000
+"""A process whose turns take longer than the first must have given way after the second [ns]: two times of judgement,
+and a turn of the machine."""
+LAWS = (
+    "speed", "tool speed", "motion", "told", "stop", "owner", "age", "way", "ends", "queues", "recorded", "recovery",
+)  # fmt: skip
 """Names of all laws."""
 
 
@@ -116,6 +121,7 @@ class Laws:
         """Newest press that is not yet in force: number of the button, and whether the press was sent to the slave."""
         self._obey_by, self._was_idle = 0.0, False
         self._presses = 0
+        self._slow_ns: dict[Process, int] = {}  # time for which a process has had slow turns
         self._sent_ns: dict[bytes, list[int]] = {}  # times of sending, by publisher
         """Sending times of setpoints by the system's clock [ns], by publisher."""
         stage.bus.seen[f"/{SLAVE_SETPOINT_JS.name}"] = self._judge_setpoint
@@ -213,6 +219,7 @@ class Laws:
             self._judge_stop(slave, process)
         self._judge_ends()
         self._judge_queues()
+        self._judge_way()
 
     def _judge_state(self, slave: Any) -> None:
         """Check that an arm that must not move is at rest, and that its state is reported in time."""
@@ -265,7 +272,8 @@ class Laws:
         lines = self._stage.bus.lines.values()
         on_the_way = max((line.delay + 20.0 * line.jitter for line in lines), default=0.0)
         lost = 0.2 * any(line.loss for line in lines)
-        return on_the_way + lost + 20e-9 * self._scheduler.costs.crowd_ns + 0.05
+        slow_ns = max(process.slow_ns for process in self._stage.session.running.values())
+        return on_the_way + lost + 20e-9 * (self._scheduler.costs.crowd_ns + slow_ns) + 0.05
 
     def _judge_ends(self) -> None:
         """Check that no process ends without an order to end."""
@@ -277,6 +285,17 @@ class Laws:
                 if process in self._stage.lost_disk and _NO_DISK in "".join(said[-1:]):
                     continue  # the saved messages are checked at the end of the session
                 self._break("ends", f"{process.name} has ended: {' '.join(said[-1:])[-300:]}")
+
+    def _judge_way(self) -> None:
+        """Check that a loop that cannot keep up gives way to other programs."""
+        for process in self._stage.session.running.values():
+            is_slow = process.slow_ns > _SLOW_NS and not (process.is_stopped or process.is_dead)
+            slow_ns = self._slow_ns[process] = self._slow_ns.get(process, 0) + _LOOK_NS if is_slow else 0
+            if slow_ns < _GIVEN_WAY_NS:
+                continue
+            self._count("way")
+            if any(strand.has_priority for strand in self._scheduler.strands(process)):
+                self._break("way", f"{process.name} keeps its priority, although its turns take several ticks")
 
     def _judge_queues(self) -> None:
         """Check that no queue grows without limit."""

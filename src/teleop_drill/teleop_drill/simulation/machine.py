@@ -136,7 +136,7 @@ class SocketEnd:
         self.other: SocketEnd | None = None
         self.is_open = True
 
-    def send(self, data: bytes | bytearray) -> int:
+    def send(self, data: bytes | bytearray | memoryview) -> int:
         """Write as many bytes as the buffer accepts; raises BlockingIOError or OSError."""
         other = self.other
         if not self.is_open or other is None or not other.is_open:

@@ -78,6 +78,7 @@ class Strand:
         self.native_id = self.ident
         self.token = 0  # a wake-up for an earlier wait is ignored
         self.has_priority = False
+        self.used_ns = 0  # processor time of all turns
         self.error: BaseException | None = None
         # When a greenlet ends, its creator continues, unless another parent is set.
         self.greenlet = greenlet(self._run, parent=scheduler.hub)
@@ -114,6 +115,7 @@ class Turns:
 
     def __init__(self) -> None:
         self.busy_ns = 0  # time until which the interpreter of the process is busy
+        self.slow_ns = 0  # time by which each turn of the process takes longer [ns]
         self.is_dead = self.is_stopped = False
         self.parked: list[tuple[Strand, int, bool]] = []
 
@@ -226,6 +228,10 @@ class Scheduler:
         self._kept.append(strand)
         return strand
 
+    def strands(self, process: Turns) -> list[Strand]:
+        """Threads of a process that have not ended."""
+        return [strand for strand in self._kept if strand.process is process and strand.is_alive()]
+
     def resume(self, process: Turns) -> None:
         """Continue a process that was stopped."""
         process.is_stopped = False
@@ -268,7 +274,9 @@ class Scheduler:
             if what is self._outside:
                 return value
             what.greenlet.switch(value)
-            process.busy_ns = self.now_ns + self.costs.turn()
+            cost_ns = self.costs.turn() + process.slow_ns
+            what.used_ns += cost_ns
+            process.busy_ns = self.now_ns + cost_ns
         raise Deadlock("deadlock: every process waits for another one")
 
     def _push(self, time_ns: int, what: Any, token: int, value: bool) -> None:

@@ -18,6 +18,8 @@ BEGIN = 1.0
 END = 9.0
 """Latest time in a session at which a fault begins [s]."""
 _LONGEST = 3.0  # longest duration of a fault [s]
+_LONGER = {"slow turns": 4.5}
+"""Time by which faults of a kind last longer, so that a loop has time to give way [s]."""
 _NAMES = sorted((*COMMANDS, "release"))
 _LEADS = {"": 8, "disable": 2, "kill": 3, "pause": 4, "press": 2}
 """Commands before a fault, with their weights. Commands to states that faults rarely met have larger weights."""
@@ -67,7 +69,7 @@ def draw(seed: int, processes: tuple[str, ...]) -> tuple[Fault, ...]:
     for _ in range(random.randint(1, 5)):
         kind = random.choice(sorted(KINDS))
         where = random.choice(processes) if kind in _OF_PROCESS else ""
-        seconds = min(_LONGEST, random.expovariate(1.0))
+        seconds = min(_LONGEST, random.expovariate(1.0)) + _LONGER.get(kind, 0.0)
         fault = Fault(random.uniform(BEGIN, END), kind, where, seconds, random.random())
         (lead,) = random.choices(list(_LEADS), list(_LEADS.values()))
         faults += [*_led(lead, fault.at - random.uniform(0.2, 0.6), processes), fault]
@@ -87,6 +89,13 @@ def _stop(stage: Stage, fault: Fault) -> Callable[[], None]:
     process.stop()
     stage.note_stop(process)
     return process.go_on
+
+
+def _slow(stage: Stage, fault: Fault) -> Callable[[], None]:
+    """Make each turn of a process longer, up to several ticks."""
+    process = stage.process(fault.where)
+    process.slow_ns = round(3e6 * fault.amount)
+    return lambda: setattr(process, "slow_ns", 0)
 
 
 def _kill(stage: Stage, fault: Fault) -> Callable[[], None]:
@@ -205,6 +214,7 @@ def _clutch(stage: Stage, fault: Fault) -> Callable[[], None]:
 
 KINDS: dict[str, Act] = {
     "standstill": _stop,
+    "slow turns": _slow,
     "kill": _kill,
     "crowd": _crowd,
     "hiccups": _hiccups,
@@ -226,4 +236,4 @@ KINDS: dict[str, Act] = {
     "buttons": _clutch,
 }
 """All kinds of faults, by their names."""
-_OF_PROCESS = ("standstill", "kill", "loss", "delay", "disorder", "repeats")
+_OF_PROCESS = ("standstill", "slow turns", "kill", "loss", "delay", "disorder", "repeats")

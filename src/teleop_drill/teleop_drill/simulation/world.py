@@ -36,6 +36,10 @@ class SimulatedWorld:
         self.background: Background = Disk(process)
         self.sleep: Callable[[float], None] = self._scheduler.sleep
 
+    def functions(self) -> dict[str, int]:
+        """None: kernels cannot reach the simulated middleware."""
+        return {}
+
     def time_ns(self) -> int:
         """Time of the system's clock [ns]."""
         now_ns = self.monotonic_ns()
@@ -57,6 +61,14 @@ class SimulatedWorld:
         """Set the priority of the calling thread."""
         self._scheduler.current.has_priority = options.priority > 0
         return []
+
+    def give_way(self) -> None:
+        """Take the priority from the calling thread."""
+        self._scheduler.current.has_priority = False
+
+    def thread_time_ns(self) -> int:
+        """Processor time that the calling thread has used [ns]."""
+        return self._scheduler.current.used_ns
 
     def tidy(self) -> None:
         """Do nothing, because a simulated start leaves no garbage."""

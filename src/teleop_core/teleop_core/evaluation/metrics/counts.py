@@ -58,12 +58,15 @@ class Ticks:
         late: Ticks that began late; None if they were not counted (virtual time, foreign slaves).
         made_up: Ticks executed after the next tick was due; None if they were not counted.
         dropped: Ticks that were due but never executed.
+        gave_way: How often the loop gave up its real-time priority because it could not keep up; None if that was not
+            counted.
     """
 
     executed: int
     late: int | None
     made_up: int | None
     dropped: int
+    gave_way: int | None = None
 
 
 class TicksMetric(Metric):
@@ -72,11 +75,11 @@ class TicksMetric(Metric):
     name = "ticks"
     keys = (
         Key(
-            "ticks.executed|late|made_up|dropped",
+            "ticks.executed|late|made_up|dropped|gave_way",
             "1",
             "control ticks of the slave: executed: all; late: begun late; made_up: executed after "
-            "the next tick was due; dropped: never executed; late and made_up are null if nobody "
-            "counted them",
+            "the next tick was due; dropped: never executed; gave_way: how often the loop gave up its real-time "
+            "priority because it could not keep up; late, made_up and gave_way are null if nobody counted them",
         ),
     )
     topics = (SLAVE_MEASURED_CP,)
@@ -96,16 +99,19 @@ class TicksMetric(Metric):
         gaps = self._stamps.of[SLAVE_MEASURED_CP.name].gaps()
         missed, made_up = own.get("missed"), own.get("caught_up")
         dropped = gaps if missed is None else missed - (made_up or 0)
-        return Ticks(own.get("ticks", self._samples), own.get("late"), made_up, dropped)
+        return Ticks(own.get("ticks", self._samples), own.get("late"), made_up, dropped, own.get("gave_way"))
 
     def rows(self) -> list[TableRow]:
         """One row for each kind of tick that was not in time."""
         ticks = self.values()
         late, made_up = (MISSING if n is None else str(n) for n in (ticks.late, ticks.made_up))
-        return [
+        rows = [
             TableRow(GROUP, "ticks executed", "", str(ticks.executed)),
             TableRow(GROUP, "late/made up/dropped", "", f"{late}/{made_up}/{ticks.dropped}"),
         ]
+        if ticks.gave_way:
+            rows.append(TableRow(GROUP, "gave up priority", "", f"{ticks.gave_way} times"))
+        return rows
 
 
 @dataclass(frozen=True)
@@ -135,7 +141,8 @@ class TopicsMetric(Metric):
             "1",
             "missing messages, found by gaps between the stamps: lost, or skipped by a stage that "
             "takes only the newest. A gap counts at the topic where it begins, and does not count in "
-            "a replayed file. Null for topics that are no streams or are sent only on changes",
+            "a replayed file. Null for topics that are no streams, are sent only on changes, or came "
+            "through a simulated network, which loses packets on purpose",
         ),
         Key(
             "topics.<name>.lost",
@@ -166,7 +173,9 @@ class TopicsMetric(Metric):
 
     def _gaps(self, name: str) -> int | None:
         tally = self._stamps.of.get(name)
-        return None if tally is None or tally.topic.is_seldom else tally.gaps()
+        if tally is None or tally.topic.is_seldom or tally.topic.stamp.may_skip:
+            return None
+        return tally.gaps()
 
     def rows(self) -> list[TableRow]:
         """Sums over all topics."""

@@ -1,0 +1,67 @@
+"""Strain: a loop with real-time priority that asks too much of its processor gives way to other programs.
+
+A loop of SCHED_FIFO that cannot keep up would make up its ticks for ever, and no other program would run on its
+processor. It gives way if, over :data:`WINDOW_NS`, it uses more than 70 % of a processor or more than half of its ticks
+are late: it runs without priority, and a late wake-up makes one tick, the newest, and skips the others. It takes its
+priority again when it uses less than half of a processor.
+"""
+
+from collections.abc import Callable
+
+from teleop_core.middleware.world import World
+
+WINDOW_NS = 2_000_000_000
+"""Time over which a loop is judged [ns]."""
+MOST_USED, MOST_LATE = 0.7, 0.5
+"""Share of a processor, and share of late ticks, beyond which a loop gives way."""
+ROOM = 0.5
+"""Share of a processor below which a loop takes its priority again."""
+
+
+class Strain:
+    """Whether a loop has given way.
+
+    Args:
+        world: World of the loop.
+        take_priority: Gives the loop its priority again; called in the loop.
+        say: Called with a text at each change.
+
+    Attributes:
+        is_over: Whether the loop has given way.
+        times: How often the loop has given way.
+    """
+
+    def __init__(self, world: World, take_priority: Callable[[], object], say: Callable[[str], None]) -> None:
+        self._world, self._take_priority, self._say = world, take_priority, say
+        self.is_over, self.times = False, 0
+        self._used = 0.0
+        self.start()
+
+    def start(self) -> None:
+        """Begin a new time of judgement; called in the loop."""
+        self._begin_ns, self._used_ns = self._world.monotonic_ns(), self._world.thread_time_ns()
+        self._turns = self._late = 0
+
+    def note(self, now_ns: int, *, is_late: bool) -> None:
+        """Count a wake-up of the loop at a monotonic time [ns]; give way or take the priority again."""
+        self._turns += 1
+        self._late += is_late
+        elapsed_ns = now_ns - self._begin_ns
+        if elapsed_ns < WINDOW_NS:
+            return
+        self._used = (self._world.thread_time_ns() - self._used_ns) / elapsed_ns
+        late = self._late / self._turns
+        if not self.is_over and (self._used > MOST_USED or late > MOST_LATE):
+            self.is_over, self.times = True, self.times + 1
+            self._world.give_way()
+            self._say(f"{self.concern()}; {100.0 * late:.0f} % of its ticks were late")
+        elif self.is_over and self._used < ROOM and late <= MOST_LATE:
+            self.is_over = False
+            self._take_priority()
+            self._say(f"the loop has its priority again: it uses {100.0 * self._used:.0f} % of a processor")
+        self.start()
+
+    def concern(self) -> str:
+        """Text for users about a loop that has given way."""
+        used = f"it uses {100.0 * self._used:.0f} % of a processor"
+        return f"the loop cannot keep up ({used}): it runs without priority and skips late ticks"
