@@ -30,9 +30,11 @@ PRESSES = 1500
 _MOST = 40  # looks at a target, which nobody reaches
 _SHORTEST = 0.1  # as in the operator
 TIME, OFF, HIT, LOOKS, BESIDE = range(5)
-"""Columns of a press: time of the first press [s], where it ended along the way relative to the middle of the target,
-time of the press that hits [s], submovements until the first press, and distance of the first press from the middle of
-the target."""
+"""Columns of a press.
+
+They are the time of the first press [s]; where it ended along the way, relative to the middle of the target; the time
+of the press that hits [s]; the submovements until the first press; and its distance from the middle of the target.
+"""
 
 
 @inner
