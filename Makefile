@@ -11,7 +11,7 @@ export AMENT_PREFIX_PATH := $(CURDIR)/$(VENV):$(AMENT_PREFIX_PATH)
 # Compiled modules are kept: without them each start of a command or a node takes a second longer.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: setup wheel crtk_msgs demo test test-slow soak coverage lint format docs docs-links bench bench-setup endurance fuzz mutants drill-mutants flaky clean
+.PHONY: setup wheel test-wheel crtk_msgs demo test test-slow soak coverage lint format docs docs-links bench bench-setup endurance fuzz mutants drill-mutants flaky clean
 
 # Python compiles a module when it is first imported: most of them never are.
 INSTALL := $(BIN)/python -m pip install --quiet --no-compile --use-pep517 --disable-pip-version-check \
@@ -33,6 +33,10 @@ $(VENV)/.tested: $(VENV)/.installed
 # Wheels of all distributions; of teleop_core one more, with kernels for x86-64 and the venv's Python.
 wheel: setup
 	$(BIN)/python src/build_wheels.py $(OUT)/wheels
+
+# The wheel in an environment of its own: arms of 7 and 12 joints run, and no kernel of ours is compiled.
+test-wheel: wheel
+	$(BIN)/python tests/wheel.py $(OUT)/wheels
 
 # CRTK's messages, which PyPI does not have, and what builds them; it needs a compiler.
 crtk_msgs: setup
@@ -131,6 +135,8 @@ bench-setup: $(VENV)/.tested
 
 bench: bench-setup
 	$(BIN)/python benchmarks/session.py
+	$(BIN)/python benchmarks/first_session.py
+	$(BIN)/python benchmarks/first_session.py --cold
 	$(BIN)/python benchmarks/kinematics.py
 	$(BIN)/python benchmarks/urdf_arms.py
 	$(BIN)/python benchmarks/live.py --seconds $(SECONDS_LIVE) --runs $(RUNS_LIVE)

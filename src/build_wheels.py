@@ -27,7 +27,7 @@ OTHERS = (
     "teleop_drill",
     "lerobot_robot_teleop_core",
 )
-COMPILE = "import sys; from teleop_core.commands.cli import main; sys.exit(main(['compile', '--all']))"
+COMPILE = "import sys; from teleop_core.commands.cli import main; sys.exit(main(['compile']))"
 RUN = """
 import hashlib
 from teleop_core.session import api

@@ -44,6 +44,15 @@ _PARALLEL_AXES = "kinematics/closed_form/parallel_axes.py"
 _CANDIDATES = "kinematics/closed_form/candidates.py"
 _SEEING = "hand/operators/observer.py"
 CODE_MUTANTS = (
+    _mutant("joints_overlap", "arrays over joints of a record begin at one place", "kernels/joint_records.py",
+            "        begin = builder.add(begin, _bytes(builder, sizes))\n", "        pass\n", "joint_records"),
+    _mutant("trigger_missed", "a stage that waits for a message steps when there is none", "kernels/program.py",
+            "elif word_at(table[at, 1]) == word_at(table[at, 2]):",
+            "elif word_at(table[at, 1]) != word_at(table[at, 2]):", "program"),
+    _mutant("copies_joined", "copies whose sources alone are neighbours become one", "kernels/program.py",
+            "target + size, target_stride]", "step[3], target_stride]", "program"),
+    _mutant("failing_goes_on", "a session goes on with a part that raised", "kernels/program.py",
+            "                self.clock.count = 0\n", "", "program"),
     _mutant("signal_breaks", "a signal breaks off what runs", "nodes/interrupt.py",
             "        if number == signal.SIGHUP:",
             "        raise KeyboardInterrupt\n        if number == signal.SIGHUP:", "interrupt"),

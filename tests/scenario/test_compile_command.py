@@ -37,12 +37,12 @@ def test_what_was_compiled_ahead_no_scenario_compiles_again() -> None:
 
 
 def test_every_part_that_is_compiled_ahead_is_configured_and_has_the_file_that_it_needs(tmp_path: Path) -> None:
-    jobs = [job for jobs in phases_of(is_all=True) for job in jobs]
-    shapes = {setting.partition("=")[2] for _, setting, _ in jobs if "fixture=" in setting}
+    jobs = [job for jobs in phases_of() for job in jobs]
+    shapes = {text.partition("=")[2] for job in jobs for text in job.texts if text.startswith("fixture=")}
     kernels = {SHAPES.find(name).distance for name in SHAPES}
     assert {SHAPES.find(name).distance for name in shapes} == kernels
     assert len(shapes) == len(kernels)
     for job in jobs:
         configuration = configured_job(job, tmp_path)
-        if "mesh" in job[1]:
+        if "fixture=mesh" in job.texts:
             VirtualTime(configuration)

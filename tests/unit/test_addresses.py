@@ -116,6 +116,17 @@ def test_an_exception_of_a_plain_python_function_is_raised_after_the_list() -> N
         _run(made)
 
 
+@kernel
+def take_all(source: Array, target: Array) -> None:
+    target[:] = source
+
+
+def test_what_a_kernel_called_by_address_raises_comes_to_its_caller() -> None:
+    made = addressed(take_all, np.ones(3), np.zeros(2))
+    with pytest.raises(ValueError, match=r"size|shape"):
+        run_all(table_of(made))
+
+
 def test_memory_is_copied_from_address_to_address() -> None:
     source, target = np.arange(5.0), np.zeros(5)
 

@@ -3,14 +3,13 @@
 import os
 import subprocess
 import sys
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import pytest
 
-from teleop_core.kernels import IS_COMPILED, apart, bound, inner, is_kernel, kernel, kernel_from_source, records
-from teleop_core.kernels.geometry import Array, multiply_quaternions
+from teleop_core.kernels import IS_COMPILED, bound, inner, is_kernel, kernel, kernel_from_source, records
+from teleop_core.kernels.geometry import multiply_quaternions
 
 compiled_only = pytest.mark.skipif(not IS_COMPILED, reason="measures the compiler")
 
@@ -138,43 +137,6 @@ def test_kernel_from_source_calls_what_it_is_given_and_is_made_once() -> None:
     assert made(2.0) == 24.0
     assert kernel_from_source(text, "twice", {"polynomial": polynomial, "FACTOR": 2.0}) is made
     assert kernel_from_source(text, "twice", {"polynomial": polynomial, "FACTOR": 3.0})(2.0) == 36.0
-
-
-@kernel
-def turned(product: Callable[..., object], q: Array, out: Array) -> None:
-    product(q, q, out)
-
-
-@kernel
-def take_all(source: Any, target: Any) -> None:
-    target[:] = source
-
-
-@kernel
-def hand_on(take: Callable[..., object], source: Array, target: Array) -> None:
-    take(source, target)
-
-
-def test_kernel_that_stands_apart_gives_the_bits_of_one_whose_code_is_copied() -> None:
-    q, here, there = np.array([0.1, 0.7, -0.5, 0.3]), np.empty(4), np.empty(4)
-    multiply_quaternions(q, q, here)
-    turned(apart(multiply_quaternions, q, q, there), q, there)
-    assert here.tolist() == there.tolist()
-
-
-@compiled_only
-def test_code_of_a_kernel_that_stands_apart_is_not_in_its_caller() -> None:
-    product = uncached("@kernel\ndef product(x):\n    return x * x\n", "product")
-    call = uncached("@kernel\ndef call(product, x):\n    return product(x)\n", "call")
-    assert call(apart(product, 3.0), 3.0) == 9.0
-    assert ["fmul" in text for text in product.inspect_llvm().values()] == [True]
-    assert ["fmul" in text for text in call.inspect_llvm().values()] == [False]
-
-
-def test_what_a_kernel_that_stands_apart_raises_comes_to_its_caller() -> None:
-    long, short = np.ones(3), np.empty(2)
-    with pytest.raises(ValueError, match=r"size|shape"):
-        hand_on(apart(take_all, long, short), long, short)
 
 
 def test_kernel_that_makes_an_array_is_called_by_a_generated_one_that_is_compiled_before_it() -> None:

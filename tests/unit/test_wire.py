@@ -16,6 +16,7 @@ from teleop_core.bags.ros_types import deserialise
 from teleop_core.graph import topics
 from teleop_core.kernels import records
 from teleop_core.kernels.fields import Cells
+from teleop_core.kernels.memory import integers
 from teleop_core.middleware.world import Taken
 from teleop_core.nodes import wire
 from teleop_core.nodes.streams import READING, Calls, Input, Output, describe
@@ -90,7 +91,7 @@ class Queue:
 
     def _clock(self, kind: int, at: int, *_: int) -> int:
         time_ns = self.monotonic_ns() if kind else self.time_ns()
-        (ctypes.c_int64 * 2).from_address(at)[:] = divmod(time_ns, 10**9)
+        integers(at, 2)[:] = divmod(time_ns, 10**9)
         return 0
 
     def monotonic_ns(self) -> int:

@@ -1,10 +1,10 @@
 """``teleop compile``: compiles the kernels of the built-in parts before a session needs them."""
 
 import argparse
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from os import sched_getaffinity
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from teleop_core.commands.arguments import command
 
@@ -13,35 +13,45 @@ if TYPE_CHECKING:
 
 _EPILOG = """\
 a session compiles what it needs and is not there yet; compiled before, it starts at once:
-  teleop compile                                        what the scenarios need
-  teleop compile --all                                  every robot, law, plant and shape too
+  teleop compile                                        everything of teleop_core, for every arm and graph
 """
 _FIRST = "coarse_box"
-Job = tuple[str, str, str]
-"""Scenario, setting (may be empty), and stage; an empty stage means the whole session."""
+
+
+class Job(NamedTuple):
+    """Kernels to compile: those of a stage, or those of a short session."""
+
+    scenario: str = _FIRST
+    texts: tuple[str, ...] = ()
+    stage: str = ""
+
+
 _MESH = "OFF\n4 4 6\n0 0 0\n90 90 0\n90 0 90\n0 90 90\n3 0 2 1\n3 0 1 3\n3 0 3 2\n3 1 2 3\n"
 """A closed surface of four triangles [mm], for parts that need a file."""
+_AXES = "0 0 1", "0 1 0"
+_ARMS = (6, 7)
+"""Joints of arms from files: one whose axes meet in a wrist, and one that is redundant."""
+_PAIR = "pair"
+"""Stage of a job for a server and its simulated arm as one object."""
 
 
 def add(commands: argparse._SubParsersAction) -> None:  # type: ignore[type-arg]
     """Add the command's parser."""
-    text = "compile the kernels of built-in parts now, on all processors"
-    parser = command(commands, "compile", _run, text, _EPILOG)
-    parser.add_argument("--all", action="store_true", help="also compile kernels that no scenario needs")
+    command(commands, "compile", _run, "compile all kernels now, on all processors", _EPILOG)
 
 
-def _run(arguments: argparse.Namespace) -> int:
+def _run(_arguments: argparse.Namespace) -> int:
     from concurrent.futures import as_completed
 
     from teleop_core.base.workers import workers
     from teleop_core.commands.progress import shown_progress
     from teleop_core.kernels.store import prune
 
-    phases = list(phases_of(is_all=arguments.all))
+    phases = list(phases_of())
     total, done, compiled = sum(map(len, phases)), 0, 0
     with shown_progress("kernels") as progress, workers(len(sched_getaffinity(0))) as pool:
         for jobs in phases:
-            waiting = [pool.submit(_compile, job, arguments.all) for job in jobs]
+            waiting = [pool.submit(_compile, job) for job in jobs]
             for made in as_completed(waiting):
                 compiled, done = compiled + made.result(), done + 1
                 progress(done, total)
@@ -50,25 +60,47 @@ def _run(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def phases_of(*, is_all: bool) -> Iterator[Sequence[Job]]:
+def phases_of() -> Iterator[Sequence[Job]]:
     """Groups of jobs. Jobs of one group run in parallel; later groups reuse the kernels of earlier groups."""
-    from importlib.util import find_spec
-
     from teleop_core.graph.graph import BUILT_IN
     from teleop_core.graph.layers import list_scenarios
+
+    yield [Job(stage=stage) for stage in (*reversed(BUILT_IN), _PAIR)]
+    yield [Job(), *(Job(texts=(f"robot=arm{joints}.urdf",)) for joints in _ARMS)]
+    scenarios = [Job(scenario) for scenario in list_scenarios() if scenario != _FIRST]
+    yield [*(Job(texts=texts) for texts in _parts()), *scenarios]
+
+
+def _parts() -> Iterator[tuple[str, ...]]:
+    """Settings that need kernels of their own, the longest work first."""
+    from importlib.util import find_spec
+
+    from teleop_core.coupling.architectures import ARCHITECTURES
+    from teleop_core.coupling.filters import TREMOR_FILTERS
+    from teleop_core.coupling.network import NETWORKS
+    from teleop_core.coupling.passivity import PASSIVITIES
+    from teleop_core.hand.tasks import TASKS
     from teleop_core.robots import ROBOTS
     from teleop_core.shapes import SHAPES
     from teleop_core.slave.controllers import CONTROLLERS
     from teleop_core.slave.plants import PLANTS
 
-    yield [(_FIRST, "", stage) for stage in BUILT_IN]
-    yield [(_FIRST, "", "")]
-    yield [(scenario, "", "") for scenario in list_scenarios() if scenario != _FIRST]
-    if is_all:
-        named = [name for name in SHAPES if find_spec("trimesh") or not _reads_a_file(name)]
-        shapes = {SHAPES.find(name).distance: name for name in named}.values()  # one shape per kernel
-        for key, parts in (("robot", ROBOTS), ("controller", CONTROLLERS), ("plant", PLANTS), ("fixture", shapes)):
-            yield [(_FIRST, f"{key}={name}", "") for name in parts]
+    named = [name for name in SHAPES if find_spec("trimesh") or not _reads_a_file(name)]
+    shapes = {SHAPES.find(name).distance: name for name in named}.values()  # one shape per kernel
+    kinds: dict[str, Iterable[str]]
+    kinds = {"robot": ROBOTS, "controller": CONTROLLERS, "plant": PLANTS, "fixture": shapes}
+    for key, parts in kinds.items():
+        yield from ((f"{key}={name}",) for name in parts)
+    stages: tuple[tuple[str, str, Iterable[str]], ...] = (
+        ("network,impedance,passivity", "reflection.architecture", ARCHITECTURES),
+        ("network,passivity", "reflection.passivity", PASSIVITIES),
+        ("network", "network.there.kind", NETWORKS),
+        ("tremor_filter", "tremor_filter.kind", TREMOR_FILTERS),
+        ("display,task", "task.kind", TASKS),
+    )
+    for used, key, names in stages:
+        yield from ((f"teleop.stages=[{used}]", f"{key}={name}") for name in names)
+    yield ("teleop.stages=[remote_centre]",)
 
 
 def _reads_a_file(shape: str) -> bool:
@@ -77,47 +109,76 @@ def _reads_a_file(shape: str) -> bool:
     return hasattr(SHAPES.find(shape).parameters, "file")
 
 
+def _urdf(joints: int) -> str:
+    """Arm whose axes turn about z and y in turn; those of the last three joints meet."""
+    lines = ['<robot name="arm"><link name="l0"/>']
+    for i in range(joints):
+        place, axis = 0.3 if i < joints - 2 else 0.0, _AXES[i % 2]
+        lines.append(
+            f'<link name="l{i + 1}"/><joint name="j{i + 1}" type="revolute"><parent link="l{i}"/>'
+            f'<child link="l{i + 1}"/><origin xyz="0 0 {place}"/><axis xyz="{axis}"/>'
+            '<limit effort="100" velocity="2" lower="-2.8" upper="2.8"/></joint>'
+        )
+    return "\n".join((*lines, "</robot>"))
+
+
 def configured_job(job: Job, folder: Path) -> "Configuration":
     """Configuration of a short session that needs a job's kernels.
 
     Args:
-        job: See :data:`Job`.
+        job: The job.
         folder: Folder with a file for parts that need one.
     """
     from teleop_core.session import api
 
-    scenario, setting, _ = job
-    key, _, name = setting.partition("=")
-    texts = [setting] if setting else []
-    if key == "fixture" and _reads_a_file(name):
-        mesh = folder / "mesh.off"
-        mesh.write_text(_MESH, encoding="ascii")
-        texts.append(f"fixture.{name}.file={mesh}")
-    if setting == "fixture=hole":  # a hole whose middle is not in the plate
-        texts.append("fixture.keep_out=true")
-    return api.configuration(scenario, texts=["teleop.duration=0.01", *texts])
+    texts = list(job.texts)
+    for text in job.texts:
+        key, _, name = text.partition("=")
+        if key == "robot" and name.endswith(".urdf"):
+            file = folder / name
+            file.write_text(_urdf(int(name.removeprefix("arm").removesuffix(".urdf"))), encoding="utf-8")
+            texts[texts.index(text)] = f"robot={file}"
+        if key == "fixture" and _reads_a_file(name):
+            mesh = folder / "mesh.off"
+            mesh.write_text(_MESH, encoding="ascii")
+            texts.append(f"fixture.{name}.file={mesh}")
+        if text == "fixture=hole":  # a hole whose middle is not in the plate
+            texts.append("fixture.keep_out=true")
+    return api.configuration(job.scenario, texts=["teleop.duration=0.01", *texts])
 
 
-def _compile(job: Job, is_replayed: bool) -> int:
+def _compile(job: Job) -> int:
     """Number of kernels that were compiled to run a stage or a short session."""
     import tempfile
 
-    from teleop_core.graph.signals import DT
-    from teleop_core.graph.stage import STAGES
     from teleop_core.kernels.progress import compiled_count
     from teleop_core.session import api
+    from teleop_core.session.virtual import VirtualTime
 
-    before, stage = compiled_count(), job[-1]
-    with tempfile.TemporaryDirectory() as folder:
-        configuration = configured_job(job, Path(folder))
-        if stage:
-            runner = STAGES.find(stage).run(configuration.groups[stage], DT)
-            runner.load()
-            if (motion := getattr(runner, "motion", None)) is not None:
-                motion.load()  # commands that a live slave accepts
-            return compiled_count() - before
-        recording = Path(folder) / "recording"
-        api.run(configuration, out=recording)
-        if is_replayed:
-            api.replay(recording, out=Path(folder) / "replay")
+    before = compiled_count()
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        configuration = configured_job(job, folder)
+        if job.stage:
+            _compile_stage(job.stage, configuration)
+        elif job == Job():
+            api.run(configuration, out=folder / "recording")
+            api.replay(folder / "recording", out=folder / "replay")
+        else:
+            VirtualTime(configuration).run(1)
     return compiled_count() - before
+
+
+def _compile_stage(stage: str, configuration: "Configuration") -> None:
+    """Compile the kernels of a stage, also those of commands that a live slave accepts."""
+    from teleop_core.graph.signals import DT
+    from teleop_core.graph.stage import STAGES
+    from teleop_core.slave.pair import ArmParameters, SimulatedArm
+
+    if stage == _PAIR:
+        SimulatedArm(ArmParameters()).load()
+        return
+    runner = STAGES.find(stage).run(configuration.groups[stage], DT)
+    runner.load()
+    if (motion := getattr(runner, "motion", None)) is not None:
+        motion.load()

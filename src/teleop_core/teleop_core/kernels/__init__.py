@@ -21,7 +21,7 @@ import linecache
 from collections.abc import Callable, Mapping
 from functools import cache, partial
 from types import FunctionType
-from typing import TYPE_CHECKING, Any, ParamSpec, Protocol, TypeVar, cast
+from typing import TYPE_CHECKING, Any, ParamSpec, Protocol, TypeVar
 
 import lazy_loader
 import numba
@@ -34,7 +34,6 @@ from teleop_core.kernels.layout import record_dtype, records
 __all__ = [
     "IS_COMPILED",
     "Kernel",
-    "apart",
     "bare",
     "bound",
     "direct",
@@ -234,27 +233,6 @@ def direct(compiled: Callable[P, R], signature: Any) -> Callable[P, R]:
         return compiled
     found: Callable[P, R] = _compiler.entry(compiled, signature.args)
     return found
-
-
-def apart(compiled: Callable[..., R], *arguments: object) -> Callable[..., R]:
-    """Kernel that other kernels call by its address, instead of compiling a copy of its code.
-
-    A kernel that calls another kernel by name is compiled with a copy of the called kernel, which takes seconds if the
-    called kernel is large. The kernel returned here is compiled once for its arguments; its callers are compiled
-    without a copy.
-
-    Args:
-        compiled: A kernel.
-        arguments: Example arguments; only their types matter.
-
-    Returns:
-        The value to pass to a kernel, which calls it with arguments of these types.
-
-    Raises:
-        KernelError: The kernel cannot be compiled for these arguments.
-    """
-    code: Any = _compiler.Code(compiled, types_of(arguments)) if IS_COMPILED else compiled
-    return cast("Callable[..., R]", code)
 
 
 def types_of(arguments: tuple[object, ...]) -> tuple[Any, ...]:

@@ -149,12 +149,12 @@ def _call_plain(address: int, _block_address: int) -> None:
 
 def _copy_plain(source: int, target: int, size: int) -> None:
     """Copy bytes in pure-Python mode."""
-    ctypes.memmove(target, source, size)
+    ctypes.memmove(int(target), int(source), int(size))
 
 
 def _word_plain(address: int) -> int:
     """Word in memory in pure-Python mode."""
-    return ctypes.c_int64.from_address(address).value
+    return ctypes.c_int64.from_address(int(address)).value
 
 
 call_address: Callable[[int, int], None] = _call_plain

@@ -14,6 +14,7 @@ from numba.core.compiler_machinery import AnalysisPass, register_pass
 from numba.core.errors import TypingError
 from numba.core.typed_passes import AnnotateTypes
 
+from teleop_core.kernels.inner_library import InnerLibrary
 from teleop_core.kernels.room import room
 
 _LOOKS = frozenset({
@@ -38,6 +39,8 @@ class _Borrowing(AnalysisPass):
             raise TypingError("its scratch memory is free again when it returns: it must return no array")
         if state.targetctx.enable_nrt and _borrows(state):
             state.targetctx.enable_nrt = False  # applies only to the context of this function
+        if state.flags.no_cpython_wrapper and state.flags.no_cfunc_wrapper:  # only kernels can call it
+            state.library = InnerLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
         return False
 
 

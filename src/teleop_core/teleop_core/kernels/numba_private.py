@@ -1,4 +1,4 @@
-"""All uses of numba's internals are in this module, ``borrowing`` and ``room``; any version may change them.
+"""Numba's internals, which any version may change; only this module and its neighbours in this folder use them.
 
 The public interface of numba cannot stamp a cache, compile without a wrapper for Python, treat literals as plain
 numbers, or report a mistake in one line.
@@ -12,7 +12,7 @@ from contextlib import suppress
 from pathlib import Path
 from pickle import UnpicklingError
 from types import FunctionType
-from typing import Any
+from typing import Any, cast
 
 import numba
 import numpy as np
@@ -29,7 +29,7 @@ from numba.extending import overload
 from numba.np import arrayobj
 
 from teleop_core import __version__
-from teleop_core.kernels import borrowing, joint_records, layout, room, store
+from teleop_core.kernels import borrowing, inner_library, joint_records, layout, room, store
 from teleop_core.kernels.borrowing import Pipeline
 from teleop_core.kernels.callables import entry_of
 from teleop_core.kernels.dependencies import digest, source_digest
@@ -292,8 +292,8 @@ class _Cache(FunctionCache):
 
 def _cache(function: Any) -> Any:
     """Cache on disk of a function; None if the function has no source file."""
-    own_types = (joint_records.__file__, layout.__file__)
-    files = (__file__, borrowing.__file__, room.__file__, *own_types, digest.__code__.co_filename)
+    ours = (borrowing, room, joint_records, layout, inner_library)
+    files = (__file__, digest.__code__.co_filename, *(cast(str, module.__file__) for module in ours))
     own = [source_digest(file) for file in files]
     config: Any = numba.config
     checked = str(config.BOUNDSCHECK)  # NUMBA_BOUNDSCHECK=1 gives different code

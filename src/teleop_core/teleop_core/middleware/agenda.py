@@ -10,13 +10,15 @@ from collections.abc import Callable
 
 NEVER_NS = 2**63 - 1
 """Due time of an agenda without timers [ns]."""
+_TOGETHER_NS = 1_000_000_000
 Work = Callable[[], object]
 
 
 class Timer:
     """See :class:`~teleop_core.middleware.world.Timer`.
 
-    A late call does not delay later calls, and missed calls are not made up.
+    A late call does not delay later calls, and missed calls are not made up. Calls of timers with a period below a
+    second are at multiples of the period, so that all timers of one period wake the executor together.
 
     Args:
         period: Time between two calls [s].
@@ -27,7 +29,11 @@ class Timer:
     def __init__(self, period: float, callback: Work, agenda: "Agenda") -> None:
         self._period_ns, self.callback, self._agenda = max(1, round(period * 1e9)), callback, agenda
         self._is_canceled = False
-        self.due_ns = time.monotonic_ns() + self._period_ns
+        self.due_ns = self._next_ns()
+
+    def _next_ns(self) -> int:
+        due_ns = time.monotonic_ns() + self._period_ns
+        return due_ns if self._period_ns >= _TOGETHER_NS else due_ns - due_ns % self._period_ns
 
     def cancel(self) -> None:
         """Pause the timer."""
@@ -35,7 +41,7 @@ class Timer:
 
     def reset(self) -> None:
         """Continue the timer; the next call is one period from now."""
-        self.due_ns, self._is_canceled = time.monotonic_ns() + self._period_ns, False
+        self.due_ns, self._is_canceled = self._next_ns(), False
         self._agenda.wake()
 
     def is_canceled(self) -> bool:

@@ -1,5 +1,6 @@
 """Node, implemented with rclpy."""
 
+import time
 from collections.abc import Callable
 from typing import Any
 
@@ -23,6 +24,11 @@ _DESTROY = {
     Service: "destroy_service",
     Client: "destroy_client",
 }
+
+
+_FRESH_NS = 50_000_000
+"""Time for which an answer of discovery is used again [ns]: the nodes of a process ask for the same topics."""
+_known: dict[tuple[Any, str], tuple[int, list[Endpoint]]] = {}
 
 
 def profile_of(qos: Qos) -> QoSProfile:
@@ -132,8 +138,13 @@ class RosNode:
         self.agenda.defer(work, *arguments)
 
     def publishers(self, name: str) -> list[Endpoint]:
-        """Discovered publishers of a topic."""
-        return [_endpoint(info) for info in self.own.get_publishers_info_by_topic(name)]
+        """Discovered publishers of a topic, as known at most 50 ms ago to any node of this context."""
+        key, now_ns = (self.own.context, name), time.monotonic_ns()
+        asked_ns, found = _known.get(key, (-_FRESH_NS, []))
+        if now_ns - asked_ns >= _FRESH_NS:
+            found = [_endpoint(info) for info in self.own.get_publishers_info_by_topic(name)]
+            _known[key] = now_ns, found
+        return found
 
     def readers(self, name: str) -> list[Endpoint]:
         """Discovered readers of a topic."""

@@ -162,7 +162,7 @@ class Schedule:
         self._next_ns += (missed + 1) * self._period_ns
         self._count(late_ns, missed, dropped)
         if self.strain is not None:
-            self.strain.note(now_ns, is_late=late_ns > self._period_ns // 2)
+            self.strain.note(now_ns, missed, is_late=late_ns > self._period_ns // 2)
         return range(first_ns, self._next_ns, self._period_ns)
 
     def _count(self, late_ns: int, missed: int, dropped: int) -> None:

@@ -1,9 +1,10 @@
 """Strain: a loop with real-time priority that asks too much of its processor gives way to other programs.
 
 A loop of SCHED_FIFO that cannot keep up would make up its ticks for ever, and no other program would run on its
-processor. It gives way if, over :data:`WINDOW_NS`, it uses more than 70 % of a processor or more than half of its ticks
-are late: it runs without priority, and a late wake-up makes one tick, the newest, and skips the others. It takes its
-priority again when it uses less than half of a processor.
+processor. It gives way if, over :data:`WINDOW_NS`, it uses more than 70 % of a processor or more than half of its
+wake-ups are late; and at once if it misses more than :data:`BEHIND` ticks in a wake-up and still more in the next one,
+because then it falls further behind by making up ticks. It then runs without priority, and a late wake-up makes one tick, the newest,
+and skips the others. It takes its priority again when it uses less than half of a processor.
 """
 
 from collections.abc import Callable
@@ -14,6 +15,8 @@ WINDOW_NS = 2_000_000_000
 """Time over which a loop is judged [ns]."""
 MOST_USED, MOST_LATE = 0.7, 0.5
 """Share of a processor, and share of late ticks, beyond which a loop gives way."""
+BEHIND = 20
+"""Number of missed ticks beyond which the next wake-up must miss fewer."""
 ROOM = 0.5
 """Share of a processor below which a loop takes its priority again."""
 
@@ -34,7 +37,7 @@ class Strain:
     def __init__(self, world: World, take_priority: Callable[[], object], say: Callable[[str], None]) -> None:
         self._world, self._take_priority, self._say = world, take_priority, say
         self.is_over, self.times = False, 0
-        self._used = 0.0
+        self._used, self._missed = 0.0, 0
         self.start()
 
     def start(self) -> None:
@@ -42,16 +45,23 @@ class Strain:
         self._begin_ns, self._used_ns = self._world.monotonic_ns(), self._world.thread_time_ns()
         self._turns = self._late = 0
 
-    def note(self, now_ns: int, *, is_late: bool) -> None:
-        """Count a wake-up of the loop at a monotonic time [ns]; give way or take the priority again."""
+    def note(self, now_ns: int, missed: int, *, is_late: bool) -> None:
+        """Count a wake-up of the loop; give way or take the priority again.
+
+        Args:
+            now_ns: Monotonic time [ns].
+            missed: Number of ticks that the loop has missed since the last wake-up.
+            is_late: Whether the loop woke late.
+        """
         self._turns += 1
         self._late += is_late
-        elapsed_ns = now_ns - self._begin_ns
-        if elapsed_ns < WINDOW_NS:
+        falls_behind = BEHIND < self._missed < missed and not self.is_over
+        self._missed, elapsed_ns = missed, now_ns - self._begin_ns
+        if elapsed_ns < WINDOW_NS and not falls_behind:
             return
-        self._used = (self._world.thread_time_ns() - self._used_ns) / elapsed_ns
+        self._used = (self._world.thread_time_ns() - self._used_ns) / max(elapsed_ns, 1)
         late = self._late / self._turns
-        if not self.is_over and (self._used > MOST_USED or late > MOST_LATE):
+        if not self.is_over and (falls_behind or self._used > MOST_USED or late > MOST_LATE):
             self.is_over, self.times = True, self.times + 1
             self._world.give_way()
             self._say(f"{self.concern()}; {100.0 * late:.0f} % of its ticks were late")

@@ -1,11 +1,12 @@
 """Pair: a server and its simulated arm as one object, to move a slave without other stages."""
 
 from dataclasses import dataclass, fields
-from typing import Any
+
+import numpy as np
 
 from teleop_core.graph import DT, RunningStage, Stage, assign
-from teleop_core.kernels import apart, kernel
-from teleop_core.slave import commands, simulation, slave, slave_sim, step
+from teleop_core.kernels import Integers, addressed, call_address, kernel
+from teleop_core.slave import commands, slave, slave_sim
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -20,18 +21,16 @@ class ArmParameters(slave.SlaveParameters, slave_sim.SlaveSimParameters):
 
 
 @kernel
-def arm_step(steps: Any, server: Any, simulated: Any, row: commands.SlaveRow, dt: float) -> None:
+def arm_step(calls: Integers, row: commands.SlaveRow, dt: float) -> None:
     """One tick of the server and its simulated arm on one row of signals.
 
     Args:
-        steps: Kernels of server and simulated arm, as returned by :func:`~teleop_core.kernels.apart`.
-        server: Arguments of :func:`~teleop_core.slave.step.slave_step`.
-        simulated: Arguments of :func:`~teleop_core.slave.simulation.simulation_step`.
+        calls: Addresses of the steps of server and simulated arm, and of their blocks (2, 2).
         row: Signals of server and simulated arm; the server reads measured values of the previous tick.
-        dt: Tick [s].
+        dt: Tick [s], which the blocks contain too.
     """
-    steps[0](server[0], server[1], server[2], row, dt)
-    steps[1](simulated[0], simulated[1], simulated[2], row, dt)
+    for i in range(2):
+        call_address(calls[i, 0], calls[i, 1])
     row.slave_measured_js_ns = row.now_ns
 
 
@@ -57,12 +56,9 @@ class SimulatedArm(RunningStage):
         super().__init__(_PAIR, self.robot.n, dt)
         for stage in (self.server, self.simulated):
             stage.signals = self.signals
-        server, simulated = self.server.arguments, self.simulated.arguments
-        steps = (
-            apart(step.slave_step, *server, self.signals, dt),
-            apart(simulation.simulation_step, *simulated, self.signals, dt),
-        )
-        self.kernel, self.arguments = arm_step, (steps, server, simulated)
+        self._steps = [addressed(one.kernel, *one.arguments, self.signals, dt) for one in (self.server, self.simulated)]
+        calls = np.array([(step.address, step.block_address) for step in self._steps], np.int64)
+        self.kernel, self.arguments = arm_step, (calls,)
         self._begin = self.signals.copy()
         self.reset()
 

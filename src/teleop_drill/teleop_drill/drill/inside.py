@@ -25,10 +25,11 @@ VARIABLE = "TELEOP_DRILL"
 """Environment variable with the path of the control file."""
 STAGE_NAME = "drill_stage"
 _FORM = struct.Struct("<qq")
-WORKS, HANGS, RAISES, STICKS, RACES = 0, 1, 2, 3, 4
+WORKS, HANGS, RAISES, STICKS, RACES, SLOWS = range(6)
 """What the stage does; or what the joints do, which no parameter of a session makes stick or race.
 """
 _BRAKED = OPERATION.index("is_braked")
+_SLOW = 3e-3  # time that a slow step takes [s]
 TURN = 5e-3  # time between two readings of the order to the joints [s]
 
 
@@ -76,20 +77,22 @@ class Steered(Protocol):
 
 
 class Passing(RunningStage):
-    """Stage that passes on every command, until the control source orders it to hang or to raise an exception.
+    """Stage that passes on every command, until the control source orders it to be slow, to hang or to raise.
 
     Attributes:
         control: Source of the orders to this stage.
-        sleep: Function that waits for some seconds while the stage hangs.
+        sleep: Function that waits for some seconds while the stage hangs or is slow.
     """
 
     control: Steered | None = None
     sleep: Callable[[float], None] = staticmethod(time.sleep)
 
     def step(self) -> None:
-        """Pass a command on, or hang, or raise an exception, as the present order says."""
+        """Pass a command on, slowly or not, or hang, or raise an exception, as the present order says."""
         while self.control is not None and self.control.word == HANGS:
             self.sleep(0.01)
+        if self.control is not None and self.control.word == SLOWS:
+            self.sleep(_SLOW)
         if self.control is not None and self.control.word == RAISES:
             raise RuntimeError("broken by the drill")
         self.signals[DRILLED_CP.field] = self.signals[SLAVE_SERVO_CP.field]

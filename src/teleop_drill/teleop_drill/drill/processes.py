@@ -5,7 +5,8 @@ from functools import partial
 
 from teleop_core.slave.operation import Fault, State
 from teleop_drill.drill.exercise import Cure, Exercise, Master, Motion, Rig, after, at_once, outage, silence, unheard
-from teleop_drill.drill.inside import HANGS, RAISES, WORKS
+from teleop_drill.drill.hand import SPEED
+from teleop_drill.drill.inside import HANGS, RAISES, SLOWS, WORKS
 from teleop_drill.drill.numbers import Numbers
 from teleop_drill.drill.recordings import LONGEST_LOSS
 
@@ -180,6 +181,11 @@ PROCESSES = (
         master=Master.DEVICE,
     ),
     *_broken("stage_hangs", "a stage hangs in a step", partial(_break, HANGS)),
+    Exercise(  # ticks are skipped, so the arm follows the hand in larger steps
+        name="stage_slow", text="a stage takes 3 ms for a step", inject=partial(_break, SLOWS), undo=_mend,
+        motion=Motion.GOES_ON, watch=6.0, warns=True, allowed=after(4.0), stands=after(3.0), hand_speed=2.0 * SPEED,
+        ways=(True,),
+    ),
     *_broken("stage_raises", "a stage raises in a step", partial(_break, RAISES)),
     Exercise(
         name="clock_ahead", text="clock stepped 1 h ahead", inject=partial(_step_clock, _HOUR_NS),

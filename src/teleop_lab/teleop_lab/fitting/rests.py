@@ -2,12 +2,11 @@
 
 import math
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
 from teleop_core.graph import TICK_NS
-from teleop_core.kernels import Array, kernel
+from teleop_core.kernels import Array, Integers, kernel
 from teleop_core.robots import load_robot_set
 from teleop_core.robots.hardware import Hardware
 from teleop_core.slave.commands import SlaveRow
@@ -18,14 +17,14 @@ _FINE = 1e-4  # step of smooth encoders, divided by the real encoder step
 
 
 @kernel
-def _drive(steps: Any, server: Any, simulated: Any, row: SlaveRow, way: Array, begin_ns: int, dt: float) -> None:
+def _drive(calls: Integers, row: SlaveRow, way: Array, begin_ns: int, dt: float) -> None:
     """Command a joint path (N, n), one joint vector per tick; the first tick is the one after ``begin_ns``."""
     for k in range(way.shape[0]):
         row.now_ns = begin_ns + (k + 1) * TICK_NS
         row.slave_servo_jp_ns = row.now_ns
         for i in range(way.shape[1]):
             row.slave_servo_jp[i] = way[k, i]
-        arm_step(steps, server, simulated, row, dt)
+        arm_step(calls, row, dt)
 
 
 class Mover:
@@ -74,8 +73,8 @@ class Mover:
         count = math.ceil((time + self._settle) / slave.dt)
         way = cubic_move(self.goal, goal, time, slave.dt * np.arange(1.0, count + 1.0))[0]
         way = np.ascontiguousarray(way)
-        steps, server, simulated = slave.arguments
-        _drive(steps, server, simulated, slave.signals, way, self._now_ns, slave.dt)
+        (calls,) = slave.arguments
+        _drive(calls, slave.signals, way, self._now_ns, slave.dt)
         self._now_ns += count * TICK_NS
         self.goal = goal
         return np.array(slave.signals["slave_measured_js"][: len(goal)])

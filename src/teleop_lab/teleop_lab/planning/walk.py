@@ -5,7 +5,6 @@ motion, the cut-off motion and the causes are those of a session. The computatio
 """
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,38 +12,15 @@ from numpy.typing import NDArray
 from teleop_core.coupling.mapping.gains import MotionScalingParameters
 from teleop_core.coupling.mapping.inverse_kinematics import InverseKinematics, InverseKinematicsParameters
 from teleop_core.coupling.mapping.motion_scaling import MotionScaling
-from teleop_core.graph import DT, assign, copy, topics
-from teleop_core.kernels import Array, apart, bound, kernel_from_source, pose_from_transform, raise_pending, records
+from teleop_core.graph import DT, assign, topics
+from teleop_core.kernels import Array, pose_from_transform, raise_pending, records
+from teleop_core.kernels.program import Program
 from teleop_lab.planning.asked import AskedPath
 from teleop_lab.planning.placement import Placement
 
 _COLUMN = {name: column for column, name in enumerate(topics.SLAVE_REACH.columns)}
 # Larger than any speed limit [rad/s or m/s].
 _ANY_SPEED = 1e6
-_SOURCE = """\
-def walk(scale, solve, scaling, solving, s, r, fk, geometry, T, q, switch, samples, answers, dt):
-    for i in range(samples.shape[0]):
-        sample, answer = samples[i], answers[i]
-        copy(sample.pose, s.master_measured_cp)
-        copy(sample.buttons, s.master_buttons)
-        s.master_measured_cp_ns = sample.stamp_ns
-        scale({scaling}s, dt)
-        copy(s.slave_servo_cp, r.slave_servo_cp)
-        r.slave_servo_cp_ns = sample.stamp_ns
-        solve({solving}r, dt)
-        copy(r.slave_servo_jp, r.slave_setpoint_js)
-        copy(r.slave_servo_jp, q)
-        fk(q, geometry, T)
-        pose_from_transform(T, s.slave_setpoint_cp)
-        r.slave_setpoint_js_ns = s.slave_setpoint_cp_ns = sample.stamp_ns
-        if switch[0]:
-            copy(r.slave_reach, s.slave_reach)
-            s.slave_reach_ns = sample.stamp_ns
-        copy(s.slave_servo_cp, answer.command)
-        copy(s.slave_setpoint_cp, answer.reached)
-        copy(r.slave_servo_jp, answer.q)
-        copy(r.slave_reach, answer.reach)
-"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,7 +76,7 @@ class Walker:
         pauses_ns = self._pauses(scaling.longest_pause)
         self._scaling_pause, self._solving_pause = pauses_ns
         self._fill()
-        self._walk = self._bind()
+        self._programs = {is_cut: self._program(is_cut=is_cut) for is_cut in (False, True)}
 
     def _pauses(self, longest: float) -> tuple[int, int]:
         """Return the longest allowed pauses of both stages [ns]; a thinned path allows longer pauses."""
@@ -117,23 +93,38 @@ class Walker:
         width = len(topics.SLAVE_REACH.columns)
         kinds = [("command", "f8", (7,)), ("reached", "f8", (7,)), ("q", "f8", (n,))]
         self._answers = records([*kinds, ("reach", "f8", (width,))], count)
-        self._switch = np.zeros(1)
 
-    def _bind(self) -> Any:
-        scaling, solving, robot = self._scaling, self._solving, self.robot
-        source = _SOURCE.format(
-            scaling="".join(f"scaling[{i}], " for i in range(len(scaling.arguments))),
-            solving="".join(f"solving[{i}], " for i in range(len(solving.arguments))),
+    def _program(self, *, is_cut: bool) -> Program:
+        """Steps of both stages for each sample, with a slave that reaches every command at once."""
+        scaling, solving, robot, made = self._scaling, self._solving, self.robot, Program()
+        s, r = np.asarray(scaling.signals), np.asarray(solving.signals)
+        samples, answers, T, q = (
+            np.asarray(self._samples),
+            np.asarray(self._answers),
+            np.zeros((4, 4)),
+            np.zeros(robot.n),
         )
-        known = {"copy": copy, "pose_from_transform": pose_from_transform}
-        return bound(
-            kernel_from_source(source, "walk", known),
-            apart(scaling.kernel, *scaling.arguments, scaling.signals, DT),
-            apart(solving.kernel, *solving.arguments, solving.signals, DT),
-            scaling.arguments, solving.arguments, scaling.signals, solving.signals,
-            robot.fk_pointer, robot.geometry_row, np.zeros((4, 4)), np.zeros(robot.n),
-            self._switch, self._samples, self._answers, DT,
-        )  # fmt: skip
+        made.copy(samples["pose"], s["master_measured_cp"], from_rows=True)
+        made.copy(samples["buttons"], s["master_buttons"], from_rows=True)
+        stamp = s["master_measured_cp_ns"]
+        made.copy(samples["stamp_ns"], stamp, from_rows=True)
+        made.call(scaling.kernel, *scaling.arguments, scaling.signals, DT)
+        made.copy(s["slave_servo_cp"], r["slave_servo_cp"])
+        made.copy(stamp, r["slave_servo_cp_ns"])
+        made.call(solving.kernel, *solving.arguments, solving.signals, DT)
+        made.copy(r["slave_servo_jp"], r["slave_setpoint_js"])
+        made.copy(r["slave_servo_jp"], q)
+        made.call(robot.kernels.fk, q, robot.geometry_row.copy(), T)
+        made.call(pose_from_transform, T, s["slave_setpoint_cp"])
+        for setpoint in (r["slave_setpoint_js_ns"], s["slave_setpoint_cp_ns"]):
+            made.copy(stamp, setpoint)
+        if is_cut:
+            made.copy(r["slave_reach"], s["slave_reach"])
+            made.copy(stamp, s["slave_reach_ns"])
+        kept = {"command": s["slave_servo_cp"], "reached": s["slave_setpoint_cp"], "q": q, "reach": r["slave_reach"]}
+        for name, value in kept.items():
+            made.copy(value, answers[name], to_rows=True)
+        return made
 
     def share(self, placement: Placement, *, is_cut: bool = True) -> float:
         """Share of the time in which the slave follows with a placement, as :attr:`Walked.share`.
@@ -187,8 +178,9 @@ class Walker:
         start = np.array(placement.start)
         solving.signals["slave_setpoint_js"] = start
         pose_from_transform(self.robot.fk(start), scaling.signals["slave_setpoint_cp"])
-        self._switch[0] = is_cut
-        self._walk()
+        program = self._programs[is_cut]
+        program.clock["count"] = len(self.path)
+        program.run()
         raise_pending()
 
 
