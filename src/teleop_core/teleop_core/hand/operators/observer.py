@@ -36,6 +36,7 @@ _COLUMNS = ("number", "act", "goal_x", "width", "goal_qw", "turn", "force")
 _NUMBER, _ACT, _GOAL, _WIDTH, _ATTITUDE, _TURN, _FORCE = map(topics.TASK_STATE.columns.index, _COLUMNS)
 _ENDS = (topics.Limit.JOINT, topics.Limit.WORKSPACE)
 _STILL = 0.05  # a tip that moves less than this share of its path in STILL_TIME is at rest
+_SAME = 0.02  # a tip is where the hand felt it end up to this share of its path, or a quarter of the goal's width
 _SHORTEST = 0.1  # displacements shorter than this share of a goal's width need no submovement
 _FELT = 0.03  # least force that is felt [N]
 _LEAST_SHARE = 0.1  # share of a submovement that a hand at the end of its room tries all the same
@@ -211,11 +212,12 @@ class Observer:
 
         An arm that overshoots stands still for a moment at its farthest point.
         """
-        width = float(self._seen.task[_WIDTH])
-        now, most = self._glances.at(when), _STILL * min(float(length(move.way.both)), 2.0 * width)
+        path, width = float(length(move.way.both)), float(self._seen.task[_WIDTH])
+        now, most = self._glances.at(when), _STILL * path
         if length(self._gone(now, self._glances.at(when + STILL_TIME))) > most:
             return False
-        if length(self._gone(move.seen, now) - move.unseen) <= 0.25 * width:
+        beyond = float(dot(self._gone(move.seen, now) - move.unseen, move.unseen)) / float(length(move.unseen))
+        if abs(beyond) <= max(0.25 * width, _SAME * path):
             return True
         return bool(length(self._gone(self._glances.at(when - SETTLED_TIME), now)) <= most)
 
