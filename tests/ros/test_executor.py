@@ -2,7 +2,7 @@
 
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import pytest
@@ -29,10 +29,20 @@ def until(executor: Any, is_done: Any) -> None:
         assert time.monotonic() < end
 
 
+def noting(done: list[str]) -> Callable[[Any, Any], Any]:
+    """Service that notes that it was served."""
+
+    def serve(_: Any, answer: Any) -> Any:
+        done.append("service")
+        return answer
+
+    return serve
+
+
 def test_services_clients_timers_and_deferred_work_are_served(guest: Guest) -> None:
-    executor, done = guest.world.executor(), []
+    executor, done = guest.world.executor(), list[str]()
     executor.add_node(guest.ros)
-    guest.ros.create_service(Trigger, "asked", lambda _, answer: done.append("service") or answer)
+    guest.ros.create_service(Trigger, "asked", noting(done))
     client = guest.ros.create_client(Trigger, "asked")
     guest.ros.create_timer(0.02, lambda: done.append("timer"))
     until(executor, client.service_is_ready)
@@ -43,11 +53,11 @@ def test_services_clients_timers_and_deferred_work_are_served(guest: Guest) -> N
 
 
 def test_an_entity_that_comes_later_is_served_and_one_that_goes_is_not(guest: Guest) -> None:
-    executor, done = guest.world.executor(), []
+    executor, done = guest.world.executor(), list[str]()
     executor.add_node(guest.ros)
     for _ in range(3):
         executor.spin_once(0.01)
-    service = guest.ros.create_service(Trigger, "later", lambda _, answer: done.append("service") or answer)
+    service = guest.ros.create_service(Trigger, "later", noting(done))
     client = guest.ros.create_client(Trigger, "later")
     until(executor, client.service_is_ready)
     client.call_async(Trigger.Request())
@@ -58,7 +68,7 @@ def test_an_entity_that_comes_later_is_served_and_one_that_goes_is_not(guest: Gu
 
 
 def test_an_error_of_a_callback_reaches_the_caller_and_the_next_call_goes_on(guest: Guest) -> None:
-    executor, done = guest.world.executor(), []
+    executor, done = guest.world.executor(), list[str]()
     executor.add_node(guest.ros)
 
     def fail() -> None:

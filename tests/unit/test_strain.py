@@ -95,4 +95,8 @@ def test_one_standstill_is_made_up_with_priority() -> None:
     run(machine, schedule, 0.5, 1e-4)
     machine.sleep(0.08)
     run(machine, schedule, 0.5, 1e-4)
-    assert (machine.has_priority, schedule.counts.dropped, schedule.counts.caught_up) == (True, 0, schedule.counts.missed)
+    assert (machine.has_priority, schedule.counts.dropped, schedule.counts.caught_up) == (
+        True,
+        0,
+        schedule.counts.missed,
+    )
