@@ -31,6 +31,7 @@ FLAGS = (
 )  # fmt: skip
 SETTINGS = ("--scenario", "coarse_box", "--set", "operator=random")
 PORT = 8087
+TOKEN = "benchmark"
 _START = 6.0  # after the first status line, until everything has settled [s]
 
 
@@ -46,7 +47,7 @@ def alone(seconds: float, folder: Path, *settings: str) -> dict[str, float]:
 def shown(seconds: float, folder: Path, *settings: str, has_browser: bool = True) -> dict[str, float]:
     """The same behind a page, which a browser shows."""
     bag = folder / "shown"
-    command = ["console", "--no-browser", "--port", str(PORT), "--out", str(bag), *SETTINGS]
+    command = ["console", "--no-browser", "--port", str(PORT), "--token", TOKEN, "--out", str(bag), *SETTINGS]
     command += [*settings, f"teleop.duration={seconds + _START + 2.0}"]
     share, window_ns = _watched(command, seconds, has_browser=has_browser)
     return {"cpu": share, **score(bag, *window_ns)}
@@ -88,7 +89,7 @@ def _open() -> "subprocess.Popen[bytes]":
         raise SystemExit(f"no browser to open the page with; install one of {', '.join(BROWSERS)}")
     profile = f"--user-data-dir={tempfile.mkdtemp()}"
     return subprocess.Popen(  # a session of processes of its own, as the browser of a desktop is
-        [browser, *FLAGS, profile, f"http://127.0.0.1:{PORT}/"], start_new_session=True,
+        [browser, *FLAGS, profile, f"http://127.0.0.1:{PORT}/?token={TOKEN}"], start_new_session=True,
         stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
     )  # fmt: skip
 

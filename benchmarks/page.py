@@ -4,7 +4,8 @@
     python benchmarks/page.py --starts 1 --seconds 2 --presses 20
 
 A browser of 1400 x 900 pixels draws with software. The first start compiles and is not counted. The stop is pressed
-beside sixteen hostile pages, which do what tests know of attacks, again and again. What an open page costs the loop of
+beside sixteen pages without the token, which ask for everything again and again, and four pages with it, which do what
+tests know of attacks. What an open page costs the loop of
 the session is measured by `benchmarks/console.py`.
 """
 
@@ -19,6 +20,7 @@ from contextlib import suppress
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
+from urllib.parse import urlsplit
 
 import numpy as np
 
@@ -28,6 +30,7 @@ import hostile
 from browser import Tab
 from console_process import STARTS, ConsoleProcess
 from page_client import PageClient, ask
+from present import present
 
 READY = "!document.querySelector('#t-start')?.hidden && document.querySelector('#t-begin')?.disabled === false"
 PAINT = "performance.getEntriesByName('first-contentful-paint')[0]?.startTime"
@@ -35,7 +38,7 @@ FRAMES = """new Promise((done) => { const begin = performance.now(); let frames 
     const frame = () => { frames += 1; const passed = performance.now() - begin;
         passed < SECONDS * 1000 ? requestAnimationFrame(frame) : done(1000 * frames / passed); };
     requestAnimationFrame(frame); })"""
-HOSTILE, PAGES = 16, 4  # pages, and how many share a process
+STRANGERS, HOSTILE, PAGES = 16, 4, 4  # pages without a token, and with it; how many share a process
 
 
 def opened(tab: Any, url: str) -> tuple[float, float]:
@@ -71,8 +74,8 @@ def stops(port: int, presses: int) -> list[float]:
     """
     logging.getLogger("websockets").setLevel(logging.CRITICAL)  # what is killed says no goodbye
     context, found = get_context("spawn"), list[float]()
-    seeds = [range(first, first + PAGES) for first in range(0, HOSTILE, PAGES)]
-    others = [context.Process(target=attackers, args=(port, some), daemon=True) for some in seeds]
+    others = [context.Process(target=attackers, args=(port, range(HOSTILE)), daemon=True)]
+    others += [context.Process(target=strangers, args=(port,), daemon=True) for _ in range(0, STRANGERS, PAGES)]
     with PageClient(port):
         for one in others:
             one.start()
@@ -106,6 +109,23 @@ def attackers(port: int, seeds: range) -> None:
         pages[0].join()
 
 
+def strangers(port: int) -> None:
+    """Be some pages without the token, until this process is killed."""
+    logging.getLogger("websockets").setLevel(logging.CRITICAL)
+
+    def asks() -> None:
+        while True:
+            with suppress(Exception):
+                for path in ("/stop", "/alive", "/"):
+                    ask(port, path, token="guess", Teleop_Page="new")
+                PageClient(port, comes_up=False, token="guess")
+
+    pages = [threading.Thread(target=asks) for _ in range(PAGES)]
+    for page in pages:
+        page.start()
+    pages[0].join()
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--starts", type=int, default=5, help="starts that are counted")
@@ -125,7 +145,7 @@ def main() -> None:
                     ended(tab)
                     starts.append(started(tab))
                 frames = float(tab.value(FRAMES.replace("SECONDS", str(told.seconds))))
-            heard = stops(int(console.url.split(":")[2].strip("/")), told.presses)
+            heard = stops(present(urlsplit(console.url).port), told.presses)
         finally:
             console.end()
     for name, value, wanted in (
@@ -133,7 +153,7 @@ def main() -> None:
         ("choice usable", f"{loads[1]:.0f} ms", "2000 ms"),
         ("Start to drawn, warm", f"{np.median(starts):.0f} ms", "4000 ms"),
         ("frames a second, software", f"{frames:.1f}", "at least 30"),
-        (f"stop beside {HOSTILE} hostile pages, median", f"{np.median(heard):.1f} ms", ""),
+        (f"stop beside {STRANGERS} + {HOSTILE} pages, median", f"{np.median(heard):.1f} ms", ""),
         ("  99 of 100", f"{np.percentile(heard, 99):.1f} ms", "50 ms"),
     ):
         print(f"{name:42}{value:>12}   {wanted}")

@@ -1,13 +1,12 @@
 """Pages of the reference that are read off the code: commands, public names, examples."""
 
-import argparse
 import ast
 import inspect
 from collections.abc import Iterator
 from importlib import import_module
 from pathlib import Path
 
-from teleop_core.commands.cli import _parser
+from teleop_core.commands.cli import application
 
 ROOT = Path(__file__).resolve().parents[1]
 TITLES = {
@@ -19,59 +18,19 @@ TITLES = {
 
 
 def commands_page() -> list[str]:
-    """Every command with its options, as paragraphs."""
-    parts = [
+    """Every command with its examples and options, as paragraphs."""
+    text = application().generate_docs(output_format="markdown")
+    return [
         "# Commands",
-        "`teleop COMMAND --help` prints the same with examples. Every command takes "
-        "`--parts FILE.py`, a Python file that registers [parts of your own](parts.md). Wrong use "
-        "is told in one line and ends with code 2.",
+        "`teleop COMMAND --help` prints the same. Every command takes `--parts FILE.py`, a Python file that registers "
+        "[parts of your own](parts.md). Wrong use is told in one line and ends with code 2.",
+        text[text.index("## teleop sim") :].strip(),
     ]
-    for name, parser, text in commands(_parser()):
-        rows = [row(parser, action) for action in parser._actions if is_shown(action)]
-        parts += [f"## teleop {name}", sentence(text)]
-        if rows:
-            parts.append("\n".join(["| option | meaning |", "|---|---|", *rows]))
-    return parts
-
-
-def commands(parser: argparse.ArgumentParser, before: str = "") -> Iterator[tuple[str, argparse.ArgumentParser, str]]:
-    """Name, parser and help of every command, those inside of commands too."""
-    for action in parser._actions:
-        if isinstance(action, argparse._SubParsersAction):
-            texts = {choice.dest: choice.help or "" for choice in action._choices_actions}
-            for name, inner in action.choices.items():
-                yield f"{before}{name}", inner, texts.get(name, "")
-                yield from commands(inner, f"{before}{name} ")
-
-
-def is_shown(action: argparse.Action) -> bool:
-    """Whether an option has a row: those that all commands have, and hidden ones, have none."""
-    kinds = (argparse._HelpAction, argparse._SubParsersAction)
-    is_common = isinstance(action, kinds) or "--parts" in action.option_strings
-    return not is_common and action.help != argparse.SUPPRESS
-
-
-def row(parser: argparse.ArgumentParser, action: argparse.Action) -> str:
-    """One option as a row of a table."""
-    value = action.metavar or (action.dest.upper() if action.nargs != 0 else "")
-    if isinstance(value, tuple):
-        value = " ".join(value)
-    if action.choices:
-        value = " or ".join(map(str, action.choices))
-    names = ", ".join(action.option_strings)
-    name = f"{names} {value}".strip() if names else value
-    text = parser._get_formatter()._expand_help(action) if action.help else ""
-    return f"| `{name}` | {cell(text)} |"
 
 
 def cell(text: str) -> str:
     """Text of a table's cell: in one line, with what Markdown would take for its own."""
     return " ".join(text.split()).replace("|", "\\|").replace("*", "\\*").replace("<", "&lt;")
-
-
-def sentence(text: str) -> str:
-    """Text with a capital at its start and a full stop at its end."""
-    return f"{text[:1].upper()}{cell(text[1:])}."
 
 
 def api_page() -> list[str]:

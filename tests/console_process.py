@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from browser import until
+from page_client import TOKEN
 
 STARTS = 180.0  # s; kernels may have to be compiled
 ENDS = 120.0  # s; a session gives its nodes 35 to end in order, then its recorder as many
@@ -24,10 +25,10 @@ class ConsoleProcess:
         command = [sys.executable, "-m", "teleop_core.commands.cli", "console", *map(str, arguments)]
         with self._log.open("wb") as log:
             self.process = subprocess.Popen(
-                [*command, "--port", "0", "--no-browser"], stdout=log, stderr=log, cwd=folder
+                [*command, "--port", "0", "--no-browser", "--token", TOKEN], stdout=log, stderr=log, cwd=folder
             )
-        told: Any = until(lambda: re.search(r"http://\S+?/(?=;)", self.text), "an address", STARTS)
-        self.url = told[0]
+        told: Any = until(lambda: re.search(r"console at (http://\S+);", self.text), "an address", STARTS)
+        self.url = told[1]
 
     @property
     def text(self) -> str:

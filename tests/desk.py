@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from page_client import TOKEN
 from teleop_console import app, link
 from teleop_console.server import ConsoleServer
 from teleop_core.graph.topics import MASTER_MEASURED_CP, OPERATION
@@ -103,7 +104,7 @@ def connected(server: ConsoleServer) -> list[Any]:
 def shown(desk: Any, renew: Any = None, *, can_end: bool = False) -> Iterator[tuple[ConsoleServer, Desk]]:
     """Server of the page of a desk, drawn as the command draws it, and the desk; further arguments as of the page."""
     ends = threading.Event()
-    with ConsoleServer(0) as server:
+    with ConsoleServer(0, token=TOKEN) as server:
         console = app.Console(server, desk, renew, can_end=can_end)
         drawing = threading.Thread(target=console.run, args=(ends.is_set,))
         drawing.start()

@@ -9,10 +9,12 @@ from contextlib import ExitStack, suppress
 from typing import Any
 
 import msgspec
+import pytest
+from websockets.exceptions import InvalidStatus
 from websockets.frames import Frame, Opcode
 
 from browser import until
-from page_client import CAMERA, PageClient, ask
+from page_client import CAMERA, TOKEN, PageClient, ask
 
 NAN, INF = math.nan, math.inf
 HERE, LEVEL = [0.0, -0.06, -0.08], [1.0, 0.0, 0.0, 0.0]
@@ -218,6 +220,16 @@ def leaves_in_the_middle_of_a_message(watcher: PageClient, driver: PageClient) -
     watcher.close()
 
 
+def has_no_token(watcher: PageClient, driver: PageClient) -> None:
+    for token in ("", "guess", TOKEN[:-1], TOKEN.upper(), TOKEN + "x"):
+        for path in ("/", "/alive", "/stop", "/strip?begin=0&end=1&pixels=100", "/page?begin=1"):
+            assert ask(watcher.port, path, token=token, Teleop_Page="new")[0] == 403
+            assert ask(watcher.port, path, Teleop_Page="new", Cookie=f"teleop_console_1={TOKEN}")[0] == 403
+        for _ in range(20):
+            with pytest.raises(InvalidStatus):
+                PageClient(watcher.port, comes_up=False, token=token)
+
+
 def keeps_another_page_alive(watcher: PageClient, driver: PageClient) -> None:
     port = watcher.port
     assert ask(port, "/alive?page=0")[0] == 403
@@ -257,6 +269,7 @@ def moves_time_and_asks_the_strip_for_too_much(watcher: PageClient, driver: Page
 
 
 HOSTILE = (
+    has_no_token,
     takes_the_callbacks_of_all_elements_away, drags_to_a_place_of_one_number,
     drags_what_another_page_drives, presses_the_buttons_of_the_driver,
     hides_disables_and_renames_elements, reaches_into_the_server, changes_what_is_shown_to_all,

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 import teleop_core as tc
-from teleop_core.commands.cli import _parser, main
+from teleop_core.commands.cli import application, main, overview
 
 ROOT = Path(__file__).resolve().parents[1]
 HELP = "--help"
@@ -69,10 +69,15 @@ def commands() -> Iterator[Named]:
         text = page.read_text(encoding="utf-8")
         for line in re.findall(r"^ {4}(?:\S*/)?teleop (.+)$", text, re.MULTILINE):
             yield from _named(page.relative_to(ROOT).as_posix(), line)
-    parsers: Any = next(action.choices for action in _parser()._actions if action.dest == "command")
-    for parser in parsers.values():
-        for line in re.findall(r"^ +teleop (.+?)(?:  .*)?$", parser.format_help(), re.MULTILINE):
-            yield from _named(HELP, line)
+    for line in shown_in_help():
+        yield from _named(HELP, line)
+
+
+def shown_in_help() -> list[str]:
+    """Every command that a ``--help`` shows."""
+    app = application()
+    helps = "\n".join([overview(), *(app[name].help for name in app if not name.startswith("-"))])
+    return re.findall(r"^ +teleop (.+?)(?:  .*)?$", helps, re.MULTILINE)
 
 
 def _named(place: str, line: str) -> Iterator[Named]:

@@ -19,6 +19,7 @@ from websockets.typing import Origin, Subprotocol
 
 from browser import until
 
+TOKEN = "token-of-the-tests"
 CAMERA = {
     "type": "ViewerCameraMessage", "wxyz": [1, 0, 0, 0], "position": [1.0, 0, 0.5], "fov": 0.8,
     "near": 0.01, "far": 1000, "image_height": 600, "image_width": 800, "look_at": [0, 0, 0],
@@ -30,7 +31,7 @@ class PageClient:
     """A page at a port; ``elements`` are viser's by what stands on them, ``gizmos`` their names,
     ``status`` is what it says of the session."""
 
-    def __init__(self, port: int, *, comes_up: bool = True) -> None:
+    def __init__(self, port: int, *, comes_up: bool = True, token: str = TOKEN) -> None:
         self.port, self.name, self.status = port, "", ""
         self.has_all = False  # that was there when it came
         self.commands: dict[Any, Any]
@@ -39,7 +40,7 @@ class PageClient:
         self.values: dict[Any, Any]
         self.elements, self.gizmos, self.commands, self.values = {}, [], {}, {}
         self.socket = connect(
-            f"ws://127.0.0.1:{port}/",
+            f"ws://127.0.0.1:{port}/?token={token}",
             origin=Origin(f"http://127.0.0.1:{port}"),
             compression=None,
             subprotocols=[Subprotocol(f"viser-v{viser.__version__}")],
@@ -135,10 +136,11 @@ class PageClient:
             self.elements[message["props"]["label"]] = message["uuid"]
 
 
-def ask(port: int, path: str, **headers: str) -> Any:
-    """Status and body of an answer to a request with some headers."""
+def ask(port: int, path: str, *, token: str = TOKEN, **headers: str) -> Any:
+    """Status and body of an answer to a request with a token, as a browser keeps it, and some headers."""
     connection = http.client.HTTPConnection("127.0.0.1", port, timeout=20)
-    connection.request("GET", path, headers={n.replace("_", "-"): v for n, v in headers.items()})
+    told = {"Cookie": f"teleop_console_{port}={token}"} | {n.replace("_", "-"): v for n, v in headers.items()}
+    connection.request("GET", path, headers=told)
     answer = connection.getresponse()
     body = answer.read()
     connection.close()

@@ -10,18 +10,29 @@ setup(
     description="Console and report of teleop_core: a session in the browser, and scores as a page",
     license="Apache-2.0",
     packages=find_packages(include=["teleop_console", "teleop_console.*"]),
-    package_data={"teleop_console": ["py.typed", "*.pyi", "*.css", "*.js", "report/*.js", "report/*.css"]},
+    package_data={
+        "teleop_console": ["py.typed", "*.pyi", "*.css", "*.js", "report/*.js", "report/*.css", "report/*.html"]
+    },
     python_requires=">=3.11",
-    install_requires=[f"teleop_core=={VERSION}", "lazy_loader", "msgspec", "numpy", "plotly", "viser>=1.1,<1.2"],
+    install_requires=[
+        f"teleop_core=={VERSION}",
+        "cyclopts",
+        "jinja2",
+        "lazy_loader",
+        "msgspec",
+        "numpy",
+        "plotly",
+        "segno",
+        "viser>=1.1,<1.2",
+    ],
     data_files=[
         ("share/ament_index/resource_index/packages", ["resource/teleop_console"]),
         ("share/teleop_console", ["package.xml"]),
     ],
     entry_points={
-        "teleop_core.commands": ["console = teleop_console.commands:add"],
         "teleop_core.pages": [
             "report = teleop_console.report.page:report_page",
             "workspace = teleop_console.report.workspace:write_workspace_page",
-        ],
+        ]
     },
 )

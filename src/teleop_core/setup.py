@@ -35,7 +35,7 @@ setup(
     package_data={"teleop_core": ["py.typed", "*.pyi", "kernels/compiled/**/*.nb?", "nodes/profiles/*.xml"]},
     python_requires=">=3.11",
     install_requires=[
-        "argcomplete",
+        "cyclopts>=5.5",
         "lazy_loader",
         "numpy",
         "numba>=0.68,<0.69",

@@ -2,7 +2,6 @@
 
 from setuptools import find_packages, setup
 
-COMMANDS = ("conformance", "drill")
 VERSION = "0.6.0"  # released together with teleop_core
 
 setup(
@@ -13,11 +12,19 @@ setup(
     packages=find_packages(include=["teleop_drill", "teleop_drill.*"]),
     package_data={"teleop_drill": ["py.typed", "*.pyi"]},
     python_requires=">=3.11",
-    install_requires=[f"teleop_core=={VERSION}", "greenlet", "lazy_loader", "mcap", "numpy", "pyyaml", "rich"],
+    install_requires=[
+        f"teleop_core=={VERSION}",
+        "cyclopts",
+        "greenlet",
+        "lazy_loader",
+        "mcap",
+        "numpy",
+        "pyyaml",
+        "rich",
+    ],
     extras_require={"ros": ["teleop_core[ros]"]},
     data_files=[
         ("share/ament_index/resource_index/packages", ["resource/teleop_drill"]),
         ("share/teleop_drill", ["package.xml"]),
     ],
-    entry_points={"teleop_core.commands": [f"{name} = teleop_drill.commands.{name}:add" for name in COMMANDS]},
 )

@@ -12,16 +12,19 @@ setup(
     packages=find_packages(include=["teleop_exchange", "teleop_exchange.*"]),
     package_data={"teleop_exchange": ["py.typed", "*.pyi"]},
     python_requires=">=3.11",
-    install_requires=[f"teleop_core=={VERSION}", "lazy_loader", "numpy", "pandas", "pyarrow", "rosbags", "scipy"],
+    install_requires=[
+        f"teleop_core=={VERSION}",
+        "cyclopts",
+        "lazy_loader",
+        "numpy",
+        "pandas",
+        "pyarrow",
+        "rosbags",
+        "scipy",
+    ],
     data_files=[
         ("share/ament_index/resource_index/packages", ["resource/teleop_exchange"]),
         ("share/teleop_exchange", ["package.xml"]),
     ],
-    entry_points={
-        "teleop_core.commands": [
-            "export = teleop_exchange.commands:add_export",
-            "import = teleop_exchange.commands:add_import",
-        ],
-        "teleop_core.readers": ["others = teleop_exchange.foreign:master_of_others"],
-    },
+    entry_points={"teleop_core.readers": ["others = teleop_exchange.foreign:master_of_others"]},
 )

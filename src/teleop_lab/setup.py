@@ -2,7 +2,6 @@
 
 from setuptools import find_packages, setup
 
-COMMANDS = ("calibrate", "experiment", "fit", "grade", "people", "reach", "study", "tune")
 VERSION = "0.6.0"  # released together with teleop_core
 
 setup(
@@ -20,10 +19,10 @@ setup(
         f"teleop_machines=={VERSION}",
         f"teleop_console=={VERSION}",
         f"teleop_exchange=={VERSION}",
+        "cyclopts",
         "lazy_loader",
         "numpy",
         "pandas",
-        "plotly",
         "pyyaml",
         "rich",
         "scipy",
@@ -34,5 +33,4 @@ setup(
         ("share/ament_index/resource_index/packages", ["resource/teleop_lab"]),
         ("share/teleop_lab", ["package.xml"]),
     ],
-    entry_points={"teleop_core.commands": [f"{name} = teleop_lab.commands.{name}:add" for name in COMMANDS]},
 )

@@ -18,6 +18,7 @@ from one_line import COMPILING, one_line
 from present import present
 from teleop_core.bags.reader import Bag
 from teleop_core.bags.writer import BagWriter
+from teleop_core.commands import cli
 from teleop_core.commands import progress as commands_progress
 from teleop_core.commands.progress import Progress, say_work, shown_progress
 from teleop_core.graph import topics
@@ -172,11 +173,58 @@ def test_lookups_answer_without_a_session(teleop: "Run", teleop_again: "Run") ->
     assert "motion_scaling" in one_line(teleop_again("parameters", "nobody", code=2))
 
 
-def test_help_answers_without_numpy(teleop: "Run") -> None:
+def test_help_imports_no_command_and_nothing_that_takes_long(teleop: "Run") -> None:
     code = "import sys; from teleop_core.commands import cli; cli.main(['--help'])"
     done = subprocess.run([sys.executable, "-X", "importtime", "-c", code], capture_output=True, text=True, check=False)
     assert "COMMAND" in done.stdout
-    assert "numba" not in done.stderr
+    for module in ("numba", "numpy", "rich", "cyclopts", "yaml", "teleop_core.commands.sessions", "teleop_lab"):
+        assert f" {module}\n" not in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        ([], "teleop: a COMMAND is missing (see teleop --help)"),
+        (["simm"], "teleop simm: COMMAND is 'simm', must be one of: sim, "),
+        (["sim"], 'teleop sim: Command "sim" parameter --out requires an argument (see teleop sim --help)'),
+        (["sim", "--out", "new", "more"], "teleop sim: one argument too many: more (see teleop sim --help)"),
+        (["sim", "--out", "new", "--sed", "1"], "teleop sim: Unknown option: --sed. Did you mean --seed?"),
+        (
+            ["sim", "--out", "new", "--seed", "x"],
+            'teleop sim: Invalid value for --seed: unable to convert "x" into int',
+        ),
+        (["sim", "--out", "new", "--set"], "teleop sim: Command "),
+        (["live", "--out", "new", "--processes", "two"], 'teleop live: Invalid value "two" for --processes. Choose'),
+        (["evaluate"], 'teleop evaluate: Command "evaluate" parameter BAGS requires an argument'),
+        (["stop", "--domain", "300"], "teleop stop: --domain is '300', must be the number of a ROS domain, 0 to 232"),
+    ],
+)
+def test_wrong_use_is_told_in_one_line(words: list[str], told: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(words) == 2
+    line = one_line_of(capsys)
+    assert line.startswith(told)
+
+
+def one_line_of(capsys: pytest.CaptureFixture[str]) -> str:
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    (line,) = captured.err.splitlines()
+    return line
+
+
+def test_words_become_typed_options_in_any_order() -> None:
+    words = (
+        "--parts mine.py sim --set a=1 b=[1,-2] --config x.yaml --set c=-3 --config y.yaml --robot puma560 --out new"
+    )
+    call = cli.parse([*words.split(), "--geometry", "d1=0.1", "--parts", "more.py", "--duration", "-1"])
+    assert call is not None
+    settings = call.arguments.arguments["settings"]
+    assert call.parts == (Path("mine.py"), Path("more.py"))
+    assert call.arguments.arguments["duration"] == -1.0
+    assert settings.config == (Path("x.yaml"), Path("y.yaml"))
+    assert settings.texts == [
+        "robot=puma560", "geometry=[]", "slave.start=[]", 'geometry=["d1=0.1"]', "a=1", "b=[1,-2]", "c=-3"
+    ]  # fmt: skip
 
 
 @pytest.mark.slow
@@ -227,14 +275,10 @@ def test_sessions_of_an_experiment_are_counted() -> None:
 
 
 def test_the_shell_completes_commands_and_options(tmp_path: Path) -> None:
+    script = tmp_path / "teleop"
+    script.write_text(cli.application().generate_completion(shell="bash"), encoding="utf-8")
     for line, expected in (("teleop ev", "evaluate"), ("teleop import --uni", "--unit")):
-        answer = tmp_path / "answer"
-        environment = os.environ | {
-            "_ARGCOMPLETE": "1",
-            "COMP_LINE": line,
-            "COMP_POINT": str(len(line)),
-            "_ARGCOMPLETE_STDOUT_FILENAME": str(answer),
-            "_ARGCOMPLETE_SUPPRESS_SPACE": "1",
-        }
-        subprocess.run([sys.executable, "-m", "teleop_core.commands.cli"], env=environment, check=False, timeout=60)
-        assert answer.read_text() == expected
+        last = len(line.split()) - 1
+        ask = f"source {script}; COMP_WORDS=({line}); COMP_CWORD={last}; _teleop; echo ${{COMPREPLY[@]}}"
+        done = subprocess.run(["bash", "-c", ask], capture_output=True, text=True, check=True, timeout=60)
+        assert expected in done.stdout.split()

@@ -11,6 +11,7 @@ import pytest
 pytest.importorskip("viser")
 
 from desk import Desk, shown
+from page_client import TOKEN
 from teleop_console.app import choose
 from teleop_console.recorded_arms import parameters_of
 from teleop_console.server import ConsoleServer
@@ -101,7 +102,7 @@ def check(tab: Any, least: int) -> None:
 def form(monkeypatch: pytest.MonkeyPatch, folder: Path) -> Iterator[str]:
     """Address of the form on which a session is chosen."""
     monkeypatch.chdir(folder)
-    with ConsoleServer(0) as server:
+    with ConsoleServer(0, token=TOKEN) as server:
         waiting = threading.Thread(target=choose, args=(server,))
         waiting.start()
         try:

@@ -12,7 +12,7 @@ pytest.importorskip("viser")
 import teleop_core as tc
 from browser import GRIP, PULLED, VIEWER, Tab, arrow, until
 from desk import POSE, Desk, shown
-from page_client import PageClient
+from page_client import TOKEN, PageClient
 from teleop_console.answers import Situation
 from teleop_console.app import Console
 from teleop_console.link import ParameterInfo
@@ -151,7 +151,7 @@ def test_fixed_setting_begins_a_new_session_and_an_impossible_one_is_refused_wit
 
 
 def test_panel_has_its_width_where_the_form_was_seen_on_a_phone_and_the_session_on_a_desk(tab: Any) -> None:
-    with ConsoleServer(0) as server:
+    with ConsoleServer(0, token=TOKEN) as server:
         server.answers.situation = Situation(chooses=True)
         tab.visit(server.url)
         for width in (1400, 390, 1400):

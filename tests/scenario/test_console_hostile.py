@@ -19,7 +19,7 @@ pytest.importorskip("viser")
 import hostile
 from browser import until
 from desk import Desk, connected, shown
-from page_client import PageClient, ask
+from page_client import TOKEN, PageClient, ask
 from teleop_console.connection import Crowd
 from teleop_console.filter import BURST, FLOOD, Budget
 from teleop_console.front import WAITING
@@ -114,7 +114,7 @@ def test_what_a_watching_page_changed_on_its_own_screen_is_put_back(
 
 
 def test_refusals_are_counted_and_each_kind_is_said_once(caplog: pytest.LogCaptureFixture) -> None:
-    with ConsoleServer(0) as server, PageClient(server.port, comes_up=False) as page:
+    with ConsoleServer(0, token=TOKEN) as server, PageClient(server.port, comes_up=False) as page:
         for _ in range(50):
             page.raw(b"nothing")
         page.sync()
@@ -129,7 +129,7 @@ def test_refusals_are_counted_and_each_kind_is_said_once(caplog: pytest.LogCaptu
 
 
 def test_a_stop_before_there_is_a_session_is_told_so_and_stays_on_offer() -> None:
-    with ConsoleServer(0) as server:
+    with ConsoleServer(0, token=TOKEN) as server:
         assert ask(server.port, "/stop", Teleop_Page="new")[0] == 409
         assert ask(server.port, "/alive", Teleop_Page="new")[1]["can_stop"] is True
 
@@ -172,7 +172,8 @@ def test_malformed_request_for_the_stop_is_none_and_ends_nothing(
     server, desk, _ = served
     pressed = desk.stops
     with socket.create_connection(("127.0.0.1", server.port), timeout=30) as guest:
-        guest.sendall(line + b"\r\nTeleop-Page: new\r\n\r\n")
+        host = f"Host: 127.0.0.1:{server.port}\r\nCookie: teleop_console_{server.port}={TOKEN}\r\n"
+        guest.sendall(line + b"\r\nTeleop-Page: new\r\n" + host.encode() + b"\r\n")
         guest.shutdown(socket.SHUT_WR)
         while guest.recv(4096):
             pass

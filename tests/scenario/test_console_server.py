@@ -1,6 +1,7 @@
 """Console's server: used by real browsers, refused to pages from elsewhere."""
 
 import asyncio
+import re
 import threading
 from collections import deque
 from collections.abc import Iterator
@@ -25,6 +26,7 @@ from viser.infra import _infra
 
 from browser import Tab, handshake, until
 from desk import connected
+from page_client import TOKEN, ask
 from teleop_console import connection
 from teleop_console.server import ConsoleServer
 from teleop_core.base.errors import SessionError
@@ -93,7 +95,7 @@ def test_page_without_the_token_is_refused_until_it_has_shown_it_once(tab: Any) 
 
 
 def test_page_of_another_origin_gets_no_connection_no_frame_and_no_answer(tab: Any) -> None:
-    with ConsoleServer(0) as server, elsewhere() as foreign:
+    with ConsoleServer(0, token=TOKEN) as server, elsewhere() as foreign:
         tab.call("Page.navigate", url=foreign)
         tab.until("document.body")
         opened = tab.value(f"""new Promise((done) => {{
@@ -111,7 +113,7 @@ def test_page_of_another_origin_gets_no_connection_no_frame_and_no_answer(tab: A
 
 
 def test_of_two_browsers_one_drives_and_a_reload_in_the_middle_keeps_it_so(tab: Any, tmp_path: Path) -> None:
-    with ConsoleServer(0) as server, Tab(tmp_path) as other:
+    with ConsoleServer(0, token=TOKEN) as server, Tab(tmp_path) as other:
         take = server.viser.gui.add_button("Take control")
         take.on_click(lambda event: server.drivers.take(present(event.client_id)))
         server.viser.make_public(take)
@@ -132,7 +134,7 @@ def test_of_two_browsers_one_drives_and_a_reload_in_the_middle_keeps_it_so(tab: 
 
 
 def test_browser_that_stands_still_while_it_holds_the_stylus_loses_control(tab: Any) -> None:
-    with ConsoleServer(0, patience=2.5) as server:
+    with ConsoleServer(0, token=TOKEN, patience=2.5) as server:
         held = []
         gizmo = server.viser.scene.add_transform_controls("/stylus", scale=2.0)
         gizmo.on_update(lambda _: held.append(gizmo.position))
@@ -160,11 +162,13 @@ def test_client_that_never_reads_costs_little_and_is_dropped_while_others_are_se
     tab: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(connection, "STUCK", 1.0)
-    with ConsoleServer(0) as server:
+    with ConsoleServer(0, token=TOKEN) as server:
         scene = server.viser.scene
         body = scene.add_frame("/body")
         mesh = scene.add_point_cloud("/cloud", **cloud(0))
-        told, dead = handshake(server.port, Origin=f"http://127.0.0.1:{server.port}", Sec_WebSocket_Protocol=SPOKEN)
+        told, dead = handshake(
+            server.port, f"/?token={TOKEN}", Origin=f"http://127.0.0.1:{server.port}", Sec_WebSocket_Protocol=SPOKEN
+        )
         assert "101" in told
         until(lambda: len(connected(server)) == 1, "the page that never reads")
         tab.visit(server.url)
@@ -195,7 +199,7 @@ def cloud(seed: int) -> dict[Any, Any]:
 
 
 def test_page_is_led_out_of_the_machine_by_nobody(tab: Any) -> None:
-    with ConsoleServer(0) as server:
+    with ConsoleServer(0, token=TOKEN) as server:
         tab.visit(server.url)
         until(lambda: is_driven(server), "the page is there")
         icons = "document.querySelectorAll('.tabler-icon-share').length"
@@ -207,21 +211,29 @@ def test_page_is_led_out_of_the_machine_by_nobody(tab: Any) -> None:
 
 
 def test_port_of_another_console_is_refused_and_not_counted_up() -> None:
-    with ConsoleServer(0) as server, pytest.raises(SessionError, match="taken by"):
+    with ConsoleServer(0, token=TOKEN) as server, pytest.raises(SessionError, match="taken by"):
         ConsoleServer(server.port)
 
 
-def test_other_addresses_than_the_loopback_are_served_with_a_token_alone() -> None:
-    with ConsoleServer(0, "0.0.0.0") as server:
+@pytest.mark.parametrize("host", ["127.0.0.1", "0.0.0.0"])
+def test_every_address_is_served_with_the_token_alone(host: str) -> None:
+    with ConsoleServer(0, host) as server:
         assert len(server.token) >= 32
-        assert server.url == f"http://localhost:{server.port}/?token={server.token}"
+        shown = "localhost" if host == "0.0.0.0" else host
+        assert server.url == f"http://{shown}:{server.port}/?token={server.token}"
         origin = f"http://127.0.0.1:{server.port}"
-        for path, first in (("/", "403"), (f"/?token={server.token}", "101")):
+        for path, first in (("/", "403"), ("/?token=guess", "403"), (f"/?token={server.token}", "101")):
             told, opened = handshake(server.port, path, Origin=origin)
             opened.close()
             assert first in told
-    with ConsoleServer(0) as server:
-        assert server.token == ""
+        for path in ("/", "/stop", "/alive", "/strip?begin=0&end=1&pixels=9", "/teleop/page.js"):
+            assert ask(server.port, path, token="guess", Teleop_Page="new")[0] == 403
+
+
+def test_address_for_a_phone_is_that_of_the_network_and_has_the_token() -> None:
+    with ConsoleServer(0, "0.0.0.0", token=TOKEN) as server:
+        assert re.fullmatch(rf"http://\d+(\.\d+){{3}}:{server.port}/\?token={TOKEN}", server.url_elsewhere)
+        assert "0.0.0.0" not in server.url_elsewhere
 
 
 def test_message_that_is_drawn_just_before_its_reader_waits_is_sent() -> None:

@@ -16,7 +16,7 @@ from headless import Headless
 pytest.importorskip("viser")
 
 from browser import both, opened, until
-from page_client import PageClient, ask
+from page_client import TOKEN, PageClient, ask
 from teleop_console.app import choose
 from teleop_console.server import ConsoleServer
 from teleop_console.start import Wish
@@ -57,7 +57,7 @@ def _clean(tab: Any) -> None:
 @contextmanager
 def chosen(wishes: list[Wish], count: int) -> Iterator[ConsoleServer]:
     """Server of a start page that is shown until some wishes have come."""
-    with ConsoleServer(0) as server:
+    with ConsoleServer(0, token=TOKEN) as server:
 
         def work() -> None:
             while len(wishes) < count:
@@ -111,7 +111,7 @@ AT_CONNECTION = """Object.defineProperty(window, 'teleopPage', { configurable: t
 
 @browser
 def test_tab_has_the_name_of_the_console_and_an_empty_scene_is_never_bare(tab: Any) -> None:
-    with ConsoleServer(0) as server:
+    with ConsoleServer(0, token=TOKEN) as server:
         script = tab.call("Page.addScriptToEvaluateOnNewDocument", source=AT_CONNECTION)
         tab.visit(server.url)
         tab.until("window.t_loads !== undefined")
@@ -274,6 +274,7 @@ def test_stop_is_answered_while_the_form_works_and_no_stranger_begins_a_session(
         foreign = {"Teleop_Page": driver.name, "Origin": "http://example.org"}
         assert ask(server.port, "/begin?operator=remote", **foreign)[0] == 403
         head = f"POST /robot?name=arm.urdf HTTP/1.1\r\nHost: 127.0.0.1:{server.port}\r\n"
+        head += f"Cookie: teleop_console_{server.port}={TOKEN}\r\n"
         slow = f"{head}Teleop-Page: {driver.name}\r\nContent-Length: 1000\r\n\r\n<"
         with socket.create_connection(("127.0.0.1", server.port)) as one:
             one.sendall(slow.encode())  # and then nothing

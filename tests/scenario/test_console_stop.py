@@ -7,6 +7,7 @@ from typing import Any
 import pytest
 
 from headless import Headless
+from page_client import TOKEN
 from teleop_console.answers import Situation
 from teleop_console.app import splash
 from teleop_console.server import ConsoleServer
@@ -98,7 +99,7 @@ def gizmos(server: ConsoleServer) -> list[Any]:
 @pytest.mark.parametrize("size", [(390, 780), (780, 390), (1400, 900)])
 def test_nothing_that_a_session_offers_lies_over_the_stop(tab: Any, size: tuple[int, int]) -> None:
     tab.resize(*size)
-    with ConsoleServer(0) as server:
+    with ConsoleServer(0, token=TOKEN) as server:
         server.answers.situation = Situation(can_end=True, can_press=True, state="ENABLED, homed")
         tab.visit(server.url)
         for name in ("#t-end", "#t-press"):
@@ -133,7 +134,7 @@ def test_every_page_looks_stopped_whoever_pressed_and_says_when_the_console_is_g
 
 def test_stop_is_in_the_page_before_there_is_an_arm_and_stops_it_as_soon_as_there_is(tab: Any) -> None:
     pressed = threading.Event()
-    with ConsoleServer(0) as server, splash(server) as say:
+    with ConsoleServer(0, token=TOKEN) as server, splash(server) as say:
         tab.visit(server.url)
         tab.until(STOP)
         say("looks for an arm …")

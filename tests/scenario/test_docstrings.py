@@ -23,7 +23,7 @@ def docstrings(text: str) -> Iterator[str]:
     """Docstrings of a source text, and texts that stand behind a constant."""
     for node in ast.walk(ast.parse(text)):
         if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant):
-            yield str(node.value.value)
+            yield re.sub(r"^ +teleop .*$", "", str(node.value.value), flags=re.MULTILINE)  # commands
 
 
 def messages(text: str) -> Iterator[str]:

@@ -16,7 +16,9 @@ import teleop_core
 import teleop_drill
 import teleop_lab
 import teleop_machines
-from teleop_core.commands.cli import _parser
+from named import shown_in_help
+from teleop_core.commands.cli import Call, parse
+from teleop_core.commands.options import ParameterOptions
 from teleop_core.evaluation.score import keys
 from teleop_core.graph.layers import parse_setting
 from teleop_core.session import api, virtual
@@ -81,14 +83,20 @@ def test_every_relative_link_leads_somewhere(name: str) -> None:
             assert anchor in anchors(place.read_text(encoding="utf-8")), target
 
 
+def settings_of(call: Call | None) -> list[str]:
+    """Texts ``key=value`` of the settings of a command."""
+    values = () if call is None else call.arguments.arguments.values()
+    return [text for value in values if isinstance(value, ParameterOptions) for text in value.texts]
+
+
 @pytest.mark.parametrize("name", NAMES)
 def test_every_teleop_command_parses_with_its_settings(name: str) -> None:
     for line in commands(text_of(name)):
         words = shlex.split(line, comments=True)
-        arguments = _parser().parse_args([word for word in words if word != "..."])
-        for setting in getattr(arguments, "settings", []):
-            if not arguments.parts + arguments.more_parts:
-                assert parse_setting(setting)
+        call = parse([word for word in words if word != "..."])
+        for setting in settings_of(call):
+            assert call is not None
+            assert call.parts or parse_setting(setting)
 
 
 @pytest.mark.slow
@@ -97,17 +105,15 @@ def test_every_session_of_a_documented_command_can_be_begun(tmp_path: Path, monk
         (tmp_path / name).symlink_to(ROOT / name)
     (tmp_path / "my_arm.urdf").symlink_to(ROOT / "examples/ur5e.urdf")  # "yours" of a document
     monkeypatch.chdir(tmp_path)
-    parsers: Any = next(action.choices for action in _parser()._actions if action.dest == "command")
-    helps = "\n".join(parser.format_help() for parser in parsers.values())
-    shown = re.findall(r"^ +teleop (.+?)(?:  .*)?$", helps, re.MULTILINE)
     begun = set()
-    for line in [*shown, *(line for name in NAMES for line in commands(text_of(name)))]:
+    for line in [*shown_in_help(), *(line for name in NAMES for line in commands(text_of(name)))]:
         words = [word for word in shlex.split(line, comments=True) if word != "..."]
-        arguments = _parser().parse_args(words)
-        settings = getattr(arguments, "settings", [])
+        call = parse(words)
+        settings = settings_of(call)
         needs_more = re.search(r"\.(py|yaml|csv|stl)\b|=(gamepad|spacemouse|elsewhere|bags/)", line)
-        if settings and hasattr(arguments, "scenario") and not needs_more:
-            virtual.VirtualTime(api.configuration(arguments.scenario, texts=settings))
+        if settings and call is not None and "scenario" in call.arguments.signature.parameters and not needs_more:
+            scenario = call.arguments.arguments.get("scenario")
+            virtual.VirtualTime(api.configuration(scenario, texts=settings))
             begun.add(line)
     assert len(begun) > 5
 

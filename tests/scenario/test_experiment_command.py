@@ -35,7 +35,7 @@ def test_experiment_prints_published_beside_predicted(teleop_again: "Run") -> No
 
 
 def test_help_teaches_what_a_mark_means(teleop_again: "Run") -> None:
-    shown = teleop_again("experiment", "--help").stdout
+    shown = " ".join(teleop_again("experiment", "--help").stdout.split())
     assert "teleop experiment all --html" in shown
     assert "not whether a number is small" in shown
 
@@ -58,7 +58,7 @@ def test_json_holds_every_number_exactly(teleop_again: "Run", tmp_path: Path) ->
         (("resolution", "--html", "{folder}"), "is a directory"),
         (("resolution", "--html", "/proc/page.html"), "cannot be written"),
         (("resolution", "--seed", "-1"), "seed is -1"),
-        (("resolution", "--seed", "one"), "invalid int value"),
+        (("resolution", "--seed", "one"), "unable to convert"),
     ],
 )
 def test_wrong_use_is_told_in_one_line_and_writes_nothing(

@@ -109,7 +109,12 @@ def test_commands_of_a_page_run_one_after_the_other(
 
 def run(named: Named, form: str) -> int:
     """Exit code of a command, run here, or in a process of its own if it loads parts."""
-    words = [*named.words, *(BRIEF if form == "brief" and named.words[0] == "sim" else ())]
+    words = list(named.words)
+    if form == "brief" and words[0] == "sim":
+        if BRIEF[0] in words:
+            at = words.index(BRIEF[0])
+            del words[at : at + 2]
+        words += BRIEF
     if "--parts" not in words:
         return main(words)
     return subprocess.run([sys.executable, "-m", "teleop_core.commands.cli", *words], check=False).returncode

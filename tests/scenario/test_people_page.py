@@ -10,7 +10,7 @@ import pytest
 pytest.importorskip("viser")
 
 from browser import until
-from page_client import PageClient, ask
+from page_client import TOKEN, PageClient, ask
 from teleop_console.answers import Situation
 from teleop_console.server import ConsoleServer
 from teleop_lab.people.conduct import serve
@@ -39,7 +39,7 @@ def plan() -> Plan:
 def served(plan: Plan, tmp_path: Path) -> Iterator[tuple[ConsoleServer, PeoplePage, Journal]]:
     """Pages of a study whose trials are over as soon as they have begun."""
     journal = Journal(tmp_path / "store", plan)
-    server, page = serve(plan, journal, 0, "127.0.0.1", "")
+    server, page = serve(plan, journal, 0, "127.0.0.1", TOKEN)
     ends = threading.Event()
 
     def work() -> None:
@@ -135,7 +135,7 @@ def test_pages_of_other_origins_and_those_that_are_not_open_get_nowhere(
             assert ask(server.port, path)[0] == 403  # not of our page
         assert ask(server.port, "/go?step=consent&at=", Teleop_Page="new")[0] == 409
         assert ask(server.port, "/act?what=skip&trial=1&reason=a&key=x", Teleop_Page="new")[0] == 403
-        assert ask(server.port, "/conduct", Host="example.org")[0] == 403
+        assert ask(server.port, "/conduct", token="guess", Host="example.org")[0] == 403
         assert page.key.encode() not in ask(server.port, "/conduct")[1] + ask(server.port, "/teleop.js")[1]
         assert not journal.rows()
         assert driver.ask("/go?step=consent&at=")[1]["step"] == "begin"

@@ -11,7 +11,8 @@ import pytest
 from teleop_console import choices
 from teleop_console.choices import FIELDS, OWN, START, Chosen
 from teleop_core.base.errors import ParameterError
-from teleop_core.commands.cli import _parsed
+from teleop_core.commands.cli import parse
+from teleop_core.commands.options import SessionOptions
 from teleop_core.session.api import configuration
 from teleop_core.session.configuration import Configuration
 
@@ -30,8 +31,11 @@ def by_command(line: str) -> Configuration:
     """Session that a command line starts, by the program's own parser."""
     words = shlex.split(line)
     assert words[:2] == ["teleop", "console"]
-    told = _parsed(words[1:])
-    return configuration(told.scenario, files=told.config, texts=[*OWN, *told.settings])
+    call = parse(words[1:])
+    assert call is not None
+    told = call.arguments.arguments
+    settings = told.get("settings", SessionOptions())
+    return configuration(told.get("scenario"), files=settings.config, texts=[*OWN, *settings.texts])
 
 
 @pytest.mark.parametrize("chosen", CHOICES, ids=lambda chosen: "-".join(chosen.values()))

@@ -6,7 +6,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from teleop_console.guard import Guard, Request, is_loopback, is_wildcard
+from teleop_console.commands import show_code
+from teleop_console.guard import Guard, Request, is_wildcard
+from teleop_core.base.errors import ParameterError
+from teleop_core.commands.cli import main
 
 
 def ask(guard: Guard, path: str = "/", is_socket: bool = False, **headers: str | list[str]) -> str:
@@ -16,24 +19,33 @@ def ask(guard: Guard, path: str = "/", is_socket: bool = False, **headers: str |
     return guard.refusal(Request(path, is_socket, lambda name: given.get(name.lower(), [])))
 
 
-LOCAL = Guard("127.0.0.1", 8080)
-SECRET = Guard("127.0.0.1", 8080, "secret")
+SECRET = Guard(8080, "secret")
+OURS = "/?token=secret"
 
 
-@pytest.mark.parametrize("host", ["localhost:8080", "127.0.0.1:8080", "[::1]:8080", "LOCALHOST"])
-def test_own_page_is_answered_by_any_name_of_the_loopback(host: str) -> None:
-    assert not ask(LOCAL, host=host)
-    assert not ask(LOCAL, host=host, is_socket=True, origin=f"http://{host}")
+@pytest.mark.parametrize("host", ["localhost:8080", "127.0.0.1:8080", "[::1]:8080", "LOCALHOST", "robot.local:8080"])
+def test_own_page_is_answered_by_any_name_that_leads_here(host: str) -> None:
+    assert not ask(SECRET, OURS, host=host)
+    assert not ask(SECRET, OURS, host=host, is_socket=True, origin=f"http://{host}")
 
 
-@pytest.mark.parametrize(
-    "host",
-    ["evil.example:8080", "localhost.evil.example", "127.0.0.1.evil.example", "127.0.0.2", "", "[",
-     "evil@localhost.example", ["localhost:8080", "evil.example"], []],
-)  # fmt: skip
-def test_name_that_is_not_ours_is_refused_though_it_leads_here(host: str | list[str]) -> None:
-    origin = f"http://{host}" if isinstance(host, str) else "http://localhost:8080"
-    assert "does not have this host name" in ask(LOCAL, host=host, is_socket=True, origin=origin)
+@pytest.mark.parametrize("host", ["evil.example:8080", "localhost.evil.example", "127.0.0.2", "", "["])
+def test_page_of_a_name_that_others_lead_here_has_no_token(host: str) -> None:
+    for path in ("/", "/stop", "/?token=", "/?token=guess", "/?token=s", "/?token=secre", "/?token=secrets"):
+        assert "token" in ask(SECRET, path, host=host, is_socket=True, origin=f"http://{host}")
+        assert "token" in ask(SECRET, path, host=host)
+
+
+@pytest.mark.parametrize("host", [["localhost:8080", "evil.example"], []])
+def test_request_under_two_names_or_none_is_refused(host: list[str]) -> None:
+    assert "one host" in ask(SECRET, OURS, host=host, is_socket=True, origin="http://localhost:8080")
+    assert "one host" in ask(SECRET, OURS, host=host)
+
+
+@pytest.mark.parametrize("token", ["", "two words", "a;b", "a&b", "a=b", "ä", 'a"b', "a\nb"])
+def test_token_that_an_address_or_a_cookie_cannot_hold_as_it_is_is_refused(token: str) -> None:
+    with pytest.raises(ParameterError, match="token"):
+        Guard(8080, token)
 
 
 @pytest.mark.parametrize(
@@ -43,21 +55,21 @@ def test_name_that_is_not_ours_is_refused_though_it_leads_here(host: str | list[
      ["http://localhost:8080", "http://evil.example"]],
 )  # fmt: skip
 def test_page_of_another_origin_is_refused(origin: str | list[str]) -> None:
-    assert "own page" in ask(LOCAL, is_socket=True, origin=origin)
-    assert "own page" in ask(LOCAL, origin=origin)
+    assert "own page" in ask(SECRET, OURS, is_socket=True, origin=origin)
+    assert "own page" in ask(SECRET, OURS, origin=origin)
 
 
 @pytest.mark.parametrize("site", ["cross-site", "same-site"])
 def test_what_another_page_fetches_is_refused_but_a_link_to_ours_is_followed(site: str) -> None:
     for mode in ("no-cors", "cors", "websocket"):
-        assert "own page" in ask(LOCAL, sec_fetch_site=site, sec_fetch_mode=mode)
-    assert not ask(LOCAL, sec_fetch_site=site, sec_fetch_mode="navigate")
-    assert not ask(LOCAL, sec_fetch_site="same-origin", sec_fetch_mode="cors")
+        assert "own page" in ask(SECRET, OURS, sec_fetch_site=site, sec_fetch_mode=mode)
+    assert not ask(SECRET, OURS, sec_fetch_site=site, sec_fetch_mode="navigate")
+    assert not ask(SECRET, OURS, sec_fetch_site="same-origin", sec_fetch_mode="cors")
 
 
 def test_socket_needs_an_origin_and_a_page_none() -> None:
-    assert not ask(LOCAL)
-    assert ask(LOCAL, is_socket=True)
+    assert not ask(SECRET, OURS)
+    assert ask(SECRET, OURS, is_socket=True)
 
 
 @given(st.text(max_size=30))
@@ -83,18 +95,22 @@ def test_token_in_the_cookie_is_as_good_as_in_the_address() -> None:
 def test_right_token_does_not_help_a_page_from_elsewhere() -> None:
     told: dict[str, Any] = {"path": "/?token=secret", "is_socket": True}
     assert ask(SECRET, origin="http://evil.example", **told)
-    assert ask(SECRET, host="evil.example", origin="http://evil.example", **told)
 
 
-def test_server_of_all_addresses_is_found_by_numbers_but_by_no_foreign_name() -> None:
-    everywhere = Guard("0.0.0.0", 8080, "secret")
-    path = "/?token=secret"
-    assert not ask(everywhere, path=path, host="192.0.2.7:8080")
-    assert ask(everywhere, path=path, host="evil.example:8080")
-
-
-def test_loopback_and_wildcard_are_told_from_other_addresses() -> None:
-    assert all(map(is_loopback, ("127.0.0.1", "::1", "localhost", "127.1.2.3")))
-    assert not any(map(is_loopback, ("0.0.0.0", "192.0.2.7", "", "robot")))
+def test_wildcard_is_told_from_other_addresses() -> None:
     assert all(map(is_wildcard, ("0.0.0.0", "::", "")))
     assert not any(map(is_wildcard, ("127.0.0.1", "robot")))
+
+
+def test_code_for_a_phone_is_that_of_the_address_and_needs_an_address_that_a_phone_reaches(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    for words in ([], ["--host", "localhost"], ["--host", "127.0.0.2"]):
+        assert main(["console", "--no-browser", "--qr", *words]) == 2
+        assert "--host 0.0.0.0" in capsys.readouterr().err
+    url = "http://192.0.2.7:8080/?token=secret"
+    show_code(url)
+    told, *rows = capsys.readouterr().out.splitlines()
+    assert told == f"for a phone: {url}"
+    assert len(rows) > 10
+    assert len({len(row) for row in rows}) == 1

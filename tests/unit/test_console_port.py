@@ -9,6 +9,7 @@ from contextlib import suppress
 
 import pytest
 
+from page_client import TOKEN
 from present import present
 from teleop_console.server import ConsoleServer, free_port, listen, owner
 from teleop_core.base.errors import ParameterError, SessionError
@@ -40,7 +41,7 @@ def test_port_is_free_again_at_once_when_its_server_has_ended() -> None:
 
 def test_server_that_ends_while_others_come_in_leaves_no_connection_open() -> None:
     for _ in range(4):
-        with ConsoleServer(0) as server:
+        with ConsoleServer(0, token=TOKEN) as server:
             came, ends = threading.Barrier(3), threading.Event()
             guests = [threading.Thread(target=come_in, args=(server.port, came, ends)) for _ in range(2)]
             for guest in guests:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from viser._scene_handles import BoxHandle, FrameHandle
 
 import teleop_core as tc
+from page_client import TOKEN
 from present import present
 from teleop_console.drivers import Drivers
 from teleop_console.fixture_outlines import Look, scale_of, unit_outline
@@ -41,7 +42,7 @@ MASTER, TIP, FORCE = "master/measured_cp", "slave/measured_cp", "master/measured
 
 @pytest.fixture(scope="module")
 def server() -> Any:
-    with ConsoleServer(port=0) as opened:
+    with ConsoleServer(port=0, token=TOKEN) as opened:
         yield opened.viser
 
 

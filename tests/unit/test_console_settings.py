@@ -6,6 +6,7 @@ from typing import Any
 import pytest
 
 from desk import Desk
+from page_client import TOKEN
 from teleop_console.inputs import KINDS, LATER, Input, kind_of, parsed, shown, text
 from teleop_console.link import ParameterInfo
 from teleop_console.server import ConsoleServer
@@ -25,7 +26,7 @@ EVERY: list[tuple[str, str, Any]] = [
 
 @pytest.fixture(scope="module")
 def _server() -> Iterator[Any]:
-    with ConsoleServer(0) as opened:
+    with ConsoleServer(0, token=TOKEN) as opened:
         yield opened.viser
 
 

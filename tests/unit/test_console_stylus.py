@@ -9,6 +9,7 @@ import pytest
 import viser
 
 import teleop_core as tc
+from page_client import TOKEN
 from present import present
 from teleop_console.cameras import FIELD
 from teleop_console.hooks import Server
@@ -24,7 +25,7 @@ POSE[3:] /= np.linalg.norm(POSE[3:])
 
 @pytest.fixture(scope="module")
 def server() -> Iterator[Server]:
-    with ConsoleServer(port=0) as opened:
+    with ConsoleServer(port=0, token=TOKEN) as opened:
         yield opened.viser
 
 

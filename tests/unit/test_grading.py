@@ -126,6 +126,6 @@ def test_the_command_prints_and_writes_what_the_function_finds(
     found = grade(table)
     assert [int(line) for line in keep.read_text().split()] == usual(found)
     assert pd.read_csv(csv)["episode"].tolist() == found.index.tolist()
-    assert "class=odd" in page.read_text()
+    assert 'class="odd"' in page.read_text()
     assert f"{len(usual(found))} of 8 episodes" in capsys.readouterr().out
     assert main(["grade", str(tmp_path / "nothing.csv")]) == 2

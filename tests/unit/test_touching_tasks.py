@@ -126,7 +126,7 @@ def test_a_wall_where_no_hole_is_is_an_error() -> None:
 
 def test_a_person_who_sees_palpates_tissue_as_its_force_says() -> None:
     where: dict[str, Any] = {"world.place": (0.281, -0.236, -0.087), "task": "palpate"}
-    recording = tc.run("palpation", duration=12.0, settings={**SEEING, **where})
+    recording = tc.run("palpation", duration=20.0, settings={**SEEING, **where})
     told, force = recording["task/state"], recording["slave/true_cf"]
     ends = told.stamp_ns[1:][np.diff(told.values[:, COLUMN["attempts"]]) > 0.0]
     assert len(ends) >= 2

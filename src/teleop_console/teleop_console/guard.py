@@ -1,20 +1,21 @@
 """Guard: decides which requests the page's server answers; a page of another origin must not drive an arm.
 
-Three checks protect the arm. *Host*: a host name that resolves to this machine but is not ours is an attack (DNS
-rebinding). *Origin*: browsers state which page opens a WebSocket or fetches a file, and only the console's page may do
-this. *Token*: if other machines can reach the port, the address must contain a secret, which the browser then stores as
-a cookie.
+Two checks protect the arm. *Token*: the address must contain a secret, which the browser then stores as a cookie. A
+name that others lead to this machine (DNS rebinding) has neither. *Origin*: a page of another port of this machine has
+the cookie, because all ports of a host share cookies. But browsers state which page opens a WebSocket or fetches a
+file, and only the console's page may do this.
 """
 
 import ipaddress
+import re
 import secrets
-import socket
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from http.cookies import CookieError, SimpleCookie
 from urllib.parse import parse_qs, urlsplit
 
-LOOPBACK = ("localhost", "127.0.0.1", "::1")
+from teleop_core.base.errors import ParameterError
+
 HEADERS = {
     "Content-Security-Policy": (
         "default-src 'self' data: blob: 'unsafe-inline' 'unsafe-eval'; connect-src 'self' data: "
@@ -26,14 +27,6 @@ HEADERS = {
     "Cache-Control": "no-store",
 }
 """Headers of every page: the page cannot send requests to another host, and no other page can frame it."""
-
-
-def is_loopback(host: str) -> bool:
-    """Whether only this machine can reach an address."""
-    try:
-        return ipaddress.ip_address(host).is_loopback
-    except ValueError:
-        return host == "localhost"
 
 
 def is_wildcard(host: str) -> bool:
@@ -68,20 +61,24 @@ class Guard:
     the page through a forwarded port. A browser cannot be made to send a Host to which it did not connect.
 
     Args:
-        host: Address to which the server is bound.
         port: Port of the server. It is part of the cookie's name, because all ports of a host share cookies.
-        token: Secret that requests must contain; empty for no secret.
+        token: Secret that requests must contain.
+
+    Raises:
+        ParameterError: The token is empty, or has a character that an address or a cookie must encode.
     """
 
-    def __init__(self, host: str, port: int, token: str = "") -> None:
-        self._host, self._token = host, token
+    def __init__(self, port: int, token: str) -> None:
+        if not re.fullmatch(r"[A-Za-z0-9._~-]+", token):
+            raise ParameterError("token", token, "letters, digits and . _ ~ - only")
+        self._token = token
         self._cookie = f"teleop_console_{port}"
 
     def refusal(self, request: Request) -> str:
         """Reason why a request is refused; empty if the request is answered."""
         hosts, origins = request.header("Host"), request.header("Origin")
-        if len(hosts) != 1 or not self._is_ours(hosts[0]):
-            return "the console does not have this host name"
+        if len(hosts) != 1:
+            return "a request must name one host"
         is_foreign = (request.is_socket or bool(origins)) and not _is_same(origins, hosts[0])
         if is_foreign or not _is_visit(request):
             return "only the console's own page may do this"
@@ -91,22 +88,9 @@ class Guard:
 
     def cookie(self) -> str:
         """Value of Set-Cookie with which the page no longer needs the token in its address."""
-        if not self._token:
-            return ""
         return f"{self._cookie}={self._token}; Path=/; HttpOnly; SameSite=Strict"
 
-    def _is_ours(self, host: str) -> bool:
-        try:
-            name = urlsplit(f"//{host}").hostname or ""
-        except ValueError:
-            return False
-        if name in (*LOOPBACK, self._host.lower()):
-            return True
-        return is_wildcard(self._host) and (_is_address(name) or name == socket.gethostname())
-
     def _has_token(self, request: Request) -> bool:
-        if not self._token:
-            return True
         given = parse_qs(urlsplit(request.path).query).get("token", [])
         for header in request.header("Cookie"):
             try:
@@ -125,12 +109,3 @@ def _is_visit(request: Request) -> bool:
     """Whether a request comes from our own page or from no page, or navigates from another page to ours."""
     sites, modes = request.header("Sec-Fetch-Site"), request.header("Sec-Fetch-Mode")
     return set(sites) <= {"same-origin", "none"} or list(modes) == ["navigate"]
-
-
-def _is_address(name: str) -> bool:
-    """Whether a name is a numeric address, which DNS cannot redirect."""
-    try:
-        ipaddress.ip_address(name)
-    except ValueError:
-        return False
-    return True

@@ -274,8 +274,7 @@ def _harden(headers: Headers, host: str, guard: Guard) -> None:
     """Add the headers of every page, and the cookie of this server."""
     for name, value in HEADERS.items():
         headers[name] = value.format(socket=f"ws://{host}")
-    if cookie := guard.cookie():
-        headers["Set-Cookie"] = cookie
+    headers["Set-Cookie"] = guard.cookie()
 
 
 @contextmanager

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from teleop_console.answers import Answers
 from teleop_console.drivers import PATIENCE, Drivers
-from teleop_console.guard import Guard, is_loopback, is_wildcard
+from teleop_console.guard import Guard, is_wildcard
 from teleop_console.hooks import Server
 from teleop_console.start import Form
 from teleop_core.base.errors import ParameterError, SessionError
@@ -98,6 +98,16 @@ def _command(folder: Path) -> str:
     return repr(" ".join(words).strip()[:_SHOWN] or "a process")
 
 
+def own_address() -> str:
+    """Address of this machine in its network; the loopback address without a network."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as asked:
+        try:
+            asked.connect(("192.0.2.1", 9))  # documentation address; a datagram socket sends nothing to connect
+        except OSError:
+            return "127.0.0.1"
+        return str(asked.getsockname()[0])
+
+
 PORT = 8080
 """Default port of the page."""
 _LOOK = 0.5  # time between two checks of the driving page [s]
@@ -107,20 +117,19 @@ _FORGET = 20  # number of checks between two removals of closed pages
 class ConsoleServer:
     """Server of the page; it runs from its construction to :meth:`close`.
 
-    Without a token the server serves this machine only; on other addresses a token is always required. Requests of
-    pages of other origins, with foreign host names, or without the token are answered by status 403. A
+    Requests of pages of other origins, or without the token, are answered by status 403. A
     :class:`~teleop_console.filter.Filter` checks the messages of pages.
 
     Attributes:
         viser: The server to which scene and panel are added.
         drivers: Object that knows which page drives.
         answers: Object with the data for pages in addition to viser's elements; it also receives the pages' stops.
-        token: Secret that the address must contain; empty for none.
+        token: Secret that the address must contain.
 
     Args:
         port: Number of the port; 0 for any free port.
         host: Address of this machine that the server uses; the loopback address by default.
-        token: Secret. If it is empty and the address is not the loopback address, a secret is generated.
+        token: Secret of letters, digits and . _ ~ -; a new one if it is empty.
         label: Heading of the panel.
         form: Function that makes, from the drivers, the form that is shown while no session runs. None for the form
             that chooses a session.
@@ -128,7 +137,7 @@ class ConsoleServer:
 
     Raises:
         SessionError: The port is in use. The message names the process that uses it, and a free port.
-        ParameterError: The address does not belong to this machine.
+        ParameterError: The address does not belong to this machine, or the token has other characters.
     """
 
     def __init__(
@@ -141,13 +150,13 @@ class ConsoleServer:
         form: Callable[[Drivers], Form] | None = None,
         patience: float = PATIENCE,
     ) -> None:
+        self.token = token or secrets.token_urlsafe(24)
         opened = listen(host, port)
         self.port = int(opened.getsockname()[1])
         self.host = host
-        self.token = token or ("" if is_loopback(host) else secrets.token_urlsafe(24))
         self.drivers = Drivers(patience)
         self.answers = Answers(self.drivers, form and form(self.drivers))
-        guard = Guard(host, self.port, self.token)
+        guard = Guard(self.port, self.token)
         self.viser = Server(opened, guard, self.drivers, self.answers, label)
         self._ends = threading.Event()
         self._watch = threading.Thread(target=self._look, name="console pages", daemon=True)
@@ -156,9 +165,15 @@ class ConsoleServer:
     @property
     def url(self) -> str:
         """Address with which people at this machine open the page; it includes the token."""
-        host = "localhost" if is_wildcard(self.host) else self.host
-        host = f"[{host}]" if ":" in host else host
-        return f"http://{host}:{self.port}/" + (f"?token={self.token}" if self.token else "")
+        return self._url("localhost" if is_wildcard(self.host) else self.host)
+
+    @property
+    def url_elsewhere(self) -> str:
+        """Address with which people at other machines open the page; it includes the token."""
+        return self._url(own_address() if is_wildcard(self.host) else self.host)
+
+    def _url(self, host: str) -> str:
+        return f"http://{f'[{host}]' if ':' in host else host}:{self.port}/?token={self.token}"
 
     def close(self) -> None:
         """Stop the server; open pages show that the connection is lost."""

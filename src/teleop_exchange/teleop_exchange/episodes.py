@@ -34,7 +34,7 @@ class Episodes:
     """
 
     def __init__(self, table: tables.Table, options: ImportOptions) -> None:
-        self._table, self._wanted = table, options.episode
+        self._table, self._wanted = table, None if options.episode == "all" else options.episode
         self._columns = _columns(table, options)
         self._beside = [] if options.numbered_by or not table.is_named else _beside(table, self._columns)
         self._texts = {

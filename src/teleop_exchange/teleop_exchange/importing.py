@@ -15,7 +15,7 @@ import numpy as np
 from teleop_core.bags.arms import ARMS_KEY
 from teleop_core.bags.finding import check_new
 from teleop_core.bags.writer import BagWriter
-from teleop_core.base.errors import RecordingError
+from teleop_core.base.errors import ParameterError, RecordingError
 from teleop_core.graph.topics import HAND_JAW, MASTER_BUTTONS, MASTER_MEASURED_CP, Topic
 from teleop_core.kernels.geometry import Array
 from teleop_exchange.import_report import ImportReport, summary
@@ -59,6 +59,8 @@ def import_recording(
     """
     path, out = Path(file), Path(out)
     wanted = options_of(options or ImportOptions(), arms, changes)
+    if any(one.episode == "all" for one in wanted.values()):
+        raise ParameterError("--episode", "all", "the number of one episode; `import_episodes` imports all of them")
     check_new(out)
     motions = {arm: Motion(path, one) for arm, one in wanted.items()}
     first_ns = min(int(motion.stamp_ns[0]) for motion in motions.values())

@@ -5,7 +5,9 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from itertools import pairwise
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated, Literal
+
+from cyclopts import Parameter
 
 from teleop_core.base.errors import ParameterError, UnknownNameError
 
@@ -93,7 +95,8 @@ class ImportOptions:
             ``("width", "0.08", "0")``. The hand then closes the slave's jaw in the same share.
         threshold: Value above which a button counts as pressed.
         skip: Number of lines to leave out at the beginning of a text file.
-        episode: Number of the recording in a table of several recordings; None for a table of one recording.
+        episode: Number of the recording in a table of several recordings; None for a table of one recording. ``all``
+            imports each into a directory of recordings, also for the directory of a LeRobot data set.
         numbered_by: Columns that number the recordings of a table; the combinations of several columns are numbered
             from 0. Empty for the column called ``episode_index`` or the like, ``none`` for a single recording.
         topic: Topic of the poses in a bag, or the end of its name; empty if only one topic contains poses.
@@ -134,14 +137,14 @@ class ImportOptions:
     jaw: Columns = ()
     threshold: float = 0.5
     skip: int = 0
-    episode: int | None = None
+    episode: int | Literal["all"] | None = None
     numbered_by: Columns = ()
     topic: str = ""
     frame: str = ""
     parent: str = ""
     buttons_topic: str = ""
     buttons: str = ""
-    axes: Columns = ("+x", "+y", "+z")
+    axes: Annotated[tuple[str, str, str], Parameter(allow_leading_hyphen=True)] = ("+x", "+y", "+z")
     handedness: str = "right"
     scale: float = 1.0
     center: str = "keep"
@@ -209,10 +212,8 @@ class ImportOptions:
             value = getattr(self, name)
             if value is not None and not 0.0 < value < float("inf"):
                 raise ParameterError(option(name), value, "finite and above 0")
-        if self.episode is not None and not isinstance(self.episode, int):
-            raise ParameterError(
-                "--episode", self.episode, "the number of one episode; `import_episodes` imports all of them"
-            )
+        if self.episode not in {None, "all"} and not isinstance(self.episode, int):
+            raise ParameterError("--episode", self.episode, "a number, or all")
         if self.jaw and not abs(self.jaw_ends[0] - self.jaw_ends[1]) > 0.0:  # NaN too
             raise ParameterError("--jaw", self.jaw, "a column and two different numbers")
         if self.skip < 0:

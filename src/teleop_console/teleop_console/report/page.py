@@ -1,26 +1,30 @@
-"""Page: scores and plots of recordings as one self-contained HTML file."""
+"""Report page: scores and plots of recordings as one self-contained HTML file."""
 
-import json
-from collections.abc import Sequence
-from html import escape
-from typing import Any
+from collections.abc import Iterator, Sequence
 
-import numpy as np
-from plotly.offline import get_plotlyjs, get_plotlyjs_version
-
-from teleop_console.report.overview import overview
-from teleop_console.report.packing import Arrays, deflated
-from teleop_console.report.page_template import PAGE, POLICY, TIMES, script, style
-from teleop_console.report.scores_table import html_table
-from teleop_core.evaluation.bands import Band
-from teleop_core.evaluation.figure import Figure, is_against_time
-from teleop_core.evaluation.published import ANGLE_FACTOR, POSITION_SHARE, SOURCE
-from teleop_core.evaluation.rows import is_compared, side_by_side
+from teleop_console.report.pages import Card, Cell, Section, Sessions, Table, page
+from teleop_core.evaluation.published import ANGLE_FACTOR, POSITION_SHARE, SOURCE, published_for
+from teleop_core.evaluation.rows import is_compared, number, side_by_side
 from teleop_core.evaluation.score import Score
 from teleop_core.evaluation.scoring import Study
 from teleop_core.evaluation.traces import spacing_s
+from teleop_core.evaluation.verdict import SHARE, percent
 
-_HEADER = "<h1>Teleoperation report</h1>"
+SHOWN = 5
+"""Number of scores on the card of a session."""
+_FIGURES = (
+    (SHARE, "%", "time followed"),
+    ("asked_error_mm.max", "mm", "largest lag behind the hand"),
+    ("position_error_mm.rms", "mm", "tracking error RMS"),
+    ("true_error_mm.rms", "mm", "error of the true tip RMS"),
+    ("orientation_error_deg.angle.rms", "°", "orientation error RMS"),
+    ("fixture.penetration_max_mm", "mm", "largest fixture penetration"),
+    ("latency_ms.total.p99", "ms", "delay p99, hand to setpoint"),
+    ("force_n.max", "N", "peak force on the hand"),
+    ("motion.hand.speed_median_mm_s", "mm/s", "median speed of the hand"),
+)
+_OFTEN_NOTHING = {"latency_ms.total.p99", "force_n.max", "fixture.penetration_max_mm"}
+_MARKS = {True: "value met", False: "value missed", None: "value plain"}
 
 
 def report_page(studies: Sequence[Study]) -> str:
@@ -29,89 +33,62 @@ def report_page(studies: Sequence[Study]) -> str:
     The page works offline, because it contains plotly.js. All plots of a recording against time show the same interval,
     down to single samples. Texts from recordings are escaped.
     """
-    sections, drawn, arrays = [], [], Arrays()
-    for number, study in enumerate(studies):
-        plots = study.figures()
-        places = [f"plot-{number}-{i}" for i in range(len(plots))]
-        sections.append(_section(number, study, plots, places))
-        for place, plot in zip(places, plots, strict=True):
-            if not plot.traces:
-                continue
-            traces, layout = arrays.named(plot.traces), arrays.named(plot.layout)
-            layout |= {"height": plot.height}
-            drawn.append({"id": place, "recording": number, "traces": traces, "layout": layout})
-    recordings = [_recording(study) for study in studies]
-    found = {"recordings": recordings, "arrays": arrays.packed(), "figures": drawn}
-    data = json.dumps(found, allow_nan=False)
     scores = [study.score for study in studies]
-    table = (  # page.js folds the table; without scripts it stays open
-        f'<details class="card table" open><summary>All figures</summary>{_note(scores)}{html_table(scores)}</details>'
-    )
-    return PAGE.format(
-        policy=POLICY,
-        title=escape("Teleoperation: " + ", ".join(score.session.title for score in scores)),
-        style=style(),
-        body="\n".join((_HEADER, overview(scores), table, *sections)),
-        data=data.replace("<", "\\u003c"),  # no text of the data can close the script element
-        plotly=deflated(get_plotlyjs().encode()),
-        library=f"plotly.js {get_plotlyjs_version()}",
-        script=script(),
-    )
-
-
-def _recording(study: Study) -> dict[str, Any]:
-    bands = [
-        {"cause": band.cause, "color": band.color, "stretches": np.round(band.stretches, 6).tolist()}
-        for band in study.bands
+    cards = [
+        Card(score.session.place, f"#recording-{i}", score.verdict, list(_known(score))[:SHOWN])
+        for i, score in enumerate(scores)
     ]
-    duration_s = study.score.session.duration_s
-    return {"duration": duration_s, "bands": bands, "kept": _kept_s(study.score)}
+    title = "Teleoperation: " + ", ".join(score.session.title for score in scores)
+    sections = [_section(i, study) for i, study in enumerate(studies)]
+    return page(title, [Sessions(cards), scores_table(scores)], sections, heading="Teleoperation report")
 
 
-def _kept_s(score: Score) -> float:
-    """Length of the intervals [s] of which the page contains only the extreme values; 0 if it contains all samples."""
-    samples = max((topic.count for topic in score.topics.values()), default=0)
-    return spacing_s(samples, score.session.duration_s)
+def _known(score: Score) -> Iterator[tuple[str, str, str]]:
+    """Value, unit and meaning of the available scores that are not trivial."""
+    values = score.to_dict()
+    for key, unit, text in _FIGURES:
+        value = values.get(key)
+        if key == SHARE and isinstance(value, float):
+            yield percent(value), unit, text
+        elif isinstance(value, int | float) and not (value == 0.0 and key in _OFTEN_NOTHING):
+            yield number(value), unit, text
 
 
-def _note(scores: Sequence[Score]) -> str:
-    """Explanation of the marks, if published numbers are shown beside ours."""
-    if not is_compared(side_by_side([score.rows for score in scores])):
-        return ""
-    return (
-        f'<p class="facts">Beside the published figures of the RCRT-1 ({escape(SOURCE)}), '
-        "presumably taken against the filtered reference too. ✓ agrees, ✗ does not: position RMS "
-        f"within {100.0 * POSITION_SHARE:.0f} %, angles within a factor of {ANGLE_FACTOR:g}.</p>"
-    )
-
-
-def _section(number: int, study: Study, plots: list[Figure], places: list[str]) -> str:
+def _section(i: int, study: Study) -> Section:
     session = study.score.session
-    cards = [_card(plot, place) for plot, place in zip(plots, places, strict=True)]
-    told = list(session.facts)
-    if kept_s := _kept_s(study.score):
-        told.append(f"plots hold the smallest and largest value of each {kept_s * 1e3:.3g} ms")
-    head = f'<h2 id="recording-{number}">{escape(session.place)}</h2>'
-    head += f'<p class="facts">{escape(" · ".join(told))}</p>{_legend(study.bands)}'
-    if any(map(is_against_time, plots)):
-        head += TIMES.format(place=f"times-{number}", duration=f"{session.duration_s:.1f}")
-    return "\n".join((f"<section>{head}", *cards, "</section>"))
-
-
-def _legend(bands: Sequence[Band]) -> str:
-    """Legend of the coloured bands; the table contains the share of time of each band."""
-    entries = "".join(
-        f'<span><i style="background:{escape(band.color)}"></i>{escape(band.cause)}</span>' for band in bands
+    samples = max((topic.count for topic in study.score.topics.values()), default=0)
+    kept_s = spacing_s(samples, session.duration_s)
+    told = [f"plots hold the smallest and largest value of each {kept_s * 1e3:.3g} ms"] * (kept_s > 0.0)
+    return Section(
+        session.place,
+        " · ".join((*session.facts, *told)),
+        study.figures(),
+        f"recording-{i}",
+        study.bands,
+        session.duration_s,
+        kept_s,
     )
-    return f'<p class="bands">In the state: {entries}</p>' if entries else ""
 
 
-def _card(plot: Figure, place: str) -> str:
-    """HTML element for a plot, or the plot's text if there is nothing to draw."""
-    title, sentence = escape(plot.title), escape(plot.sentence)
-    if not plot.traces:
-        return f'<p class="facts">{title}: {sentence}</p>'
-    return (
-        f'<figure class="card"><h3>{title}</h3><figcaption>{sentence}</figcaption>'
-        f'<div id="{place}" class="plot"></div></figure>'
+def scores_table(scores: Sequence[Score]) -> Table:
+    """Scores side by side, with a second column for published numbers if there are any."""
+    found = side_by_side([score.rows for score in scores])
+    columns = list(zip(*(line.rows for line in found), strict=True))
+    are_compared = [any(row.published for row in rows) for rows in columns]
+    heads, kinds = [Cell(), Cell()], [Cell(), Cell()]
+    for score, is_beside in zip(scores, are_compared, strict=False):
+        mode = published_for(score.session.gain, score.session.robot, score.session.plant)
+        heads.append(Cell(score.session.place, span=1 + is_beside))
+        kinds += [Cell(note="measured"), *[Cell(note=f"published{f', {mode.mode}' if mode else ''}")] * is_beside]
+    rows = []
+    for line in found:
+        cells = [Cell(line.label), Cell(line.unit, "unit")]
+        for row, is_beside in zip(line.rows, are_compared, strict=True):
+            cells += [Cell(row.value, _MARKS[row.is_met]), *[Cell(row.published, "published")] * is_beside]
+        rows.append((line.group, cells))
+    note = (
+        f"Beside the published figures of the RCRT-1 ({SOURCE}), presumably taken against the filtered reference too. "
+        f"✓ agrees, ✗ does not: position RMS within {100.0 * POSITION_SHARE:.0f} %, angles within a factor of "
+        f"{ANGLE_FACTOR:g}."
     )
+    return Table([heads, kinds], rows, "All figures", note if is_compared(found) else "")

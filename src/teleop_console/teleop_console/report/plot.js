@@ -182,7 +182,7 @@ function put(target, [key, ...further], value) {
 }
 
 function laidOut(own) {
-  const layout = { font: { size: 13 }, legend: { orientation: "h", x: 0, y: 1.02, yanchor: "bottom" }, ...own };
+  const layout = { font: { size: 13 }, autotypenumbers: "strict", legend: { orientation: "h", x: 0, y: 1.02, yanchor: "bottom" }, ...own };
   for (const key of Object.keys(layout)) if (/^[xy]axis/.test(key)) layout[key] = { ...AXIS, ...layout[key] };
   if (layout.scene) layout.scene = { xaxis: {}, yaxis: {}, zaxis: {}, ...layout.scene };
   return themed(layout);

@@ -3,10 +3,8 @@
 from pathlib import Path
 from typing import Any
 
-import plotly.graph_objects as plots
-from plotly.subplots import make_subplots
-
-from teleop_console.report.plain_page import Figures, plain_page
+from teleop_console.report.pages import Section, page
+from teleop_core.evaluation.figure import Figure, axis, scene
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots.robot import Robot
 
@@ -26,31 +24,14 @@ def write_workspace_page(robot: Robot, points: Array, values: Array, file: Path)
     Raises:
         OSError: The file cannot be written.
     """
-    titles = ("in space", "from above: x, y", "from the side: x, z")
-    figure = make_subplots(
-        rows=2,
-        cols=2,
-        column_widths=[0.62, 0.38],
-        subplot_titles=titles,
-        specs=[[{"type": "scene", "rowspan": 2}, {"type": "xy"}], [None, {"type": "xy"}]],
-    )
     x, y, z = points[:DRAWN].T
+    bar = {"title": {"text": "manipulability"}}
     marker: dict[str, Any] = {"size": 2, "color": values[:DRAWN], "colorscale": "Viridis", "opacity": 0.7}
-    bar = {"title": "manipulability", "x": -0.08}
-    figure.add_trace(
-        plots.Scatter3d(x=x, y=y, z=z, mode="markers", marker={**marker, "colorbar": bar, "showscale": True}),
-        row=1,
-        col=1,
-    )
-    for row, second in ((1, y), (2, z)):
-        trace = plots.Scattergl(x=x, y=second, mode="markers", marker=marker)
-        figure.add_trace(trace, row=row, col=2)
-        name = "yz"[row - 1]
-        figure.update_yaxes(title_text=f"{name} [m]", scaleanchor=f"x{row}", row=row, col=2)
-        figure.update_xaxes(title_text="x [m]", row=row, col=2)
-    axes = {f"{axis}axis": {"title": f"{axis} [m]"} for axis in "xyz"}
-    figure.update_layout(showlegend=False, height=820, template="none", scene={**axes, "aspectmode": "data"})
+    whole = {"type": "scatter3d", "x": x, "y": y, "z": z, "mode": "markers", "marker": {**marker, "colorbar": bar}}
+    figures = [Figure("in space", "", [whole], {**scene("m"), "showlegend": False}, 560)]
+    for title, name, second in (("from above", "y", y), ("from the side", "z", z)):
+        trace = {"type": "scattergl", "x": x, "y": second, "mode": "markers", "marker": marker}
+        layout = {"xaxis": axis("x", "m"), "yaxis": axis(name, "m", scaleanchor="x"), "showlegend": False}
+        figures.append(Figure(title, "", [trace], layout, 420))
     told = f"{len(points):,} joint vectors drawn within the limits"
-    figures = Figures()
-    card = figures.card(figure.data, figure.layout, told)
-    file.write_text(plain_page(f"Workspace of {robot.name}", [card], figures), encoding="utf-8")
+    file.write_text(page(f"Workspace of {robot.name}", [], [Section(facts=told, parts=figures)]), encoding="utf-8")

@@ -1,21 +1,12 @@
 """``teleop compile``: compiles the kernels of the built-in parts before a session needs them."""
 
-import argparse
 from collections.abc import Iterable, Iterator, Sequence
 from os import sched_getaffinity
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-from teleop_core.commands.arguments import command
-
 if TYPE_CHECKING:
     from teleop_core.session.configuration import Configuration
-
-_EPILOG = """\
-a session compiles what it needs and is not there yet; compiled before, it starts at once:
-  teleop compile --scenarios                            what "make setup" compiles
-  teleop compile                                        everything of teleop_core, for every arm and graph
-"""
 
 
 class Job(NamedTuple):
@@ -33,14 +24,17 @@ _PAIR = "pair"
 """Stage of a job for a server and its simulated arm as one object."""
 
 
-def add(commands: argparse._SubParsersAction) -> None:  # type: ignore[type-arg]
-    """Add the command's parser."""
-    parser = command(commands, "compile", _run, "compile all kernels now, on all processors", _EPILOG)
-    text = "compile only what the built-in scenarios need, also with an arm from a URDF file"
-    parser.add_argument("--scenarios", action="store_true", help=text)
+def compile_(*, scenarios: bool = False) -> None:
+    """Compile all kernels now, on all processors.
 
+    A session compiles what it needs and is not there yet; compiled before, it starts at once:
 
-def _run(arguments: argparse.Namespace) -> int:
+        teleop compile --scenarios  # what "make setup" compiles
+        teleop compile  # everything of teleop_core, for every arm and graph
+
+    Args:
+        scenarios: Compile only what the built-in scenarios need, also with an arm from a URDF file.
+    """
     from concurrent.futures import as_completed
 
     from teleop_core.base.workers import workers
@@ -48,7 +42,7 @@ def _run(arguments: argparse.Namespace) -> int:
     from teleop_core.kernels.store import prune
 
     phases = list(phases_of())
-    if arguments.scenarios:
+    if scenarios:
         phases.pop()
     total, done, compiled = sum(map(len, phases)), 0, 0
     with shown_progress("kernels") as progress, workers(len(sched_getaffinity(0)), _collect_rarely) as pool:
@@ -59,7 +53,6 @@ def _run(arguments: argparse.Namespace) -> int:
                 progress(done, total)
     prune()
     print(f"{compiled} kernels compiled" if compiled else "all kernels are there")
-    return 0
 
 
 def phases_of() -> Iterator[Sequence[Job]]:

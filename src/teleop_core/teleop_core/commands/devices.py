@@ -1,19 +1,10 @@
 """``teleop devices``: lists gamepads and 3-D mice of this machine that can move the stylus."""
 
-import argparse
 from collections.abc import Callable, Iterator
-from typing import Any
-
-from teleop_core.commands.arguments import command
 
 
-def add(commands: Any) -> None:
-    """Add the command's parser."""
-    text = "list gamepads and 3-D mice of this machine, for --set operator=gamepad or spacemouse"
-    command(commands, "devices", _run, text)
-
-
-def _run(_: argparse.Namespace) -> int:
+def devices() -> None:
+    """List gamepads and 3-D mice of this machine, for --set operator=gamepad or spacemouse."""
     from teleop_core.base.errors import SessionError
 
     searches: tuple[tuple[str, Callable[[], Iterator[str]]], ...] = (
@@ -27,7 +18,6 @@ def _run(_: argparse.Namespace) -> int:
             names = [str(error)]
         for name in names or ["none found"]:
             print(f"{operator:12} {name}")
-    return 0
 
 
 def _gamepads() -> Iterator[str]:

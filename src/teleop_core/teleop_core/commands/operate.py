@@ -1,53 +1,25 @@
 """``teleop stop`` and ``teleop operate``: stop arms, command their states, show their states."""
 
-import argparse
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated
+
+from cyclopts import Parameter
 
 from teleop_core.base.errors import SessionError
-from teleop_core.commands.arguments import command, domain_argument, ros_module
-from teleop_core.graph.topics import STATE_COMMANDS
+from teleop_core.commands.options import Domain, ros_module
 from teleop_core.middleware.domains import domain_of_environment
 
 if TYPE_CHECKING:
     from teleop_core.nodes.remote_control import ArmState, RemoteControl
 
-_STOP = """\
-stops all arms of all `teleop live` sessions of this machine, or of one ROS domain:
-  teleop stop
-  teleop stop --domain 42
-the stop is latched. To go on: release it, reset and enable each arm:
-  teleop operate release reset enable
-release overrides every stop button that is pressed, and names it
-"""
-_OPERATE = """\
-without commands it says how the arms are; commands are sent one after the other:
-  teleop operate
-  teleop operate enable home                 an arm that waits for people
-  teleop operate release reset enable        after an emergency stop
-  teleop operate pause --arm left            one arm of several
-commands: release, """ + ", ".join(STATE_COMMANDS)
 
-
-def add(commands: Any) -> None:
-    """Add the parsers of ``teleop stop`` and ``teleop operate``."""
-    text = "emergency stop of the arms that run here"
-    stop = command(commands, "stop", _stop, text, _STOP)
-    text = "enable, home, pause or reset arms, or show their states"
-    operate = command(commands, "operate", _operate, text, _OPERATE)
-    operate.add_argument("words", nargs="*", metavar="COMMAND", help="see below")
-    operate.add_argument("--arm", help="namespace of one arm (default: all)")
-    for parser in (stop, operate):
-        domain_argument(parser, "ROS domain (default: ROS_DOMAIN_ID, or those of all sessions of this machine)")
-
-
-def chosen_domains(arguments: argparse.Namespace) -> tuple[int, ...]:
+def chosen_domains(domain: int | None) -> tuple[int, ...]:
     """ROS domains that the command applies to.
 
     Raises:
         SessionError: No domain is named, and no session runs on this machine.
     """
-    if arguments.domain is not None:
-        return (arguments.domain,)
+    if domain is not None:
+        return (domain,)
     if (named := domain_of_environment()) is not None:
         return (named,)
     from teleop_core.nodes.sessions import domains
@@ -60,17 +32,33 @@ def chosen_domains(arguments: argparse.Namespace) -> tuple[int, ...]:
     return found
 
 
-def _operators(arguments: argparse.Namespace) -> "list[RemoteControl]":
+def _operators(domain: int | None) -> "list[RemoteControl]":
     from teleop_core.nodes.children import environment
 
     module = ros_module("remote_control")
     environment()
-    return [module.RemoteControl(domain) for domain in chosen_domains(arguments)]
+    return [module.RemoteControl(one) for one in chosen_domains(domain)]
 
 
-def _stop(arguments: argparse.Namespace) -> int:
+def stop(*, domain: Domain = None) -> int:
+    """Emergency stop of the arms that run here.
+
+    Stops all arms of all `teleop live` sessions of this machine, or of one ROS domain:
+
+        teleop stop
+        teleop stop --domain 42
+
+    The stop is latched. To go on, release it, reset and enable each arm:
+
+        teleop operate release reset enable
+
+    Release overrides every stop button that is pressed, and names it.
+
+    Args:
+        domain: ROS domain; without it, ROS_DOMAIN_ID, or those of all sessions of this machine.
+    """
     failed = False
-    for one in _operators(arguments):
+    for one in _operators(domain):
         with one as operator:
             try:
                 arms = operator.stop()
@@ -92,17 +80,31 @@ def _stopped(arm: "ArmState") -> str:
     )
 
 
-def _operate(arguments: argparse.Namespace) -> int:
+def operate(*commands: Annotated[str, Parameter(name="COMMAND")], arm: str | None = None, domain: Domain = None) -> int:
+    """Enable, home, pause or reset arms, or show their states.
+
+    Without commands it says how the arms are; commands are sent one after the other:
+
+        teleop operate
+        teleop operate enable home           # an arm that waits for people
+        teleop operate release reset enable  # after an emergency stop
+        teleop operate pause --arm left      # one arm of several
+
+    Args:
+        commands: release, enable, disable, pause, resume, home, unhome, reset or stop.
+        arm: Namespace of one arm; without it, all arms.
+        domain: ROS domain; without it, ROS_DOMAIN_ID, or those of all sessions of this machine.
+    """
     code = 0
-    for one in _operators(arguments):
+    for one in _operators(domain):
         with one as operator:
-            names = [arguments.arm] if arguments.arm is not None else list(operator.look())
-            for word in arguments.words:
+            names = [arm] if arm is not None else list(operator.look())
+            for word in commands:
                 for name in names:
                     is_done, text = operator.command(word, name)
                     print(f"{name or 'arm'}: {text}")
                     code = code or (0 if is_done else 1)
-            if not arguments.words:
-                for name, arm in operator.arms.items():
-                    print(f"{name or 'arm'} on ROS domain {operator.domain}: {arm.text}")
+            if not commands:
+                for name, found in operator.arms.items():
+                    print(f"{name or 'arm'} on ROS domain {operator.domain}: {found.text}")
     return code

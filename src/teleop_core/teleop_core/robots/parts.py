@@ -13,7 +13,7 @@ from teleop_core.base.ranges import MOST_OF_ARM, check
 from teleop_core.robots.robot import Robot
 
 _BUILT_IN = {"rcrt1": "arms.rcrt1:make"} | {
-    name: f"arms.textbook:{name}" for name in ("puma560", "scara", "planar_3r", "five_axis")
+    name: f"arms.textbook:{name}" for name in ("puma560", "scara", "planar_3r", "five_axis", "pointer")
 }
 _OF_MACHINES = ("four_bar", "mma", "parallelogram", "rps3", "scara_stewart", "stewart", "three_finger_hand")
 _TABLE_ENDINGS = (".yaml", ".yml")

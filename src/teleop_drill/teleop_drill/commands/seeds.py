@@ -1,35 +1,35 @@
 """``teleop drill --seeds``: runs random schedules of faults, and checks the laws in each of them."""
 
-import argparse
 import json
 from pathlib import Path
 
 from teleop_core.bags.finding import check_new
 from teleop_core.base.errors import ParameterError
-from teleop_core.commands.arguments import ros_module
+from teleop_core.commands.options import ros_module
 from teleop_core.nodes.crews import Processes
+from teleop_drill.commands.options import Options
 
 
-def run_schedules(arguments: argparse.Namespace) -> int:
+def run_schedules(names: tuple[str, ...], options: Options) -> int:
     """Run the schedules; returns 1 if a law was broken.
 
     Raises:
         ParameterError: Arguments contradict each other.
         RecordingError: The folder for recordings exists already.
     """
-    count, first, out = arguments.seeds or 1, arguments.seed, arguments.out
-    if arguments.names or arguments.short or arguments.drives:
+    count, first, out = options.seeds or 1, options.seed, options.out
+    if names or options.short or options.drives:
         raise ParameterError("--seeds", count, "given without names, --short and --drives")
-    if (arguments.faults is not None or out is not None) and count != 1:
+    if (options.faults is not None or out is not None) and count != 1:
         raise ParameterError("--seeds", count, "1 with --faults and --out")
-    if not 0.0 <= arguments.breaks <= 0.1:
-        raise ParameterError("--breaks", arguments.breaks, "from 0 to 0.1")
+    if not 0.0 <= options.breaks <= 0.1:
+        raise ParameterError("--breaks", options.breaks, "from 0 to 0.1")
     check_new(out)
     ros_module("seeds", "teleop_drill.simulation")
-    processes = Processes.ONE if arguments.composed else Processes.SIDES
+    processes = Processes.ONE if options.composed else Processes.SIDES
     if count == 1:
-        return _run_one(first, arguments.faults, out, processes, arguments.breaks)
-    return _run_many(first, count, arguments.json, processes, arguments.breaks)
+        return _run_one(first, options.faults, out, processes, options.breaks)
+    return _run_many(first, count, options.json, processes, options.breaks)
 
 
 def _run_one(seed: int, chosen: str | None, out: Path | None, processes: Processes, breaks: float) -> int:

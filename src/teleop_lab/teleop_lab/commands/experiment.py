@@ -1,61 +1,58 @@
 """``teleop experiment``: the sources' experiments, repeated on our models and compared with the printed results."""
 
-import argparse
-import json
 import sys
 import time
 from os import sched_getaffinity
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated
+
+from cyclopts import Parameter
 
 from teleop_core.base.errors import UnknownNameError
-from teleop_core.commands.arguments import command
 
 if TYPE_CHECKING:
     from teleop_lab.experiments import Outcome
 
 ALL = "all"
-_EPILOG = """\
-without a name the experiments are listed; `all` runs every one, in five to seven minutes:
-  teleop experiment resolution                          a table: published, predicted, difference
-  teleop experiment master_slave gravity --seed 5       other hands; sessions both need run once
-  teleop experiment all --html experiments.html         one page with the source's figures
-  teleop experiment all --json experiments.json         every number, exact
-a mark says whether prediction and publication agree, ✓, or not, ✗, not whether a number is small.
-"""
 
 
-def add(commands: Any) -> None:
-    """Add the command's parser."""
-    text = "repeat what the sources did, and print predicted beside published figures"
-    parser = command(commands, "experiment", _run, text, _EPILOG)
-    parser.add_argument(
-        "names", nargs="*", metavar="NAME", help="names of experiments, or `all`; without a name, all are listed"
-    )
-    parser.add_argument("--json", type=Path, metavar="FILE", help="write all numbers as JSON")
-    parser.add_argument("--html", type=Path, metavar="FILE", help="write one page with figures")
-    parser.add_argument("--seed", type=int, default=1, help="seed of the first simulated hand (default: 1)")
+def experiment(
+    *names: Annotated[str, Parameter(name="NAME")], json: Path | None = None, html: Path | None = None, seed: int = 1
+) -> None:
+    """Repeat what the sources did, and print predicted beside published figures.
 
+    Without a name the experiments are listed; `all` runs every one, in five to seven minutes:
 
-def _run(arguments: argparse.Namespace) -> int:
+        teleop experiment resolution                     # a table: published, predicted, difference
+        teleop experiment master_slave gravity --seed 5  # other hands; sessions both need run once
+        teleop experiment all --html experiments.html    # one page with the source's figures
+        teleop experiment all --json experiments.json    # every number, exact
+
+    A mark says whether prediction and publication agree, ✓, or not, ✗, not whether a number is small.
+
+    Args:
+        names: Names of experiments, or `all`; without a name, all are listed.
+        json: Write all numbers as JSON.
+        html: Write one page with figures.
+        seed: Seed of the first simulated hand.
+    """
     from teleop_core.evaluation.command import check_places
     from teleop_lab.experiments import EXPERIMENTS, list_experiments
 
-    if not arguments.names and arguments.json is None and arguments.html is None:
+    if not names and json is None and html is None:
         for name, title in list_experiments().items():
             print(f"{name:16} {title}")
-        return 0
-    for name in arguments.names:
+        return
+    for name in names:
         if name != ALL and name not in EXPERIMENTS.names():
             raise UnknownNameError("experiment", name, (*EXPERIMENTS.names(), ALL))
-    check_places(arguments.json, arguments.html)
-    is_all = not arguments.names or ALL in arguments.names
-    outcomes = _outcomes(() if is_all else tuple(arguments.names), arguments.seed)
+    check_places(json, html)
+    is_all = not names or ALL in names
+    outcomes = _outcomes(() if is_all else names, seed)
     # Files are written before the tables are printed, because a reader of the tables may close the pipe early.
-    written = _write(outcomes, arguments.json, arguments.html)
+    written = _write(outcomes, json, html)
     _show(outcomes)
     print("".join(f"{line}\n" for line in written), end="")
-    return 0
 
 
 def _outcomes(names: tuple[str, ...], seed: int) -> "list[Outcome]":
@@ -87,6 +84,8 @@ def _show(outcomes: "list[Outcome]") -> None:
 
 def _write(outcomes: "list[Outcome]", json_file: Path | None, html_file: Path | None) -> list[str]:
     """Write the requested files; returns a line for each file."""
+    import json
+
     from teleop_core import __version__
     from teleop_core.evaluation.command import write_whole
 

@@ -1,66 +1,74 @@
 """``teleop study``: sessions over named values of parameters; an interrupted study can be continued."""
 
-import argparse
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated
+
+from cyclopts import Parameter
 
 from teleop_core.base.errors import SessionError
-from teleop_core.commands.arguments import command
-from teleop_lab.commands.outputs import add_study, check_outputs, write_outputs
+from teleop_lab.commands.outputs import Outputs
 
 if TYPE_CHECKING:
     from distributed import Client
 
-_EPILOG = """\
-a study is a YAML file:
-  scenario: point
-  seeds: 10                                       how many, from 1 on, or a list
-  set: {operator.tremor_amplitude: 0.0}           the same in all sessions
-  sweep:                                          a dimension each
-    display.latency: [0.033, 0.133, 0.333]
-    coarse_gain: [0.5, 1.0]
-  metrics: [task.time_s, task.error_share]        keys of scores, as `teleop evaluate --json`
-  duration: 20.0                                  of each session [s]
-  parts: [mine.py]                                files of your own parts, beside this one
-then:
-  teleop study delay.yaml --explain               how many sessions, how long, how many bytes
-  teleop study delay.yaml --store delay           killed and called again, it goes on
-  teleop study delay.yaml --store delay --html delay.html --csv delay.csv
-"""
 
+def study(
+    file: Annotated[Path, Parameter(name="FILE.yaml")],
+    /,
+    *,
+    store: Path | None = None,
+    scheduler: str | None = None,
+    recordings: Path | None = None,
+    explain: bool = False,
+    outputs: Outputs = Outputs(),
+) -> int:
+    """Run sessions over named values of parameters and seeds, and compare their scores.
 
-def add(commands: Any) -> None:
-    """Add the command's parser."""
-    text = "run sessions over named values of parameters and seeds, and compare their scores"
-    parser = command(commands, "study", _run, text, _EPILOG)
-    add_study(parser, "YAML file of the study: parameter values, seeds and scores", "session")
-    parser.add_argument("--scheduler", metavar="ADDRESS", help="run on the workers of this Dask scheduler")
-    parser.add_argument("--recordings", type=Path, metavar="DIR", help="directory for a recording of each session")
-    parser.add_argument("--explain", action="store_true", help="print the sessions and their cost, and run nothing")
+    A study is a YAML file:
 
+        scenario: point
+        seeds: 10                                       how many, from 1 on, or a list
+        set: {operator.tremor_amplitude: 0.0}           the same in all sessions
+        sweep:                                          a dimension each
+          display.latency: [0.033, 0.133, 0.333]
+          coarse_gain: [0.5, 1.0]
+        metrics: [task.time_s, task.error_share]        keys of scores, as `teleop evaluate --json`
+        duration: 20.0                                  of each session [s]
+        parts: [mine.py]                                files of your own parts, beside this one
 
-def _run(arguments: argparse.Namespace) -> int:
+    Then:
+
+        teleop study delay.yaml --explain      # how many sessions, how long, how many bytes
+        teleop study delay.yaml --store delay  # killed and called again, it goes on
+        teleop study delay.yaml --store delay --html delay.html --csv delay.csv
+
+    Args:
+        file: YAML file of the study: parameter values, seeds and scores.
+        store: Directory that keeps results; sessions whose result is there are not run again.
+        scheduler: Address of a Dask scheduler, to run on its workers.
+        recordings: Directory for a recording of each session.
+        explain: Print the sessions and their cost, and run nothing.
+        outputs: Files with the scores.
+    """
     from teleop_core.commands.progress import shown_progress
     from teleop_lab.studies import read_study
     from teleop_lab.studies.page import study_page
     from teleop_lab.studies.summary import study_table
 
-    study = read_study(arguments.file)
-    check_outputs(arguments)
-    explained = study.explain(arguments.store, arguments.jobs)
+    wanted = read_study(file)
+    outputs.check()
+    explained = wanted.explain(store, outputs.jobs)
     print(explained)
-    if arguments.explain:
+    if explain:
         return 0
-    client = _client(arguments.scheduler) if arguments.scheduler else None
-    with shown_progress(arguments.file.stem) as progress:
-        found = study.run(
-            arguments.store, jobs=arguments.jobs, client=client, recordings=arguments.recordings, progress=progress
-        )
-    print(study_table(study, found))
+    client = _client(scheduler) if scheduler else None
+    with shown_progress(file.stem) as progress:
+        found = wanted.run(store, jobs=outputs.jobs, client=client, recordings=recordings, progress=progress)
+    print(study_table(wanted, found))
     failed = [str(error) for error in found["error"].values.ravel() if error]
     if failed:
         print(f"{len(failed)} of {explained.sessions} failed; first: {failed[0]}")
-    write_outputs(arguments, found.to_dataframe().to_csv, lambda: study_page(study, found, arguments.file.stem))
+    outputs.write(found.to_dataframe().to_csv, lambda: study_page(wanted, found, file.stem))
     return 1 if failed else 0
 
 

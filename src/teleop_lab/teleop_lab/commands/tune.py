@@ -1,56 +1,63 @@
 """``teleop tune``: the values of some parameters with which a score is best."""
 
-import argparse
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
 
-from teleop_core.commands.arguments import command
-from teleop_lab.commands.outputs import add_study, check_outputs, write_outputs
+from cyclopts import Parameter
+
+from teleop_lab.commands.outputs import Outputs
 
 if TYPE_CHECKING:
     from teleop_lab.studies.tuning import Tuned, Tuning
 
-_EPILOG = """\
-a search is a YAML file:
-  scenario: point
-  seeds: 3                                        the score is the mean over them
-  set: {display.latency: 0.3}                     the same in all sessions
-  tune:                                           a range, or a list of choices
-    coarse_gain: {low: 0.1, high: 1.0, log: true}
-    tremor.kind: [none, low_pass]
-  minimize: task.time_s                           or maximize: a key of a score
-then:
-  teleop tune config/studies/scale.yaml --store best           killed and called again, it goes on
-  teleop tune config/studies/scale.yaml --store best --trials 60 --html best.html
-"""
 _SHOWN = 5
 
 
-def add(commands: Any) -> None:
-    """Add the command's parser."""
-    text = "search the values of parameters with which a score is best"
-    parser = command(commands, "tune", _run, text, _EPILOG)
-    add_study(parser, "YAML file of the search: parameters, their ranges, and the score", "trial")
-    parser.add_argument(
-        "--trials", type=int, default=30, metavar="N", help="number of sets of values to try (default: 30)"
-    )
+def tune(
+    file: Annotated[Path, Parameter(name="FILE.yaml")],
+    /,
+    *,
+    store: Path | None = None,
+    trials: int = 30,
+    outputs: Outputs = Outputs(),
+) -> None:
+    """Search the values of parameters with which a score is best.
 
+    A search is a YAML file:
 
-def _run(arguments: argparse.Namespace) -> int:
+        scenario: point
+        seeds: 3                                        the score is the mean over them
+        set: {display.latency: 0.3}                     the same in all sessions
+        tune:                                           a range, or a list of choices
+          coarse_gain: {low: 0.1, high: 1.0, log: true}
+          tremor.kind: [none, low_pass]
+        minimize: task.time_s                           or maximize: a key of a score
+
+    Then:
+
+        teleop tune config/studies/scale.yaml --store best  # killed and called again, it goes on
+        teleop tune config/studies/scale.yaml --store best --trials 60 --html best.html
+
+    Args:
+        file: YAML file of the search: parameters, their ranges, and the score.
+        store: Directory that keeps results; sessions whose result is there are not run again.
+        trials: Number of sets of values to try.
+        outputs: Files with the trials.
+    """
     from teleop_core.commands.progress import shown_progress
     from teleop_lab.studies.page import tuning_page
     from teleop_lab.studies.tuning import read_tuning
 
-    tuning = read_tuning(arguments.file)
-    check_outputs(arguments)
-    with shown_progress(arguments.file.stem) as progress:
-        tuned = tuning.run(arguments.store, trials=arguments.trials, jobs=arguments.jobs, progress=progress)
+    tuning = read_tuning(file)
+    outputs.check()
+    with shown_progress(file.stem) as progress:
+        tuned = tuning.run(store, trials=trials, jobs=outputs.jobs, progress=progress)
     print(_table(tuning, tuned))
     failed = [trial.error for trial in tuned.trials if trial.error]
     if failed:
         print(f"{len(failed)} of {len(tuned.trials)} trials failed; first: {failed[0]}")
     print("best: --set " + " ".join(f"{n}={_text(v)}" for n, v in tuned.best.values.items()))
-    write_outputs(arguments, lambda: _csv(tuning, tuned), lambda: tuning_page(tuning, tuned, arguments.file.stem))
-    return 0
+    outputs.write(lambda: _csv(tuning, tuned), lambda: tuning_page(tuning, tuned, file.stem))
 
 
 def _text(value: object) -> str:

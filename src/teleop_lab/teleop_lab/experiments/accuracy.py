@@ -7,12 +7,11 @@ from typing import NamedTuple
 import numpy as np
 
 from teleop_core.base.errors import TeleopError
-from teleop_core.evaluation.figure import FIRST, SECOND, Figure
+from teleop_core.evaluation.figure import FIRST, SECOND, Figure, axis, joined, published_points
 from teleop_core.kernels.geometry import Array, rotation, transform
 from teleop_core.robots import Robot, load_robot
 from teleop_core.slave.pair import ArmParameters
 from teleop_lab.calibration.appendix_e import ESCAPE, OFFSET_OF_D3, READ, STEP
-from teleop_lab.drawing import axis, joined, published_points
 from teleop_lab.experiments import conditions, experiment
 from teleop_lab.experiments.bench import Bench, rms
 from teleop_lab.experiments.comparison import Comparison, Findings, absolute

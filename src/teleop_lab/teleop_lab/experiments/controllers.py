@@ -5,11 +5,25 @@ from typing import NamedTuple
 
 import numpy as np
 
-from teleop_core.evaluation.figure import COMMAND, FIRST, FIXTURE, MEASURED, SECOND, THIRD, Figure, time_axis
+from teleop_core.evaluation.figure import (
+    COMMAND,
+    DARK,
+    FIRST,
+    FIXTURE,
+    MEASURED,
+    SECOND,
+    THIRD,
+    Figure,
+    Trace,
+    axis,
+    level,
+    line,
+    points,
+    time_axis,
+)
 from teleop_core.evaluation.published import COARSE, FINE
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots import load_robot
-from teleop_lab.drawing import DARK, Trace, axis, level, line, points
 from teleop_lab.experiments import experiment, joint_steps
 from teleop_lab.experiments.bench import Bench, Session, Settings, mean, pooled, rms
 from teleop_lab.experiments.comparison import Comparison, Findings, percent

@@ -6,10 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from teleop_core.coupling.passivity.port import IN, OUT
-from teleop_core.evaluation.figure import FIRST, FIXTURE, SECOND, THIRD, Figure
+from teleop_core.evaluation.figure import FIRST, FIXTURE, SECOND, THIRD, Figure, axis, joined, level
 from teleop_core.hand.operators.shapes import minimum_jerk
 from teleop_core.kernels.geometry import Array
-from teleop_lab.drawing import axis, joined, level
 from teleop_lab.experiments import experiment, transmission
 from teleop_lab.experiments.bench import Bench
 from teleop_lab.experiments.comparison import Comparison, Findings, absolute

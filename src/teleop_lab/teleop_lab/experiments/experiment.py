@@ -76,6 +76,8 @@ EXPERIMENTS: Registry[Experiment] = Registry(
         "drift": f"{_PLACE}.drift:DRIFT",
         "puncture": f"{_PLACE}.puncture:PUNCTURE",
         "fitts": f"{_PLACE}.fitts:FITTS",
+        "operator_models": f"{_PLACE}.operator_models:OPERATOR_MODELS",
+        "blind": f"{_PLACE}.blind:BLIND",
         "delay": f"{_PLACE}.delay:DELAY",
         "scaling_under_delay": f"{_PLACE}.delay:SCALING_UNDER_DELAY",
         "uva": f"{_PLACE}.uva:UVA",

@@ -2,9 +2,8 @@
 
 import numpy as np
 
-from teleop_core.evaluation.figure import COMMAND, MEASURED, Figure, time_axis
+from teleop_core.evaluation.figure import COMMAND, MEASURED, Figure, axis, line, time_axis
 from teleop_core.robots import load_robot
-from teleop_lab.drawing import axis, line
 from teleop_lab.experiments import conditions, experiment, master_slave
 from teleop_lab.experiments.bench import Bench, Session, pooled
 from teleop_lab.experiments.comparison import Comparison, Findings, percent

@@ -4,10 +4,9 @@ import math
 
 import numpy as np
 
-from teleop_core.evaluation.figure import FIRST, SECOND, THIRD, Figure
+from teleop_core.evaluation.figure import FIRST, SECOND, THIRD, Figure, in_space, scene
 from teleop_core.kernels.geometry import Array, rotation, transform
 from teleop_core.robots import load_robot
-from teleop_lab.drawing import in_space, scene
 from teleop_lab.experiments.bench import Bench
 from teleop_lab.experiments.comparison import Comparison, Findings, absolute
 from teleop_lab.experiments.experiment import Experiment

@@ -5,11 +5,20 @@ from typing import NamedTuple
 import numpy as np
 
 from teleop_core.evaluation import COMMAND, FIRST, MEASURED, SECOND, THIRD, Figure, axis_suffix, time_axis
-from teleop_core.evaluation.figure import REFERENCE, stacked_axes
+from teleop_core.evaluation.figure import (
+    FIXTURE,
+    REFERENCE,
+    axis,
+    in_planes,
+    in_space,
+    level,
+    line,
+    scene,
+    stacked_axes,
+)
 from teleop_core.evaluation.published import ANGLE_FACTOR, BOX_OVERSHOOT_MM, COARSE, FINE, POSITION_SHARE, Published
 from teleop_core.kernels.geometry import Array, roll_pitch_yaw, rotations_from_quaternions
 from teleop_core.shapes.basis.drawing import edges_of
-from teleop_lab.drawing import FIXTURE, axis, in_planes, in_space, level, line, scene
 from teleop_lab.experiments import conditions, experiment
 from teleop_lab.experiments.bench import Bench, Session, mean, pooled
 from teleop_lab.experiments.comparison import Comparison, Findings, Tolerance, absolute, factor, percent

@@ -2,9 +2,8 @@
 
 import numpy as np
 
-from teleop_core.evaluation.figure import FIRST, THIRD, Figure
+from teleop_core.evaluation.figure import FIRST, PUBLISHED, THIRD, Figure, in_space, scene
 from teleop_core.robots import load_robot
-from teleop_lab.drawing import PUBLISHED, in_space, scene
 from teleop_lab.experiments.bench import Bench
 from teleop_lab.experiments.comparison import EXACT, Comparison, Findings, absolute
 from teleop_lab.experiments.experiment import Experiment

@@ -4,8 +4,7 @@ import math
 
 import numpy as np
 
-from teleop_core.evaluation.figure import DARK, SECOND, THIRD, Figure
-from teleop_lab.drawing import axis, line, published_points
+from teleop_core.evaluation.figure import DARK, SECOND, THIRD, Figure, axis, line, published_points
 from teleop_lab.experiments.bench import Bench
 from teleop_lab.experiments.comparison import EXACT, Comparison, Findings, absolute, percent
 from teleop_lab.experiments.experiment import Experiment

@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from teleop_core.evaluation.figure import FIRST, SECOND, Figure
-from teleop_lab.drawing import axis, line
+from teleop_core.evaluation.figure import FIRST, SECOND, Figure, axis, line
 from teleop_lab.experiments.bench import Bench
 from teleop_lab.experiments.comparison import EXACT, Comparison, Findings
 from teleop_lab.experiments.experiment import Experiment

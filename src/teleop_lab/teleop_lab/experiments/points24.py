@@ -7,12 +7,11 @@ import numpy as np
 
 from teleop_core.base.errors import TeleopError
 from teleop_core.coupling.mapping.gains import MotionScalingParameters
-from teleop_core.evaluation.figure import COMMAND, FIRST, MEASURED, Figure
+from teleop_core.evaluation.figure import COMMAND, FIRST, MEASURED, Figure, axis, line
 from teleop_core.graph.signals import DT
 from teleop_core.hand.operators.tour import TourParameters
 from teleop_core.kernels.axes import axis_map
 from teleop_core.kernels.geometry import Array
-from teleop_lab.drawing import axis, line
 from teleop_lab.experiments.bench import Bench, Session, Settings, mean
 from teleop_lab.experiments.comparison import EXACT, Comparison, Findings
 from teleop_lab.experiments.conditions import OURS, PREDICTED

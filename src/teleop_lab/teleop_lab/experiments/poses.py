@@ -5,10 +5,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from teleop_core.evaluation.figure import MEASURED, SURROUNDING, Figure
+from teleop_core.evaluation.figure import MEASURED, PUBLISHED, SURROUNDING, Figure, in_space, scene
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots import Robot, load_robot
-from teleop_lab.drawing import PUBLISHED, in_space, scene
 from teleop_lab.experiments.bench import Bench
 from teleop_lab.experiments.comparison import Comparison, Findings, absolute
 from teleop_lab.experiments.experiment import Experiment

@@ -4,12 +4,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from teleop_core.evaluation.figure import FIRST, MEASURED, SECOND, Figure
+from teleop_core.evaluation.figure import FIRST, MEASURED, SECOND, Figure, axis, points, published_points
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots import load_robot
 from teleop_core.session.configuration import configure
 from teleop_core.slave.pair import ArmParameters
-from teleop_lab.drawing import axis, points, published_points
 from teleop_lab.experiments import conditions, experiment
 from teleop_lab.experiments.bench import Bench, Settings, rms
 from teleop_lab.experiments.comparison import Comparison, Findings, factor, percent

@@ -7,11 +7,10 @@ from functools import partial
 
 import numpy as np
 
-from teleop_core.evaluation.figure import FIRST, FIXTURE, MEASURED, SECOND, THIRD, Figure
+from teleop_core.evaluation.figure import FIRST, FIXTURE, MEASURED, PUBLISHED, SECOND, THIRD, Figure, axis, joined
 from teleop_core.hand.operators.human import HumanParameters
 from teleop_core.hand.operators.shapes import minimum_jerk
 from teleop_core.kernels.geometry import Array
-from teleop_lab.drawing import PUBLISHED, axis, joined
 from teleop_lab.experiments.bench import Bench, Settings
 from teleop_lab.experiments.comparison import Comparison, Findings, absolute
 from teleop_lab.experiments.experiment import Experiment

@@ -4,10 +4,9 @@ import math
 
 import numpy as np
 
-from teleop_core.evaluation.figure import FIRST, SECOND, Figure
+from teleop_core.evaluation.figure import FIRST, SECOND, Figure, axis, joined, points
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots import load_robot
-from teleop_lab.drawing import axis, joined, points
 from teleop_lab.experiments.bench import Bench
 from teleop_lab.experiments.comparison import EXACT, Comparison, Findings, percent
 from teleop_lab.experiments.experiment import Experiment

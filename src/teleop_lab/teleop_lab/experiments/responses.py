@@ -7,12 +7,11 @@ from typing import NamedTuple
 import numpy as np
 
 from teleop_core.evaluation import FIRST, MEASURED, SECOND, THIRD, Figure, axis_suffix, time_axis
-from teleop_core.evaluation.figure import REFERENCE, stacked_axes
+from teleop_core.evaluation.figure import REFERENCE, axis, level, line, stacked_axes
 from teleop_core.graph.signals import TICK_NS
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots import load_robot
 from teleop_core.slave import pair, trajectory
-from teleop_lab.drawing import axis, level, line
 from teleop_lab.experiments import conditions, experiment
 from teleop_lab.experiments.bench import Bench, Settings
 from teleop_lab.experiments.comparison import Comparison, Findings, factor

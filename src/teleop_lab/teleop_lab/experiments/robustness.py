@@ -5,11 +5,10 @@ from collections.abc import Callable, Mapping
 import numpy as np
 
 from teleop_core.base.errors import ParameterError
-from teleop_core.evaluation.figure import COMMAND, FIRST, FIXTURE, MEASURED, SECOND, THIRD, Figure
+from teleop_core.evaluation.figure import COMMAND, DARK, FIRST, FIXTURE, MEASURED, SECOND, THIRD, Figure, axis
 from teleop_core.robots import load_robot
 from teleop_core.slave.pair import SimulatedArm
 from teleop_core.slave.plants.hardware import faults_of
-from teleop_lab.drawing import DARK, axis
 from teleop_lab.experiments import controllers, experiment
 from teleop_lab.experiments.bench import Bench, Settings
 from teleop_lab.experiments.comparison import Comparison, Findings

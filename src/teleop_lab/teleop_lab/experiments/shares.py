@@ -2,9 +2,8 @@
 
 import numpy as np
 
-from teleop_core.evaluation.figure import FIRST, SECOND, Figure
+from teleop_core.evaluation.figure import FIRST, SECOND, Figure, axis
 from teleop_core.slave.plants.hardware import FAULTS
-from teleop_lab.drawing import axis
 from teleop_lab.experiments import conditions, experiment
 from teleop_lab.experiments.bench import Bench, Session, Settings
 from teleop_lab.experiments.comparison import Comparison, Findings

@@ -5,10 +5,9 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from teleop_core.evaluation.figure import DARK, FIRST, FIXTURE, SECOND, THIRD, Figure
+from teleop_core.evaluation.figure import DARK, FIRST, FIXTURE, PUBLISHED, SECOND, THIRD, Figure, axis, joined, line
 from teleop_core.graph.signals import DT
 from teleop_core.hand.master.device import DeviceParameters
-from teleop_lab.drawing import PUBLISHED, axis, joined, line
 from teleop_lab.experiments import experiment, one_axis, transmission
 from teleop_lab.experiments.bench import Bench, Settings
 from teleop_lab.experiments.comparison import Comparison, Findings, percent

@@ -4,10 +4,9 @@ import math
 
 import numpy as np
 
-from teleop_core.evaluation.figure import FIRST, SECOND, Figure
+from teleop_core.evaluation.figure import FIRST, SECOND, Figure, axis, line
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots.arms.rcrt1_hardware import tendon_joint_angles, tendon_motor_angles
-from teleop_lab.drawing import axis, line
 from teleop_lab.experiments.bench import Bench
 from teleop_lab.experiments.comparison import EXACT, Comparison, Findings, percent
 from teleop_lab.experiments.experiment import Experiment

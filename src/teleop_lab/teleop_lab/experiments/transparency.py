@@ -6,9 +6,21 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from teleop_core.evaluation.figure import FIRST, FIXTURE, MEASURED, SECOND, THIRD, Figure
+from teleop_core.evaluation.figure import (
+    FIRST,
+    FIXTURE,
+    MEASURED,
+    PUBLISHED,
+    SECOND,
+    THIRD,
+    Figure,
+    Trace,
+    axis,
+    level,
+    line,
+    points,
+)
 from teleop_core.kernels.geometry import Array
-from teleop_lab.drawing import PUBLISHED, Trace, axis, level, line, points
 from teleop_lab.experiments.bench import Bench
 from teleop_lab.experiments.comparison import Comparison, Findings, absolute, percent
 from teleop_lab.experiments.experiment import Experiment

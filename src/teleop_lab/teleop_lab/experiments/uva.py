@@ -10,11 +10,17 @@ from collections.abc import Iterable
 from importlib.resources import files
 from typing import NamedTuple
 
+import numpy as np
+
 from teleop_lab.experiments.bench import Bench
 from teleop_lab.experiments.comparison import Comparison, Findings, absolute
 from teleop_lab.experiments.experiment import Experiment
-from teleop_lab.experiments.look_and_move import CYCLE, difficulty, looks
 
+CYCLE = 0.325
+"""Time of a look-move cycle of a person without any lag [s], identified from MacKenzie and Ware 1993. The formula MT =
+2.7 (0.325 s + lag) fits their four lags within 2 %."""
+_LEAST_TIME, _TIME_PER_BIT, _NOISE = 0.06, 0.02, 0.04  # of the operator, when the prediction was registered [s]
+_PEOPLE, _MOST = 20_000, 60
 LATENCY = 0.033 + 0.050
 """Latency of the operator's station [s]: two frames at 60 Hz, and 50 ms for encoding and decoding the video (Nankaku et
 al. 2022)."""
@@ -69,13 +75,33 @@ LEVELS = (
 )
 
 
+def looks(way: float, width: float, passed: float = 1.0, seed: int = 1) -> float:
+    """Mean number of submovements to a target, by the rules that the operator had when the prediction was registered.
+
+    Args:
+        way: Distance to the target [m].
+        width: Width of the target in which the motion must end [m].
+        passed: Share of each motion that the slave makes; it is below 1 if, for example, the network loses increments.
+        seed: Seed of the hand's noise.
+    """
+    rng, off = np.random.default_rng(seed), np.full(_PEOPLE, way)
+    count, tries = np.zeros(_PEOPLE), np.ones(_PEOPLE, bool)
+    for _ in range(_MOST):
+        lasts = _LEAST_TIME + _TIME_PER_BIT * np.log2(np.abs(off) / width + 1.0)
+        noise = rng.standard_normal(_PEOPLE) * _NOISE * np.abs(off) / lasts
+        off = np.where(tries, off - passed * off + noise, off)
+        count += tries
+        tries &= np.abs(off) > 0.5 * width
+    return float(count.mean())
+
+
 def _unscaled_time(primitive: Primitive, level: Level) -> float:
     """Time of a primitive at a level [s], before the common scale factor is applied.
 
     The time of a look is the sum of a cycle, the station's latency and the delay. Lost motion must be repeated. An
     outage costs its duration and the time of the look that it interrupts.
     """
-    count, _ = looks(primitive.way, primitive.width, 1.0 - level.loss)
+    count = looks(primitive.way, primitive.width, 1.0 - level.loss)
     time = count * (CYCLE + LATENCY + level.delay)
     if level.pause > 0.0:
         time *= 1.0 + (level.outage + CYCLE + LATENCY) / level.pause
@@ -84,7 +110,7 @@ def _unscaled_time(primitive: Primitive, level: Level) -> float:
 
 def _mackenzie(primitive: Primitive, level: Level) -> float:
     """Time of a primitive by the law of MacKenzie and Ware 1993: MT = 230 + (169 + 1.03 lag) ID ms."""
-    bits = float(difficulty(primitive.way, primitive.width))
+    bits = math.log2(primitive.way / primitive.width + 1.0)
     return 0.230 + (0.169 + 1.03 * (LATENCY + level.delay)) * bits
 
 

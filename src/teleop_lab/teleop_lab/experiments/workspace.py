@@ -2,10 +2,9 @@
 
 import numpy as np
 
-from teleop_core.evaluation.figure import FIRST, SECOND, Figure
+from teleop_core.evaluation.figure import FIRST, SECOND, Figure, axis, in_space, line, scene
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots import Robot, load_robot
-from teleop_lab.drawing import axis, in_space, line, scene
 from teleop_lab.experiments.bench import Bench
 from teleop_lab.experiments.comparison import Comparison, Findings, percent
 from teleop_lab.experiments.experiment import Experiment

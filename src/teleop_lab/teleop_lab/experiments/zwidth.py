@@ -6,10 +6,9 @@ from itertools import count
 
 import numpy as np
 
-from teleop_core.evaluation.figure import FIRST, FIXTURE, SECOND, Figure
+from teleop_core.evaluation.figure import FIRST, FIXTURE, SECOND, Figure, Trace, axis, level, line, points
 from teleop_core.graph.signals import DT
 from teleop_core.hand.master.device import DeviceParameters
-from teleop_lab.drawing import Trace, axis, level, line, points
 from teleop_lab.experiments import experiment, one_axis, sampled_wall, stability
 from teleop_lab.experiments.bench import Bench
 from teleop_lab.experiments.comparison import Comparison, Findings, absolute, percent

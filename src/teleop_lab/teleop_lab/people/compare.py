@@ -1,16 +1,15 @@
 """Compare: scores of people as a data set like a study's, and a comparison with the simulated operator."""
 
-from html import escape
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from teleop_console.report.plain_page import Figures
+from teleop_console.report.pages import Part, Section, Text, page, plain_table
 from teleop_core.evaluation.figure import FIRST, SECOND
 from teleop_lab.people.journal import DONE, Journal
 from teleop_lab.people.plan import Plan
 from teleop_lab.studies.dataset import swept_coordinates, units_of_scores
-from teleop_lab.studies.page import condition_lines, label_of, table_html, whole_page
+from teleop_lab.studies.page import condition_figure, condition_lines
 from teleop_lab.studies.summary import Mean, apart, conditions, differences, median_of, table_text
 
 if TYPE_CHECKING:
@@ -83,21 +82,21 @@ def comparison_table(plan: Plan, people: "xarray.Dataset", simulated: "xarray.Da
 
 def comparison_page(plan: Plan, people: "xarray.Dataset", simulated: "xarray.Dataset") -> str:
     """HTML page of this comparison, with plots, paired differences and answers; it works offline."""
-    figures, parts = Figures(), list[str]()
     both = {"people": (people, FIRST), "simulated operator": (simulated, SECOND)}
+    sections = []
     for metric in plan.study.metrics:
         rows = [[row[0], *map(str, row[1:])] for row in compared(plan, people, simulated, metric)]
-        parts += [f"<h2>{escape(metric)}</h2>", table_html((metric, *_HEADS), rows)]
+        parts: list[Part] = [plain_table((metric, *_HEADS), rows)]
         if plan.study.swept:
             traces = [
                 trace | {"name": " ".join(filter(None, (who, trace["name"]))), "line": {"color": color}}
                 for who, (found, color) in both.items()
                 for trace in condition_lines(plan.study, found, metric, median_of)
             ]
-            parts.append(figures.card(traces, label_of(plan.study, people, metric)))
-        parts.append(
-            table_html((f"change of {metric}", "against the first", *_HEADS[:2]), _changes(plan, both, metric))
-        )
+            heads = (f"change of {metric}", "against the first", *_HEADS[:2])
+            parts.append(condition_figure(plan.study, people, metric, traces))
+            parts.append(plain_table(heads, _changes(plan, both, metric)))
+        sections.append(Section(metric, parts=parts))
     asked = [question.name for question in plan.questions]
     if asked:
         rows = [
@@ -107,8 +106,8 @@ def comparison_page(plan: Plan, people: "xarray.Dataset", simulated: "xarray.Dat
             ]
             for values, part in conditions(plan.study, people)
         ]
-        parts += ["<h2>Questions</h2>", table_html(("medians of people, 0 to 100", *asked), rows)]
-    return whole_page(plan.people.title, _ABOUT, parts, figures)
+        sections.append(Section("Questions", parts=[plain_table(("medians of people, 0 to 100", *asked), rows)]))
+    return page(plan.people.title, [Text(_ABOUT)], sections)
 
 
 def _changes(plan: Plan, both: dict[str, Any], metric: str) -> list[list[str]]:

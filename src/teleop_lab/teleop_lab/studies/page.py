@@ -1,15 +1,13 @@
 """Page: a study as one HTML file: lines with intervals, heat maps, and paired differences."""
 
-from collections.abc import Callable, Sequence
-from html import escape
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from teleop_console.report.plain_page import Figures, plain_page
-from teleop_core.evaluation.figure import FIRST, FIXTURE, SECOND, THIRD
+from teleop_console.report.pages import Part, Section, Table, Text, page, plain_table
+from teleop_core.evaluation.figure import FIRST, FIXTURE, SECOND, THIRD, Figure, axis
 from teleop_core.kernels.geometry import Array
-from teleop_lab.drawing import axis
 from teleop_lab.studies.study import SEED, is_number
 from teleop_lab.studies.summary import Mean, conditions, differences, mean_of
 from teleop_lab.studies.tuning import Range
@@ -25,18 +23,29 @@ _COLORS = (FIRST, SECOND, THIRD, FIXTURE, "#7f7f7f", "#17becf", "#bcbd22", "#8c5
 
 def study_page(study: "Study", found: "xarray.Dataset", title: str) -> str:
     """HTML page of a study; it works offline, with plotly.js inside."""
-    figures, parts = Figures(), [_table(study, found)]
-    for metric in study.metrics:
-        parts.append(f"<h2>{escape(metric)}</h2>")
-        if study.swept:
-            parts.append(figures.card(condition_lines(study, found, metric), label_of(study, found, metric)))
-        if (heat := _heat(study, found, metric)) is not None:
-            parts.append(figures.card(*heat))
-        parts.append(_changes(study, found, metric))
-    errors = sorted({str(error) for error in found["error"].values.ravel() if error})
-    parts += [f"<p>failed: {escape(error)}</p>" for error in errors]
     facts = ", ".join(f"{name} {value}" for name, value in found.attrs.items() if value)
-    return whole_page(title, f"{facts}. Means over the seeds, with 95 % intervals by the bootstrap.", parts, figures)
+    errors = sorted({str(error) for error in found["error"].values.ravel() if error})
+    parts: list[Part] = [
+        Text(f"{facts}. Means over the seeds, with 95 % intervals by the bootstrap."),
+        _table(study, found),
+        *(Text(f"failed: {error}") for error in errors),
+    ]
+    return page(title, parts, [Section(metric, parts=_parts(study, found, metric)) for metric in study.metrics])
+
+
+def _parts(study: "Study", found: "xarray.Dataset", metric: str) -> list[Part]:
+    """Figures and table of one score."""
+    parts: list[Part] = []
+    if study.swept:
+        parts.append(condition_figure(study, found, metric, condition_lines(study, found, metric)))
+    if len(study.swept) > 1:
+        parts.append(_heat(study, found, metric))
+    rows = [
+        [name, str(value), str(mean)]
+        for name, means in differences(study, found, metric).items()
+        for value, mean in zip(study.swept[name][1:], means, strict=True)
+    ]
+    return [*parts, *[plain_table((metric, "against the first value", "difference"), rows)] * bool(rows)]
 
 
 def tuning_page(tuning: "Tuning", tuned: "Tuned", title: str) -> str:
@@ -44,7 +53,7 @@ def tuning_page(tuning: "Tuning", tuned: "Tuned", title: str) -> str:
     numbers = [str(n) for n in range(1, len(tuned.trials) + 1)]
     columns: dict[str, list[Any]] = {"trial": [int(n) for n in numbers]}
     columns |= {name: [trial.values[name] for trial in tuned.trials] for name in tuning.searched}
-    figures, parts = Figures(), list[str]()
+    figures: list[Part] = []
     for name, values in columns.items():
         trace = {
             "type": "scatter",
@@ -57,18 +66,14 @@ def tuning_page(tuning: "Tuning", tuned: "Tuned", title: str) -> str:
         }
         where = tuning.searched.get(name)
         kind = {"type": "log"} if isinstance(where, Range) and where.is_log else {}
-        layout = {"xaxis": axis(name, **kind), "yaxis": axis(tuning.metric), "height": 300}
-        parts += [f"<h2>{escape(name)}</h2>", figures.card([trace], layout)]
+        layout = {"xaxis": axis(name, **kind), "yaxis": axis(tuning.metric)}
+        figures.append(Figure(name, "", [trace], layout, 300))
     best = ", ".join(
         f"{name}={value:.4g}" if isinstance(value, float) else f"{name}={value}"
         for name, value in tuned.best.values.items()
     )
-    return whole_page(title, f"Best: {best}, with {tuning.metric} {tuned.best.score:.4g}.", parts, figures)
-
-
-def whole_page(title: str, sentence: str, parts: list[str], figures: Figures) -> str:
-    """HTML page of some parts, with plotly.js inside."""
-    return plain_page(title, [f'<p class="facts">{escape(sentence)}</p>', *parts], figures)
+    told = f"Best: {best}, with {tuning.metric} {tuned.best.score:.4g}."
+    return page(title, [Text(told)], [Section(parts=figures)])
 
 
 def _label(found: "xarray.Dataset", metric: str) -> dict[str, Any]:
@@ -107,15 +112,15 @@ def condition_lines(
     return traces
 
 
-def label_of(study: "Study", found: "xarray.Dataset", metric: str) -> dict[str, Any]:
-    """Layout of a figure of lines over the first swept parameter."""
-    return {"xaxis": axis(next(iter(study.swept))), "yaxis": _label(found, metric), "height": 340}
+def condition_figure(study: "Study", found: "xarray.Dataset", metric: str, traces: list[dict[str, Any]]) -> Figure:
+    """Figure of lines over the first swept parameter."""
+    name = next(iter(study.swept))
+    layout = {"xaxis": axis(name), "yaxis": _label(found, metric)}
+    return Figure("", f"{metric} over {name}", traces, layout, 340)
 
 
-def _heat(study: "Study", found: "xarray.Dataset", metric: str) -> tuple[Any, Any] | None:
-    """Heat map of means for the values of the first two parameters; None if fewer than two are swept."""
-    if len(study.swept) < 2:
-        return None
+def _heat(study: "Study", found: "xarray.Dataset", metric: str) -> Figure:
+    """Heat map of means for the values of the first two parameters."""
     first, second = list(study.swept)[:2]
     others = [name for name in (*study.swept, SEED) if name not in {first, second}]
     means = found[metric].mean(others).transpose(second, first)
@@ -127,32 +132,12 @@ def _heat(study: "Study", found: "xarray.Dataset", metric: str) -> tuple[Any, An
         "y": [str(value) for value in study.swept[second]],
         "colorbar": {"title": {"text": metric}},
     }
-    layout = {"xaxis": axis(first), "yaxis": axis(second), "height": 280}
-    return [trace], layout
+    return Figure("", f"means over {', '.join(others)}", [trace], {"xaxis": axis(first), "yaxis": axis(second)}, 340)
 
 
-def _table(study: "Study", found: "xarray.Dataset") -> str:
+def _table(study: "Study", found: "xarray.Dataset") -> Table:
     rows = [
         [*map(str, values.values()), *(str(mean_of(part[metric].values)) for metric in study.metrics)]
         for values, part in conditions(study, found)
     ]
-    return table_html((*study.swept, *study.metrics), rows)
-
-
-def _changes(study: "Study", found: "xarray.Dataset", metric: str) -> str:
-    rows = [
-        [name, str(value), str(mean)]
-        for name, means in differences(study, found, metric).items()
-        for value, mean in zip(study.swept[name][1:], means, strict=True)
-    ]
-    return table_html((metric, "against the first value", "difference"), rows)
-
-
-def table_html(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """A table for a :func:`whole_page`; empty without rows."""
-    lines = [
-        [f"<th>{escape(text)}</th>" for text in heads],
-        *([f"<td>{escape(cell)}</td>" for cell in r] for r in rows),
-    ]
-    body = "".join(f"<tr>{''.join(line)}</tr>" for line in lines)
-    return f'<div class="card table"><table>{body}</table></div>' if rows else ""
+    return plain_table((*study.swept, *study.metrics), rows)

@@ -1,5 +1,6 @@
 """Glances: data that a visually guided operator has recently seen and felt, interpolated in time."""
 
+import math
 from collections import deque
 from typing import NamedTuple
 
@@ -8,6 +9,8 @@ from teleop_core.kernels import Array, length
 
 STILL_TIME = 0.02
 """A motion is at rest if it changes little in this time [s]."""
+SETTLED_TIME = 0.1
+"""A motion that did not end where the hand felt it end is at rest if it changes little in this time [s]."""
 
 
 class Glance(NamedTuple):
@@ -38,8 +41,12 @@ class Glances:
         kept = self._kept
         if seen.slave[:3].any():  # otherwise no pose has been shown yet
             kept.append(Glance(now, seen.slave.copy(), goal.copy(), seen.force[:3].copy()))
-        while len(kept) > 2 and kept[1].time <= now - self._eye - STILL_TIME:
+        while len(kept) > 2 and kept[1].time <= now - self._eye - SETTLED_TIME:
             kept.popleft()
+
+    def covers(self, when: float) -> bool:
+        """Whether the glance that can be used at a time [s] was taken."""
+        return bool(self._kept) and self._kept[0].time <= when - self._eye
 
     def at(self, when: float) -> Glance:
         """Glance that can be used at a time [s]: the data one eye delay earlier, interpolated between two glances."""
@@ -58,9 +65,46 @@ class Glances:
 
     def speed_of_goal(self, width: float) -> Array:
         """Velocity of the goal (3,) [m/s] since the goal last jumped by more than its width [m]."""
-        first = last = self._kept[-1]
+        seen = self._since_jump(width)
+        return _speed(seen[0], seen[-1])
+
+    def way_of_goal(self, width: float, time: float) -> Array:
+        """Way (3,) [m] that the goal will go in a time [s], if it goes on to accelerate as it was seen to do.
+
+        Args:
+            width: Width of the goal [m]; after a jump by more than this the memory begins anew.
+            time: Time from now on [s].
+        """
+        seen = self._since_jump(width)
+        first, middle, last = seen[0], seen[len(seen) // 2], seen[-1]
+        lasted = last.time - first.time
+        acceleration = (_speed(middle, last) - _speed(first, middle)) / max(0.5 * lasted, 1e-9)
+        now = _speed(first, last) + 0.5 * lasted * acceleration
+        return time * now + 0.5 * time * time * acceleration
+
+    def _since_jump(self, width: float) -> list[Glance]:
+        """Latest glances, since the goal last jumped by more than its width [m]; at least one."""
+        seen = [self._kept[-1]]
+        begin = seen[0].time - self._eye - STILL_TIME
         for glance in reversed(self._kept):
-            if float(length(first.goal - glance.goal)) > width:
+            if glance.time <= begin or float(length(seen[-1].goal - glance.goal)) > width:
                 break
-            first = glance
-        return (last.goal - first.goal) / max(last.time - first.time, 1e-9)
+            seen.append(glance)
+        return seen[:0:-1] or seen
+
+
+def crossing(seen: list[tuple[float, float]], level: float) -> float:
+    """Time [s] at which values rise to a level, interpolated between pairs of time and value; infinite if never."""
+    before: tuple[float, float] | None = None
+    for time, value in seen:
+        if value >= level:
+            if before is None or value <= before[1]:
+                return time
+            return before[0] + (level - before[1]) / (value - before[1]) * (time - before[0])
+        before = (time, value)
+    return math.inf
+
+
+def _speed(a: Glance, b: Glance) -> Array:
+    """Mean velocity of the goal (3,) [m/s] between two glances; zero if they are the same."""
+    return (b.goal - a.goal) / max(b.time - a.time, 1e-9)

@@ -12,26 +12,34 @@ import numpy as np
 
 from teleop_core.graph import STATE, topics
 from teleop_core.hand.operators import Operator, Setting
-from teleop_core.hand.operators.glances import STILL_TIME, Glance, Glances
+from teleop_core.hand.operators.glances import SETTLED_TIME, STILL_TIME, Glance, Glances, crossing
 from teleop_core.hand.operators.hand_room import HandRoom, TurnsOfHand, turned
 from teleop_core.hand.operators.observer_parameters import ObserverParameters
-from teleop_core.hand.operators.shapes import minimum_jerk
-from teleop_core.hand.operators.submovement import Move, Way
+from teleop_core.hand.operators.submovement import (
+    PRESS_TIME,
+    SURE,
+    Doubt,
+    Move,
+    Way,
+    careful_time,
+    chance_inside,
+    draw,
+    end_noise,
+)
 from teleop_core.hand.tasks import Act
 from teleop_core.kernels import Array, dot, length, product
 from teleop_core.kernels.axes import axis_map
 
 AHEAD = 16
 """Number of ticks per request of the motion, about one frame; the delay of the eye is longer, so this adds no delay."""
-_COLUMNS = ("number", "act", "goal_x", "width", "goal_qw", "turn", "force", "clearance")
-_NUMBER, _ACT, _GOAL, _WIDTH, _ATTITUDE, _TURN, _FORCE, _CLEARANCE = map(topics.TASK_STATE.columns.index, _COLUMNS)
-_BOX, _SIZE = STATE["fixture_center_x"], STATE["fixture_size_x"]
+_COLUMNS = ("number", "act", "goal_x", "width", "goal_qw", "turn", "force")
+_NUMBER, _ACT, _GOAL, _WIDTH, _ATTITUDE, _TURN, _FORCE = map(topics.TASK_STATE.columns.index, _COLUMNS)
 _ENDS = (topics.Limit.JOINT, topics.Limit.WORKSPACE)
-_PRESS_TIME = 0.06  # duration of a press of the hand, and of the clutch's press before and after a motion [s]
 _STILL = 0.05  # a tip that moves less than this share of its path in STILL_TIME is at rest
+_SAME = 0.02  # a tip is where the hand felt it end up to this share of its path, or a quarter of the goal's width
 _SHORTEST = 0.1  # displacements shorter than this share of a goal's width need no submovement
 _FELT = 0.03  # least force that is felt [N]
-_SURE = 2.0  # distance of a submovement's end from a wall, divided by the standard deviation of that end
+_LEAST_SHARE = 0.1  # share of a submovement that a hand at the end of its room tries all the same
 
 
 class Observer:
@@ -54,6 +62,7 @@ class Observer:
         self._hand = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])  # pose at which the last submovement ends
         self._softness = p.softness  # last felt compliance: displacement per newton [m/N]
         self._move: Move | None = None
+        self._has_tried = False  # whether a submovement to the present goal was made
         self._turns = False  # whether the last submovement turns the stylus
         self._number = 0.0
         self._next = 0.0  # time before which the operator does not move [s]
@@ -62,38 +71,23 @@ class Observer:
         self._close = -math.inf  # time at which the hand closes for a moment [s]
         self._holds, self._since = False, -math.inf  # whether the hand stays closed, and since which time [s]
         self._lag = -1.0  # delay with which the last motion was seen, without the eye's delay [s]; < 0: not known
+        self._doubt: Doubt = SURE  # of the seen place of the tip
 
     def __call__(self, times: Array) -> Array:
         """Rows (N, 13) of :data:`~teleop_core.hand.operators.Motion` for times (N,) [s]."""
         now, until = float(times[0]), float(times[-1])
         self._glances.take(now, self._seen, self._seen.task[_GOAL : _GOAL + 3])
         rows = np.zeros((len(times), 13))
-        self._draw(times, rows)
+        draw(self._move, self._turns, times, rows)
         if self._seen.task[_NUMBER] > 0.0 and self._glances and self._decide(now, until):
-            self._draw(times, rows)
+            draw(self._move, self._turns, times, rows)
         if now < self._since <= until:
             rows[:, 12] = (times >= self._since) == self._holds
         else:
             rows[:, 12] = (now >= self._since) == self._holds
-        if self._close <= until and now < self._close + _PRESS_TIME:
-            rows[(times >= self._close) & (times < self._close + _PRESS_TIME), 12] = 1.0
+        if self._close <= until and now < self._close + PRESS_TIME:
+            rows[(times >= self._close) & (times < self._close + PRESS_TIME), 12] = 1.0
         return rows
-
-    def _draw(self, times: Array, rows: Array) -> None:
-        """Write the present submovement into ``rows``, from its beginning on."""
-        if (move := self._move) is None:
-            return
-        if not move.is_clutched and not self._turns and move.begin + move.duration < times[0]:
-            rows[:, :3] = move.start[:3] + move.step  # the submovement is over
-            return
-        share, has_begun = minimum_jerk((times - move.begin) / move.duration), times >= move.begin
-        moved = move.start[:3] + share[:, None] * move.step
-        rows[:, :3] = np.where(has_begun[:, None], moved, rows[:, :3])
-        if self._turns:
-            turns = np.array([turned(move.start[3:], s * move.turn)[1] for s in share])
-            rows[:, 3:6] = np.where(has_begun[:, None], turns, rows[:, 3:6])
-        if move.is_clutched:
-            rows[:, 6] = (times >= move.begin - _PRESS_TIME) & (times < move.begin + move.duration + _PRESS_TIME)
 
     def _decide(self, now: float, until: float) -> bool:
         """Begin the next submovement or press, if it is due before ``until``.
@@ -105,30 +99,62 @@ class Observer:
         width, act = float(task[_WIDTH]), int(task[_ACT])
         if task[_NUMBER] != self._number and act != Act.PASS:
             self._number = float(task[_NUMBER])
-            self._next = now + p.reaction
+            self._next, self._doubt, self._has_tried = now + p.reaction, SURE, False
         when = max(self._next, self._seen_at(until), now)
         if when > until:
             return False
         glance = self._glances.at(when)
         way = self._way(glance)
         off, turn = float(length(way.step)), float(length(way.turn))
-        if act != Act.PASS and off <= 0.5 * width and turn <= 0.5 * task[_TURN]:
+        if act != Act.PASS and self._is_worth_it(off, turn):
             self._press(when, act)
         elif off > _SHORTEST * width or turn > _SHORTEST * task[_TURN] or abs(way.missing) > _SHORTEST:
-            self._begin(when, glance, way)
+            lag = max(self._lag, 0.0)
+            ahead = self._way_of_goal(lag + self._time_of_look()) - self._way_of_goal(lag)
+            gone = float(length(self._glances.speed_of_goal(width))) * self._time_of_look()
+            # On the way to a goal that moves nothing is left on purpose.
+            runs = act in (Act.PRESS, Act.PASS) and gone > 0.25 * width
+            whole = 1.0 / (1.0 - self._p.undershoot) if runs else 1.0
+            self._begin(when, glance, way._replace(step=whole * (way.step + ahead)))
             return True
+        elif act != Act.PASS:  # inside, but not sure: look again
+            self._next, self._doubt = when + self._time_of_look(), SURE
         return False
+
+    def _is_worth_it(self, off: float, turn: float) -> bool:
+        """Whether to press now, believed ``off`` [m] and ``turn`` [rad] beside the goal, rather than to look again."""
+        p, task, doubt, width = self._p, self._seen.task, self._doubt, float(self._seen.task[_WIDTH])
+        extrapolated = p.noise / p.least_time * float(length(self._way_of_goal(self._time_of_look())))
+        if off > 0.5 * width and not (self._has_tried and extrapolated > 0.0):  # only a goal that runs away is given up
+            return False
+        chance = chance_inside(off, math.hypot(doubt.spread, extrapolated), width)
+        later = chance_inside(0.0, extrapolated, width)  # 1 for a goal at rest
+        if task[_TURN] > 0.0:
+            chance *= chance_inside(turn, doubt.turn_spread, float(task[_TURN]))
+        return (later - chance) * p.error_cost < self._time_of_look()
+
+    def _time_of_look(self) -> float:
+        """Time of another submovement and of seeing its end [s]; a lag that is not known yet counts as none."""
+        return self._p.least_time + max(self._lag, 0.0) + self._p.eye
+
+    def _way_of_goal(self, time: float) -> Array:
+        """Way (3,) [m] of a goal to press that moves; a goal of the jaw counts as at rest."""
+        if int(self._seen.task[_ACT]) != Act.PRESS:
+            return np.zeros(3)
+        return self._glances.way_of_goal(float(self._seen.task[_WIDTH]), time)
 
     def _way(self, glance: Glance) -> Way:
         """The motion to be made, from the data seen and, during a press, from the force felt."""
         p, task, turn, lever, missing = self._p, self._seen.task, np.zeros(3), 0.0, 0.0
         is_moving = int(task[_ACT]) == Act.PASS
         goal = glance.goal if is_moving else task[_GOAL : _GOAL + 3]
-        step = goal - glance.tip[:3]
+        step = goal - glance.tip[:3] + self._doubt.place
         if is_moving:
             step = step + self._glances.speed_of_goal(float(task[_WIDTH])) * (p.eye + p.least_time)
+        else:
+            step = step + self._way_of_goal(max(self._lag, 0.0))
         if task[_TURN] > 0.0:
-            turn = self._turns_of_hand.of_tip(glance.tip[3:], task[_ATTITUDE : _ATTITUDE + 4])
+            turn = self._turns_of_hand.of_tip(glance.tip[3:], task[_ATTITUDE : _ATTITUDE + 4]) + self._doubt.turn
             lever = float(task[_WIDTH] / task[_TURN])
         felt = float(length(glance.force))
         if task[_FORCE] > 0.0 and felt >= _FELT:
@@ -175,17 +201,31 @@ class Observer:
         when = self._half_seen + 0.5 * move.duration
         if when > until or self._is_still:
             return when
-        gone = float(length(self._gone(self._glances.at(when), self._glances.at(when + STILL_TIME))))
-        self._is_still = gone <= _STILL * float(length(move.way.both))
+        self._is_still = self._has_ended(move, when)
         if not self._is_still:  # the tip still moves: the half is seen later
             self._half_seen += until - when + 1e-3
             return math.inf
         return when
 
+    def _has_ended(self, move: Move, when: float) -> bool:
+        """Whether a motion is seen at rest at a time [s]: for longer, if it is not where the hand felt it end.
+
+        An arm that overshoots stands still for a moment at its farthest point.
+        """
+        path, width = float(length(move.way.both)), float(self._seen.task[_WIDTH])
+        now, most = self._glances.at(when), _STILL * path
+        if length(self._gone(now, self._glances.at(when + STILL_TIME))) > most:
+            return False
+        beyond = float(dot(self._gone(move.seen, now) - move.unseen, move.unseen)) / float(length(move.unseen))
+        if abs(beyond) <= max(0.25 * width, _SAME * path):
+            return True
+        return bool(length(self._gone(self._glances.at(when - SETTLED_TIME), now)) <= most)
+
     def _is_at_rest(self, until: float) -> bool:
         """Whether the operator recently saw the tip at rest."""
         gone = self._gone(self._glances.at(until - STILL_TIME), self._glances.at(until))
-        return bool(length(gone) <= _STILL * self._seen.task[_WIDTH])
+        is_seen = self._glances.covers(until - STILL_TIME)
+        return is_seen and bool(length(gone) <= _STILL * self._seen.task[_WIDTH])
 
     def _is_felt(self, move: Move, when: float, until: float) -> bool:
         """Whether the force at rest already shows the result of a submovement, and not the force before it."""
@@ -208,77 +248,58 @@ class Observer:
         """Time at which the tip was seen at half of the path [s]; infinite if this was not before ``until``."""
         unseen, whole = move.unseen, float(dot(move.unseen, move.unseen))
         half = 1.0 - 0.5 * float(length(move.way.both)) / math.sqrt(whole)
-        before: tuple[float, float] | None = None
-        for glance in self._glances.since(move.begin, until):
-            gone = float(dot(self._gone(move.seen, glance), unseen)) / whole
-            if gone >= half:
-                at = glance.time
-                if before is not None and gone > before[1]:
-                    share = (half - before[1]) / (gone - before[1])
-                    at = before[0] + share * (at - before[0])
-                late = at - move.begin - 0.5 * move.duration
-                self._lag = max(late, 0.0)
-                return at + self._p.eye
-            before = (glance.time, gone)
-        return math.inf
+        gone = [
+            (glance.time, float(dot(self._gone(move.seen, glance), unseen)) / whole)
+            for glance in self._glances.since(move.begin, until)
+        ]
+        at = crossing(gone, half)
+        if math.isinf(at):
+            return at
+        self._lag = max(at - move.begin - 0.5 * move.duration, 0.0)
+        return at + self._p.eye
 
     def _patience(self) -> float:
         """Time for which the operator waits, after the end of a motion, until the motion becomes visible [s]."""
         p = self._p
         if self._lag < 0.0:
             return p.longest_wait
-        return min(p.longest_wait, p.eye + 1.5 * self._lag + p.reaction)
+        return min(p.longest_wait, 2.0 * p.eye + 1.5 * self._lag + p.least_time)
 
     def _begin(self, now: float, seen: Glance, way: Way) -> None:
         """Begin a submovement; bring the hand back instead if the hand or the arm is at the end of its range."""
-        p, task = self._p, self._seen.task
-        gain, width = float(self._seen.state[STATE["gain"]]) or 1.0, float(task[_WIDTH])
-        distance, angle = float(length(way.step)), float(length(way.turn))
-        duration = p.least_time + p.time_per_bit * math.log2(distance / width + 1.0)
-        duration = max(duration, distance / gain / p.fastest, self._careful(seen.tip[:3], way.step))
-        if angle > 0.0:
-            bits = p.time_per_bit * math.log2(angle / float(task[_TURN]) + 1.0)
-            duration = max(duration, p.least_time + bits, angle / p.fastest_turn)
-        ended = Way(self._ended(way.step, duration), self._ended(way.turn, duration) if angle else way.turn, way.lever)
-        step = product(self._hand_of_slave, ended.step) / gain
-        turn = self._turns_of_hand.of_hand(ended.turn, self._hand[3:]) if angle else way.turn
+        p = self._p
+        gain = float(self._seen.state[STATE["gain"]]) or 1.0
+        step = product(self._hand_of_slave, way.step) / gain
+        turn = self._turns_of_hand.of_hand(way.turn, self._hand[3:]) if way.turn.any() else way.turn
         was_back, fits = self._move is not None and self._move.is_clutched, self._room.share(self._hand, step, turn)
         has_stopped = self._seen.state[STATE["limit"]] in _ENDS and self._move is not None
         if ((has_stopped and math.isinf(self._half_seen)) or fits < 1.0) and not was_back:
             self._bring_back(now, seen, *(fits < 1.0) * np.stack((step, turn)))
             return
+        fits = max(fits, _LEAST_SHARE)
+        share = min(fits, 1.0 - p.undershoot) if way.missing == 0.0 else fits
+        way = Way(share * way.step, share * way.turn, way.lever)
+        distance, angle = float(length(way.step)), float(length(way.turn))
+        duration = max(p.least_time, distance / gain / p.fastest, angle / p.fastest_turn)
+        duration = max(duration, careful_time(p, self._seen, seen.tip[:3], way.step))
+        ended = Way(
+            way.step + end_noise(p, self._rng, way.step, duration),
+            way.turn + end_noise(p, self._rng, way.turn, duration),
+            way.lever,
+        )
+        step = product(self._hand_of_slave, ended.step) / gain
+        turn = self._turns_of_hand.of_hand(ended.turn, self._hand[3:]) if angle else way.turn
+        fits = max(self._room.share(self._hand, step, turn), _LEAST_SHARE)  # noise may lead beyond the room
         ended = Way(fits * ended.step, fits * ended.turn, way.lever)
         unseen = ended.both
         if self._move is not None and self._was_felt:
             seen, unseen = seen._replace(tip=self._move.seen.tip), unseen + self._move.unseen
         self._go(Move(now, duration, self._hand, fits * step, fits * turn, seen, ended, unseen))
-        spread = p.noise * distance / duration
-        missed = math.erfc(0.5 * width / (math.sqrt(2.0) * max(spread, 1e-12)))
-        is_press = int(task[_ACT]) == Act.PRESS and p.error_cost > 0.0
-        if is_press and missed * p.error_cost < max(self._lag, 0.0) + p.eye:
-            self._press(now + duration, Act.PRESS)
-
-    def _careful(self, tip: Array, step: Array) -> float:
-        """Duration [s] at which the noise of a step (3,) [m] does not reach walls or edges; 0 without walls and edges.
-
-        The fixture's walls are those of its box. The operator aims no more exactly than the goal requires.
-        """
-        p, state, task = self._p, self._seen.state, self._seen.task
-        across, slowest = p.noise_across, 0.0
-        if task[_CLEARANCE] > 0.0:
-            slowest = across * float(length(step)) / float(task[_CLEARANCE])
-        if state[STATE["is_fixture_on"]] > 0.0 and state[_SIZE] > 0.0:
-            gap = 0.5 * state[_SIZE : _SIZE + 3] - np.abs(tip + step - state[_BOX : _BOX + 3])
-            lean = np.sqrt(step * step * (1.0 - across**2) + across**2 * float(dot(step, step)))
-            slowest = max(slowest, float((lean / np.maximum(gap, 0.5 * task[_WIDTH])).max()))
-        return _SURE * p.noise * slowest
-
-    def _ended(self, way: Array, duration: float) -> Array:
-        """A displacement or rotation (3,) with the noise of a hand that makes it in ``duration`` [s]."""
-        p, distance, noise = self._p, float(length(way)), self._rng.standard_normal(3)
-        along = way / max(distance, 1e-12)
-        ahead = along * float(dot(along, noise))
-        return way + p.noise * distance / duration * (ahead + p.noise_across * (noise - ahead))
+        self._has_tried = True
+        # As uncertain as the movement itself: the operator decides before it has seen all of the end.
+        spread = p.noise / duration
+        doubts = end_noise(p, self._rng, way.step, duration), end_noise(p, self._rng, way.turn, duration)
+        self._doubt = Doubt(*doubts, spread * distance, spread * angle)
 
     def _bring_back(self, now: float, seen: Glance, step: Array, turn: Array) -> None:
         """Clutch, and bring the hand to the pose with most room for a step (3,) [m] and a turn (3,) [rad]."""
@@ -286,8 +307,8 @@ class Observer:
         way, angle = self._room.back(self._hand, step, turn)
         duration = max(p.least_time, float(length(way)) / p.fastest, float(length(angle)) / p.fastest_turn)
         nothing = Way(np.zeros(3), np.zeros(3), 0.0)
-        self._go(Move(now + _PRESS_TIME, duration, self._hand, way, angle, seen, nothing, nothing.both, True))
-        self._next += 2.0 * _PRESS_TIME
+        self._go(Move(now + PRESS_TIME, duration, self._hand, way, angle, seen, nothing, nothing.both, True))
+        self._next += 2.0 * PRESS_TIME
 
     def _go(self, move: Move) -> None:
         """Store a submovement as the present one."""

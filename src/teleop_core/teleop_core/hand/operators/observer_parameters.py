@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from teleop_core.base import Within, fixed
 from teleop_core.kernels.axes import AXES
 
-_FITTED = "fitted: to the four times of movement of MacKenzie and Ware 1993"
+_FITTED = "fitted: to times and misses of MacKenzie and Ware 1993"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -13,25 +13,26 @@ class ObserverParameters:
     """How the operator sees, waits and moves."""
 
     eye: float = fixed(
-        0.13,
+        0.11,
         Within(0.0, 1.0, "s"),
         "time from seeing or feeling something to a plan that uses it",
         source="published: 0.110 to 0.163 s in six studies of corrections by sight",
     )
     reaction: float = fixed(
-        0.25, Within(0.0, 2.0, "s"), "time from a new goal to the first submovement", source=_FITTED
+        0.03,
+        Within(0.0, 2.0, "s"),
+        "time from a new goal, whose place is expected, to the first submovement",
+        source=_FITTED,
     )
-    least_time: float = fixed(
-        0.06, Within(0.02, 1.0, "s"), "duration of a submovement whose index of difficulty is 0", source=_FITTED
-    )
-    time_per_bit: float = fixed(
-        0.02,
-        Within(0.0, 1.0, "s"),
-        "added duration of a submovement for each bit of its index of difficulty",
+    least_time: float = fixed(0.102, Within(0.02, 1.0, "s"), "shortest duration of a submovement", source=_FITTED)
+    undershoot: float = fixed(
+        0.315,
+        Within(0.0, 0.9),
+        "share of the distance to the goal that a submovement leaves on purpose",
         source=_FITTED,
     )
     noise: float = fixed(
-        0.04,
+        0.0194,
         Within(0.0, 0.5, "s"),
         "standard deviation of a submovement's end along its direction, divided by its mean speed",
         source=_FITTED + "; linear in speed: Meyer et al. 1988",
@@ -43,11 +44,11 @@ class ObserverParameters:
         source="assumed: the ratio of the operator human",
     )
     error_cost: float = fixed(
-        0.0,
-        Within(0.0, 100.0, "s"),
-        "cost of an error, as time: the operator presses without seeing the result if the wait would "
-        "cost more; 0: never",
-        off=0.0,
+        0.87,
+        Within(0.01, 1000.0, "s"),
+        "cost of an error, as time: the operator presses, grips or releases when the believed probability of an error "
+        "times this cost is less than the time of another look",
+        source=_FITTED,
     )
     fastest: float = fixed(
         0.04,

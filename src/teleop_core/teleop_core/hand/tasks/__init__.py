@@ -124,7 +124,7 @@ def _lead(part: Task, numbers: Array, memory: Array, scene: Array, state: Array)
 TASKS: Registry[Task] = Registry(
     "task",
     "tasks",
-    places("teleop_core.hand.tasks", "follow insert palpate peg_transfer point reach trace"),
+    places("teleop_core.hand.tasks", "catch follow insert palpate peg_transfer point reach trace"),
     part_check("task", Task, "judge"),
     _try,
 )

@@ -1,4 +1,4 @@
-"""Textbook arms: PUMA 560, SCARA, planar 3R and a five-axis arm, each a table.
+"""Textbook arms: PUMA 560, SCARA, planar 3R, a five-axis arm, and the pointer of a screen, each a table.
 
 Sources:
     Ghosal 2020, lecture 6 (PUMA 560, SCARA, planar 3R; misprints corrected). Lengths of the PUMA: Corke and
@@ -127,16 +127,38 @@ def five_axis(**geometry: float | str) -> Robot:
     return _arm("five_axis", g, ("x", "y", "z", "ry", "rz"), rows, drives)
 
 
+def pointer(**geometry: float | str) -> Robot:
+    """Pointer of a screen, as of a mouse: it slides along z and y of its base, nearly without friction.
+
+    ``x`` is the distance of the screen from the base [m]. With a control law that feeds the reference forward, such as
+    ``computed_torque``, and without the reference filter, the pointer follows its command within 1 ms.
+    """
+    g = geometry_of({"x": 0.3}, geometry)
+    slide = {"lower": -1.0, "upper": 1.0}
+    rows = [{"name": "up", "a": g["x"], "d": "q", **slide}, {"name": "aside", "alpha": 90.0, "d": "-q", **slide}]
+    drives = _drives(
+        bandwidth=500.0,
+        inertia=(0.1, 0.1),
+        viscous=(1e-3, 1e-3),
+        coulomb=(1e-3, 1e-3),
+        friction_speed=(1e-3, 1e-3),
+        effort_limit=(1e3, 1e3),
+        speed_limit=(20.0, 20.0),
+        encoder_step=(1e-6, 1e-6),
+    )
+    return _arm("pointer", g, ("y", "z"), rows, drives)
+
+
 def _turn(upper: float, lower: float | None = None, home: float = 0.0, **constants: float) -> dict[str, Any]:
     """Row of a turning joint, with limits and home [°]."""
     limits = {"lower": -upper if lower is None else lower, "upper": upper, "home": home}
     return {"theta": "q", **limits, **constants}
 
 
-def _drives(**entries: Sequence[float] | Array) -> Drives:
+def _drives(bandwidth: float = 60.0, **entries: Sequence[float] | Array) -> Drives:
     """Drive table, all of it assumed."""
     rows = {name: np.array(values) for name, values in entries.items()}
-    return Drives(**rows, bandwidth=np.full(len(rows["inertia"]), 60.0), assumed=ENTRIES)
+    return Drives(**rows, bandwidth=np.full(len(rows["inertia"]), bandwidth), assumed=ENTRIES)
 
 
 def _arm(
