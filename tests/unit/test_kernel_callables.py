@@ -59,6 +59,19 @@ def test_kernel_is_made_a_pointer_once_for_each_signature_and_a_plain_function_e
     assert pointer(compiled, real)(np.full(1, 2.5)) == 2.5
 
 
+def test_an_error_in_a_kernel_that_is_called_through_a_pointer_ends_its_caller() -> None:
+    @kernel
+    def broken(row: Any, x: Any) -> Any:
+        if x > 1.0:
+            raise ValueError("beyond")
+        return row[0]
+
+    made = pointer(broken, types.float64(ROW, types.float64))
+    assert call_with_row(made, np.ones(3), 2) == 2.0
+    with pytest.raises(ValueError, match="beyond"):
+        call_with_row(made, np.ones(3), 3)
+
+
 def test_plain_function_gets_tables_flags_and_counts() -> None:
     seen = []
 
