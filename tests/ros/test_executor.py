@@ -21,6 +21,12 @@ def guest() -> Iterator[Guest]:
         yield one
 
 
+def spin_for_ever(executor: Any) -> None:
+    """Serve until the middleware has ended."""
+    while True:
+        executor.spin_once(1.0)
+
+
 def until(executor: Any, is_done: Any) -> None:
     """Serve until a condition is true, at most 10 s."""
     end = time.monotonic() + 10.0
@@ -94,5 +100,4 @@ def test_a_wait_without_limit_ends_when_another_thread_wakes_it_or_ends_the_midd
     assert time.monotonic() - begin < 5.0
     threading.Timer(0.2, guest.world.shutdown).start()
     with pytest.raises(WorldEndedError):
-        while True:
-            executor.spin_once(1.0)
+        spin_for_ever(executor)
