@@ -1,6 +1,6 @@
 """Strain: a loop with real-time priority that asks too much of its processor gives way to other programs.
 
-A loop of SCHED_FIFO that cannot keep up would make up its ticks for ever, and no other program would run on its
+A loop of SCHED_FIFO that cannot keep up would make up its ticks without end, and no other program would run on its
 processor. It gives way if, over :data:`WINDOW_NS`, it uses more than 70 % of a processor or more than half of its
 wake-ups are late; and at once if it misses more than :data:`BEHIND` ticks in a wake-up and still more in the next one,
 because then it falls further behind by making up ticks. It then runs without priority, and a late wake-up makes one
