@@ -1,8 +1,8 @@
 """Compose: the tick of a graph as a program of copies and calls.
 
 In each tick the program copies values from record to record along the links and calls the kernel of each stage. It
-stamps the topics that the stage wrote and copies them to the row that is recorded. One compiled loop runs the programs of all
-graphs (:mod:`teleop_core.kernels.program`).
+stamps the topics that the stage wrote and copies them to the row that is recorded. One compiled loop runs the
+programs of all graphs (:mod:`teleop_core.kernels.program`).
 """
 
 import traceback
