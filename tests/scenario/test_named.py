@@ -28,13 +28,13 @@ AGREEING = {
     "resolution": 16, "tendons": 3, "poses": 73, "workspace": 1, "filter": 10, "precision": 5,
     "repeatability": 6, "responses": 5, "accuracy": 30, "master_slave": 7, "controllers": 2,
     "gravity": 6, "robustness": 0, "shares": 0, "points24": 1, "stability": 15, "zwidth": 29,
-    "transparency": 112, "drift": 42, "puncture": 27, "fitts": 1, "delay": 6,
+    "transparency": 112, "drift": 42, "puncture": 27, "fitts": 14, "delay": 5,
     "scaling_under_delay": 3, "uva": 74, "mma_frames": 39, "mma_balance": 15, "hybrid": 18,
-    "parallel_robots": 6,
+    "parallel_robots": 6, "operator_models": 0, "blind": 124,
 }  # fmt: skip
 """Published figures, laws and goals that each experiment agrees with."""
-LONG_EXPERIMENTS = ("stability", "transparency")
-"""Half a minute each; tests/unit has their laws with fewer cases."""
+LONG_EXPERIMENTS = ("stability", "transparency", "operator_models")
+"""Half a minute and more each; tests/unit has their laws with fewer cases."""
 TRACKED_MM = {"coarse_box": 0.289, "fine_box": 0.260, "human": 0.114, "point": 0.126}
 """Root mean square of each scenario's position error, where it is above a tenth."""
 
@@ -130,5 +130,7 @@ def test_every_example_is_run_by_a_test() -> None:
 
 def test_every_command_that_is_not_run_has_a_reason_and_most_are_run() -> None:
     found = list(commands())
-    assert sum(not named.reason for named in found) > 0.55 * len(found)
+    experiments_run = "each is run by a test of its own"
+    run = sum(not named.reason or named.reason.startswith(experiments_run) for named in found)
+    assert run > 0.55 * len(found)
     assert set(AGREEING) == set(experiments.EXPERIMENTS.names())

@@ -51,7 +51,8 @@ def _sessions(bench: Bench) -> list[Comparison]:
             width = {"task.point.diameter": 0.0384, "task.point.width": 0.0024} if scenario == "mouse" else {}
             settings = {"display.latency": latency, "teleop.duration": 60.0, **width}
             found = bench.sessions(scenario, settings)
-            shares.append(100.0 * float(np.mean([one.score.value("task.error_share") or math.nan for one in found])))
+            found_shares = [one.score.value("task.error_share") for one in found]
+            shares.append(100.0 * float(np.mean([math.nan if share is None else share for share in found_shares])))
         rows.append(
             Comparison(
                 quantity=f"misses, {1e3 * (latency + CHAIN):g} ms late",
