@@ -55,7 +55,7 @@ class CoreNode(TunedNode):
         self.has_own_loop = True
         """Whether the node works in its own thread; False if it works in the thread of a whole session."""
         self.phases: Phases | None = None
-        """Time that the phases of a session's ticks took; its last node reports them."""
+        """Time that the phases of a session's ticks took; None for a node with its own loop."""
         self.tells_strain = True
         """Whether the reports of this node say that its loop has given way; one node of a session does."""
         self.is_at_work = self.has_worked = False

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from teleop_core.base.errors import UnknownNameError
+from teleop_core.evaluation.metrics.counts import PHASES
 from teleop_core.graph.graph import RECORDER_NAME, Graph, Member
 from teleop_core.graph.stage import STAGES
 from teleop_core.graph.topics import Kind
@@ -75,7 +76,9 @@ class TeleopSession:
             last.options.max_catch_up,
             phase_ns=0 if members[0] is graph.members[0] else _AFTER_NS,
         )
-        self._phases = last.phases = Phases("take", "step", "give", "tell")
+        self._phases = Phases(*PHASES)
+        for node in self._stages:
+            node.phases = self._phases
         self._at_work: tuple[bool, ...] = ()
         self._ticks = 0
         self._loop = Loop(world, "session", self._turn, last.fail, patience=last.patience)

@@ -46,6 +46,8 @@ def _is_whole(text: str) -> bool:
 
 
 GROUP = "counts"
+PHASES = ("take", "step", "give", "tell")
+"""Phases of a tick of a live process, whose times its nodes report."""
 _FORMER = "slave_sim"  # the node that counted the ticks in versions without an arm server
 
 
@@ -94,21 +96,29 @@ class TicksMetric(Metric):
 
     def values(self) -> Ticks:
         """Ticks of the whole recording."""
-        nodes = self._nodes.values()
-        own = nodes.get(self._slave) or nodes.get(_FORMER) or {}
+        own = self._own()
         gaps = self._stamps.of[SLAVE_MEASURED_CP.name].gaps()
         missed, made_up = own.get("missed"), own.get("caught_up")
         dropped = gaps if missed is None else missed - (made_up or 0)
         return Ticks(own.get("ticks", self._samples), own.get("late"), made_up, dropped, own.get("gave_way"))
 
+    def _own(self) -> dict[str, int]:
+        """Counts that the slave's node reported."""
+        nodes = self._nodes.values()
+        return nodes.get(self._slave) or nodes.get(_FORMER) or {}
+
     def rows(self) -> list[TableRow]:
-        """One row for each kind of tick that was not in time."""
+        """Rows for ticks, for each kind of tick that was not in time, and for the time of a live tick's phases."""
         ticks = self.values()
         late, made_up = (MISSING if n is None else str(n) for n in (ticks.late, ticks.made_up))
         rows = [
             TableRow(GROUP, "ticks executed", "", str(ticks.executed)),
             TableRow(GROUP, "late/made up/dropped", "", f"{late}/{made_up}/{ticks.dropped}"),
         ]
+        own = self._own()
+        if count := own.get("phase_ticks"):
+            times = "/".join(f"{own.get(f'phase_us.{name}', 0) / count:.0f}" for name in PHASES)
+            rows.append(TableRow(GROUP, f"a tick: {'/'.join(PHASES)}", "µs", times))
         if ticks.gave_way:
             rows.append(TableRow(GROUP, "gave up priority", "", f"{ticks.gave_way} times"))
         return rows
