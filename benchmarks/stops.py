@@ -2,6 +2,7 @@
 
     python benchmarks/stops.py --count 100                   # composed and in processes
     python benchmarks/stops.py --count 100 --load 4          # beside four busy processes
+    python benchmarks/stops.py --count 15 --graphs           # with display, network and tank too
 
 A button as anybody would write it (std_msgs/Bool, no priority) is pressed at random times while
 the arm moves. The time ends where the slave publishes the first setpoint that equals the one
@@ -10,6 +11,7 @@ which is as ordinary as the load, has to wait for a processor is no part of it.
 """
 
 import argparse
+import itertools
 import os
 import random
 import signal
@@ -39,6 +41,13 @@ _LATCHED = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 _JOINTS = load_robot("rcrt1").joint_names
 _PATIENCE = 120.0
 _STILL = 60  # equal setpoints that are a standstill
+GRAPHS: dict[str, tuple[str, ...]] = {
+    "plain": (),
+    "display": ("teleop.stages=[display]",),
+    "display, network": ("teleop.stages=[display,network]", "network.preset=delay_100"),
+    "network, tank": ("teleop.stages=[network,passivity]", "reflection.passivity=tank", "network.preset=delay_100"),
+}
+"""Settings of each graph."""
 _MOVES = 5e-4  # what the fastest joint comes on in as many ticks [rad or m]
 
 
@@ -111,11 +120,14 @@ def one_stop(tap: Tap) -> float:
     return float(stamps[first] - pressed_ns) * 1e-9
 
 
-def session(folder: Path, domain: str, priority: int, processes: str) -> subprocess.Popen[bytes]:
+def session(
+    folder: Path, domain: str, priority: int, processes: str, settings: tuple[str, ...]
+) -> subprocess.Popen[bytes]:
     """Start a session in which the hand never rests."""
     command = [sys.executable, "-m", "teleop_core.commands.cli", "live", "--out", str(folder / "bag")]
     command += ["--scenario", "free_motion", "--duration", "3600"]
-    for setting in (f"real_time.priority={priority}", "operator.approach_time=1.0", "operator.patience=0.0"):
+    own = f"real_time.priority={priority}", "operator.approach_time=1.0", "operator.patience=0.0"
+    for setting in (*own, *settings):
         command += ["--set", setting]
     return subprocess.Popen(
         [*command, "--processes", processes], stdin=subprocess.DEVNULL,
@@ -123,12 +135,12 @@ def session(folder: Path, domain: str, priority: int, processes: str) -> subproc
     )  # fmt: skip
 
 
-def measure(count: int, priority: int, processes: str) -> list[float]:
+def measure(count: int, priority: int, processes: str, settings: tuple[str, ...] = ()) -> list[float]:
     """Times of some stops of one session [s]."""
     environment()
     domain = free_domain()
     with tempfile.TemporaryDirectory() as folder:
-        running = session(Path(folder), domain, priority, processes)
+        running = session(Path(folder), domain, priority, processes, settings)
         tap, found = Tap(int(domain)), []
         try:
             with RemoteControl(int(domain), patience=_PATIENCE) as operator:
@@ -150,13 +162,15 @@ def main() -> None:
     parser.add_argument("--priority", type=int, default=-1, help="SCHED_FIFO of the session; 0: none; -1: its default")
     parser.add_argument("--load", type=int, default=0, help="busy processes beside the session")
     parser.add_argument("--kinds", nargs="+", default=["sides", "one"], choices=("sides", "one", "nodes"))
+    parser.add_argument("--graphs", action="store_true", help="all graphs, not the plain one alone")
     given = parser.parse_args()
     busy = [subprocess.Popen([sys.executable, "-c", "while 1: pass"]) for _ in range(given.load)]
     try:
-        for kind in given.kinds:
-            times = 1e3 * np.sort(measure(given.count, given.priority, kind))
+        graphs = list(GRAPHS) if given.graphs else ["plain"]
+        for graph, kind in itertools.product(graphs, given.kinds):
+            times = 1e3 * np.sort(measure(given.count, given.priority, kind, GRAPHS[graph]))
             within = np.count_nonzero(times <= 2.0)
-            print(f"{kind}, priority {given.priority}, load {os.getloadavg()[0]:.1f}: median "
+            print(f"{graph}, {kind}, priority {given.priority}, load {os.getloadavg()[0]:.1f}: median "
                   f"{np.median(times):.2f} ms, within 2 ms {within} of {len(times)}, largest "
                   f"{', '.join(f'{t:.1f}' for t in times[-3:])} ms", flush=True)  # fmt: skip
     finally:
