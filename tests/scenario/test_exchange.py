@@ -128,7 +128,7 @@ def test_axes_with_a_minus_are_values_not_options(teleop_again: "Run", hand: Pat
     [
         (("import", "{hand}", "--out", "{out}", "--position", "a", "y", "z"), "time, x, y, z, qx"),
         (("import", "nothing.csv", "--out", "{out}"), "does not exist"),
-        (("import", "{hand}", "--out", "{out}", "--unit", "km"), "invalid choice"),
+        (("import", "{hand}", "--out", "{out}", "--unit", "km"), "must be one of: m, auto, cm, mm, in"),
         (("import", "{hand}", "--out", "{bag}"), "exists already"),
         (("console", "--out", "{bag}"), "exists already"),
         (("export", "{bag}", "--out", "{out}.csv", "--topics", "nowhere"), "master/measured_cp"),
