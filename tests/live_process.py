@@ -32,6 +32,7 @@ class LiveProcess:
         self,
         folder: Path,
         *arguments: str,
+        scenario: str = "coarse_box",
         duration: float = 600.0,
         env: Mapping[str, str] | None = None,
         ignores: tuple[int, ...] = (),
@@ -41,7 +42,7 @@ class LiveProcess:
         self._duration = duration
         self.temporary.mkdir()
         command = [sys.executable, "-m", "teleop_core.commands.cli", "live", "--out", str(self.bag)]
-        command += ["--duration", f"{duration}", "--scenario", "coarse_box", *arguments]
+        command += ["--duration", f"{duration}", "--scenario", scenario, *arguments]
         command += [word for setting in settings for word in ("--set", setting)]
         with self._log.open("wb") as log:
             self.process = subprocess.Popen(

@@ -34,8 +34,7 @@ def test_stages_of_an_installed_package_sum_and_run_between_ours(peer: "Peer", t
     listeners = [peer.listen(topic) for topic in WATCHED]
     session = LiveProcess(
         tmp_path,
-        "--scenario",
-        "free_motion",
+        scenario="free_motion",
         env={"ROS_DOMAIN_ID": peer.domain, "PYTHONPATH": str(site)},
         settings=(*SETTINGS, "operator.approach_time=1.0", CALM),
     )
