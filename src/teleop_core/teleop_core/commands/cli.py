@@ -132,12 +132,12 @@ class Call:
 def main(words: list[str] | None = None) -> int:
     """Entry point of ``teleop``; returns the exit code: 0, 2 for wrong use, 130 for Ctrl-C."""
     words = sys.argv[1:] if words is None else words
-    if words in (["--help"], ["-h"]):
-        print(overview())
-        return 0
-    warnings.showwarning = _note  # type: ignore[assignment]
     call = None
     try:
+        if words in (["--help"], ["-h"]):
+            print(overview(), flush=True)
+            return 0
+        warnings.showwarning = _note  # type: ignore[assignment]
         call = parse(words)
         return 0 if call is None else call.run()
     except TeleopError as error:
