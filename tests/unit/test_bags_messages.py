@@ -8,9 +8,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from teleop_core.bags.messages import Refusal, Report, check, read_reports, read_values, report, write_values
+from teleop_core.bags.messages import Refusal, Report, read_reports, read_values, report, write_values
 from teleop_core.base.texts import printable
 from teleop_core.graph.topics import Kind
+from teleop_core.kernels.fields import record
+from teleop_core.nodes import wire
+from teleop_core.nodes.sender import Sender
 
 POSE = np.array([0.1, 0.2, 0.3, 1.0, 0.0, 0.0, 0.0])
 
@@ -85,6 +88,20 @@ def test_velocities_and_efforts_that_are_not_sent_are_nan() -> None:
     assert not isinstance(taken, Refusal)
     _, values = taken
     np.testing.assert_array_equal(values, [1.0, 2.0, *[np.nan] * 4])
+
+
+def check(kind: Kind, stamp_ns: int, values: Any, last_ns: int | None) -> Refusal | None:
+    """Reason why a live input refuses values, after a message with the stamp ``last_ns``."""
+    reading: Any = record(wire.Reading)
+    row, target, sender = values.copy(), np.zeros(len(values)), Sender(into=reading)
+    reading.width, reading.is_pose = len(values), kind is Kind.POSE
+    reading.row_at, reading.target_at = row.ctypes.data, target.ctypes.data
+    if last_ns is not None:
+        reading.has_stamp, reading.stamp_ns = 1, last_ns
+    is_accepted = wire.accept(sender.own, stamp_ns, 0, 0)
+    assert np.array_equal(target, values) is bool(is_accepted)
+    found = [reason for reason, count in zip(wire.REASONS, reading.refused, strict=False) if count]
+    return found[0] if found else None
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])

@@ -19,12 +19,13 @@ from teleop_core.bags.ros_types import deserialise
 from teleop_core.graph.topics import Kind
 
 __all__ = [
-    "SECOND_NS", "Layout", "Refusal", "Report", "Stamps", "Values", "check", "discover", "layout",
+    "SECOND_NS", "Layout", "Refusal", "Report", "Stamps", "Values", "discover", "layout",
     "layout_of", "read_any", "read_joints", "read_numbers", "read_reports", "read_values", "report",
     "write_values",
 ]  # fmt: skip
 
 QUATERNION_TOLERANCE = 1e-3
+"""Largest difference from 1 of the length of a received quaternion."""
 BUTTONS = (0, 1, 2)
 """Indices of clutch, fixture and mode among the buttons of a message."""
 
@@ -44,27 +45,6 @@ class Refusal(Enum):
     MALFORMED = "has bytes that are no valid message of its type"
     SECOND_PUBLISHER = "is from a second publisher, while the first one sends"
     FLOOD = "came faster than flood_rate allows"
-
-
-def check(kind: Kind, stamp_ns: int, values: Values, last_stamp_ns: int | None) -> Refusal | None:
-    """Reason to refuse a live message; None if the message is valid.
-
-    Args:
-        kind: Kind of the values.
-        stamp_ns: Stamp of the message, [ns].
-        values: Numbers of the message, shape (width,).
-        last_stamp_ns: Stamp of the last message used; None before the first.
-    """
-    numbers = values.tolist()
-    if not math.isfinite(sum(numbers)):
-        return Refusal.NOT_FINITE
-    if kind is Kind.POSE:
-        norm = math.hypot(*numbers[3:])
-        if abs(norm - 1.0) > QUATERNION_TOLERANCE:
-            return Refusal.NOT_UNIT
-    if last_stamp_ns is not None and stamp_ns <= last_stamp_ns:
-        return Refusal.NOT_NEWER
-    return None
 
 
 def read_values(

@@ -254,7 +254,10 @@ def read(r: Reading, address: int, length: int) -> int:
 
 @inner
 def _fault(r: Reading, row: Array, stamp_ns: int, has_last: bool, last_ns: int) -> int:
-    """Reason to refuse the values of a message; 0 for a valid one. See :func:`teleop_core.bags.messages.check`."""
+    """Reason to refuse the values of a message; 0 for a valid one.
+
+    Values that are not finite, a quaternion that is not of unit length, or a stamp that is not newer than the last one.
+    """
     total = 0.0
     for i in range(r.width):
         total += row[i]
