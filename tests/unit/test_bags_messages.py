@@ -8,12 +8,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from accepted import why_refused
 from teleop_core.bags.messages import Refusal, Report, read_reports, read_values, report, write_values
 from teleop_core.base.texts import printable
 from teleop_core.graph.topics import Kind
-from teleop_core.kernels.fields import record
-from teleop_core.nodes import wire
-from teleop_core.nodes.sender import Sender
 
 POSE = np.array([0.1, 0.2, 0.3, 1.0, 0.0, 0.0, 0.0])
 
@@ -90,30 +88,16 @@ def test_velocities_and_efforts_that_are_not_sent_are_nan() -> None:
     np.testing.assert_array_equal(values, [1.0, 2.0, *[np.nan] * 4])
 
 
-def check(kind: Kind, stamp_ns: int, values: Any, last_ns: int | None) -> Refusal | None:
-    """Reason why a live input refuses values, after a message with the stamp ``last_ns``."""
-    reading: Any = record(wire.Reading)
-    row, target, sender = values.copy(), np.zeros(len(values)), Sender(into=reading)
-    reading.width, reading.is_pose = len(values), kind is Kind.POSE
-    reading.row_at, reading.target_at = row.ctypes.data, target.ctypes.data
-    if last_ns is not None:
-        reading.has_stamp, reading.stamp_ns = 1, last_ns
-    is_accepted = wire.accept(sender.own, stamp_ns, 0, 0)
-    assert np.array_equal(target, values) is bool(is_accepted)
-    found = [reason for reason, count in zip(wire.REASONS, reading.refused, strict=False) if count]
-    return found[0] if found else None
-
-
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
 @pytest.mark.parametrize("column", [0, 3, 6])
 def test_numbers_that_are_not_finite_are_refused(bad: float, column: int) -> None:
     values = POSE.copy()
     values[column] = bad
-    assert check(Kind.POSE, 5, values, None) is Refusal.NOT_FINITE
+    assert why_refused(Kind.POSE, 5, values, None) is Refusal.NOT_FINITE
 
 
 def test_opposite_infinities_do_not_cancel() -> None:
-    assert check(Kind.JOINTS, 5, np.array([np.inf, -np.inf]), None) is Refusal.NOT_FINITE
+    assert why_refused(Kind.JOINTS, 5, np.array([np.inf, -np.inf]), None) is Refusal.NOT_FINITE
 
 
 @pytest.mark.parametrize(
@@ -122,12 +106,12 @@ def test_opposite_infinities_do_not_cancel() -> None:
 def test_quaternions_off_unit_length_by_more_than_a_thousandth_are_refused(norm: float, reason: Refusal | None) -> None:
     values = POSE.copy()
     values[3:] = norm * np.array([0.5, 0.5, -0.5, 0.5])
-    assert check(Kind.POSE, 5, values, None) is reason
+    assert why_refused(Kind.POSE, 5, values, None) is reason
 
 
 @pytest.mark.parametrize("last", [5, 6])
 def test_stamps_that_stand_still_or_go_back_are_refused(last: int) -> None:
-    assert check(Kind.POSE, 5, POSE, last) is Refusal.NOT_NEWER
+    assert why_refused(Kind.POSE, 5, POSE, last) is Refusal.NOT_NEWER
 
 
 # Control codes are shown, not kept: see teleop_core.base.texts.
