@@ -108,18 +108,14 @@ def test_of_three_seeds_the_one_is_run_whose_faults_have_met_least(monkeypatch: 
         (["--seed", "3", "stop_topic"], "with --simulated"),
     ],
 )
-def test_arguments_that_do_not_go_together_are_refused_in_one_line(words: Any, needed: Any) -> None:
-    done = subprocess.run(
-        [sys.executable, "-m", "teleop_core.commands.cli", "drill", *words], check=False, capture_output=True, text=True
-    )
-    assert done.returncode == 2
+def test_arguments_that_do_not_go_together_are_refused_in_one_line(words: Any, needed: Any, teleop_again: Any) -> None:
+    done = teleop_again("drill", *words, code=2)
     assert needed in done.stderr
     assert len(done.stderr.strip().splitlines()) == 1
 
 
 @pytest.mark.parametrize("count", ["0", "-1"])
-def test_no_schedules_are_refused_and_start_no_session(count: str) -> None:
-    words = [sys.executable, "-m", "teleop_core.commands.cli", "drill", "--seeds", count]
-    done = subprocess.run(words, check=False, capture_output=True, text=True)
-    assert (done.returncode, done.stdout) == (2, "")
+def test_no_schedules_are_refused_and_start_no_session(count: str, teleop_again: Any) -> None:
+    done = teleop_again("drill", "--seeds", count, code=2)
+    assert not done.stdout
     assert f"--seeds is {count}, must be at least 1" in done.stderr
