@@ -119,7 +119,7 @@ def info_of(out: Path) -> Any:
     return json.loads((out / "meta/info.json").read_text(encoding="utf-8"))
 
 
-def exported(bag: Path | list[Path], out: Path, **options: Any) -> teleop_exchange.ExportReport:
+def exported(bag: Path | tc.Recording | list[Path], out: Path, **options: Any) -> teleop_exchange.ExportReport:
     return teleop_exchange.export_recording(bag, out, "lerobot", **options)
 
 
@@ -243,8 +243,9 @@ def test_episodes_share_a_video_and_each_knows_its_part(tmp_path: Path) -> None:
     found, fps = frames_of(out, FRONT), info_of(out)["fps"]
     assert (fps, report.rows, len(found)) == (20, 32, 32)
     with av.open(str(out / f"videos/{FRONT}/chunk-000/file-000.mp4")) as file:
-        times = [frame.pts * frame.time_base for frame in file.decode(video=0)]
-    assert times == [Fraction(k, 20) for k in range(32)]
+        frames = list(file.decode(video=0))
+    assert [(frame.pts or 0) * (frame.time_base or 0) for frame in frames] == [Fraction(k, 20) for k in range(32)]
+    assert np.flatnonzero([frame.key_frame for frame in frames]).tolist() == list(range(0, 32, 5))
     for row, count in zip(rows, (12, 20), strict=True):
         begin = round(row[f"videos/{FRONT}/from_timestamp"] * fps)
         assert round(row[f"videos/{FRONT}/to_timestamp"] * fps) == begin + count == begin + row["length"]
@@ -364,10 +365,8 @@ def test_grade_grades_a_data_set_with_videos_as_one_without(tmp_path: Path) -> N
         bags.append(write(tmp_path / f"bag{seed}", messages + filmed(at, at)))
     exported(bags, tmp_path / "seen", rate=50.0)
     exported(bags, tmp_path / "blind", rate=50.0, cameras=())
-    columns = {"position": ("observation.state.6", "observation.state.7", "observation.state.8"), "unit": "m"}
-    found = [
-        teleop_lab.grade(tmp_path / name, options=teleop_exchange.ImportOptions(**columns))
-        for name in ("seen", "blind")
-    ]
+    columns = ("observation.state.6", "observation.state.7", "observation.state.8")
+    options = teleop_exchange.ImportOptions(position=columns, unit="m")
+    found = [teleop_lab.grade(tmp_path / name, options=options) for name in ("seen", "blind")]
     assert list(found[0].index) == list(found[1].index)
     assert found[0]["path_mm"].to_numpy() == pytest.approx(found[1]["path_mm"].to_numpy(), rel=0.05)

@@ -9,6 +9,7 @@ from typing import Any
 os.environ.setdefault("SVT_LOG", "1")  # the AV1 encoder would print its settings; errors remain
 
 import av
+import av.video.frame
 import av.video.reformatter
 import numpy as np
 from numpy.typing import NDArray
@@ -16,10 +17,10 @@ from numpy.typing import NDArray
 from teleop_exchange.pictures import LIMITED, pixels
 
 CODECS = {
-    "av1": ("libsvtav1", {"g": "2", "crf": "30", "preset": "12", "svtav1-params": "fast-decode=0"}),
-    "h264": ("libx264", {"g": "2", "crf": "23", "preset": "veryfast"}),
+    "av1": ("libsvtav1", {"g": "5", "crf": "30", "preset": "12", "svtav1-params": "fast-decode=0"}),
+    "h264": ("libx264", {"g": "5", "crf": "23", "preset": "veryfast"}),
 }
-"""Encoder of FFmpeg and its options, by codec. A key frame every two frames makes random access fast."""
+"""Encoder of FFmpeg and its options, by codec. A key frame every five frames: a learner reads single frames."""
 LEAST_AV1 = 64  # smallest width and height [px] that the AV1 encoder takes
 FILE_BYTES = 200 << 20
 PATTERN = "videos/{video_key}/chunk-{chunk_index:03d}/file-{file_index:03d}.mp4"
@@ -94,6 +95,7 @@ class Video:
             frame, self.width, self.height, "yuv420p", src_color_range=frame.color_range, dst_color_range=LIMITED
         )
         made.pts, made.time_base = self._frames, Fraction(1, self.fps)
+        made.pict_type = av.video.frame.PictureType.NONE  # that of a JPEG would make each frame a key frame
         packets = self._stream.encode(made)
         self._bytes += sum(packet.size for packet in packets)
         self._container.mux(packets)
