@@ -6,7 +6,6 @@ Source:
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import pairwise
 
 import mujoco
 import numpy as np

@@ -21,9 +21,9 @@ import numpy as np
 
 from teleop_core.base import TeleopError
 from teleop_core.kernels import Array, Fields, kernel, record
+from teleop_core.kernels.fields import Integers
 from teleop_core.kernels.memory import call
 from teleop_scene import actuators, models
-from teleop_core.kernels.fields import Integers
 
 _STEPS_TRIED = 40
 _SHARE = 0.7  # of a tick that the steps of a scene may take in a live session
