@@ -157,7 +157,7 @@ def with_changes(recorded: Layer, changes: Iterable[Layer]) -> list[Layer]:
         now = [robot for robot in robots if robot is not None]
         if now and now[-1] != now[0]:
             of_scene = _implied(f"{arm}{slash}{stage}", {"robot": now[0]})
-            for key, value in (PUBLISHED.get(str(now[0]), {}).get(stage, {}) | of_scene).items():
+            for key, value in {**PUBLISHED.get(str(now[0]), {}).get(stage, {}), **of_scene}.items():
                 if values.get(key) in (value, list(value)):
                     del values[key]
     return [kept, *changes]

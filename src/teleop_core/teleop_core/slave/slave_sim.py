@@ -223,7 +223,9 @@ class SlaveSim(RunningStage):
         if make is None:
             return None
         if p["has_world"]:
-            raise ParameterError("world.kind", parameters.world.kind.kind, f"empty, because plant={kind.kind} has a world")
+            raise ParameterError(
+                "world.kind", parameters.world.kind.kind, f"empty, because plant={kind.kind} has a world"
+            )
         mover = make(kind.parameters, self.robot, self.arm, self.signals, self.dt)
         p["see"], p["see_block"] = mover.see.address, mover.see.block_address
         p["move"], p["move_block"] = mover.move.address, mover.move.block_address
