@@ -4,7 +4,7 @@ import warnings
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from teleop_core.base import ParameterError, PartError, TeleopWarning, UnknownNameError, build, specs, values_of
 from teleop_core.base.plain_yaml import written
@@ -21,12 +21,15 @@ from teleop_core.graph.layers import (
     config_folder,
     declared_groups,
     load_file,
+    merge,
     parse_setting,
     scenario_file,
 )
 from teleop_core.hand.operators import OPERATORS
 from teleop_core.robots.parts import is_scene
 from teleop_core.robots.selection import PUBLISHED, RobotParameters
+
+_Group = TypeVar("_Group")
 
 
 @dataclass(frozen=True)
@@ -54,10 +57,7 @@ class Configuration:
             ParameterError: A value violates its declaration.
             PartError: The graph cannot run.
         """
-        merged: Layer = {}
-        for layer in layers:
-            for name, values in layer.items():
-                merged.setdefault(name, {}).update(_implied(name, values) | values)
+        merged = merge({name: _implied(name, given) | given for name, given in layer.items()} for layer in layers)
         every = merged.pop(EVERY, {})
         session = _with_scene(build(SessionParameters, merged.get(SESSION, {}), f"{SESSION}."), merged)
         _check_order(session.stages)
@@ -75,8 +75,29 @@ class Configuration:
             _check_operator(graph, groups, arm)
         return Configuration(groups, scenario, graph)
 
+    @property
+    def session(self) -> SessionParameters:
+        """Parameters of the session as a whole."""
+        return self.of(SessionParameters)
+
+    def of(self, kind: type[_Group], arm: str = "") -> _Group:
+        """Parameters of the stage whose parameters are a ``kind``.
+
+        Args:
+            kind: Parameter group, such as ``MotionScalingParameters``.
+            arm: Namespace of the arm.
+
+        Raises:
+            UnknownNameError: No stage of the arm has such parameters.
+        """
+        own = {name: group for name, group in self.groups.items() if name.rpartition("/")[0] == arm}
+        found = next((group for group in own.values() if type(group) is kind), None)
+        if found is None:
+            raise UnknownNameError("parameter group", kind.__name__, [type(group).__name__ for group in own.values()])
+        return found
+
     def group(self, stage: str, arm: str = "") -> Any:
-        """Parameters of a stage of the arm with the namespace ``arm``."""
+        """Parameters of a stage, by its name, of the arm with the namespace ``arm``."""
         return self.groups[f"{arm}/{stage}" if arm else stage]
 
     def value(self, name: str, arm: str = "") -> Any:
@@ -157,7 +178,8 @@ def with_changes(recorded: Layer, changes: Iterable[Layer]) -> list[Layer]:
         now = [robot for robot in robots if robot is not None]
         if now and now[-1] != now[0]:
             of_scene = _implied(f"{arm}{slash}{stage}", {"robot": now[0]})
-            for key, value in {**PUBLISHED.get(str(now[0]), {}).get(stage, {}), **of_scene}.items():
+            implied: dict[str, Any] = {**PUBLISHED.get(str(now[0]), {}).get(stage, {}), **of_scene}
+            for key, value in implied.items():
                 if values.get(key) in (value, list(value)):
                     del values[key]
     return [kept, *changes]
