@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from accepted import why_refused
 from teleop_core.bags.messages import Refusal, Report, read_reports, read_values, report, write_values
 from teleop_core.base.texts import printable
-from teleop_core.graph.topics import Kind
+from teleop_core.graph.topics import POSES, Kind
 
 POSE = np.array([0.1, 0.2, 0.3, 1.0, 0.0, 0.0, 0.0])
 
@@ -22,6 +22,7 @@ def empty_message(kind: Kind) -> Any:
 
     bodies = {
         Kind.POSE: {"pose": Record(position=vector(), orientation=vector())},
+        Kind.POSES: {"poses": [Record(position=vector(), orientation=vector()) for _ in range(POSES)]},
         Kind.TWIST: {"twist": Record(linear=vector(), angular=vector())},
         Kind.WRENCH: {"wrench": Record(force=vector(), torque=vector())},
     }
