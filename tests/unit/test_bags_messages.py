@@ -20,7 +20,7 @@ def empty_message(kind: Kind) -> Any:
     def vector() -> Record:
         return Record(x=0.0, y=0.0, z=0.0)
 
-    bodies = {
+    bodies: dict[Kind, dict[str, Any]] = {
         Kind.POSE: {"pose": Record(position=vector(), orientation=vector())},
         Kind.POSES: {"poses": [Record(position=vector(), orientation=vector()) for _ in range(POSES)]},
         Kind.TWIST: {"twist": Record(linear=vector(), angular=vector())},
