@@ -75,11 +75,14 @@ def load_scene(file: Path, *, tip: str = "", base: str = "", task: str = "", dri
     """
     if drive not in DRIVES:
         raise UnknownNameError("drive", drive, DRIVES)
-    return _loaded(file, models.model_of(file), tip, base, task, drive)
+    return arm_of(file, models.model_of(file), tip, base, task, drive)
 
 
 @lru_cache(maxsize=32)
-def _loaded(file: Path, model: mujoco.MjModel, tip: str, base: str, task: str, drive: str) -> SceneRobot:
+def arm_of(
+    file: Path, model: mujoco.MjModel, tip: str = "", base: str = "", task: str = "", drive: str = "model"
+) -> SceneRobot:
+    """Arm of a compiled model; arguments and errors are those of :func:`load_scene`."""
     own = chain.chain_of(model, tip, base)
     chain.refuse_unusable(model, own)
     begin = np.array(model.key_qpos[0] if model.nkey else model.qpos0)

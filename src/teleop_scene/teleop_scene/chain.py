@@ -18,6 +18,7 @@ from teleop_core.robots.files.urdf_tree import ASSUMED, turn_of_z
 
 HINGE, SLIDE = int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE)
 _NAMES = {int(mujoco.mjtJoint.mjJNT_FREE): "free", int(mujoco.mjtJoint.mjJNT_BALL): "ball"}
+_TIES = (int(mujoco.mjtEq.mjEQ_CONNECT), int(mujoco.mjtEq.mjEQ_WELD))
 _EYE = np.eye(4)
 
 
@@ -207,7 +208,7 @@ def gravity(model: mujoco.MjModel, chain: Chain, base: Array) -> Array:
 
 
 def refuse_unusable(model: mujoco.MjModel, chain: Chain) -> None:
-    """Refuse constraints that tie joints of the arm together, or the arm to other bodies; inverse kinematics ignore them.
+    """Refuse constraints between joints of the arm, or between the arm and others; inverse kinematics ignore them.
 
     Raises:
         ParameterError: There is such an equality constraint or tendon; the message names it.
@@ -232,19 +233,21 @@ def _tie(model: mujoco.MjModel, chain: Chain, own: set[int], i: int) -> str:
     kind, a, b = model.eq_type[i], int(model.eq_obj1id[i]), int(model.eq_obj2id[i])
     if kind == mujoco.mjtEq.mjEQ_JOINT:
         return f"it ties joint {joint_name(model, min(own & {a, b}))}" if own & {a, b} else ""
-    if kind not in (mujoco.mjtEq.mjEQ_CONNECT, mujoco.mjtEq.mjEQ_WELD) or is_puppet(model, i):
+    if kind not in _TIES or is_puppet(model, i):
         return ""
     if model.eq_objtype[i] == mujoco.mjtObj.mjOBJ_SITE:
         a, b = int(model.site_bodyid[a]), int(model.site_bodyid[b])
     links = [next((x for x in ancestors(model, body) if x in chain.bodies), 0) for body in (a, b)]
-    if links[0] == links[1] or not any(_joint_links(model, chain, link) for link in links):
+    if links[0] == links[1] or any(_is_free(model, body) for body in (a, b)):
         return ""
-    names = [model.body(x).name or "the world" for x in (a, b)]
+    names = [model.body(x).name for x in (a, b)]
     return f"it ties {names[0]} to {names[1]}"
 
 
-def _joint_links(model: mujoco.MjModel, chain: Chain, link: int) -> bool:
-    return link in chain.bodies
+def _is_free(model: mujoco.MjModel, body: int) -> bool:
+    """Whether a free joint moves a body, which an arm may carry."""
+    kinds = [model.jnt_type[j] for b in ancestors(model, body) for j in joints_of(model, b)]
+    return mujoco.mjtJoint.mjJNT_FREE in kinds
 
 
 def is_puppet(model: mujoco.MjModel, i: int) -> bool:

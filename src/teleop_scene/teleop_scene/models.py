@@ -10,6 +10,8 @@ import mujoco
 
 from teleop_core.base import ParameterError, RecordingError
 
+OWN = Path(__file__).parent / "scenes"
+"""Folder of the scenes of this package."""
 _MOST_WORDS = 40  # of an error of the compiler, whose messages may be pages long
 
 
@@ -17,12 +19,16 @@ def file_of(name: str) -> Path:
     """File that the name of a scene means.
 
     Args:
-        name: Path of an MJCF file, or such a path that begins with the name of an installed package:
-            ``gym_aloha/assets/bimanual_viperx_transfer_cube.xml``. The package is not imported.
+        name: Path of an MJCF file; or such a path that begins with the name of an installed package, which is not
+            imported: ``gym_aloha/assets/bimanual_viperx_transfer_cube.xml``; or the name of a scene of this package:
+            ``cubes.xml``.
     """
     path = Path(name).expanduser()
-    if path.is_absolute() or path.exists() or len(path.parts) < 2:
+    if path.is_absolute() or path.exists():
         return path
+    if len(path.parts) == 1:
+        own = OWN / path
+        return own if own.is_file() else path
     folder = package_folder(path.parts[0])
     return path if folder is None else folder.joinpath(*path.parts[1:])
 

@@ -21,6 +21,7 @@ from teleop_scene.chain import ancestors, is_puppet
 from teleop_scene.scene import SceneState, advance, shared
 
 _BRAKED = topics.OPERATION.index("is_braked")
+_FIRM = 0.9999  # impedance of the friction of a brake, the largest that MuJoCo uses, so that it hardly creeps
 _BRAKE = 2.0  # friction of a brake, divided by the effort limit of its drive
 
 
@@ -55,7 +56,7 @@ def see(
         own: State of the arm; written.
         scene: Positions, speeds and efforts of the scene.
         places: Rows (3, n): positions, speeds and actuators of the joints in the arrays of the scene.
-        ratios: Rows (3, n), see :class:`_Mover`.
+        ratios: Rows (5, n), see :class:`_Mover`.
         bodies: Bodies behind the last joint.
         forces: Forces of contacts (nbody, 6): torque, then force, about ``center`` in axes of the world.
         center: Centre of mass of the arm (3,) in the world.
@@ -106,7 +107,7 @@ def move(
     ratios: Array,
     control: Array,
     efforts: Array,
-    friction: Array,
+    friction: tuple[Array, Array],
     arm: SimulatedArm,
     row: Row,
 ) -> None:
@@ -115,17 +116,20 @@ def move(
     Args:
         own: State of the arm.
         places: Rows (3, n), as in :func:`see`.
-        ratios: Rows (3, n), see :class:`_Mover`.
+        ratios: Rows (5, n), see :class:`_Mover`.
         control: Controls (nu,) of the scene's actuators; written.
         efforts: Efforts (nv,) on joints without an actuator; written.
-        friction: Dry friction (nv,) of the scene's joints; written.
+        friction: Dry friction (nv,) of the scene's joints, and how firm it is (nv, 5); written.
         arm: The arm.
         row: Signals.
     """
     is_braked = row.slave_operation[_BRAKED] > 0.0
     for i in range(arm.q.shape[0]):
         dof, actuator = places[1, i], places[2, i]
-        friction[dof] = ratios[1, i] + (ratios[2, i] if is_braked else 0.0)
+        friction[0][dof] = ratios[1, i] + (ratios[2, i] if is_braked else 0.0)
+        friction[1][dof, 0], friction[1][dof, 1] = ratios[3, i], ratios[4, i]
+        if is_braked:
+            friction[1][dof, 0] = friction[1][dof, 1] = _FIRM
         if own.has_servos != 0:
             control[actuator] = ratios[0, i] * (arm.q[i] if is_braked else arm.setpoint[i])
         elif actuator >= 0:
@@ -137,8 +141,8 @@ def move(
 class _Mover:
     """Arm in a scene.
 
-    The rows of ``ratios`` (3, n) are: control divided by effort, or by position for servos; dry friction; friction that
-    the brakes add.
+    The rows of ``ratios`` (5, n) are: control divided by effort, or by position for servos; dry friction; friction that
+    the brakes add; the least and the largest impedance of dry friction.
     """
 
     see: Addressed
@@ -158,7 +162,8 @@ class _Mover:
         dofs = model.jnt_dofadr[joints]
         places = np.array([model.jnt_qposadr[joints], dofs, [d.index for d in drives]], np.int64)
         scale = [d.gear if d.is_servo else 1.0 / (d.gear * d.gain) for d in drives]
-        ratios = np.array([scale, model.dof_frictionloss[dofs], _BRAKE * arm.limit], np.float64)
+        firm = model.dof_solimp[dofs, :2].T
+        ratios = np.array([scale, model.dof_frictionloss[dofs], _BRAKE * arm.limit, *firm], np.float64)
         last = int(model.jnt_bodyid[joints[-1]])
         bodies = np.array([b for b in range(model.nbody) if last in ancestors(model, b)], np.int64)
         center = scene.data.subtree_com[model.body_rootid[last]]
@@ -167,7 +172,17 @@ class _Mover:
             robot.world_base.copy(), arm, row,
         )  # fmt: skip
         data = scene.data
-        self.move = addressed(move, own, places, ratios, data.ctrl, data.qfrc_applied, model.dof_frictionloss, arm, row)
+        self.move = addressed(
+            move,
+            own,
+            places,
+            ratios,
+            data.ctrl,
+            data.qfrc_applied,
+            (model.dof_frictionloss, model.dof_solimp),
+            arm,
+            row,
+        )
         self._slowness = scene.slowness()
 
     def _free_from_others(self, drives: list[actuators.JointDrive]) -> None:

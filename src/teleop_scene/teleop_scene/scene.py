@@ -4,8 +4,8 @@ A tick calls ``mj_step`` by its address from compiled code, without Python. The 
 arms begins its next tick: by then every arm has given its efforts for the last tick. So the order of the arms has no
 effect, and two arms move one world.
 
-The scene begins with its whole state at the keyframe or at the model's own zero; :meth:`Scene.reset` restores all of it,
-with the solver's warm start. Therefore equal controls give equal bits on one machine with one version of MuJoCo.
+The scene begins with its whole state at the keyframe or at the model's own zero; :meth:`Scene.reset` restores all of
+it, with the solver's warm start. So equal controls give equal bits on one machine with one version of MuJoCo.
 """
 
 import copy
@@ -27,6 +27,7 @@ from teleop_scene import actuators, models
 
 _STEPS_TRIED = 40
 _SHARE = 0.7  # of a tick that the steps of a scene may take in a live session
+_HUGE = 1e10  # MuJoCo calls a larger position or speed bad
 _DISABLED = mujoco.mjtDisableBit
 
 
@@ -63,7 +64,7 @@ def address_of(name: str) -> int:
 
 @kernel
 def advance(s: SceneState, qpos: Array, qvel: Array, force: Array, given: Array) -> None:
-    """Move the scene by a tick; a scene with a number that is not finite stands still.
+    """Move the scene by a tick; a scene with a number that is huge or not finite stands still.
 
     Args:
         s: State record; written.
@@ -80,10 +81,10 @@ def advance(s: SceneState, qpos: Array, qvel: Array, force: Array, given: Array)
             s.work += (force[i] + given[i]) * qvel[i] * s.dt
     call(s.find_forces, s.model, s.data, 0, 0)
     for i in range(qpos.shape[0]):
-        if not math.isfinite(qpos[i]):
+        if not abs(qpos[i]) < _HUGE:
             s.is_lost = 1
     for i in range(qvel.shape[0]):
-        if not math.isfinite(qvel[i]):
+        if not abs(qvel[i]) < _HUGE:
             s.is_lost = 1
     s.ticks += 1
 
@@ -123,7 +124,7 @@ class Scene:
         self.begin = np.array(self.model.key_qpos[0] if self.model.nkey else self.model.qpos0)
         self.control = np.array(self.model.key_ctrl[0] if self.model.nkey else np.zeros(self.model.nu))
         self._claims: set[str] = set()
-        self._friction = self.model.dof_frictionloss.copy()
+        self._friction = self.model.dof_frictionloss.copy(), self.model.dof_solimp.copy()
         self.reset()
 
     def claim(self, owner: str) -> bool:
@@ -151,7 +152,7 @@ class Scene:
             self.data.act[:] = self.model.key_act[0]
         self.data.ctrl[:] = self.control
         self.data.qpos[:] = self.begin
-        self.model.dof_frictionloss[:] = self._friction
+        self.model.dof_frictionloss[:], self.model.dof_solimp[:] = self._friction
         mujoco.mj_forward(self.model, self.data)
         self.data.qacc_warmstart[:] = 0.0
         self.state["ticks"], self.state["is_lost"], self.state["work"] = 0, 0, 0.0
@@ -179,7 +180,7 @@ class Scene:
 
     def _is_lost(self, joint: int) -> bool:
         begin = int(self.model.jnt_dofadr[joint])
-        return not math.isfinite(float(self.data.qvel[begin]))
+        return not abs(float(self.data.qvel[begin])) < _HUGE
 
     def step_time(self) -> float:
         """Processor time [s] of the steps of a tick, the median of some ticks at the start on a copy of the state."""

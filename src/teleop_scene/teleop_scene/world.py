@@ -41,7 +41,8 @@ class WorldState(Fields):
     """State record of the stage."""
 
     ticks: int
-    every: int  # ticks from one message to the next
+    every_ns: int  # time from one message to the next [ns]
+    slot: int  # number of the last message
     is_first: int  # whether the stage writes poses and energies
     place: int  # address of the C function that computes the poses of the bodies
     has_jaw: int
@@ -88,7 +89,9 @@ def world_step(
         before = row.slave_jaw_measured_js[0]
         row.slave_jaw_measured_js[0] = own.upper * share
         row.slave_jaw_measured_js[1] = (own.upper * share - before) / dt if own.ticks > 0 else 0.0
-    if own.is_first != 0 and own.ticks % own.every == 0 and s.is_lost == 0:
+    slot = row.now_ns // own.every_ns
+    if own.is_first != 0 and slot != own.slot and s.is_lost == 0:
+        own.slot = slot
         call(own.place, s.model, s.data, 0, 0)
         for k in range(bodies.shape[0]):
             for i in range(3):
@@ -120,7 +123,7 @@ class World(RunningStage):
         self.scene, self.robot, model, data = scene, robot, scene.model, scene.data
         self._row = self.signals.copy()
         self.state = own = record(WorldState)
-        own["every"] = max(1, round(1.0 / (parameters.rate * dt)))
+        own["every_ns"] = round(1e9 / parameters.rate)
         own["is_first"], own["place"] = scene.claim("poses"), address_of("mj_kinematics")
         own["upper"] = parameters.jaw_upper
         self.jaw = found = jaw_of(model, robot, parameters.jaw, parameters.jaw_open)
@@ -140,7 +143,7 @@ class World(RunningStage):
     def reset(self) -> None:
         """Return to the state before the first tick; the scene itself is reset by its arms."""
         assign(self.signals, self._row)
-        self.state["ticks"] = 0
+        self.state["ticks"], self.state["slot"] = 0, -1
         self.signals["slave_jaw_measured_js"][0] = self.state["upper"]
         self.signals["slave_jaw_setpoint_js_ns"] = topics.NO_COMMAND_NS
 

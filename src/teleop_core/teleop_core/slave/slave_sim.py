@@ -303,7 +303,8 @@ class SlaveSim(RunningStage):
         assert self.robot.drives is not None
         if self.parameters["has_servos"]:
             return
-        stability.check_friction(self.parameters, self.robot.drives.inertia, self.dt)
+        if self._mover is None:
+            stability.check_friction(self.parameters, self.robot.drives.inertia, self.dt)
         loop = stability.ClosedLoop(self.parameters, self.state, self.arm, self.signals, self.dt)
         stability.check_stable(self._law, self.robot, loop, are_large_tried=parameters.trials == "all")
 
