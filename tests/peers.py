@@ -22,7 +22,8 @@ from teleop_core.nodes.observer import Observer
 from teleop_core.nodes.quality import profile
 from teleop_core.nodes.streams import Subscription, message_type
 from teleop_core.robots import load_robot
-from teleop_core.slave import slave, slave_sim
+from teleop_core.slave import slave_sim
+from teleop_core.slave.parameters import SlaveParameters
 
 with warnings.catch_warnings():
     warnings.simplefilter("ignore")  # its parser imports a deprecated module of Python
@@ -89,7 +90,7 @@ def at_rest(listener: Listener, count: int = 1000) -> Callable[[], object]:
 def _is_of_arm(key: str) -> bool:
     """Whether a parameter, with double underscores for dots, is that of a simulated arm alone."""
     name = key.replace("__", ".")
-    mine, its = ({spec.name for spec in specs(g)} for g in (slave.SlaveParameters, slave_sim.SlaveSimParameters))
+    mine, its = ({spec.name for spec in specs(g)} for g in (SlaveParameters, slave_sim.SlaveSimParameters))
     return name in its - mine
 
 

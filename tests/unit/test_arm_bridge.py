@@ -17,7 +17,7 @@ from teleop_core.slave.bridges import BRIDGES, Command, arm_bridge, leading
 from teleop_core.slave.bridges.hearing import Hearing, Sample, Wrong
 from teleop_core.slave.bridges.names import JointMap
 from teleop_core.slave.operation.states import State
-from teleop_core.slave.slave import SlaveParameters
+from teleop_core.slave.parameters import SlaveParameters
 
 MS = 1_000_000
 SPEED = np.array([1.0, 2.0])

@@ -13,7 +13,8 @@ from teleop_core.robots import load_robot
 from teleop_core.slave.commands import CommandStatus
 from teleop_core.slave.operation import Event, Fault, State
 from teleop_core.slave.pair import ArmParameters, SimulatedArm
-from teleop_core.slave.slave import Slave, SlaveParameters
+from teleop_core.slave.parameters import SlaveParameters
+from teleop_core.slave.slave import Slave
 
 ARM = load_robot("rcrt1")
 N = ARM.n

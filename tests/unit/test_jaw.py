@@ -16,7 +16,8 @@ from teleop_core.graph import TICK_NS, topics
 from teleop_core.kernels.geometry import Array
 from teleop_core.slave.jaw.grip import WEIGHT
 from teleop_core.slave.jaw.jaw import Jaw, JawParameters
-from teleop_core.slave.jaw.jaw_sim import GripObjectParameters, JawSim, JawSimParameters, PegParameters
+from teleop_core.slave.jaw.jaw_sim import JawSim
+from teleop_core.slave.jaw.parameters import GripObjectParameters, JawSimParameters, PegParameters
 from teleop_core.slave.operation import State
 
 ENABLED, STATE = float(State.ENABLED), topics.OPERATION.index("state")

@@ -23,7 +23,7 @@ from teleop_core.slave import commands, pair, slave_sim
 from teleop_core.slave.controllers import CONTROLLERS
 from teleop_core.slave.joints import integrate
 from teleop_core.slave.operation import Answer, Fault, OperationParameters, State
-from teleop_core.slave.slave import ReferenceFilterParameters
+from teleop_core.slave.parameters import ReferenceFilterParameters
 
 ARM = load_robot("rcrt1")
 DRIVES = present(ARM.drives)

@@ -13,7 +13,7 @@ from typing import Any
 
 from teleop_core.graph.topics import TELEOP_STATE, Kind, Topic
 from teleop_core.kernels import Array, kernel, records
-from teleop_core.kernels.fields import Field
+from teleop_core.kernels.groups import Field
 from teleop_core.kernels.layout import COUNT, PerJoints
 
 TICK_NS = 1_000_000

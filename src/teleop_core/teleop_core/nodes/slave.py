@@ -12,7 +12,7 @@ from teleop_core.nodes.ticking import TickingNode
 from teleop_core.slave.commands import CommandStatus
 from teleop_core.slave.operation import Fault, State, operation_text
 from teleop_core.slave.ownership import Leader
-from teleop_core.slave.slave import SlaveParameters
+from teleop_core.slave.parameters import SlaveParameters
 
 _SERVO = SLAVE_SERVO_JP.name
 _SELDOM = 10

@@ -4,7 +4,7 @@ import warnings
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from teleop_core.base import ParameterError, PartError, TeleopWarning, UnknownNameError, build, specs, values_of
 from teleop_core.base.plain_yaml import written
@@ -21,11 +21,14 @@ from teleop_core.graph.layers import (
     config_folder,
     declared_groups,
     load_file,
+    merge,
     parse_setting,
     scenario_file,
 )
 from teleop_core.hand.operators import OPERATORS
 from teleop_core.robots.selection import PUBLISHED, RobotParameters
+
+_Group = TypeVar("_Group")
 
 
 @dataclass(frozen=True)
@@ -53,10 +56,7 @@ class Configuration:
             ParameterError: A value violates its declaration.
             PartError: The graph cannot run.
         """
-        merged: Layer = {}
-        for layer in layers:
-            for name, values in layer.items():
-                merged.setdefault(name, {}).update(values)
+        merged = merge(layers)
         every = merged.pop(EVERY, {})
         session = build(SessionParameters, merged.get(SESSION, {}), f"{SESSION}.")
         _check_order(session.stages)
@@ -74,8 +74,29 @@ class Configuration:
             _check_operator(graph, groups, arm)
         return Configuration(groups, scenario, graph)
 
+    @property
+    def session(self) -> SessionParameters:
+        """Parameters of the session as a whole."""
+        return self.of(SessionParameters)
+
+    def of(self, kind: type[_Group], arm: str = "") -> _Group:
+        """Parameters of the stage whose parameters are a ``kind``.
+
+        Args:
+            kind: Parameter group, such as ``MotionScalingParameters``.
+            arm: Namespace of the arm.
+
+        Raises:
+            UnknownNameError: No stage of the arm has such parameters.
+        """
+        own = {name: group for name, group in self.groups.items() if name.rpartition("/")[0] == arm}
+        found = next((group for group in own.values() if type(group) is kind), None)
+        if found is None:
+            raise UnknownNameError("parameter group", kind.__name__, [type(group).__name__ for group in own.values()])
+        return found
+
     def group(self, stage: str, arm: str = "") -> Any:
-        """Parameters of a stage of the arm with the namespace ``arm``."""
+        """Parameters of a stage, by its name, of the arm with the namespace ``arm``."""
         return self.groups[f"{arm}/{stage}" if arm else stage]
 
     def value(self, name: str, arm: str = "") -> Any:

@@ -8,7 +8,7 @@ from teleop_core.kernels.room import room
 from teleop_core.kinematics.damped import eliminate, gram, weigh
 from teleop_core.slave import commands
 from teleop_core.slave.arm import ArmModel
-from teleop_core.slave.commands import SlaveNumbers, SlaveState
+from teleop_core.slave.commands import SlaveRecord, SlaveState
 
 
 class Motion(IntEnum):
@@ -59,7 +59,7 @@ def joint_speeds(arm: ArmModel, q: Array, twist: Array, speed: Array) -> None:
 
 
 @inner
-def _share_of_limits(p: SlaveNumbers, s: SlaveState, dt: float) -> float:
+def _share_of_limits(p: SlaveRecord, s: SlaveState, dt: float) -> float:
     """Largest factor, at most 1, by which the wanted speeds stay within speed limits and, for a twist, joint limits."""
     share = 1.0
     for i in range(s.drive.shape[0]):
@@ -75,7 +75,7 @@ def _share_of_limits(p: SlaveNumbers, s: SlaveState, dt: float) -> float:
 
 
 @inner
-def advance_velocity(p: SlaveNumbers, s: SlaveState, arm: ArmModel, now_ns: int, dt: float) -> None:
+def advance_velocity(p: SlaveRecord, s: SlaveState, arm: ArmModel, now_ns: int, dt: float) -> None:
     """Move the setpoint at the wanted speed; without a fresh command the setpoint brakes to rest.
 
     All joints stay within their speed limits, change their speed no faster than their drives can brake, and stop at

@@ -12,7 +12,6 @@ from std_msgs.msg import Bool
 from std_srvs.srv import Trigger
 
 from teleop_core.bags.messages import layout
-from teleop_core.graph.layers import SESSION
 from teleop_core.graph.topics import SLAVE_MEASURED_JS, SLAVE_OPERATION, SLAVE_SETPOINT_JS, TELEOP_STATE, Topic
 from teleop_core.kernels.geometry import Array
 from teleop_core.middleware.ros_parameters import to_message
@@ -79,7 +78,7 @@ class LiveRig:
         self.begin_ns, self.warned, self.said = 0, dict[str, int](), ""
         self.woken_ns, self._warned_before = 0, dict[str, str]()
         self.tap = Tap(
-            self._own, robot.joint_names, configuration.groups[SESSION].real_time, has_hand=site.master is Master.DRILL
+            self._own, robot.joint_names, configuration.session.real_time, has_hand=site.master is Master.DRILL
         )
 
     def close(self) -> None:

@@ -17,6 +17,8 @@ from teleop_core.kernels.geometry import Array
 from teleop_core.session.recording import Recording, Stream
 from teleop_core.session.runner import silent
 from teleop_core.slave.pair import ArmParameters
+from teleop_core.slave.parameters import SlaveParameters
+from teleop_core.slave.slave_sim import SlaveSimParameters
 
 Setting = float | str | bool | tuple[float, ...] | tuple[str, ...]
 Settings = Mapping[str, Setting]
@@ -184,7 +186,7 @@ class Bench:
 
         given = {"seed": self.seed, **self._settings, **dict(settings or {})}
         made = configuration(settings=given)
-        return ArmParameters.of(made.group("slave"), made.group("slave_sim"))
+        return ArmParameters.of(made.of(SlaveParameters), made.of(SlaveSimParameters))
 
     def signals(
         self, scenario: str, seconds: float, settings: Settings | None = None, motion: Motion | None = None

@@ -9,6 +9,7 @@ from teleop_core.base.errors import TeleopError
 from teleop_core.coupling.mapping.gains import MotionScalingParameters
 from teleop_core.evaluation.figure import COMMAND, FIRST, MEASURED, Figure, axis, line
 from teleop_core.graph.signals import DT
+from teleop_core.hand.operators.behaviour import OperatorParameters
 from teleop_core.hand.operators.tour import TourParameters
 from teleop_core.kernels.axes import axis_map
 from teleop_core.kernels.geometry import Array
@@ -96,7 +97,7 @@ def _visits(bench: Bench, settings: Settings, *, seeing: bool) -> list[Visits]:
     """Results of all hands. A hand that sees repeats the task and corrects the errors of the first run."""
     from teleop_core.session.api import configuration
 
-    made = configuration(SCENARIO).group("operator")
+    made = configuration(SCENARIO).of(OperatorParameters)
     center, p, approach = np.array(made.center), made.kind.parameters, float(made.approach_time)
     first = [visits_of(s, p, center, approach) for s in bench.sessions(SCENARIO, settings)]
     if not seeing:

@@ -8,7 +8,7 @@ from teleop_core.evaluation.figure import COMMAND, FIRST, MEASURED, Figure, axis
 from teleop_core.graph.signals import DT
 from teleop_core.kernels.filters import lag_step
 from teleop_core.kernels.geometry import Array
-from teleop_core.slave.slave import ReferenceFilterParameters
+from teleop_core.slave.parameters import ReferenceFilterParameters
 from teleop_lab.experiments.bench import Bench, Session, Settings
 from teleop_lab.experiments.comparison import EXACT, Comparison, Findings, absolute, factor
 from teleop_lab.experiments.experiment import Experiment
