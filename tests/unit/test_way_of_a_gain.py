@@ -20,7 +20,7 @@ from teleop_core.slave.parameters import SlaveParameters
 
 PAGE = Path(__file__).parents[2] / "docs" / "parameters.md"
 STEP = re.compile(r"^\| \d+ \| `([\w/]+)\.py`, `([\w.]+)`", re.MULTILINE)
-GAINS: list[tuple[type, str, str, float]] = [
+GAINS: list[tuple[type[Any], str, str, float]] = [
     (MotionScalingParameters, "motion_scaling", "fixture.damping", 12.345),
     (HapticMasterParameters, "haptic_master", "device.peak_force", 2.345),
     (SlaveParameters, "slave", "operation.overspeed", 1.345),
@@ -34,7 +34,7 @@ def of_file(path: Path, stage: str, name: str, value: float) -> Configuration:
 
 @pytest.mark.parametrize(("kind", "stage", "name", "value"), GAINS, ids=[gain[2] for gain in GAINS])
 def test_a_gain_has_one_name_in_the_file_the_group_and_the_record(
-    kind: type, stage: str, name: str, value: float, tmp_path: Path
+    kind: type[Any], stage: str, name: str, value: float, tmp_path: Path
 ) -> None:
     of_name = attrgetter(name)
     given = of_file(tmp_path / "gain.yaml", stage, name, value).of(kind)

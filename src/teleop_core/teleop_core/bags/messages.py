@@ -108,6 +108,10 @@ def _row(kind: Kind, message: Any, joint_names: tuple[str, ...]) -> list[float] 
     if kind is Kind.POSE:
         p, q = message.pose.position, message.pose.orientation
         return [p.x, p.y, p.z, q.w, q.x, q.y, q.z]
+    if kind is Kind.POSES:
+        found = [(p.position, p.orientation) for p in message.poses]
+        row = [x for p, q in found for x in (p.x, p.y, p.z, q.w, q.x, q.y, q.z)]
+        return row if len(row) == kind.width(0) else Refusal.WRONG_LENGTH
     if kind is Kind.TWIST:
         return _six(message.twist.linear, message.twist.angular)
     if kind is Kind.WRENCH:

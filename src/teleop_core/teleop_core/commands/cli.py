@@ -60,6 +60,7 @@ COMMANDS = {
         "import": "Turn a file from another system into a recording",
         "export": "Write recordings as tables or a data set",
     },
+    "teleop_scene.commands": {"scenes": "List MuJoCo models that a session can use, or the arms of one"},
     "teleop_lab.commands.calibrate": {
         "calibrate": "Find joint offsets and link errors of an arm from measured places of its tip"
     },

@@ -51,6 +51,8 @@ def make_signals(topics: Iterable[Topic], joints: int, notes: Iterable[Field] = 
     for topic in ports:
         if topic.kind is Kind.POSE:
             signals[topic.field][:, 3] = 1.0
+        elif topic.kind is Kind.POSES:
+            signals[topic.field][:, 3::7] = 1.0
     return signals
 
 

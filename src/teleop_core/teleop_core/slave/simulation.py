@@ -3,7 +3,7 @@
 import math
 
 from teleop_core.graph import Row, copy, topics
-from teleop_core.kernels import Array, PerJoint, inner, kernel, pose_from_transform
+from teleop_core.kernels import Array, Fields, PerJoint, call_address, inner, kernel, pose_from_transform
 from teleop_core.robots.dynamics.rigid_body import write_model
 from teleop_core.slave.arm import Arm
 from teleop_core.slave.elastic import ElasticNumbers, ElasticState, integrate_elastic
@@ -21,7 +21,17 @@ SPEED_LAG = 5e-3
 _BRAKED = topics.OPERATION.index("is_braked")
 
 
-class SimulationNumbers(ElasticNumbers, DriveNumbers, SensorNumbers, ObserverNumbers):
+class MoverNumbers(Fields):
+    """Addresses of the kernels of a plant that moves the arm itself, and of their blocks; all 0 for our own motion."""
+
+    see: int  # writes the arm's motion and the force on its tip before a tick
+    see_block: int
+    move: int  # takes the effort or the setpoint of a tick
+    move_block: int
+    has_servos: int  # whether the plant's own drives follow the setpoint, so that the control law has no effect
+
+
+class SimulationNumbers(MoverNumbers, ElasticNumbers, DriveNumbers, SensorNumbers, ObserverNumbers):
     """Parameter record of a simulated arm."""
 
     encoder_step: PerJoint  # [rad or m]
@@ -103,7 +113,9 @@ def _estimate(p: SimulationNumbers, s: SimulationState, arm: Arm, row: Row, dt: 
 @inner
 def _move_on(p: SimulationNumbers, s: SimulationState, arm: Arm, braked: bool, dt: float) -> None:
     """Advance the arm by a tick, decelerated by its brakes or driven by its drives."""
-    if braked:
+    if p.move != 0:
+        call_address(p.move, p.move_block)
+    elif braked:
         _brake(p, s, arm, dt)
         for i in range(arm.q.shape[0]):
             s.link[i] += arm.dq[i] * dt
@@ -131,9 +143,12 @@ def simulation_step(p: SimulationNumbers, s: SimulationState, arm: Arm, row: Row
     n = arm.q.shape[0]
     braked = row.slave_operation[_BRAKED] > 0.0
     copy(row.slave_setpoint_js, arm.setpoint)
+    if p.see != 0:
+        call_address(p.see, p.see_block)
     _measure(p, s, arm.q, dt)
-    _control(p, s, arm, dt)
-    drive(p, s, arm)
+    if p.has_servos == 0:
+        _control(p, s, arm, dt)
+        drive(p, s, arm)
     for i in range(n):
         if braked:
             arm.effort[i] = 0.0

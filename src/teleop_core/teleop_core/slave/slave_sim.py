@@ -17,7 +17,7 @@ from teleop_core.slave.controllers import CONTROLLERS, per_joint
 from teleop_core.slave.elastic import gear_damping
 from teleop_core.slave.force_sensor import ForceSensorParameters, SensorNoise
 from teleop_core.slave.friction import bristle_damping
-from teleop_core.slave.plants import PER_JOINT, PLANTS, Physics
+from teleop_core.slave.plants import PER_JOINT, PLANTS, Mover, Physics
 from teleop_core.slave.world import WORLD_OBJECTS, contact, puncture
 from teleop_core.slave.world.button import ButtonNumbers
 from teleop_core.slave.world.contents import WorldParameters
@@ -125,6 +125,7 @@ class SlaveSim(RunningStage):
         )
         self.kernel, self.arguments = simulation.simulation_step, (self.parameters, self.state, self.arm)
         self._take(parameters)
+        self._mover = self._moved_by(parameters)
         self.reset()
         self._check_world(parameters.world)
         self._check_loop(parameters)
@@ -157,6 +158,8 @@ class SlaveSim(RunningStage):
         row["slave_true_cf"] = row["slave_measured_cf"] = row["slave_estimated_cf"] = 0.0
         row["slave_measured_js"][: self.robot.n] = s["measured"]
         row["slave_measured_js_ns"] = topics.NO_COMMAND_NS  # position before the first tick
+        if self._mover is not None:
+            self._mover.reset()
 
     @property
     def punctures(self) -> int:
@@ -175,9 +178,15 @@ class SlaveSim(RunningStage):
         return max(-float(tip["gap"]), 0.0) if tip["is_open"] else 0.0
 
     def prepare(self, ticks: int) -> None:
-        """Draw the noise of the force sensor for the next ticks."""
+        """Draw the noise of the force sensor for the next ticks; an error if another simulator cannot go on."""
+        if self._mover is not None:
+            self._mover.check()
         if self.parameters["has_noise"]:
             self._noise.prepare(self.state, ticks)
+
+    def concerns(self) -> list[str]:
+        """Problems of a simulator of others that moves the arm."""
+        return [] if self._mover is None else self._mover.concerns()
 
     def examine(self, parameters: SlaveSimParameters) -> None:
         """Try parameters on a separate copy of the arm, at home and at the present position.
@@ -206,6 +215,22 @@ class SlaveSim(RunningStage):
             self.examine(parameters)
         self._take(parameters)
         self._hand_over()
+
+    def _moved_by(self, parameters: SlaveSimParameters) -> Mover | None:
+        """Simulator of the plant that moves the arm, with its kernels in the parameter record; None for our own."""
+        kind, p = parameters.plant.kind, self.parameters
+        make = PLANTS.find(kind.kind).mover
+        if make is None:
+            return None
+        if p["has_world"]:
+            raise ParameterError(
+                "world.kind", parameters.world.kind.kind, f"empty, because plant={kind.kind} has a world"
+            )
+        mover = make(kind.parameters, self.robot, self.arm, self.signals, self.dt)
+        p["see"], p["see_block"] = mover.see.address, mover.see.block_address
+        p["move"], p["move_block"] = mover.move.address, mover.move.block_address
+        p["has_servos"] = mover.has_servos
+        return mover
 
     def _take(self, parameters: SlaveSimParameters) -> None:
         """Write parameters into the records that the step reads."""
@@ -276,6 +301,8 @@ class SlaveSim(RunningStage):
     def _check_loop(self, parameters: SlaveSimParameters) -> None:
         """Try the present control loop at the arm's position; see :mod:`teleop_core.slave.stability`."""
         assert self.robot.drives is not None
+        if self.parameters["has_servos"]:
+            return
         stability.check_friction(self.parameters, self.robot.drives.inertia, self.dt)
         loop = stability.ClosedLoop(self.parameters, self.state, self.arm, self.signals, self.dt)
         stability.check_stable(self._law, self.robot, loop, are_large_tried=parameters.trials == "all")

@@ -85,9 +85,13 @@ class ClosedLoop(NamedTuple):
     dt: float
 
     def copied(self) -> "ClosedLoop":
-        """Return a separate copy of the arm without objects to touch, because the loop is judged without contact."""
+        """Return a separate copy of the arm without objects to touch, because the loop is judged without contact.
+
+        The copy moves by our own equations, also if another simulator moves the arm.
+        """
         p, s, row = (_copy(record) for record in (self.p, self.s, self.row))
         p["has_world"] = 0
+        p["see"] = p["move"] = 0
         p["is_ideal"], p["has_noise"], p["is_estimated"] = 1, 0, 0
         parts = (np.array(part) if isinstance(part, np.ndarray) else part for part in self.arm)
         arm = Arm(*parts)
