@@ -132,7 +132,9 @@ def test_topics_of_other_nodes_are_recorded_byte_for_byte(peer: "Peer", tmp_path
     assert session.node.end() == 0
     bag = Bag(tmp_path / "bag")
     assert bag.topics[name].type == "sensor_msgs/msg/CompressedImage"
-    assert [data for *_, data in bag.raw([name])] == sent
+    kept = [data for *_, data in bag.raw([name])]
+    assert len(kept) > 15  # the first ones may come before recorder and sender have found each other
+    assert kept == sent[-len(kept) :]
 
 
 @pytest.mark.parametrize("entry", ["imu", "imu=Imu", "=sensor_msgs/msg/Imu"])

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import teleop_core as tc
-from teleop_core.base import ParameterError, TeleopError
 from teleop_core.bags.reader import Bag
+from teleop_core.base import ParameterError, TeleopError
 from teleop_core.graph import topics
 from teleop_core.session.virtual import VirtualTime
 

@@ -9,7 +9,6 @@ from teleop_core.base import ParameterError, UnknownNameError, Within, fixed
 from teleop_core.graph import Stage
 from teleop_core.graph.topics import BY_NAME, Kind, Quality, Stamp, Topic
 
-
 _TYPE = re.compile(r"\w+/msg/\w+")
 _PICTURES = {
     "/compressed": "sensor_msgs/msg/CompressedImage",
