@@ -250,7 +250,7 @@ class AnyPeer:
     def publisher(self, topic: Topic, readers: int = 1) -> Any:
         """Publisher of a topic, once that many subscriptions are there."""
         if topic.name not in self._publishers:
-            kind = message_type(topic.kind.ros_type)
+            kind = message_type(topic.ros_type)
             quality = profile(topic) if readers else Qos()
             made = self.ros.create_publisher(kind, topic.name, quality)
             self._publishers[topic.name] = made

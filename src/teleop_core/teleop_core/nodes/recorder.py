@@ -167,7 +167,7 @@ class RecorderNode(CoreNode):
         configuration = self._configuration(parameters)
         graph = self._graph or (configuration.graph if parameters.configuration else graph_of(sys.argv))
         self._path = Path(parameters.out or time.strftime("bags/live_%Y%m%d_%H%M%S"))
-        topics = (*(topic.of_arm(self.arm) for topic in graph.topics), DIAGNOSTICS)
+        topics = (*(topic.of_arm(self.arm) for topic in graph.topics), DIAGNOSTICS, *parameters.others)
         self._model = self._model_of(configuration, parameters)
         self._model_topics, self._newest = ModelTopics(self, self._model.topics), Newest()
         self._shown: list[LiveMarkers | LiveDisplay] = []
