@@ -34,6 +34,7 @@ _KEPT = (
     topics.MASTER_ENERGY,
     topics.SLAVE_ENERGY,
     topics.TASK_STATE,
+    topics.SCENE_POSES,
 )
 
 
