@@ -13,7 +13,6 @@ from teleop_console.jaw_nodes import JawNodes
 from teleop_console.link import ArmView, ShownArm, box_of
 from teleop_console.look import MEASURED, ROLES, TARGET, WANTED, Color
 from teleop_console.master_nodes import MasterNodes
-from teleop_console.scene_nodes import SceneNodes
 from teleop_console.stand import DEVICE, PUBLISHED_AXES, REST, stand_beside
 from teleop_console.tails import LENGTH, Tail, is_jump
 from teleop_console.world_nodes import WorldNodes
@@ -37,7 +36,6 @@ from teleop_core.robots.bodies.looks import fingers_of, looks_of
 from teleop_core.robots.bodies.meshes import mesh_of
 from teleop_core.robots.dexterity import sample_workspace
 from teleop_core.robots.robot import Robot
-from teleop_core.robots.scenery import HasScenery
 
 Path = Callable[[Topic, str, float], tuple[Array, Array]]
 """Function of a topic, an arm and a length [s] that returns times (N,) [s] and rows (N, width) up to now."""
@@ -83,10 +81,6 @@ class ArmNodes:
         if arm.name:
             server.scene.add_label(f"{self.path}/name", arm.name, anchor="top-center")
         self._looks, self._fingers = looks_of(robot), fingers_of(robot)
-        self.scene: SceneNodes | None = None
-        if isinstance(robot, HasScenery):
-            self.scene = SceneNodes(server, self.path, robot.scenery())
-            self._looks = dict.fromkeys(range(len(self.bodies.bodies)), ())  # the scene shows its arms
         self.drawn = BodyNodes(server, f"{self.path}/robot", self.bodies, self._looks, self._fingers)
         self._ghost: BodyNodes | None = None
         self._is_ghost_shown = False
@@ -196,8 +190,6 @@ class ArmNodes:
         push = view.get(SLAVE_MEASURED_CF)
         self.world.draw(self._poses[-1][:3], None if push is None else push[:3])
         self.jaw.draw(self._poses[-1], view)
-        if self.scene is not None:
-            self.scene.draw(view)
         if self._fingers and self.jaw.opening is not None:
             self.drawn.grip(self.jaw.opening)
         self._draw_goal(view)

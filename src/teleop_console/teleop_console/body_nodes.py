@@ -54,7 +54,7 @@ class BodyNodes:
             role: Role = "link" if i else "base"
             for number, look in enumerate(looks.get(i, ())):
                 name = f"{place}/{role}{number or ''}"
-                add_look(server, name, role, look.mesh, color=look.color, is_ghost=is_ghost, is_flat=True)
+                _add_mesh(server, name, role, look.mesh, color=look.color, is_ghost=is_ghost, is_flat=True)
             if i not in looks:
                 add_solids(server, place, body.solids, is_ghost=is_ghost)
         self._fingers = [(finger, self._add_finger(finger, k, is_ghost=is_ghost)) for k, finger in enumerate(fingers)]
@@ -66,7 +66,7 @@ class BodyNodes:
         frame = self._server.scene.add_frame(path, show_axes=False)
         set_pose(frame, finger.rest)
         look = finger.look
-        add_look(self._server, f"{path}/tool", "tool", look.mesh, color=look.color, is_ghost=is_ghost, is_flat=True)
+        _add_mesh(self._server, f"{path}/tool", "tool", look.mesh, color=look.color, is_ghost=is_ghost, is_flat=True)
         return frame
 
     def grip(self, share: float) -> None:
@@ -119,11 +119,11 @@ def add_solids(
     meshes = {}
     for role in dict.fromkeys(solid.role for solid in solids):
         mesh = merged([mesh_of(solid) for solid in solids if solid.role == role])
-        meshes[role] = add_look(server, f"{path}/{role}", role, mesh, is_ghost=is_ghost, opacity=opacity)
+        meshes[role] = _add_mesh(server, f"{path}/{role}", role, mesh, is_ghost=is_ghost, opacity=opacity)
     return meshes
 
 
-def add_look(
+def _add_mesh(
     server: viser.ViserServer,
     name: str,
     role: Role,
@@ -134,7 +134,6 @@ def add_look(
     is_flat: bool = False,
     opacity: float | None = None,
 ) -> viser.MeshHandle:
-    """Add triangles below a node, in the colour of their role if they have no colour of their own."""
     vertices, faces = mesh
     own = ROLES[role] if color is None else (round(255 * color[0]), round(255 * color[1]), round(255 * color[2]))
     return server.scene.add_mesh_simple(

@@ -34,7 +34,6 @@ _KEPT = (
     topics.MASTER_ENERGY,
     topics.SLAVE_ENERGY,
     topics.TASK_STATE,
-    topics.SCENE_POSES,
 )
 
 

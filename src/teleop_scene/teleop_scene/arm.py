@@ -24,9 +24,7 @@ from teleop_core.robots.dynamics.chain_dynamics import chain_dynamics, chain_row
 from teleop_core.robots.freedom import start_of
 from teleop_core.robots.rank import directions_of
 from teleop_core.robots.robot import Robot
-from teleop_core.robots.scenery import Scenery
 from teleop_scene import actuators, chain, models
-from teleop_scene.scenery import scenery
 
 DRIVES = ("model", "effort")
 """What moves the joints of an arm, see :func:`load_scene`."""
@@ -52,10 +50,6 @@ class SceneRobot(Robot):
     drive: str
     world_base: Array
     begin: Array
-
-    def scenery(self) -> Scenery:
-        """What the scene looks like."""
-        return scenery(models.model_of(self.file), self.world_base, self.begin)
 
 
 def load_scene(file: Path, *, tip: str = "", base: str = "", task: str = "", drive: str = "model") -> SceneRobot:
