@@ -199,6 +199,8 @@ class SlaveSim(RunningStage):
                 the integrator; or an error would grow, or not decay.
         """
         trial = SlaveSim(parameters, self.dt)
+        if trial._mover is not None:
+            trial._mover.close()
         if stability.loop_key(trial.parameters, trial.arm) != stability.loop_key(self.parameters, self.arm):
             trial._rest_at(self.arm.q.clip(self.robot.lower, self.robot.upper))
             trial._check_loop(parameters)
