@@ -173,3 +173,48 @@ def test_a_world_of_ours_beside_a_scene_is_refused() -> None:
 def test_the_plant_scene_is_refused_for_another_robot() -> None:
     with pytest.raises(ParameterError, match=r"robot=SCENE\.xml"):
         session("rcrt1", plant="scene")
+
+
+FLOOR = """<mujoco><worldbody><geom type="plane" size="1 1 1" pos="0 0 0.987" solref="-2000 -60"/>
+<body name="carriage" pos="0 0 1">
+  <joint name="x" type="slide" axis="1 0 0" range="-1 1" limited="true" damping="5" armature="1"/>
+  <joint name="y" type="slide" axis="0 1 0" range="-1 1" limited="true" damping="5" armature="1"/>
+  <joint name="z" type="slide" axis="0 0 1" range="-1 1" limited="true" damping="5" armature="1"/>
+  <geom type="sphere" size="0.01" mass="1"/><site name="tip"/></body>
+</worldbody><keyframe><key qpos="0 0 0"/></keyframe></mujoco>"""
+LATE = {
+    "teleop.stages": ["network", "passivity"],
+    "network.there.least_delay": 0.1,
+    "network.back.least_delay": 0.1,
+    "feedback_timeout": 1.0,
+}
+
+
+def pressed(tmp_path: Path, **settings: Any) -> tc.Recording:
+    """A hand presses four times onto a floor 3 mm below the tip, and feels the force on the tip."""
+    path = tmp_path / "floor.xml"
+    path.write_text(FLOOR)
+
+    def press(times: np.ndarray) -> np.ndarray:
+        nothing = 0.0 * times
+        return np.column_stack((nothing, nothing, -0.002 - 0.003 * np.sin(np.pi * times)))
+
+    every = {"axes": ["+x", "+y", "+z"], "reflection.architecture": "position_force", "operator.buttons.fixture": []}
+    return tc.run("coarse_box", operator=press, duration=8.0, robot=str(path), settings=every | settings)
+
+
+def test_the_hand_feels_the_contacts_of_a_scene(tmp_path: Path) -> None:
+    recording = pressed(tmp_path)
+    on_tip, on_hand = (recording[name]["fz"] for name in ("slave/true_cf", "master/measured_cf"))
+    assert on_tip.max() > 1.0
+    assert on_hand.max() == pytest.approx(on_tip.max(), rel=0.05)
+
+
+def test_a_late_contact_of_a_scene_feeds_the_hand_and_a_tank_ends_that(tmp_path: Path) -> None:
+    margins = []
+    for method in ("none", "tank"):
+        score = pressed(tmp_path, **LATE, **{"reflection.passivity": method}).score()
+        given, taken = (present(score.value(f"passivity.hand.{way}_mj")) for way in ("out", "in"))
+        margins.append(given - taken)
+    assert margins[0] > 50.0
+    assert margins[1] < 0.0
