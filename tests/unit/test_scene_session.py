@@ -38,7 +38,7 @@ WILD = """<mujoco><worldbody><body>
   <joint name="x" type="slide" axis="1 0 0" range="-1 1" limited="true"/>
   <joint name="y" type="slide" axis="0 1 0" range="-1 1" limited="true"/>
   <joint name="z" type="slide" axis="0 0 1" range="-1 1" limited="true"/><geom size="0.1"/><site name="tip"/></body>
-  <body pos="3 0 0"><joint name="wild" springref="0.1" stiffness="-9e6" type="slide"/><geom size="0.1" mass="9"/></body>
+  <body pos="3 0 0"><joint name="wild" springref="1e-6" stiffness="-2e3" type="slide"/><geom size="0.1" mass="9"/></body>
 </worldbody></mujoco>"""
 
 
@@ -69,7 +69,7 @@ def test_the_control_law_replaces_servos_if_asked() -> None:
     assert present(score.value("position_error_mm.rms")) < 0.5
 
 
-def test_a_session_is_repeated_bit_for_bit_from_its_recording_alone(tmp_path: Path) -> None:
+def test_a_session_is_repeated_bit_for_bit_although_a_file_of_its_scene_has_changed(tmp_path: Path) -> None:
     text = (Path(tc.load_robot("cubes.xml").file)).read_text()  # type: ignore[attr-defined]
     arm = Path(tc.load_robot("cubes.xml").file).with_name("arm.xml")  # type: ignore[attr-defined]
     folder = tmp_path / "model"
@@ -77,8 +77,7 @@ def test_a_session_is_repeated_bit_for_bit_from_its_recording_alone(tmp_path: Pa
     (folder / "own.xml").write_text(text)
     (folder / "arm.xml").write_text(arm.read_text())
     first = tc.run("coarse_box", duration=2.0, robot=str(folder / "own.xml"), out=tmp_path / "bag")
-    for path in folder.iterdir():
-        path.unlink()
+    (folder / "arm.xml").write_text(arm.read_text().replace('damping="1.0"', 'damping="9.0"'))
     again = tc.replay(tmp_path / "bag", out=tmp_path / "again")
     assert first.path != again.path
     for name in BITS:
@@ -159,10 +158,10 @@ def test_an_unstable_scene_ends_the_session_in_one_line_and_keeps_its_recording(
     path = tmp_path / "wild.xml"
     path.write_text(WILD)
     with pytest.raises(TeleopError, match="became unstable after") as told:
-        tc.run("point", duration=5.0, operator="hold", robot=str(path), out=tmp_path / "bag")
+        tc.run("point", duration=2.0, operator="hold", robot=str(path), out=tmp_path / "bag")
     assert "\n" not in str(told.value)
     assert "wild" in str(told.value)
-    assert len(Bag(tmp_path / "bag").read("slave/measured_js").values) >= 1000
+    assert len(Bag(tmp_path / "bag").read("slave/measured_js").values) == 1000  # the first block, before it
 
 
 def test_a_world_of_ours_beside_a_scene_is_refused() -> None:
