@@ -12,7 +12,7 @@ setup(
     packages=find_packages(include=["teleop_scene", "teleop_scene.*"]),
     package_data={"teleop_scene": ["py.typed", "scenes/*.xml"]},
     python_requires=">=3.11",
-    install_requires=[f"teleop_core=={VERSION}", "cyclopts", "mujoco-core", "numpy"],
+    install_requires=[f"teleop_core=={VERSION}", "cyclopts", "mujoco-core", "numpy", "PyOpenGL", "simplejpeg"],
     data_files=[
         ("share/ament_index/resource_index/packages", ["resource/teleop_scene"]),
         ("share/teleop_scene", ["package.xml"]),

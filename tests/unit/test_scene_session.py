@@ -38,8 +38,8 @@ WILD = """<mujoco><worldbody><body>
   <joint name="x" type="slide" axis="1 0 0" range="-1 1" limited="true"/>
   <joint name="y" type="slide" axis="0 1 0" range="-1 1" limited="true"/>
   <joint name="z" type="slide" axis="0 0 1" range="-1 1" limited="true"/><geom size="0.1"/><site name="tip"/></body>
-  <body pos="3 0 0"><joint name="wild" springref="1e-6" stiffness="-2e3" type="slide"/><geom size="0.1" mass="9"/></body>
-</worldbody></mujoco>"""
+  <body pos="3 0 0"><joint name="wild" springref="1e-6" stiffness="-2e3" type="slide"/><geom size="0.1" mass="9"/>
+</body></worldbody></mujoco>"""
 
 
 def session(robot: str, *stages: str, scenario: str = "coarse_box", **more: Any) -> VirtualTime:
