@@ -178,9 +178,7 @@ class SlaveSim(RunningStage):
         return max(-float(tip["gap"]), 0.0) if tip["is_open"] else 0.0
 
     def prepare(self, ticks: int) -> None:
-        """Draw the noise of the force sensor for the next ticks; an error if another simulator cannot go on."""
-        if self._mover is not None:
-            self._mover.check()
+        """Draw the noise of the force sensor for the next ticks."""
         if self.parameters["has_noise"]:
             self._noise.prepare(self.state, ticks)
 
