@@ -1,4 +1,4 @@
-"""Arms of MuJoCo models: kinematics and inertias are those of the model, and unusable models are refused in one line."""
+"""Arms of MuJoCo models: kinematics and inertias are the model's own; unusable models are refused in one line."""
 
 from pathlib import Path
 

@@ -31,6 +31,7 @@ _KEPT = (
     topics.SLAVE_JAW_MEASURED_JS,
     topics.SLAVE_JAW_OBJECT_CP,
     topics.SLAVE_JAW_BOARD,
+    topics.SCENE_POSES,
     topics.MASTER_ENERGY,
     topics.SLAVE_ENERGY,
     topics.TASK_STATE,

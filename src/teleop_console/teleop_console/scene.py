@@ -11,6 +11,7 @@ from teleop_console.fixture_outlines import Look
 from teleop_console.link import Arm, Parameters, Setting, View
 from teleop_console.look import DARK, GRID, GRID_DARK, LIGHT, TARGET
 from teleop_console.stand import PUBLISHED_AXES
+from teleop_console.surrounding_nodes import SurroundingNodes
 from teleop_core.base.errors import TeleopError
 from teleop_core.hand.operators.rest import REST_POSITION
 from teleop_core.kernels.axes import axis_map
@@ -79,12 +80,17 @@ class Scene:
         server.scene.configure_environment_map(None)
         server.scene.add_light_hemisphere("/light", intensity=1.5)
         with server.atomic():
-            for arm in arms:
+            each = list(arms)
+            self._surroundings = SurroundingNodes(server, each[0].robot)
+            for arm in each:
                 nodes = ArmNodes(server, arm)
                 low, high = nodes.low, nodes.high
                 if self.arms:  # to the right of the previous arm
                     side -= float(high[1])
-                nodes.place(side)
+                if arm.robot.world_base is None:
+                    nodes.place(side)
+                else:
+                    nodes.stand_beside(each[0].robot)
                 side += float(low[1]) - 0.1 * nodes.bodies.size
                 self.arms[arm.name] = nodes
             self._ground()
@@ -99,6 +105,8 @@ class Scene:
             for name, nodes in self.arms.items():
                 if (seen := view.arms.get(name)) is not None:
                     nodes.draw(view.time, seen)
+            if (seen := view.arms.get(next(iter(self.arms)))) is not None:
+                self._surroundings.draw(seen)
 
     def retune(self, parameters: Parameters) -> None:
         """Apply the session's parameters that change the picture: axes, fixture, targets and object.

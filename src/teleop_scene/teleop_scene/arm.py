@@ -24,7 +24,9 @@ from teleop_core.robots.dynamics.chain_dynamics import chain_dynamics, chain_row
 from teleop_core.robots.freedom import start_of
 from teleop_core.robots.rank import directions_of
 from teleop_core.robots.robot import Robot
+from teleop_core.robots.visual import Surrounding
 from teleop_scene import actuators, chain, models
+from teleop_scene.looks import surroundings_of
 
 DRIVES = ("model", "effort")
 """What moves the joints of an arm, see :func:`load_scene`."""
@@ -50,6 +52,10 @@ class SceneRobot(Robot):
     drive: str
     world_base: Array
     begin: Array
+
+    def surroundings(self) -> tuple[Surrounding, ...]:
+        """Shapes of the whole scene."""
+        return surroundings_of(models.model_of(self.file), self.begin)
 
 
 def load_scene(file: Path, *, tip: str = "", base: str = "", task: str = "", drive: str = "model") -> SceneRobot:

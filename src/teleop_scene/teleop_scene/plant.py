@@ -18,7 +18,7 @@ from teleop_core.slave.plants import PLANTS, Physics, Plant
 from teleop_scene import actuators
 from teleop_scene.arm import SceneRobot
 from teleop_scene.chain import ancestors, is_puppet
-from teleop_scene.scene import SceneState, advance, shared
+from teleop_scene.scene import SceneState, advance, leave, shared
 
 _BRAKED = topics.OPERATION.index("is_braked")
 _FIRM = 0.9999  # impedance of the friction of a brake, the largest that MuJoCo uses, so that it hardly creeps
@@ -200,6 +200,10 @@ class _Mover:
         self._own["ticks"] = 0
         self.scene.place(self._robot.chain.joints, self._arm.q)
         self.scene.reset()
+
+    def close(self) -> None:
+        """Let no other stage share the scene of a trial."""
+        leave(self.scene)
 
     def check(self) -> None:
         """Raise an error if the scene has become unstable."""

@@ -208,8 +208,8 @@ _newest: "weakref.WeakValueDictionary[tuple[Path, float], Scene]" = weakref.Weak
 def shared(file: Path, dt: float, owner: str) -> Scene:
     """Scene of the session that is being built.
 
-    Stages of a session are made one after the other. A part that already has an owner therefore belongs to another
-    session, so that this owner gets a scene of its own, which the following stages share.
+    Stages of a session are made one after the other, in any order. A part that already has an owner therefore belongs
+    to another session, so that this owner gets a scene of its own, which the following stages share.
 
     Args:
         file: File of the model.
@@ -224,9 +224,7 @@ def shared(file: Path, dt: float, owner: str) -> Scene:
     return scene
 
 
-def claimed(file: Path, dt: float, tip: str) -> Scene | None:
-    """Scene in which an arm was just made, for the stage of its bodies; None if there is none."""
-    scene = _newest.get((file.resolve(), dt))
-    if scene is None or not scene.has(tip) or not scene.claim(f"{tip} world"):
-        return None
-    return scene
+def leave(scene: Scene) -> None:
+    """Let no further stage share a scene."""
+    for key in [key for key, value in _newest.items() if value is scene]:
+        del _newest[key]

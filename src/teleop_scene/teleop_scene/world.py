@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from teleop_core.base import ParameterError, SessionError, Within, fixed
+from teleop_core.base import ParameterError, Within, fixed
 from teleop_core.graph import DT, Row, RunningStage, Stage, assign, topics
 from teleop_core.kernels import Array, Fields, kernel, record
 from teleop_core.kernels.fields import Integers
@@ -19,7 +19,7 @@ from teleop_core.robots.selection import RobotParameters
 from teleop_scene.arm import SceneRobot
 from teleop_scene.jaw import Jaw, jaw_of
 from teleop_scene.models import moving_bodies
-from teleop_scene.scene import SceneState, address_of, claimed
+from teleop_scene.scene import SceneState, address_of, shared
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -106,7 +106,6 @@ class World(RunningStage):
     """Stage of the bodies of a scene.
 
     Raises:
-        SessionError: No arm of the scene is in this process.
         ParameterError: A joint of the jaw is unknown, has no position actuator, or the robot is no arm of a scene.
     """
 
@@ -115,11 +114,7 @@ class World(RunningStage):
         super().__init__(SCENE_STAGE, robot.n, dt)
         if not isinstance(robot, SceneRobot):
             raise ParameterError("scene.robot", parameters.robot, "SCENE.xml, the arm of a scene")
-        scene = claimed(robot.file, dt, robot.chain.tip)
-        if scene is None:
-            raise SessionError(
-                "the stage scene must be in the process of slave_sim: teleop live --composed, or by side"
-            )
+        scene = shared(robot.file, dt, f"{robot.chain.tip} world")
         self.scene, self.robot, model, data = scene, robot, scene.model, scene.data
         self._row = self.signals.copy()
         self.state = own = record(WorldState)
@@ -139,6 +134,12 @@ class World(RunningStage):
             scene.state, own, bodies, arrays, (jaw.places, jaw.ends, jaw.gears, data.ctrl if model.nu else np.zeros(1))
         )  # fmt: skip
         self.reset()
+
+    def concerns(self) -> list[str]:
+        """Report a stage whose arm is in another process, so that nothing moves here."""
+        if self.scene.has(self.robot.chain.tip):
+            return []
+        return ["the scene stands still: it must be in the process of slave_sim, as by side or with --composed"]
 
     def reset(self) -> None:
         """Return to the state before the first tick; the scene itself is reset by its arms."""

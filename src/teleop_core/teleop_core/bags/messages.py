@@ -175,6 +175,10 @@ def write_values(
     if kind is Kind.POSE:
         _set(message.pose.position, "xyz", row[:3])
         _set(message.pose.orientation, "wxyz", row[3:])
+    elif kind is Kind.POSES:
+        for i, pose in enumerate(message.poses):  # of which the message has enough
+            _set(pose.position, "xyz", row[7 * i : 7 * i + 3])
+            _set(pose.orientation, "wxyz", row[7 * i + 3 : 7 * i + 7])
     elif kind is Kind.TWIST:
         _set(message.twist.linear, "xyz", row[:3])
         _set(message.twist.angular, "xyz", row[3:])

@@ -20,6 +20,7 @@ from teleop_core.kernels.axes import axis_map
 from teleop_core.kernels.geometry import Array, quaternion_from_rotation
 from teleop_core.robots import load_robot_set
 from teleop_core.robots.bodies import bodies_of, urdf_of
+from teleop_core.robots.bodies.frames import pose_of
 from teleop_core.robots.robot import Robot
 from teleop_core.session.configuration import Configuration
 
@@ -127,6 +128,8 @@ def _arms(configuration: Configuration, namespace: str) -> tuple[ArmModel, ...]:
         side -= _APART * reach if arms else 0.0
         base = _HERE.copy()
         base[1] = side
+        if loaded.world_base is not None:  # arms of a scene stand where the scene has them
+            base = pose_of(loaded.world_base)
         axes = configuration.value("axes", name)
         master = _master(base, reach, np.eye(3) if axes is None else axis_map("axes", axes))
         where = "/".join(filter(None, (namespace, name)))

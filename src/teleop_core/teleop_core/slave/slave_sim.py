@@ -199,6 +199,8 @@ class SlaveSim(RunningStage):
                 the integrator; or an error would grow, or not decay.
         """
         trial = SlaveSim(parameters, self.dt)
+        if trial._mover is not None:
+            trial._mover.close()
         if stability.loop_key(trial.parameters, trial.arm) != stability.loop_key(self.parameters, self.arm):
             trial._rest_at(self.arm.q.clip(self.robot.lower, self.robot.upper))
             trial._check_loop(parameters)
@@ -303,7 +305,8 @@ class SlaveSim(RunningStage):
         assert self.robot.drives is not None
         if self.parameters["has_servos"]:
             return
-        stability.check_friction(self.parameters, self.robot.drives.inertia, self.dt)
+        if self._mover is None:
+            stability.check_friction(self.parameters, self.robot.drives.inertia, self.dt)
         loop = stability.ClosedLoop(self.parameters, self.state, self.arm, self.signals, self.dt)
         stability.check_stable(self._law, self.robot, loop, are_large_tried=parameters.trials == "all")
 

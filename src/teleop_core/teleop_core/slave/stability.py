@@ -38,6 +38,7 @@ _LEFT = 0.5  # the error must fall to this share of the largest error of the das
 _ROOM = 0.8
 # Stability limit of classical Runge-Kutta: -h times a real pole.
 _STABLE = 2.785
+_STIFFEST = 0.5  # rate of viscous friction in a trial of an arm that others move, times the tick
 _LOOP = (*PER_JOINT, "bristle_damping", "gear_damping", "effort_limit", "speed_limit",
          "compensated", "steps", "delay_ticks")  # fmt: skip
 _ARM = ("gains", "dynamics", "model", "coupling")
@@ -91,7 +92,10 @@ class ClosedLoop(NamedTuple):
         """
         p, s, row = (_copy(record) for record in (self.p, self.s, self.row))
         p["has_world"] = 0
-        p["see"] = p["move"] = 0
+        if p["see"]:  # others integrate friction that our steps cannot resolve
+            p["see"] = p["move"] = 0
+            p["coulomb"], inertia = 0.0, self.arm.limit / p["braking"]
+            p["viscous"] = np.minimum(p["viscous"], _STIFFEST * inertia / self.dt)
         p["is_ideal"], p["has_noise"], p["is_estimated"] = 1, 0, 0
         parts = (np.array(part) if isinstance(part, np.ndarray) else part for part in self.arm)
         arm = Arm(*parts)

@@ -102,6 +102,9 @@ class Mover(Protocol):
     def reset(self) -> None:
         """Return to the state before the first tick, with the arm at its present position, at rest."""
 
+    def close(self) -> None:
+        """End a trial, which no other stage of the session joins."""
+
     def check(self) -> None:
         """Raise an error if the simulation cannot go on; called outside of ticks.
 

@@ -1,0 +1,58 @@
+"""Surrounding nodes: the bodies of a scene on the page, moved by ``scene/poses``."""
+
+import numpy as np
+import viser
+
+from teleop_console.link import ArmView
+from teleop_console.poses import move
+from teleop_core.graph.topics import POSES, SCENE_POSES
+from teleop_core.kernels.geometry import Array
+from teleop_core.robots.bodies.frames import inverse, pose_of
+from teleop_core.robots.robot import Robot
+
+PATH = "/scene"
+"""Path of the node in the world of the scene."""
+
+
+class SurroundingNodes:
+    """Bodies of the scene in which the first arm of a session stands; without a scene there are none.
+
+    Args:
+        server: The page, whose axes are those of the arm's base.
+        robot: The arm.
+    """
+
+    def __init__(self, server: viser.ViserServer, robot: Robot) -> None:
+        shapes = robot.surroundings() if robot.world_base is not None else ()
+        self._frames: dict[int, viser.FrameHandle] = {}
+        if not shapes or robot.world_base is None:
+            return
+        self._root = server.scene.add_frame(PATH, show_axes=False)
+        move(self._root, inverse(pose_of(robot.world_base)))
+        for number, shape in enumerate(shapes):
+            above = PATH
+            if shape.place >= 0:
+                above = f"{PATH}/body{shape.place}"
+                if shape.place not in self._frames:
+                    self._frames[shape.place] = server.scene.add_frame(above, show_axes=False)
+                    move(self._frames[shape.place], shape.begin)
+            vertices, faces = shape.mesh
+            server.scene.add_mesh_simple(
+                f"{above}/shape{number}",
+                vertices.astype(np.float32),
+                faces.astype(np.uint32),
+                color=tuple(round(255 * x) for x in shape.color),
+                flat_shading=True,
+                cast_shadow=False,
+                receive_shadow=False,
+            )
+
+    def draw(self, view: ArmView) -> None:
+        """Move the bodies to the newest poses; only changes are sent."""
+        told: Array | None = view.get(SCENE_POSES)
+        if told is None:
+            return
+        poses = told.reshape(POSES, 7)
+        for place, frame in self._frames.items():
+            if place < POSES and np.isfinite(poses[place]).all():
+                move(frame, poses[place])
