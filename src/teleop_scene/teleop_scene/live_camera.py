@@ -64,17 +64,13 @@ class _Sender:
         self._late: list[Array] = [np.empty(0)] * len(views)
         self._made = [[self._publisher(topic) for topic in topics_of(view)] for view in views]
         self._reports = self._publisher(DIAGNOSTICS)
-        self._waiting: list[tuple[int, int, Publisher, bytes]] = []
+        self._waiting: list[tuple[int, int, int, tuple[bytes, bytes]]] = []
 
     def _publisher(self, topic: Topic) -> Publisher:
         return self._guest.ros.create_publisher(message_type(topic.ros_type), f"/{topic.name}", profile(topic))
 
-    def calibrate(self, k: int, data: bytes) -> None:
-        """Publish the calibration of camera ``k``."""
-        self._made[k][1].send(data)
-
-    def send(self, k: int, data: bytes) -> None:
-        """Send a picture of camera ``k`` on its way."""
+    def send(self, k: int, picture: bytes, calibrated: bytes) -> None:
+        """Send a picture of camera ``k`` and its calibration on their way."""
         if not len(self._late[k]):
             self._late[k] = self._ways[k].arrivals(_BLOCK)
             self._ways[k] = replace(self._ways[k], seed=self._ways[k].seed + 1000)
@@ -84,13 +80,14 @@ class _Sender:
             return
         self._number += 1
         due = self._guest.world.monotonic_ns() + round(late * SECOND_NS)
-        heapq.heappush(self._waiting, (due, self._number, self._made[k][0], data))
+        heapq.heappush(self._waiting, (due, self._number, k, (picture, calibrated)))
 
     def deliver(self) -> None:
         """Publish the pictures that are due."""
         while self._waiting and self._waiting[0][0] <= self._guest.world.monotonic_ns():
-            _, _, publisher, data = heapq.heappop(self._waiting)
-            publisher.send(data)
+            _, _, k, messages = heapq.heappop(self._waiting)
+            for publisher, data in zip(self._made[k], messages, strict=True):
+                publisher.send(data)
 
     def tell(self) -> None:
         """Publish the counts."""
@@ -105,8 +102,7 @@ class _Cameras:
         self._form, self._slot, self._told = layout(SCENE_POSES, ()), -1, 0
         self._poses = Subscription(guest, SCENE_POSES, f"/{SCENE_POSES.name}")
         self._sender = _Sender(guest, [camera.view for camera in cameras], way, counts)
-        for k, camera in enumerate(cameras):
-            self._sender.calibrate(k, calibration(camera, guest.world.time_ns()))
+        self._calibrated = [calibration(camera) for camera in cameras]
 
     def turn(self) -> None:
         """Deliver what is due, then draw the newest poses if a period has begun."""
@@ -134,7 +130,7 @@ class _Cameras:
         for k, camera in enumerate(self._cameras):
             begin = perf_counter()
             picture = camera.take(row.reshape(-1, 7)[: camera.bodies], stamp_ns // TICK_NS)
-            self._sender.send(k, encoded(picture, stamp_ns, camera.view.name))
+            self._sender.send(k, encoded(picture, stamp_ns, camera.view.name), self._calibrated[k](stamp_ns))
             self._counts.taken += 1
             self._counts.times_ms.append(1e3 * (perf_counter() - begin))
             self._sender.deliver()
