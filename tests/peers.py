@@ -18,7 +18,7 @@ from teleop_core.bags.messages import discover, layout
 from teleop_core.base.parameters import specs
 from teleop_core.graph.topics import Topic
 from teleop_core.middleware.world import Executor, Node, Owner, Qos, World
-from teleop_core.nodes.observer import Observer
+from teleop_core.nodes.observer import ReportReader
 from teleop_core.nodes.quality import profile
 from teleop_core.nodes.streams import Subscription, message_type
 from teleop_core.robots import load_robot
@@ -113,7 +113,7 @@ class AnyPeer:
     world: World
     ros: Node
     executor: Executor
-    observer: Observer
+    observer: ReportReader
 
     def __init__(self) -> None:
         self.nodes: list[Any] = []

@@ -12,8 +12,9 @@ from led_slave import LedSlave
 from present import present
 from teleop_core.base import UnknownNameError, build
 from teleop_core.graph import TICK_NS
+from teleop_core.graph.operation import State
 from teleop_core.kernels import Array, kernel, record
-from teleop_core.slave.operation import Answer, Event, Fault, OperationParameters, State, command_event
+from teleop_core.slave.operation import Answer, Event, Fault, OperationParameters, command_event
 from teleop_core.slave.operation.states import COMMANDS, TABLE, OperatingState, answer_text, change
 from teleop_core.slave.pair import ArmParameters, SimulatedArm
 

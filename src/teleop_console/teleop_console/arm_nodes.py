@@ -10,7 +10,7 @@ from teleop_console.body_nodes import BodyNodes, extent
 from teleop_console.cameras import corners
 from teleop_console.fixture_outlines import Look, OutlineNode, scale_of, unit_outline
 from teleop_console.jaw_nodes import JawNodes
-from teleop_console.link import Arm, ArmView, box_of
+from teleop_console.link import ArmView, ShownArm, box_of
 from teleop_console.look import MEASURED, ROLES, TARGET, WANTED, Color
 from teleop_console.master_nodes import MasterNodes
 from teleop_console.poses import move
@@ -73,7 +73,7 @@ class ArmNodes:
         recorded_path: Function that returns the recorded path when time jumps; None without a recording.
     """
 
-    def __init__(self, server: viser.ViserServer, arm: Arm) -> None:
+    def __init__(self, server: viser.ViserServer, arm: ShownArm) -> None:
         robot = self._robot = arm.robot
         self._server, self.path = server, f"/{arm.name or 'arm'}"
         self.bodies = bodies_of(robot)

@@ -21,7 +21,7 @@ REFUSED = "a recording accepts no commands"
 
 
 @dataclass(frozen=True)
-class Arm:
+class ShownArm:
     """An arm of the session: its robot, and its namespace, which is empty for the default arm."""
 
     name: str
@@ -123,7 +123,7 @@ class SessionLink(Protocol):
         is_live: Whether the session accepts commands; false for a recording.
     """
 
-    arms: tuple[Arm, ...]
+    arms: tuple[ShownArm, ...]
     title: str
     is_live: bool
 

@@ -8,7 +8,7 @@ import viser
 from teleop_console.arm_nodes import ArmNodes, Path
 from teleop_console.cameras import ASPECT, FIELD, Camera, around, corners, from_tool, microscope
 from teleop_console.fixture_outlines import Look
-from teleop_console.link import Arm, Parameters, Setting, View
+from teleop_console.link import Parameters, Setting, ShownArm, View
 from teleop_console.look import DARK, GRID, GRID_DARK, LIGHT, TARGET
 from teleop_console.stand import PUBLISHED_AXES
 from teleop_console.surrounding_nodes import SurroundingNodes
@@ -71,7 +71,7 @@ class Scene:
         arms: Arms of the session, at least one.
     """
 
-    def __init__(self, server: viser.ViserServer, arms: Iterable[Arm]) -> None:
+    def __init__(self, server: viser.ViserServer, arms: Iterable[ShownArm]) -> None:
         self._server = server
         self.arms: dict[str, ArmNodes] = {}
         side = 0.0

@@ -21,7 +21,7 @@ from teleop_core.nodes.children import Child, end_all, environment
 from teleop_core.nodes.crews import Crew, Processes, crews
 from teleop_core.nodes.interrupt import Interrupt
 from teleop_core.nodes.keys import Keys
-from teleop_core.nodes.observer import WARNING, Observer, Status
+from teleop_core.nodes.observer import WARNING, ReportReader, Status
 from teleop_core.nodes.remote_control import RemoteControl
 from teleop_core.nodes.sessions import announced
 from teleop_core.nodes.starter import START_TIMEOUT, Starter
@@ -93,7 +93,7 @@ def live(
         Starter(configuration.text(), env) as starter,
         interrupt.caught(),
         announced(int(env["ROS_DOMAIN_ID"])),
-        Observer(int(env["ROS_DOMAIN_ID"])) as observer,
+        ReportReader(int(env["ROS_DOMAIN_ID"])) as observer,
     ):
         priority = _priority(configuration, processes)
         parameters.write(written(session_parameters(configuration, str(out), priority=priority)))
@@ -136,7 +136,7 @@ class _Session:
         self,
         configuration: Configuration,
         console: Console,
-        observer: Observer,
+        observer: ReportReader,
         parameters: IO[Any],
         env: dict[str, str],
         interrupt: Interrupt,

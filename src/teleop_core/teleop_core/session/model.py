@@ -34,7 +34,7 @@ _APART = 2.0  # distance between two slaves, as a multiple of the robot's reach
 
 
 @dataclass(frozen=True, eq=False)
-class ArmModel:
+class DrawnArm:
     """Robot, master and frames of one arm.
 
     Args:
@@ -107,7 +107,7 @@ class Model:
     def __init__(self, configuration: Configuration, rate: float | None = None, namespace: str = "") -> None:
         if rate is None:
             rate = configuration.groups[RECORDER_NAME].tf_rate
-        self.arms: tuple[ArmModel, ...] = _arms(configuration, namespace) if rate else ()
+        self.arms: tuple[DrawnArm, ...] = _arms(configuration, namespace) if rate else ()
         self.period_ns = round(1e9 / rate) if rate else 0
 
     @property
@@ -116,8 +116,8 @@ class Model:
         return (*(arm.description for arm in self.arms), TF) if self.arms else ()
 
 
-def _arms(configuration: Configuration, namespace: str) -> tuple[ArmModel, ...]:
-    arms: list[ArmModel] = []
+def _arms(configuration: Configuration, namespace: str) -> tuple[DrawnArm, ...]:
+    arms: list[DrawnArm] = []
     side = 0.0
     for name in configuration.graph.namespaces:
         robot = configuration.value("robot", name)
@@ -133,7 +133,7 @@ def _arms(configuration: Configuration, namespace: str) -> tuple[ArmModel, ...]:
         axes = configuration.value("axes", name)
         master = _master(base, reach, np.eye(3) if axes is None else axis_map("axes", axes))
         where = "/".join(filter(None, (namespace, name)))
-        arms.append(ArmModel(where, loaded, base, master))
+        arms.append(DrawnArm(where, loaded, base, master))
         side -= _ASIDE
     return tuple(arms)
 
@@ -173,7 +173,7 @@ class ModelRecords:
             for found in messages:
                 writer.write(TF, int(now_ns[row]), found[at])
 
-    def _of(self, arm: ArmModel, block: Any, rows: NDArray[np.int64]) -> list[bytes]:
+    def _of(self, arm: DrawnArm, block: Any, rows: NDArray[np.int64]) -> list[bytes]:
         joints = block[SLAVE_MEASURED_JS.of_arm(arm.arm).field][rows, : arm.robot.n]
         stylus = block[MASTER_MEASURED_CP.of_arm(arm.arm).field][rows]
         return arm.transforms(block["now_ns"][rows], joints, stylus)

@@ -9,11 +9,11 @@ import numpy as np
 
 from teleop_core.base import ParameterError, SessionError, ShapeError, UnknownNameError
 from teleop_core.graph import STATE, TICK_NS, topics
+from teleop_core.graph.operation import State
 from teleop_core.hand.master.haptic_master import HapticMasterParameters
 from teleop_core.hand.operators import Operator
 from teleop_core.kernels.geometry import Array
 from teleop_core.session import api, virtual
-from teleop_core.slave.operation import State
 
 _NUMBERS = count()
 _STATE = topics.OPERATION.index("state")

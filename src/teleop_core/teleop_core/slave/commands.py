@@ -4,13 +4,13 @@ import math
 from enum import IntEnum
 
 from teleop_core.graph import Row, copy
+from teleop_core.graph.operation import State
 from teleop_core.kernels import Array, PerJoint, Wrench, inner
 from teleop_core.kernels.filters import lag_step
 from teleop_core.slave import ownership
 from teleop_core.slave.arm import ArmModel
 from teleop_core.slave.interpolation import WayRecord, WayState, begin_way
 from teleop_core.slave.operation.faults import Fault
-from teleop_core.slave.operation.states import State
 from teleop_core.slave.operation.watch import ServerRecord, ServerState, fail
 from teleop_core.slave.parameters import SlaveParameters
 

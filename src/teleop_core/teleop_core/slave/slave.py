@@ -10,12 +10,13 @@ import numpy as np
 
 from teleop_core.base import ParameterError, fill
 from teleop_core.graph import DT, RunningStage, Stage, assign, topics
+from teleop_core.graph.operation import State
 from teleop_core.kernels import kernel, length, pointer, pose_from_transform, record, records
 from teleop_core.kinematics import FK
 from teleop_core.robots import load_robot_set
 from teleop_core.robots.robot import Robot
 from teleop_core.slave import arm, commands, motion_commands, simulation, step, trajectory
-from teleop_core.slave.operation import Answer, Event, Fault, OperationParameters, State, command_event
+from teleop_core.slave.operation import Answer, Event, Fault, OperationParameters, command_event
 from teleop_core.slave.operation.states import answer_text, change
 from teleop_core.slave.operation.watch import fail
 from teleop_core.slave.parameters import SlaveParameters

@@ -3,12 +3,13 @@
 import math
 
 from teleop_core.graph import copy, topics
+from teleop_core.graph.operation import State
 from teleop_core.kernels import Array, inner, kernel, pose_from_transform
 from teleop_core.slave import commands, interpolation, velocity
 from teleop_core.slave.arm import ArmModel
 from teleop_core.slave.operation import watch
 from teleop_core.slave.operation.faults import Fault
-from teleop_core.slave.operation.states import AFTER_RESET, Event, State, change
+from teleop_core.slave.operation.states import AFTER_RESET, Event, change
 
 _ENABLED, _FAULT = int(State.ENABLED), int(State.FAULT)
 _PAUSED, _SETPOINT = int(State.PAUSED), int(Fault.SETPOINT)

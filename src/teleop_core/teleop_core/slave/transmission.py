@@ -3,7 +3,7 @@
 from typing import Annotated
 
 from teleop_core.kernels import Array, Fields, PerJoint, inner
-from teleop_core.slave.arm import Arm
+from teleop_core.slave.arm import SimulatedArm
 
 LONGEST_DELAY = 30
 """Largest delay of efforts [ticks]."""
@@ -52,7 +52,7 @@ def follow_encoders(p: DriveNumbers, s: DriveState, q: Array, coupling: Array, t
 
 
 @inner
-def drive(p: DriveNumbers, s: DriveState, arm: Arm) -> None:
+def drive(p: DriveNumbers, s: DriveState, arm: SimulatedArm) -> None:
     """Turn the commanded effort into the effort that the motors give.
 
     Args:

@@ -11,7 +11,7 @@ from teleop_core.slave.arm import ArmModel
 from teleop_core.slave.commands import SlaveRecord, SlaveState
 
 
-class Motion(IntEnum):
+class MotionSource(IntEnum):
     """Source of the setpoint's motion while an enabled slave does not move to a goal."""
 
     FOLLOWING = 0  # the setpoint follows joint references
@@ -19,7 +19,7 @@ class Motion(IntEnum):
     TIP = 2  # the setpoint moves with a twist of the tip
 
 
-_FOLLOWING, _TIP = int(Motion.FOLLOWING), int(Motion.TIP)
+_FOLLOWING, _TIP = int(MotionSource.FOLLOWING), int(MotionSource.TIP)
 # Length [m] that relates rotation to translation: 1 rad/s of the tip counts as much as this length per second.
 _LENGTH = 0.1
 # Damping added to the squares of the weighted singular values; assumed. With singular values of 1, it reduces speeds by

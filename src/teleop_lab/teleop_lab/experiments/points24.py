@@ -13,7 +13,7 @@ from teleop_core.hand.operators.behaviour import OperatorParameters
 from teleop_core.hand.operators.tour import TourParameters
 from teleop_core.kernels.axes import axis_map
 from teleop_core.kernels.geometry import Array
-from teleop_lab.experiments.bench import Bench, Session, Settings, mean
+from teleop_lab.experiments.bench import Bench, ScoredSession, Settings, mean
 from teleop_lab.experiments.comparison import EXACT, Comparison, Findings
 from teleop_lab.experiments.conditions import OURS, PREDICTED
 from teleop_lab.experiments.experiment import Experiment
@@ -48,7 +48,7 @@ class Visits(NamedTuple):
     tracing: Array
 
 
-def visits_of(session: Session, p: TourParameters, center: Array, approach_s: float) -> Visits:
+def visits_of(session: ScoredSession, p: TourParameters, center: Array, approach_s: float) -> Visits:
     """Compute the result of the task in a session.
 
     Args:

@@ -7,6 +7,7 @@ import numpy as np
 
 from teleop_core.base import Within, fill, fixed, parameter
 from teleop_core.graph import DT, Noise, Row, RunningStage, Stage, assign, topics
+from teleop_core.graph.operation import State
 from teleop_core.hand.master import contact, hand_mechanics, rendering
 from teleop_core.hand.master.device import (
     DeviceParameters,
@@ -21,7 +22,6 @@ from teleop_core.hand.operators.rest import REST_POSITION, REST_TILT, rest_pose
 from teleop_core.hand.operators.shapes import PHASES
 from teleop_core.kernels import Array, PoseRow, inner, kernel, record, rotation, transform
 from teleop_core.kernels.room import room
-from teleop_core.slave.operation.states import State
 
 _DOUBT_NS = 1_000_000_000
 """Time for which forces are ignored after a force was out of range [ns]."""

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 from teleop_core.base import Within, fill, fixed, parameter
 from teleop_core.graph import DT, Row, RunningStage, Stage, assign, topics
+from teleop_core.graph.operation import State
 from teleop_core.kernels import Fields, inner, kernel, record
-from teleop_core.slave.operation.states import State
 
 _STATE, _ENABLED = topics.OPERATION.index("state"), int(State.ENABLED)
 _NEAR = 1e-3  # a command this near to the held angle has reached it [rad]

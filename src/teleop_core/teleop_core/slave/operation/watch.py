@@ -5,9 +5,10 @@ from typing import Annotated
 import numpy as np
 
 from teleop_core.graph import TICK_NS
+from teleop_core.graph.operation import State
 from teleop_core.kernels import Array, Fields, IntegerPerJoint, Integers, PerJoint, Vector3, inner
 from teleop_core.slave.operation.faults import FAULTS, Fault, Reaction
-from teleop_core.slave.operation.states import Event, OperatingState, State, change
+from teleop_core.slave.operation.states import Event, OperatingState, change
 from teleop_core.slave.operation.thresholds import MOST_EVENTS, OperationParameters
 
 

@@ -16,7 +16,7 @@ import numpy as np
 from teleop_core.kernels import Array, PerJoint, Vector3, inner
 from teleop_core.kernels.room import room
 from teleop_core.shapes.basis.directions import NEAR, make_unit
-from teleop_core.slave.arm import Arm
+from teleop_core.slave.arm import SimulatedArm
 from teleop_core.slave.world.button import ButtonNumbers, ButtonState, follow_button, push_of_button
 from teleop_core.slave.world.puncture import PunctureNumbers, PunctureState, follow_channel, puncture, push_in_channel
 
@@ -143,7 +143,7 @@ def _lay_flat(s: ContactState) -> None:
 
 
 @inner
-def _begin_at(s: ContactState, arm: Arm, lever: Array, q: Array, dq: Array, speed: Array) -> None:
+def _begin_at(s: ContactState, arm: SimulatedArm, lever: Array, q: Array, dq: Array, speed: Array) -> None:
     """Store surface and Jacobian of the tick at the point of contact, which is ``lever`` (3,) off the tip.
 
     Writes the speed (3,) of that point.
@@ -173,7 +173,14 @@ def _keep_bend(p: WorldNumbers, s: ContactState, force: Array) -> None:
 
 @inner
 def _touch_at(
-    p: WorldNumbers, s: ContactState, arm: Arm, has_jacobian: bool, lever: Array, q: Array, dq: Array, force: Array
+    p: WorldNumbers,
+    s: ContactState,
+    arm: SimulatedArm,
+    has_jacobian: bool,
+    lever: Array,
+    q: Array,
+    dq: Array,
+    force: Array,
 ) -> bool:
     """Find the position of one point relative to the object, and write the push on it (3,) [N].
 
@@ -219,7 +226,7 @@ def _touch_at(
 
 
 @inner
-def touch(p: WorldNumbers, contacts: Any, arm: Arm, q: Array, dq: Array, felt: Array) -> None:
+def touch(p: WorldNumbers, contacts: Any, arm: SimulatedArm, q: Array, dq: Array, felt: Array) -> None:
     """Find the position of the tool relative to the object, and write the wrench on its tip (6,) [N, N·m].
 
     The points are balls of the tool's radius. They lie evenly along its axis, which is z of the
