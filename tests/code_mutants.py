@@ -46,6 +46,12 @@ _SEEING = "hand/operators/observer.py"
 CODE_MUTANTS = (
     _mutant("joints_overlap", "arrays over joints of a record begin at one place", "kernels/joint_records.py",
             "        begin = builder.add(begin, _bytes(builder, sizes))\n", "        pass\n", "joint_records"),
+    _mutant("start_far", "a start may be any posture with room", "robots/freedom.py",
+            "good[int(_away(robot, good).argmin())]", "good[-1]", "freedom"),
+    _mutant("walked_too_few", "postures are left out before one with all the room", "robots/freedom.py",
+            "if parts[-1].max() >= STEPS:", "if True:", "freedom"),
+    _mutant("fan_half", "the last pose of a fan is not looked at", "kinematics/__init__.py",
+            "for k in range(transforms.shape[1]):", "for k in range(transforms.shape[1] - 1):", "freedom"),
     _mutant("trigger_missed", "a stage that waits for a message steps when there is none", "kernels/program.py",
             "elif word_at(table[at, 1]) == word_at(table[at, 2]):",
             "elif word_at(table[at, 1]) != word_at(table[at, 2]):", "program"),
