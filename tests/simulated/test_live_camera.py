@@ -20,7 +20,7 @@ from teleop_scene.film import Way, topics_of  # noqa: E402
 from teleop_scene.live_camera import run  # noqa: E402
 
 if TYPE_CHECKING:
-    from tests.simulated.conftest import SimulatedPeer
+    from simulated.conftest import SimulatedPeer
 
 SCENE = models.OWN / "cubes.xml"
 VIEW = View("front", 160, 120, is_marked=True)
