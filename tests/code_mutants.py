@@ -423,7 +423,7 @@ CODE_MUTANTS = (
             "hand/master/master_bridge.py", "age <= p.force_timeout and self.is_heard(now_ns)",
             "age <= p.force_timeout", "master_bridge"),
     _mutant("from_tomorrow", "poses that are stamped ahead are believed",
-            "slave/bridges/hearing.py", "0.0 < oldest < abs(age)", "0.0 < oldest < age",
+            "graph/stamps.py", "0.0 < oldest < abs(age)", "0.0 < oldest < age",
             "master_bridge"),
     _mutant("intention_late", "the score against intention leaves out what the filter changed",
             "evaluation/metrics/tremor_filter.py", "(tremor, after[own] - before[own] + tremor)",
