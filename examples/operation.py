@@ -3,7 +3,7 @@
 import numpy as np
 
 import teleop_core as tc
-from teleop_core.slave.operation import State
+from teleop_core.graph.operation import State
 
 
 def main() -> None:

@@ -8,8 +8,8 @@ import sys
 import tempfile
 from pathlib import Path
 
-from teleop_core.slave.operation import State
-from teleop_drill import Cure, Exercise, Motion, Rig, hand, register_exercise
+from teleop_core.graph.operation import State
+from teleop_drill import AllowedMotion, Cure, Exercise, Rig, hand, register_exercise
 
 AMPLITUDE, FREQUENCY = 0.0003, 10.0  # m, Hz
 
@@ -32,7 +32,7 @@ SHAKEN = register_exercise(
         text="hand trembles by 0.3 mm, ten times a second",
         inject=shake,
         undo=steady,
-        motion=Motion.GOES_ON,
+        motion=AllowedMotion.GOES_ON,
         states=(State.ENABLED,),
         cures=(Cure.NOTHING,),
         hand_speed=math.hypot(hand.SPEED, 2.0 * math.pi * FREQUENCY * AMPLITUDE),

@@ -24,6 +24,7 @@ OTHERS = (
     "teleop_machines",
     "teleop_console",
     "teleop_exchange",
+    "teleop_scene",
     "teleop_lab",
     "teleop_drill",
     "lerobot_robot_teleop_core",

@@ -12,10 +12,11 @@ import numpy as np
 from page_client import TOKEN
 from teleop_console import app, link
 from teleop_console.server import ConsoleServer
+from teleop_core.graph.operation import State
 from teleop_core.graph.topics import MASTER_MEASURED_CP, OPERATION
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots import load_robot_set
-from teleop_core.slave.operation import Fault, State, operation_text
+from teleop_core.slave.operation import Fault, operation_text
 
 POSE = np.array([0.0, -0.0655, -0.0881, 1.0, 0.0, 0.0, 0.0])
 
@@ -31,7 +32,7 @@ class Desk:
 
     def __init__(self, *, is_stoppable: bool = False) -> None:
         self.is_stoppable = is_stoppable
-        self.arms: tuple[link.Arm, ...] = (link.Arm("", load_robot_set("rcrt1", ())),)
+        self.arms: tuple[link.ShownArm, ...] = (link.ShownArm("", load_robot_set("rcrt1", ())),)
         self.asked: list[Any]
         self.known: dict[Any, Any]
         self.asked, self.stops, self.known = [], 0, {}

@@ -29,7 +29,7 @@ NOT_RUN = {
     r"compile": "the kernels are compiled before tests: tests/scenario/test_compile_command.py",
     r"fit rests\.csv|sim --config scara\.yaml": "needs measurements of a machine",
     r"import user\.bag": "needs a bag of ROS 1: tests/unit/test_import_bags.py",
-    r".*--format lerobot": "needs its library: tests/unit/test_lerobot.py",
+    r"export drive\.db3": "needs a bag of others: tests/unit/test_data_set_with_pictures.py",
     r"study .* --scheduler": "needs a Dask scheduler: tests/unit/test_studies.py",
     r"study config/studies/(uva|ten_thousand)": "takes ten minutes and more of all processors; tests check its points",
     r"experiment": "each is run by a test of its own, below its name",
@@ -181,13 +181,13 @@ def _arm(path: Path) -> None:
 
 
 def _data_set(path: Path) -> None:
-    """Two episodes, as `teleop export --format lerobot` writes them."""
+    """Two episodes, as `teleop export --to lerobot` writes them."""
     bags = [path.with_name(f"of_{path.name}_{seed}") for seed in (1, 2)]
     for seed, bag in enumerate(bags):
         if not bag.exists():
             tc.run("coarse_box", duration=2.0, seed=seed, out=bag)
     if not path.exists():
-        words = ["export", *map(str, bags), "--out", str(path), "--format", "lerobot"]
+        words = ["export", *map(str, bags), "--to", "lerobot", str(path)]
         assert main([*words, "--task", "follow the edge"]) == 0
 
 
@@ -204,13 +204,13 @@ FILES: dict[str, Callable[[Path], None]] = {
 def provide(named: Named, folder: Path) -> None:
     """Make what a command reads and no command before it wrote: files, and recordings.
 
-    Where a page shows a command in several forms, each has its ``--out`` to itself.
+    Where a page shows a command in several forms, each has its output to itself.
     """
     for name, make in FILES.items():
         if any(re.search(rf"(?:^|[=,]){re.escape(name)}\b", word) for word in named.words):
             maker = _hand_in_mm if name == "hand.csv" and "px" in named.words else make
             maker(folder / name)
-    written = _value(named.words, "--out")
+    written = _value(named.words, "--out") or (_value(named.words, "lerobot") if named.words[0] == "export" else "")
     if (place := folder / written).is_file():
         place.unlink()
     elif written and place.is_dir():

@@ -18,11 +18,12 @@ from teleop_core.bags.messages import discover, layout
 from teleop_core.base.parameters import specs
 from teleop_core.graph.topics import Topic
 from teleop_core.middleware.world import Executor, Node, Owner, Qos, World
-from teleop_core.nodes.observer import Observer
+from teleop_core.nodes.observer import ReportReader
 from teleop_core.nodes.quality import profile
 from teleop_core.nodes.streams import Subscription, message_type
 from teleop_core.robots import load_robot
-from teleop_core.slave import slave, slave_sim
+from teleop_core.slave import slave_sim
+from teleop_core.slave.parameters import SlaveParameters
 
 with warnings.catch_warnings():
     warnings.simplefilter("ignore")  # its parser imports a deprecated module of Python
@@ -89,7 +90,7 @@ def at_rest(listener: Listener, count: int = 1000) -> Callable[[], object]:
 def _is_of_arm(key: str) -> bool:
     """Whether a parameter, with double underscores for dots, is that of a simulated arm alone."""
     name = key.replace("__", ".")
-    mine, its = ({spec.name for spec in specs(g)} for g in (slave.SlaveParameters, slave_sim.SlaveSimParameters))
+    mine, its = ({spec.name for spec in specs(g)} for g in (SlaveParameters, slave_sim.SlaveSimParameters))
     return name in its - mine
 
 
@@ -112,7 +113,7 @@ class AnyPeer:
     world: World
     ros: Node
     executor: Executor
-    observer: Observer
+    observer: ReportReader
 
     def __init__(self) -> None:
         self.nodes: list[Any] = []
@@ -249,7 +250,7 @@ class AnyPeer:
     def publisher(self, topic: Topic, readers: int = 1) -> Any:
         """Publisher of a topic, once that many subscriptions are there."""
         if topic.name not in self._publishers:
-            kind = message_type(topic.kind.ros_type)
+            kind = message_type(topic.ros_type)
             quality = profile(topic) if readers else Qos()
             made = self.ros.create_publisher(kind, topic.name, quality)
             self._publishers[topic.name] = made

@@ -31,7 +31,7 @@ setup(
     ],
     entry_points={
         "teleop_core.pages": [
-            "report = teleop_console.report.page:report_page",
+            "report = teleop_console.report.report_page:report_page",
             "workspace = teleop_console.report.workspace:write_workspace_page",
         ]
     },

@@ -14,6 +14,7 @@ setup(
     python_requires=">=3.11",
     install_requires=[
         f"teleop_core=={VERSION}",
+        "av",
         "cyclopts",
         "lazy_loader",
         "numpy",

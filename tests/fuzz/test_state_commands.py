@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 
 from fuzzing import fuzz
 from present import present
-from teleop_core.slave.operation import Fault, OperationParameters, State
+from teleop_core.graph.operation import State
+from teleop_core.slave.operation import Fault, OperationParameters
 from teleop_core.slave.operation.states import COMMANDS
 from teleop_core.slave.pair import ArmParameters, SimulatedArm
 

@@ -7,9 +7,10 @@ import pytest
 
 from led_slave import LedSlave
 from present import present
+from teleop_core.graph.operation import State
 from teleop_core.kernels.geometry import Array
 from teleop_core.slave.commands import CommandStatus
-from teleop_core.slave.operation import OperationParameters, State
+from teleop_core.slave.operation import OperationParameters
 from teleop_core.slave.operation.faults import Fault
 from teleop_core.slave.operation.states import COMMANDS
 from teleop_core.slave.pair import ArmParameters, SimulatedArm

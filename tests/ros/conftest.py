@@ -35,7 +35,7 @@ from teleop_core.nodes.children import environment, free_domain
 from teleop_core.nodes.crews import Processes
 from teleop_core.nodes.interrupt import Interrupt
 from teleop_core.nodes.live import live
-from teleop_core.nodes.observer import Observer
+from teleop_core.nodes.observer import ReportReader
 from teleop_core.nodes.starter import NODE, Started, Starter
 from teleop_core.robots import load_robot
 from teleop_core.session.configuration import Configuration, configure
@@ -129,7 +129,7 @@ class Peer(AnyPeer):
         self.world, self.ros = ros.RosWorld(self.context), ros_node.RosNode(self.node)
         self.executor = self.world.executor()
         self.executor.add_node(self.ros)
-        self.observer = Observer(int(self.domain))
+        self.observer = ReportReader(int(self.domain))
 
     def close(self) -> None:
         """End the nodes, then leave: a participant that goes while others talk to it can crash.

@@ -13,7 +13,7 @@ import teleop_core as tc
 from browser import until
 from console_process import STARTS, ConsoleProcess
 from page_client import PageClient
-from teleop_core.slave.operation import State
+from teleop_core.graph.operation import State
 
 pytestmark = [pytest.mark.ros, pytest.mark.soak]
 

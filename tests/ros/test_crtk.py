@@ -15,15 +15,15 @@ from live_process import wait_until
 from present import present
 from teleop_core.middleware.ros import ROS
 from teleop_core.nodes.children import free_domain
-from teleop_drill.conformance import Finding, Verdict
+from teleop_drill.conformance import Finding, RowResult
 from teleop_drill.nodes.conformance import examine, left_behind
-from teleop_drill.nodes.conformance_arm import Arm
+from teleop_drill.nodes.conformance_arm import ArmClient
 
 pytestmark = pytest.mark.ros
 
 
 @contextmanager
-def foreign_arm(*faults: str) -> Iterator[Arm]:
+def foreign_arm(*faults: str) -> Iterator[ArmClient]:
     """Client of a foreign arm with these faults, which runs meanwhile."""
     domain, has_ended = int(free_domain()), threading.Event()
     world = ROS.guest(domain)
@@ -31,7 +31,7 @@ def foreign_arm(*faults: str) -> Iterator[Arm]:
     thread = threading.Thread(target=own.serve, args=(lambda: not has_ended.is_set(),), daemon=True)
     thread.start()
     try:
-        with Arm("PSM", domain) as arm:
+        with ArmClient("PSM", domain) as arm:
             assert arm.is_there(20.0)
             yield arm
     finally:
@@ -60,7 +60,7 @@ def test_a_foreign_arm_without_fault_passes() -> None:
         "move_jp",
         "servo_jp",
     )
-    assert {name: found[name].verdict for name in sound} == dict.fromkeys(sound, Verdict.OK), found
+    assert {name: found[name].verdict for name in sound} == dict.fromkeys(sound, RowResult.OK), found
 
 
 def test_types_and_qualities_of_a_foreign_arm_are_those_that_discovery_tells() -> None:

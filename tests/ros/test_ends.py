@@ -17,7 +17,7 @@ from live_process import TIMEOUT, LiveProcess, are_gone, wait_until
 from teleop_core.bags.reader import Bag
 from teleop_core.graph import BUILT_IN, RECORDER_NAME, topics
 from teleop_core.middleware.real_time import is_priority_granted
-from teleop_core.nodes.observer import Observer
+from teleop_core.nodes.observer import ReportReader
 
 if TYPE_CHECKING:
     pass
@@ -128,7 +128,7 @@ def domain_said_first(session: LiveProcess) -> str:
     lines = [line for line in session.text.splitlines() if not line.startswith("note: ")]
     assert lines[1] == f"recording to {session.bag}"
     domain = lines[0].rpartition("ROS_DOMAIN_ID=")[2]
-    with Observer(int(domain)) as observer:
+    with ReportReader(int(domain)) as observer:
 
         def is_heard() -> bool:
             observer.listen(0.1)

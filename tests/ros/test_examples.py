@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 import pytest
 
 from example_runs import EXAMPLES, numbers, run
+from teleop_core.graph.operation import State
 from teleop_core.nodes.children import environment
 from teleop_core.nodes.remote_control import RemoteControl
-from teleop_core.slave.operation import State
 
 if TYPE_CHECKING:
     from ros.conftest import Peer

@@ -96,6 +96,7 @@ def test_teleop_of_the_workspace_finds_the_commands_of_the_other_packages(worksp
             "teleop_machines",
             "teleop_console",
             "teleop_exchange",
+            "teleop_scene",
             "teleop_lab",
             "teleop_drill",
         )

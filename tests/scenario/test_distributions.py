@@ -16,7 +16,7 @@ from teleop_core.robots import ROBOTS
 ALONE = """
 import importlib.metadata, sys
 
-for name in ("teleop_machines", "teleop_console", "teleop_exchange", "teleop_lab", "teleop_drill"):
+for name in ("teleop_machines", "teleop_console", "teleop_exchange", "teleop_scene", "teleop_lab", "teleop_drill"):
     sys.modules[name] = None  # cannot be imported
 entries = (entry for found in importlib.metadata.distributions() for entry in found.entry_points)
 others = [entry for entry in entries if not entry.group.startswith("teleop_")]

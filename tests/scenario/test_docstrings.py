@@ -12,7 +12,15 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 STYLE = tomllib.loads((ROOT / "docs" / "words.toml").read_text(encoding="utf-8"))
-ROOMS = ("teleop_core", "teleop_machines", "teleop_console", "teleop_exchange", "teleop_lab", "teleop_drill")
+ROOMS = (
+    "teleop_core",
+    "teleop_machines",
+    "teleop_console",
+    "teleop_exchange",
+    "teleop_scene",
+    "teleop_lab",
+    "teleop_drill",
+)
 FILES = sorted(path for room in ROOMS for path in (ROOT / "src" / room / room).rglob("*.py"))
 SHORTEST = 6  # words of a message; what has less is a name or a format
 # Where a sentence or an item of a list ends, or an entry of Args begins.

@@ -15,7 +15,7 @@ from one_line import one_line
 from teleop_lab import experiments
 from teleop_lab.experiments.bench import Bench
 from teleop_lab.experiments.outcome import Outcome
-from teleop_lab.experiments.page import experiments_page
+from teleop_lab.experiments.results_page import experiments_page
 
 if TYPE_CHECKING:
     from conftest import Run

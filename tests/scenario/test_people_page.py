@@ -15,7 +15,7 @@ from teleop_console.answers import Situation
 from teleop_console.server import ConsoleServer
 from teleop_lab.people.conduct import serve
 from teleop_lab.people.journal import DONE, Journal
-from teleop_lab.people.page import PeoplePage
+from teleop_lab.people.people_page import PeoplePage
 from teleop_lab.people.plan import TLX, Plan, read_plan
 
 FILE = Path(__file__).parents[2] / "config" / "studies" / "people_on_a_late_screen.yaml"

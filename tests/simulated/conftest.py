@@ -13,7 +13,7 @@ from teleop_core.bags.reader import Bag
 from teleop_core.graph.graph import BUILT_IN, RECORDER_NAME, Graph, build_graph
 from teleop_core.graph.stage import STAGES
 from teleop_core.nodes.making import make_node
-from teleop_core.nodes.observer import Observer
+from teleop_core.nodes.observer import ReportReader
 from teleop_core.nodes.process import serve
 from teleop_core.nodes.teleop_session import TeleopSession
 from teleop_core.nodes.watch import Crew
@@ -105,7 +105,7 @@ class SimulatedPeer(AnyPeer):
         self.ros = self.world.node("peer")
         self.executor = self.world.executor()
         self.executor.add_node(self.ros)
-        self.observer = Observer(0, world=self.world)
+        self.observer = ReportReader(0, world=self.world)
 
     def launch(self, name: str, parameters: dict[str, Any], arm: str, env: Mapping[str, str] | None) -> SimulatedNode:
         full = f"{arm}/{name}".strip("/")

@@ -6,9 +6,9 @@ import pytest
 
 from foreign_arm import ForeignArm
 from simulated.conftest import SimulatedPeer
-from teleop_drill.conformance import Finding, Verdict, exit_code
+from teleop_drill.conformance import Finding, RowResult, exit_code
 from teleop_drill.nodes.conformance import examine
-from teleop_drill.nodes.conformance_arm import Arm
+from teleop_drill.nodes.conformance_arm import ArmClient
 
 
 @cache
@@ -16,7 +16,7 @@ def findings_of(fault: str, *, may_move: bool = True) -> dict[str, Finding]:
     """What is found of an arm with a fault, by topic."""
     peer = SimulatedPeer()
     peer.foreign("foreign", lambda world: ForeignArm(world, (fault,)).serve())
-    with Arm("PSM", world=peer.world) as arm:
+    with ArmClient("PSM", world=peer.world) as arm:
         assert arm.is_there(20.0)
         return {found.row.name: found for found in examine(arm, may_move=may_move)}
 
@@ -34,12 +34,12 @@ def test_an_arm_without_fault_passes_and_is_only_moved_by_what_it_takes() -> Non
         "move_jp",
         "servo_jp",
     )
-    assert {name: verdicts[name] for name in sound} == dict.fromkeys(sound, Verdict.OK), found
-    assert {verdict for name, verdict in verdicts.items() if name not in sound} == {Verdict.ABSENT}
+    assert {name: verdicts[name] for name in sound} == dict.fromkeys(sound, RowResult.OK), found
+    assert {verdict for name, verdict in verdicts.items() if name not in sound} == {RowResult.ABSENT}
 
 
 def test_a_signal_ends_a_test_where_it_waits() -> None:
-    with Arm("PSM", world=SimulatedPeer().world) as arm:
+    with ArmClient("PSM", world=SimulatedPeer().world) as arm:
         arm.interrupt.ask()
         with pytest.raises(KeyboardInterrupt):
             arm.is_there(60.0)
@@ -76,7 +76,7 @@ def test_faults_are_found_by_looking_or_else_by_moving_the_arm(
 ) -> None:
     found = findings_of(fault, may_move=may_move)
     for topic in topics:
-        assert found[topic].verdict is Verdict.FAILED, (topic, found[topic])
+        assert found[topic].verdict is RowResult.FAILED, (topic, found[topic])
         assert note in found[topic].note, found[topic]
 
 
@@ -90,5 +90,5 @@ def test_rows_that_were_not_tried_are_no_pass(fault: str, may_move: bool, code: 
 
 def test_nothing_is_commanded_when_only_looking() -> None:
     found = findings_of("", may_move=False)
-    assert found["move_jp"].verdict is Verdict.SKIPPED
+    assert found["move_jp"].verdict is RowResult.SKIPPED
     assert found["state_command"].note == "read only"

@@ -11,12 +11,13 @@ from std_msgs.msg import Bool
 from std_srvs.srv import Trigger
 
 from teleop_core.bags.reports import read_reports
+from teleop_core.graph.operation import State
 from teleop_core.graph.topics import SLAVE_OPERATION, SLAVE_SERVO_JP, SLAVE_SETPOINT_JS
 from teleop_core.middleware.world import Publisher, Qos
 from teleop_core.nodes.operation import STOP_TOPIC, StopButton
 from teleop_core.nodes.streams import Subscription
 from teleop_core.robots import load_robot
-from teleop_core.slave.operation import Fault, State
+from teleop_core.slave.operation import Fault
 
 if TYPE_CHECKING:
     from peers import AnyPeer as Peer

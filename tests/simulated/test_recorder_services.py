@@ -7,8 +7,9 @@ import pytest
 from std_srvs.srv import Trigger
 
 from teleop_core.bags.reader import Bag
-from teleop_core.bags.recording import MARKS
+from teleop_core.bags.recording import MARKS, RecordingParameters
 from teleop_core.bags.reports import report
+from teleop_core.base.errors import ParameterError
 from teleop_core.graph import topics
 
 if TYPE_CHECKING:
@@ -118,3 +119,25 @@ def test_a_new_recording_begins_with_the_last_state(peer: "Peer", tmp_path: Path
     for name in ("bag", "bag_1"):
         (found,) = Bag(tmp_path / name).reports(topics.TELEOP_STATE)
         assert (found.stamp_ns, found.message) == (7, "FOLLOWING")
+
+
+def test_topics_of_other_nodes_are_recorded_byte_for_byte(peer: "Peer", tmp_path: Path) -> None:
+    name = "camera/front/image_raw/compressed"
+    session = Session(peer, out=str(tmp_path / "bag"), also=[name])
+    publisher = peer.publisher(topics.Topic(name, topics.Kind.REPORT, message="sensor_msgs/msg/CompressedImage"))
+    sent = [bytes([0, 1, 0, 0, number]) + bytes(100_000) for number in range(20)]
+    for data in sent:
+        publisher.send(data)
+        session.send(10)
+    assert session.node.end() == 0
+    bag = Bag(tmp_path / "bag")
+    assert bag.topics[name].type == "sensor_msgs/msg/CompressedImage"
+    kept = [data for *_, data in bag.raw([name])]
+    assert len(kept) > 15  # the first ones may come before recorder and sender have found each other
+    assert kept == sent[-len(kept) :]
+
+
+@pytest.mark.parametrize("entry", ["imu", "imu=Imu", "=sensor_msgs/msg/Imu"])
+def test_further_topics_without_a_type_are_refused(entry: str) -> None:
+    with pytest.raises(ParameterError, match="PACKAGE/msg/TYPE"):
+        RecordingParameters(also=(entry,))

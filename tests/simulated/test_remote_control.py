@@ -2,8 +2,8 @@
 
 from typing import TYPE_CHECKING
 
+from teleop_core.graph.operation import State
 from teleop_core.nodes.remote_control import RemoteControl
-from teleop_core.slave.operation import State
 
 if TYPE_CHECKING:
     from peers import AnyPeer as Peer

@@ -10,9 +10,9 @@ from typing import Any
 
 import pytest
 
+from teleop_core.graph.operation import State
 from teleop_core.nodes.crews import Processes
 from teleop_core.nodes.operation import StopInput
-from teleop_core.slave.operation import State
 from teleop_drill.simulation import seeds
 from teleop_drill.simulation.schedules import KINDS, Fault, draw
 from teleop_drill.simulation.seeds import PROCESSES, run_seed, shrink

@@ -4,7 +4,7 @@ import time
 
 import pytest
 
-from teleop_core.middleware.agenda import NEVER_NS, Agenda, Guard
+from teleop_core.middleware.agenda import NEVER_NS, Agenda, GuardCondition
 
 
 def served(agenda: Agenda, until_ns: int) -> None:
@@ -53,7 +53,7 @@ def test_a_cancelled_or_dropped_timer_calls_no_more_until_it_is_reset() -> None:
 def test_deferred_work_comes_before_timers_and_a_guard_calls_once_for_all_its_triggers() -> None:
     agenda, calls, woken = Agenda(), [], []
     agenda.wake = lambda: woken.append(1)
-    guard = Guard(agenda, lambda: calls.append("guard"))
+    guard = GuardCondition(agenda, lambda: calls.append("guard"))
     for _ in range(3):
         guard.trigger()
     agenda.defer(calls.append, "work")

@@ -11,13 +11,13 @@ import yaml
 
 from present import present
 from teleop_core.base import build
+from teleop_core.graph.operation import State
 from teleop_core.robots import load_robot
+from teleop_core.robots.joint_map import JointMap
 from teleop_core.session.configuration import configure
 from teleop_core.slave.bridges import BRIDGES, Command, arm_bridge, leading
 from teleop_core.slave.bridges.hearing import Hearing, Sample, Wrong
-from teleop_core.slave.bridges.names import JointMap
-from teleop_core.slave.operation.states import State
-from teleop_core.slave.slave import SlaveParameters
+from teleop_core.slave.parameters import SlaveParameters
 
 MS = 1_000_000
 SPEED = np.array([1.0, 2.0])

@@ -33,6 +33,10 @@ def rosbags_message(kind: topics.Kind, stamp_ns: int, values: Array, names: tupl
     if kind is topics.Kind.POSE:
         pose = t["geometry_msgs/msg/Pose"](point(*v[:3]), turn(*v[4:], v[3]))
         return kind_type(header, pose)
+    if kind is topics.Kind.POSES:
+        pose = t["geometry_msgs/msg/Pose"]
+        rows = values.reshape(-1, 7).tolist()
+        return kind_type(header, [pose(point(*row[:3]), turn(*row[4:], row[3])) for row in rows])
     if kind in {topics.Kind.TWIST, topics.Kind.WRENCH}:
         part = t["geometry_msgs/msg/" + ("Twist" if kind is topics.Kind.TWIST else "Wrench")]
         return kind_type(header, part(vector(*v[:3]), vector(*v[3:])))

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from accepted import why_refused
 from teleop_core.bags.messages import Refusal, Report, read_reports, read_values, report, write_values
 from teleop_core.base.texts import printable
-from teleop_core.graph.topics import Kind
+from teleop_core.graph.topics import POSES, Kind
 
 POSE = np.array([0.1, 0.2, 0.3, 1.0, 0.0, 0.0, 0.0])
 
@@ -20,8 +20,9 @@ def empty_message(kind: Kind) -> Any:
     def vector() -> Record:
         return Record(x=0.0, y=0.0, z=0.0)
 
-    bodies = {
+    bodies: dict[Kind, dict[str, Any]] = {
         Kind.POSE: {"pose": Record(position=vector(), orientation=vector())},
+        Kind.POSES: {"poses": [Record(position=vector(), orientation=vector()) for _ in range(POSES)]},
         Kind.TWIST: {"twist": Record(linear=vector(), angular=vector())},
         Kind.WRENCH: {"wrench": Record(force=vector(), torque=vector())},
     }

@@ -19,7 +19,7 @@ from teleop_console.drivers import Drivers
 from teleop_console.fixture_outlines import Look, scale_of, unit_outline
 from teleop_console.hooks import Server
 from teleop_console.jaw_nodes import finger_poses
-from teleop_console.link import Arm, ArmView, View
+from teleop_console.link import ArmView, ShownArm, View
 from teleop_console.look import GOOD, HELD, ROLES, WRONG
 from teleop_console.master_nodes import METRES_PER_NEWTON
 from teleop_console.recorded import RecordedLink
@@ -71,7 +71,7 @@ def drawn(server: Server, link: RecordedLink, time: float) -> tuple[Scene, View]
 def scene_of(server: Server, name: str) -> Scene:
     """Empty scene with an arm."""
     server.scene.reset()
-    return Scene(server, [Arm("", tc.load_robot(name))])
+    return Scene(server, [ShownArm("", tc.load_robot(name))])
 
 
 def turned(node: FrameHandle | BoxHandle) -> Array:
@@ -222,7 +222,7 @@ def test_a_link_with_a_visual_is_drawn_as_it_looks_and_the_others_plainly(server
     box = '<visual><geometry><box size="0.1 0.2 0.3"/></geometry></visual>'
     file = tmp_path / "arm.urdf"
     file.write_text(text.replace('<link name="forearm">', f'<link name="forearm">{box}'))
-    scene = Scene(server, [Arm("", tc.load_robot(str(file), tip="tool0"))])
+    scene = Scene(server, [ShownArm("", tc.load_robot(str(file), tip="tool0"))])
     scene.show("ghost", is_shown=True)
     for place in ("/arm/robot", "/arm/ghost"):
         forearm = present(server.scene.get_handle_by_name(f"{place}/link3/link"))

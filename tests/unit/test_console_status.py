@@ -7,10 +7,10 @@ import pytest
 
 from teleop_console.link import ArmView, View
 from teleop_console.status import closes, facts, leader, next_step, status_html, task_text
+from teleop_core.graph.operation import State
 from teleop_core.graph.topics import TASK_STATE
 from teleop_core.hand.operators import OPERATORS
 from teleop_core.hand.tasks import Act, Miss
-from teleop_core.slave.operation import State
 
 
 def view_of(state: State, *, is_clutched: bool = False) -> View:

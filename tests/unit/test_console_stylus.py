@@ -13,7 +13,7 @@ from page_client import TOKEN
 from present import present
 from teleop_console.cameras import FIELD
 from teleop_console.hooks import Server
-from teleop_console.link import Arm, ArmView, View
+from teleop_console.link import ArmView, ShownArm, View
 from teleop_console.scene import Scene
 from teleop_console.server import ConsoleServer
 from teleop_console.stylus import LINGER, STEP_LENGTH, STEP_TURN, Stylus, stepped
@@ -36,7 +36,7 @@ class Hand:
         server.scene.reset()
         self.said: list[Any]
         self.server, self.drivers, self.said = server, {1, 2}, []
-        scene = Scene(server, [Arm("", tc.load_robot("rcrt1"))])
+        scene = Scene(server, [ShownArm("", tc.load_robot("rcrt1"))])
         self.stylus = Stylus(
             server,
             scene,
@@ -167,7 +167,7 @@ def test_nothing_is_stepped_before_the_stylus_is_known_or_while_it_is_dragged(se
     hand.stylus.nudge("", "x", 1)
     assert hand.take() == []
     server.scene.reset()
-    scene, said = Scene(server, [Arm("", tc.load_robot("rcrt1"))]), list[Any]()
+    scene, said = Scene(server, [ShownArm("", tc.load_robot("rcrt1"))]), list[Any]()
     stylus = Stylus(server, scene, lambda _: True, lambda *_: said.append(1), said.append)
     stylus.nudge("", "x", 1)
     assert said == []
@@ -186,7 +186,7 @@ def test_a_pose_that_is_none_moves_nothing(hand: Hand) -> None:
 @pytest.mark.parametrize("robot", ["rcrt1", "puma560"])
 def test_handles_grow_with_the_arm_so_that_a_large_view_shows_them_as_large(server: Server, robot: str) -> None:
     server.scene.reset()
-    scene = Scene(server, [Arm("", tc.load_robot(robot))])
+    scene = Scene(server, [ShownArm("", tc.load_robot(robot))])
     Stylus(server, scene, lambda _: True, lambda *_: None, lambda _: None)
     gizmo: Any = server.scene.get_handle_by_name(f"{scene.masters['']}/grip")
     camera = scene.work()

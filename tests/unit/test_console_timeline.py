@@ -17,8 +17,8 @@ import teleop_core as tc
 from patience import wait_until
 from teleop_console.curves import STRETCHES, TICKS, bands, thinned
 from teleop_console.drivers import Drivers
-from teleop_console.link import Arm, ArmView, View
-from teleop_console.past import DELAY, ERROR, ROWS, Past, Rows, Seen
+from teleop_console.link import ArmView, ShownArm, View
+from teleop_console.past import DELAY, ERROR, ROWS, Past, Rows, Views
 from teleop_console.recorded import RecordedLink
 from teleop_console.recorded_past import Recorded
 from teleop_console.timeline import CURVES, FOUND, HELD, PIXELS, StripPage, Timeline
@@ -26,12 +26,13 @@ from teleop_core.bags.memory import MemoryBag
 from teleop_core.bags.recording import MARKS
 from teleop_core.bags.reports import report
 from teleop_core.graph import topics
+from teleop_core.graph.operation import State
 from teleop_core.graph.topics import Topic
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots import load_robot
-from teleop_core.slave.operation import Fault, State
+from teleop_core.slave.operation import Fault
 
-ARM = Arm("", load_robot("rcrt1"))
+ARM = ShownArm("", load_robot("rcrt1"))
 DRIVES, WATCHES = 0, 1
 WHOLE = {"begin": ["0"], "end": ["6"], "pixels": ["500"]}
 
@@ -225,8 +226,8 @@ def test_marks_that_were_set_are_ticks_with_their_texts(session: tc.Recording) -
 
 
 def test_marks_of_a_live_session_are_ticks_and_two_arms_have_bands_of_their_own() -> None:
-    arms = tuple(Arm(name, ARM.robot) for name in ("left", "right"))
-    seen = Seen(arms)
+    arms = tuple(ShownArm(name, ARM.robot) for name in ("left", "right"))
+    seen = Views(arms)
     for tick in range(30):
         told = {}
         for arm, state in zip(arms, (State.ENABLED, State.PAUSED), strict=True):
@@ -339,7 +340,7 @@ def view(time: float, x: float = 0.0, *, is_fresh: bool = True) -> View:
     return View(time, {"": arm}, is_fresh=is_fresh, delay=(0.001, 0.002))
 
 
-def known(seen: Seen, name: str) -> Rows:
+def known(seen: Views, name: str) -> Rows:
     """Samples of a column."""
     found = seen.samples(name)
     assert found is not None
@@ -347,7 +348,7 @@ def known(seen: Seen, name: str) -> Rows:
 
 
 def test_what_was_seen_is_kept_for_two_minutes_and_known_at_any_time_of_them() -> None:
-    seen = Seen((ARM,))
+    seen = Views((ARM,))
     for i in range(ROWS + 500):
         seen.add(view(i / 30.0, 1e-3 * i))
     begin, end = seen.span()
@@ -363,7 +364,7 @@ def test_what_was_seen_is_kept_for_two_minutes_and_known_at_any_time_of_them() -
 
 
 def test_what_was_not_known_is_no_number_and_silence_is_a_gap() -> None:
-    seen = Seen((ARM,))
+    seen = Views((ARM,))
     for i in range(100):
         seen.add(replace(view(i / 30.0), is_fresh=not 30 < i < 60))
     late = view(100 / 30.0)
@@ -377,7 +378,7 @@ def test_what_was_not_known_is_no_number_and_silence_is_a_gap() -> None:
 
 
 def test_a_time_that_goes_back_begins_anew_and_one_that_stands_still_adds_nothing() -> None:
-    seen = Seen((ARM,))
+    seen = Views((ARM,))
     for time in (5.0, 6.0, 2.0, 2.0):
         seen.add(view(time))
     assert seen.span() == (2.0, 2.0)

@@ -17,7 +17,7 @@ from teleop_core.slave import pair, slave_sim
 from teleop_core.slave.controllers import CONTROLLERS, Controller, adaptive, register_controller
 from teleop_core.slave.controllers.computed_torque import COMPUTED_TORQUE
 from teleop_core.slave.controllers.motion_estimates import known_friction
-from teleop_core.slave.slave import ReferenceFilterParameters
+from teleop_core.slave.parameters import ReferenceFilterParameters
 from teleop_lab.experiments.joint_steps import answer_to_steps
 
 LAWS = ("friction_compensation", "computed_torque", "adaptive", "disturbance_observer")

@@ -20,17 +20,18 @@ from present import present
 from teleop_core.bags import reader, reports
 from teleop_core.bags.writer import BagWriter
 from teleop_core.base.errors import UnknownNameError
+from teleop_core.graph.operation import State
 from teleop_core.graph.topics import DIAGNOSTICS, SLAVE_SETPOINT_JS, SLAVE_TRUE_CP
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots import load_robot
 from teleop_core.session import api
-from teleop_core.slave.operation import Fault, State
+from teleop_core.slave.operation import Fault
 from teleop_drill import drill
 from teleop_drill.drill import hand, judging
 from teleop_drill.drill.drill_table import drill_table, markdown, rows, summary
 from teleop_drill.drill.exercise import Exercise
 from teleop_drill.drill.numbers import Numbers, Scheduling
-from teleop_drill.drill.outcome import Outcome
+from teleop_drill.drill.outcome import FaultOutcome
 from teleop_drill.drill.recordings import Recorded, check_recording, judge_recording, missing, told_lost
 
 MS = 1_000_000
@@ -159,7 +160,7 @@ def test_what_a_hand_cannot_send_is_sent(number: float) -> None:
         assert np.array_equal(sample.pose[:3], [number] * 3, equal_nan=True)
 
 
-def outcome(**changed: object) -> drill.Outcome:
+def outcome(**changed: object) -> drill.FaultOutcome:
     """One that is as expected, of an arm that was stopped."""
     good: dict[str, Any] = {
         "exercise": next(one for one in drill.EXERCISES if one.name == "stop_topic"),
@@ -171,7 +172,7 @@ def outcome(**changed: object) -> drill.Outcome:
         "cure": drill.Cure.RESET,
         "detected": 1e-3,
     }
-    return drill.Outcome(**(good | changed))
+    return drill.FaultOutcome(**(good | changed))
 
 
 @pytest.mark.parametrize(
@@ -235,14 +236,14 @@ ROBOT = NUMBERS.robot
 BEGIN: Any = 1_500 * MS
 
 
-def seen(joints: Array, lies: float = 1.0, told: Any = None, warned: Any = None, late: float = 0.0) -> judging.Seen:
+def seen(joints: Array, lies: float = 1.0, told: Any = None, warned: Any = None, late: float = 0.0) -> judging.Tapped:
     """What a tap hears of an arm whose setpoint and measured joints are these, each millisecond."""
     joints = np.asarray(joints)
     measured = ROBOT.start + lies * (joints - ROBOT.start)
     tips = [np.append(ROBOT.fk(row)[:3, 3], [1.0, 0.0, 0.0, 0.0]) for row in joints]
     end = 1_000 * MS + len(joints) * MS
     heard = [trace(values) for values in (joints, measured, tips)]
-    return judging.Seen(BEGIN, end, heard[0], heard[1], heard[2], told, warned, Scheduling(late, late))
+    return judging.Tapped(BEGIN, end, heard[0], heard[1], heard[2], told, warned, Scheduling(late, late))
 
 
 def round_and_round(speed: float = 1.0, count: int = 2000) -> Array:
@@ -265,7 +266,7 @@ def stopping(after: float, braking: float = 1.0, count: int = 1500) -> Array:
     return ROBOT.start + np.cumsum(step, axis=0)
 
 
-def wrong(name: str, found: judging.Seen) -> list[str]:
+def wrong(name: str, found: judging.Tapped) -> list[str]:
     return [m.name for m in judging.judge(by_name(name), found, NUMBERS) if m.failure]
 
 
@@ -398,7 +399,7 @@ def test_what_was_on_its_way_as_a_fault_began_is_lost_by_that_fault(
     kept = np.delete(sent, 100 - before)
     with BagWriter(tmp_path / "bag", (SLAVE_SETPOINT_JS,), ROBOT.joint_names) as writer:
         writer.write_block({SLAVE_SETPOINT_JS: (kept, np.zeros((len(kept), ROBOT.n)), kept)})
-    first, second = (Outcome(exercise=one) for one in drill.chosen(("stop_topic", "flood"), is_composed=False))
+    first, second = (FaultOutcome(exercise=one) for one in drill.chosen(("stop_topic", "flood"), is_composed=False))
     faults = [(BEGIN, first), (BEGIN + 100 * MS, second)]
     heard = {SLAVE_SETPOINT_JS.name: (sent, sent)}
     judge_recording(Recorded(tmp_path / "bag", faults, heard, int(sent[-1]), None), 0.001)
@@ -413,7 +414,7 @@ def test_every_exercise_says_what_is_expected_and_has_a_name_of_its_own_in_each_
     for one in drill.EXERCISES:
         assert one.states
         assert one.cures
-        assert one.motion is drill.Motion.RESTS or one.watch >= 0.0
+        assert one.motion is drill.AllowedMotion.RESTS or one.watch >= 0.0
 
 
 @pytest.mark.parametrize("mutant", MUTANTS, ids=lambda one: one.name)

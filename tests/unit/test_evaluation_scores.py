@@ -11,7 +11,7 @@ import pytest
 
 from present import present
 from recipes import JOINTS, START_NS, Recipe, pose_rows, state, terminal
-from teleop_console.report.page import report_page
+from teleop_console.report.report_page import report_page
 from teleop_core.bags import reader, reports
 from teleop_core.bags.writer import BagWriter
 from teleop_core.base.errors import EvaluationError, RecordingError

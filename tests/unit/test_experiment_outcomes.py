@@ -17,7 +17,7 @@ from teleop_core.evaluation.figure import Figure
 from teleop_lab import experiments
 from teleop_lab.experiments import EXACT, Comparison, Experiment, Outcome, Tolerance, absolute, factor, percent
 from teleop_lab.experiments.outcome import numbers, summary
-from teleop_lab.experiments.page import experiments_page
+from teleop_lab.experiments.results_page import experiments_page
 
 positive = st.floats(1e-6, 1e6)
 finite = st.floats(-1e9, 1e9)

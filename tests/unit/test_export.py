@@ -137,7 +137,7 @@ def test_streams_of_different_rates_are_joined_and_newest_values_held_over_many_
         ({"topics": ["slave/nowhere"]}, "slave/nowhere"),
         ({"format": "xlsx"}, "csv, parquet, lerobot"),
         ({"rate": 0.0}, "--rate"),
-        ({"format": "lerobot", "action": "wish"}, "joints, tip"),
+        ({"format": "lerobot", "action": "wish"}, "joints, "),
         ({"format": "lerobot", "rate": 33.3}, "whole number"),
         ({"out": "a.xlsx"}, ".parquet"),
     ],

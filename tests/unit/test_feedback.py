@@ -8,12 +8,14 @@ import pytest
 from present import present
 from teleop_core.base import build
 from teleop_core.graph import DT, TICK_NS, topics
+from teleop_core.graph.operation import State
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots import load_robot
 from teleop_core.slave.commands import CommandStatus
-from teleop_core.slave.operation import Event, Fault, State
+from teleop_core.slave.operation import Event, Fault
 from teleop_core.slave.pair import ArmParameters, SimulatedArm
-from teleop_core.slave.slave import Slave, SlaveParameters
+from teleop_core.slave.parameters import SlaveParameters
+from teleop_core.slave.slave import Slave
 
 ARM = load_robot("rcrt1")
 N = ARM.n

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from teleop_core.base import build
 from teleop_core.kernels.filters import lag_step
 from teleop_core.kernels.geometry import Array
-from teleop_core.slave.slave import ReferenceFilterParameters
+from teleop_core.slave.parameters import ReferenceFilterParameters
 
 GAIN, ZERO, POLE, DT = 0.1, 100.0, 10.0, 1e-3
 # One difference equation of three terms.

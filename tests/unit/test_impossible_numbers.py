@@ -25,6 +25,7 @@ from teleop_core.robots.arms.as_chain import true_chain
 from teleop_core.robots.drives import ENTRIES, Drives, independent_axes
 from teleop_core.robots.hardware import Hardware
 from teleop_core.robots.inertias import LinkInertia, check_possible
+from teleop_core.robots.joint_map import JointMap
 from teleop_core.robots.link_errors import LinkErrors
 from teleop_core.shapes.capsule import CapsuleParameters
 from teleop_core.shapes.cone import ConeParameters
@@ -35,10 +36,9 @@ from teleop_core.shapes.line import LineParameters
 from teleop_core.shapes.path import PathParameters
 from teleop_core.shapes.plane import PlaneParameters
 from teleop_core.slave.bridges.jaw_bridge import JawBridgeParameters
-from teleop_core.slave.bridges.names import JointMap
-from teleop_core.slave.jaw.jaw_sim import GripObjectParameters, PegParameters
+from teleop_core.slave.jaw.parameters import GripObjectParameters, PegParameters
 from teleop_core.slave.operation import OperationParameters
-from teleop_core.slave.slave import ReferenceFilterParameters
+from teleop_core.slave.parameters import ReferenceFilterParameters
 from teleop_core.slave.trajectory import cubic_move, shortest_move_time
 from teleop_core.slave.world.button import ButtonParameters
 from teleop_lab.calibration import Measured, appendix_e, simulate

@@ -14,8 +14,8 @@ from teleop_core.graph.signals import DT
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots import load_robot
 from teleop_core.slave.commands import CommandStatus
+from teleop_core.slave.interpolation import INTERPOLATIONS
 from teleop_core.slave.pair import ArmParameters, SimulatedArm
-from teleop_core.slave.slave import INTERPOLATIONS
 
 ROBOT = load_robot("planar_3r")  # it starts at home, with room on all sides
 HOME, SPEED = ROBOT.home, present(ROBOT.drives).speed_limit

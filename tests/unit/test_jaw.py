@@ -13,11 +13,12 @@ import teleop_core as tc
 from present import present
 from teleop_core.coupling.mapping.jaw_command import JAW_COMMAND, JawCommandParameters
 from teleop_core.graph import TICK_NS, topics
+from teleop_core.graph.operation import State
 from teleop_core.kernels.geometry import Array
 from teleop_core.slave.jaw.grip import WEIGHT
 from teleop_core.slave.jaw.jaw import Jaw, JawParameters
-from teleop_core.slave.jaw.jaw_sim import GripObjectParameters, JawSim, JawSimParameters, PegParameters
-from teleop_core.slave.operation import State
+from teleop_core.slave.jaw.jaw_sim import JawSim
+from teleop_core.slave.jaw.parameters import GripObjectParameters, JawSimParameters, PegParameters
 
 ENABLED, STATE = float(State.ENABLED), topics.OPERATION.index("state")
 PLACE = np.array([0.2, -0.1, 0.05])

@@ -5,10 +5,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from teleop_core.graph.operation import State
 from teleop_core.graph.topics import NO_COMMAND_NS, OPERATION
 from teleop_core.kernels.geometry import Array
 from teleop_core.slave.bridges import hearing, jaw_bridge
-from teleop_core.slave.operation.states import State
 
 MS = 1_000_000
 PERIOD = 2 * MS

@@ -15,13 +15,14 @@ from led_slave import LedSlave
 from present import present
 from teleop_core.base import ShapeError, build
 from teleop_core.graph import DT, TICK_NS, topics
+from teleop_core.graph.operation import State
 from teleop_core.kernels.geometry import Array, rotation, transform
 from teleop_core.robots import load_robot
 from teleop_core.robots.robot import Robot
 from teleop_core.slave import motion_commands, pair
 from teleop_core.slave.operation import OperationParameters
 from teleop_core.slave.operation.faults import Fault
-from teleop_core.slave.operation.states import Answer, State
+from teleop_core.slave.operation.states import Answer
 
 ARM = load_robot("rcrt1")
 # Well inside the limits and off the singularities.

@@ -12,8 +12,9 @@ from led_slave import LedSlave
 from present import present
 from teleop_core.base import UnknownNameError, build
 from teleop_core.graph import TICK_NS
+from teleop_core.graph.operation import State
 from teleop_core.kernels import Array, kernel, record
-from teleop_core.slave.operation import Answer, Event, Fault, OperationParameters, State, command_event
+from teleop_core.slave.operation import Answer, Event, Fault, OperationParameters, command_event
 from teleop_core.slave.operation.states import COMMANDS, TABLE, OperatingState, answer_text, change
 from teleop_core.slave.pair import ArmParameters, SimulatedArm
 
@@ -162,7 +163,7 @@ def test_homing_is_smooth_and_within_the_limits() -> None:
     slave.server.request("home")
     found = LedSlave(slave).along([None] * 10_000)["slave_setpoint_js"]
     assert slave.server.operation["is_homed"] == 1.0
-    start = slave.server.parameters["start"]
+    start = slave.server.parameters["start_jp"]
     assert np.allclose(found[-1], start, rtol=0, atol=1e-12)
     drives = present(slave.robot.drives)
     speed = np.abs(np.diff(found, axis=0)) / 1e-3
@@ -292,7 +293,7 @@ def test_an_arm_that_was_paused_while_it_homed_homes_when_it_is_resumed() -> Non
     assert slave.server.request("resume")[0] is Answer.DONE
     led.along([None] * 10_000)
     assert slave.server.operation["is_homed"] == 1.0
-    assert np.allclose(led.setpoint, slave.server.parameters["start"], rtol=0, atol=1e-12)
+    assert np.allclose(led.setpoint, slave.server.parameters["start_jp"], rtol=0, atol=1e-12)
 
 
 def test_unhome_and_disable_end_what_a_pause_left_of_homing() -> None:

@@ -12,7 +12,15 @@ import pytest
 from present import present
 
 SOURCES = Path(__file__).resolve().parents[2] / "src"
-PACKAGES = ("teleop_core", "teleop_machines", "teleop_console", "teleop_exchange", "teleop_lab", "teleop_drill")
+PACKAGES = (
+    "teleop_core",
+    "teleop_machines",
+    "teleop_console",
+    "teleop_exchange",
+    "teleop_scene",
+    "teleop_lab",
+    "teleop_drill",
+)
 ROS = re.compile(r"rclpy|rcl_interfaces|builtin_interfaces|ament_index_python|launch|launch_ros|std_srvs|.*_msgs")
 NAMED_BY = {"pyyaml": "python3-yaml"} | {name: name for name in PACKAGES}
 
@@ -37,7 +45,7 @@ def imported(package: str) -> Iterator[str]:
 def test_every_ros_package_that_is_imported_is_declared(package: str) -> None:
     declared, _ = manifest(package)
     used = {name for name in imported(package) if ROS.fullmatch(name)}
-    assert used or package in {"teleop_exchange", "teleop_lab", "teleop_machines"}
+    assert used or package in {"teleop_exchange", "teleop_scene", "teleop_lab", "teleop_machines"}
     assert used - declared == set()
 
 
@@ -47,7 +55,7 @@ def test_every_python_dependency_is_declared_or_noted_as_one_of_pip(package: str
     note = present(re.search(r"From pip.*?-->", text, re.DOTALL)).group()
     setup = (SOURCES / package / "setup.py").read_text()
     listed = present(re.search(r"install_requires=\[(.*?)\]", setup, re.DOTALL))
-    names = re.findall(r'"([a-z0-9_]+)', listed.group(1))
+    names = re.findall(r'"([a-z0-9_-]+)', listed.group(1))
     assert "numpy" in names
     for name in names:
         key = NAMED_BY.get(name, f"python3-{name}")

@@ -18,7 +18,7 @@ from teleop_core.graph.topics import TASK_STATE
 from teleop_lab.people.compare import comparison_page, comparison_table, people_dataset
 from teleop_lab.people.conduct import score_all
 from teleop_lab.people.journal import DONE, FAILED, Journal
-from teleop_lab.people.page import PeoplePage
+from teleop_lab.people.people_page import PeoplePage
 from teleop_lab.people.plan import TLX, Plan, conditions_of, read_plan
 from teleop_lab.studies.summary import apart, median_of
 

@@ -18,7 +18,7 @@ from teleop_core.robots import load_robot
 from teleop_core.robots.robot import Robot
 from teleop_core.slave import pair, slave_sim
 from teleop_core.slave.controllers.pid import PID, THIRD, PidParameters, pid_control, pid_step
-from teleop_core.slave.slave import ReferenceFilterParameters
+from teleop_core.slave.parameters import ReferenceFilterParameters
 
 ROBOTS = {name: load_robot(name) for name in ("rcrt1", "scara", "puma560", "stewart", "rps3")}
 AXES = [("rcrt1", 0), ("rcrt1", 2), ("rcrt1", 5), ("scara", 2), ("puma560", 1), ("stewart", 0), ("rps3", 0)]

@@ -17,13 +17,14 @@ from led_slave import LedSlave
 from present import present
 from teleop_core.base import ParameterError, build
 from teleop_core.graph import DT, TICK_NS
+from teleop_core.graph.operation import State
 from teleop_core.kernels import Array, pointer
 from teleop_core.robots import drives, load_robot
 from teleop_core.slave import commands, pair, slave_sim
 from teleop_core.slave.controllers import CONTROLLERS
 from teleop_core.slave.joints import integrate
-from teleop_core.slave.operation import Answer, Fault, OperationParameters, State
-from teleop_core.slave.slave import ReferenceFilterParameters
+from teleop_core.slave.operation import Answer, Fault, OperationParameters
+from teleop_core.slave.parameters import ReferenceFilterParameters
 
 ARM = load_robot("rcrt1")
 DRIVES = present(ARM.drives)

@@ -8,7 +8,7 @@ import pytest
 import teleop_core as tc
 from present import present
 from teleop_core.base.errors import ParameterError, ShapeError, TeleopError, UnknownNameError
-from teleop_core.slave.operation import State
+from teleop_core.graph.operation import State
 
 KINDS: Any = {
     "coarse": {},

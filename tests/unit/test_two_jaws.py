@@ -12,6 +12,7 @@ from teleop_core.kernels import Array, kernel
 from teleop_core.session.links import link_texts
 from teleop_core.slave.jaw import jaw_sim, sharing
 from teleop_core.slave.jaw.grip import WEIGHT
+from teleop_core.slave.jaw.parameters import GripObjectParameters, JawSimParameters
 
 PLACE = np.array([0.2, -0.1, 0.05])
 BASE = np.array([0.5, -0.2, 0.1])  # of the second arm in the first one's
@@ -28,8 +29,8 @@ class Pair:
     """Two jaws whose tips and setpoints are led by hand; each hears of the other a tick later."""
 
     def __init__(self, places: Any = PLACE, **thing: float) -> None:
-        given = jaw_sim.JawSimParameters(
-            second_base=tuple(BASE), object=jaw_sim.GripObjectParameters(place=tuple(np.ravel(places)), **thing)
+        given = JawSimParameters(
+            second_base=tuple(BASE), object=GripObjectParameters(place=tuple(np.ravel(places)), **thing)
         )
         self.sims = jaw_sim.JawSim(given), jaw_sim.JawSim(given)
         self.rows = [sim.signals for sim in self.sims]

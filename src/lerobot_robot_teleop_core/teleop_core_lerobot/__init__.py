@@ -17,6 +17,7 @@ from teleop_core.commands.progress import shown_progress
 from teleop_core.graph import TICK_NS, topics
 from teleop_core.kernels.fields import PerJoint, Wrench
 from teleop_core.session.runner import record_blocks
+from teleop_core.slave.parameters import SlaveParameters
 
 __all__ = ["Connection", "MasterSide", "SessionFields", "Side", "SlaveSide"]
 
@@ -121,7 +122,7 @@ class Side:
             needed = f"one arm, with {stage.name} among teleop.stages"
             raise tc.ParameterError("settings", tuple(settings), needed)
         self._stage, self._fps, self._bag = stage.name, fps, bag
-        self.joint_names: tuple[str, ...] = self._configuration.group("slave").joint_names
+        self.joint_names: tuple[str, ...] = self._configuration.of(SlaveParameters).joint_names
         self._session: tc.VirtualTime | None = None
 
     @property

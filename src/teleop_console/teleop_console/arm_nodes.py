@@ -10,9 +10,10 @@ from teleop_console.body_nodes import BodyNodes, extent
 from teleop_console.cameras import corners
 from teleop_console.fixture_outlines import Look, OutlineNode, scale_of, unit_outline
 from teleop_console.jaw_nodes import JawNodes
-from teleop_console.link import Arm, ArmView, box_of
+from teleop_console.link import ArmView, ShownArm, box_of
 from teleop_console.look import MEASURED, ROLES, TARGET, WANTED, Color
 from teleop_console.master_nodes import MasterNodes
+from teleop_console.poses import move
 from teleop_console.stand import DEVICE, PUBLISHED_AXES, REST, stand_beside
 from teleop_console.tails import LENGTH, Tail, is_jump
 from teleop_console.world_nodes import WorldNodes
@@ -32,6 +33,7 @@ from teleop_core.graph.topics import (
 )
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots.bodies import bodies_of
+from teleop_core.robots.bodies.frames import inverse, pose_of, product
 from teleop_core.robots.bodies.looks import fingers_of, looks_of
 from teleop_core.robots.bodies.meshes import mesh_of
 from teleop_core.robots.dexterity import sample_workspace
@@ -71,7 +73,7 @@ class ArmNodes:
         recorded_path: Function that returns the recorded path when time jumps; None without a recording.
     """
 
-    def __init__(self, server: viser.ViserServer, arm: Arm) -> None:
+    def __init__(self, server: viser.ViserServer, arm: ShownArm) -> None:
         robot = self._robot = arm.robot
         self._server, self.path = server, f"/{arm.name or 'arm'}"
         self.bodies = bodies_of(robot)
@@ -91,7 +93,7 @@ class ArmNodes:
         self.master = MasterNodes(server, f"{self.path}/master", self._stand)
         self._tails = self.measured, self.reference, self.master.tail
         self.world = WorldNodes(server, self.path, robot)
-        self.jaw = JawNodes(server, self.path, has_fingers=bool(self._fingers))
+        self.jaw = JawNodes(server, self.path, has_fingers=bool(self._fingers) or robot.world_base is not None)
         self.fixture = Look()
         self._goal: viser.IcosphereHandle | None = None
         self.outline = OutlineNode(server, f"{self.path}/fixture", self._stand.quaternion)
@@ -109,6 +111,23 @@ class ArmNodes:
         """Move arm and master to a position along the page's y axis [m]."""
         self._side = side
         self._root.position = (0.0, side, 0.0)
+
+    def stand_beside(self, first: Robot) -> None:
+        """Put the arm of a scene where it stands beside the first arm, whose base has the axes of the page.
+
+        The scene draws the arm's own bodies. Cameras take the arm's position into account, but not its rotation.
+        """
+        self.drawn.show(is_shown=False)
+        if self._robot.world_base is not None and first.world_base is not None:
+            pose = product(inverse(pose_of(first.world_base)), pose_of(self._robot.world_base))
+            self._side = float(pose[1])
+            move(self._root, pose)
+
+    def give_way(self, *, is_hidden: bool) -> None:
+        """Hide the arm and all paths while a picture takes the place of the scene; the master stays."""
+        self.drawn.show(is_shown=not is_hidden and self._robot.world_base is None)
+        for tail in self._tails:
+            tail.show(is_shown=not is_hidden)
 
     def room(self) -> tuple[Array, Array]:
         """Lowest and highest corner (3,) [m] of arm and master, in the axes of the page."""

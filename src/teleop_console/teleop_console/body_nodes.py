@@ -49,14 +49,16 @@ class BodyNodes:
         }
         self._list = list(self.frames.values())
         self._halos: dict[int, viser.IcosphereHandle] = {}
+        self._meshes: list[viser.MeshHandle] = []
         for i, body in enumerate(bodies.bodies):
             place = f"{path}/{body.name}"
             role: Role = "link" if i else "base"
             for number, look in enumerate(looks.get(i, ())):
                 name = f"{place}/{role}{number or ''}"
-                _add_mesh(server, name, role, look.mesh, color=look.color, is_ghost=is_ghost, is_flat=True)
+                mesh = _add_mesh(server, name, role, look.mesh, color=look.color, is_ghost=is_ghost, is_flat=True)
+                self._meshes.append(mesh)
             if i not in looks:
-                add_solids(server, place, body.solids, is_ghost=is_ghost)
+                self._meshes += add_solids(server, place, body.solids, is_ghost=is_ghost).values()
         self._fingers = [(finger, self._add_finger(finger, k, is_ghost=is_ghost)) for k, finger in enumerate(fingers)]
         self._drawn = np.tile(np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]), (len(self._list), 1))
         self._marked: frozenset[int] = frozenset()
@@ -84,6 +86,11 @@ class BodyNodes:
             set_pose(self._list[body], poses[body])
             self._drawn[body] = poses[body]
         return self._drawn.copy()
+
+    def show(self, *, is_shown: bool) -> None:
+        """Show the shapes of all bodies, or hide them; frames, axes and halos remain."""
+        for mesh in self._meshes:
+            mesh.visible = is_shown
 
     def mark(self, joints: frozenset[int]) -> None:
         """Show a halo around the given joints only; the colours of the bodies do not change."""

@@ -153,7 +153,7 @@ def texts(chosen: Chosen, *, opens: bool = True) -> tuple[str, ...]:
     except TeleopError:
         return said
     known = () if chosen.get("operator") else (f"operator={found.groups['operator'].kind.kind}",)
-    duration = found.groups[SESSION].duration
+    duration = found.session.duration
     if chosen.get("task", _NOTHING) != _NOTHING:
         duration = max(duration, _TASK_TIME)
     return (*said, *known, f"{SESSION}.duration={duration!r}")

@@ -14,9 +14,10 @@ from typing import Any
 
 from std_srvs.srv import Trigger
 
-from teleop_console.console_streams import SILENCE, Hand, Seen, now_of
-from teleop_console.link import Arm, ArmView, ParameterInfo, Parameters, Setting, View
+from teleop_console.console_streams import SILENCE, Hand, NewestSample, now_of
+from teleop_console.link import ArmView, ParameterInfo, Parameters, Setting, ShownArm, View
 from teleop_console.parameter_client import ParameterClient, ParameterEvents, call
+from teleop_console.picture_streams import PictureStreams
 from teleop_core.bags.messages import read_numbers, read_reports
 from teleop_core.bags.recording import MARKS
 from teleop_core.base.errors import ParameterError, SessionError
@@ -26,7 +27,7 @@ from teleop_core.kernels.geometry import Array
 from teleop_core.middleware.ros import ROS
 from teleop_core.middleware.world import World, WorldEndedError
 from teleop_core.nodes.display import SEEN
-from teleop_core.nodes.observer import WARNING, Observer
+from teleop_core.nodes.observer import WARNING, ReportReader
 from teleop_core.nodes.operation import StopButton
 from teleop_core.nodes.streams import Subscription
 from teleop_core.robots import load_robot_set
@@ -41,7 +42,7 @@ _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}")
 _HEARTBEAT = "operation.heartbeat"
 
 
-class LiveLink(Observer):
+class LiveLink(ReportReader):
     """A :class:`~teleop_console.link.SessionLink` to a running session.
 
     Args:
@@ -113,12 +114,13 @@ class LiveLink(Observer):
                     "session; give it with --domain N"
                 )
             self.world.sleep(0.02)
-        self.arms = tuple(Arm(name, self._robot(name)) for name in sorted(names))
-        self._seen = {arm.name: [Seen(self, t, arm) for t in SEEN] for arm in self.arms}
+        self.arms = tuple(ShownArm(name, self._robot(name)) for name in sorted(names))
+        self._seen = {arm.name: [NewestSample(self, t, arm) for t in SEEN] for arm in self.arms}
         told = {arm.name: [t.of_arm(arm.name) for t in (SLAVE_OPERATION, TELEOP_STATE)] for arm in self.arms}
         self._told = {arm: [Subscription(self, t, f"/{t.name}") for t in topics] for arm, topics in told.items()}
         self._marks = Subscription(self, MARKS, f"/{self._recorder()}/marks", _MARKS)
         self._hands = {arm.name: Hand(self, arm.name) for arm in self.arms}
+        self._pictures = PictureStreams(self)
         self._view = View(arms={arm.name: ArmView() for arm in self.arms})
         self._begun = self._heard = now_of(self)
 
@@ -160,13 +162,14 @@ class LiveLink(Observer):
             self._insist(view)
             self._hear_nodes(view)
             self._hear_marks(view)
+            view.pictures = self._pictures.take()
             view.time, view.age = now - self._begun, now - self._heard
             # frame rate of the display's topic, which is the last one
             view.display = self._seen[self.arms[0].name][-1].rhythm()
             view.is_fresh = view.age < SILENCE
             return view
 
-    def _hear(self, arm: Arm, view: ArmView) -> None:
+    def _hear(self, arm: ShownArm, view: ArmView) -> None:
         operation, state = self._told[arm.name]
         while (taken := operation.take()) is not None:
             found = read_numbers(taken.data, OPERATION)

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from teleop_console.link import Arm, ArmView
+from teleop_console.link import ArmView, ShownArm
 from teleop_core.bags.messages import Layout, layout, read_any
 from teleop_core.graph.topics import DISPLAY_MEASURED_CP, OPERATOR_BUTTONS, OPERATOR_JAW, OPERATOR_SERVO_CP, Topic
 from teleop_core.kernels.geometry import Array
@@ -29,10 +29,10 @@ def now_of(owner: Owner) -> float:
     return 1e-9 * owner.world.monotonic_ns()
 
 
-class Seen:
+class NewestSample:
     """Newest sample of a stream of an arm."""
 
-    def __init__(self, owner: Owner, topic: Topic, arm: Arm) -> None:
+    def __init__(self, owner: Owner, topic: Topic, arm: ShownArm) -> None:
         self.topic, self._joints = topic, arm.robot.joint_names
         self._layout: Layout = layout(topic, self._joints)
         self._owner, self._own = owner, topic.of_arm(arm.name)

@@ -7,9 +7,9 @@ import numpy as np
 
 from teleop_console.past import Past, Rows
 from teleop_console.recorded_arms import in_words
+from teleop_core.graph.operation import State
 from teleop_core.graph.topics import OPERATION, SLAVE_OPERATION, TELEOP_STATE, Limit, limit_text
 from teleop_core.kernels.geometry import Array
-from teleop_core.slave.operation import State
 
 STRETCHES = 400
 """Largest number of stretches drawn in a band; the worst and the longest stretches are drawn."""

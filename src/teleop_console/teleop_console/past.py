@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from teleop_console.link import Arm, ArmView, View
+from teleop_console.link import ArmView, ShownArm, View
 from teleop_console.recorded_arms import in_words
 from teleop_core.graph import topics
 from teleop_core.kernels.geometry import Array
@@ -135,14 +135,14 @@ class Past(ABC):
         self._add(arm, topic, names, units, is_held=kind is topics.Kind.REPORT)
 
 
-class Seen(Past):
+class Views(Past):
     """Views of a live session that the page received in the last minutes, with a row for each view.
 
     Args:
         arms: The arms.
     """
 
-    def __init__(self, arms: Sequence[Arm]) -> None:
+    def __init__(self, arms: Sequence[ShownArm]) -> None:
         super().__init__()
         self._arms = {arm.name: arm for arm in arms}
         self.joints = {arm.name: arm.robot.joint_names for arm in arms}

@@ -7,7 +7,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from teleop_console.link import Arm, ArmView, ParameterInfo, Setting
+from teleop_console.link import ArmView, ParameterInfo, Setting, ShownArm
 from teleop_core.bags.arms import arm_names, of_arm, topic_prefix
 from teleop_core.bags.reader import Bag
 from teleop_core.bags.reports import read_reports
@@ -31,6 +31,7 @@ _KEPT = (
     topics.SLAVE_JAW_MEASURED_JS,
     topics.SLAVE_JAW_OBJECT_CP,
     topics.SLAVE_JAW_BOARD,
+    topics.SCENE_POSES,
     topics.MASTER_ENERGY,
     topics.SLAVE_ENERGY,
     topics.TASK_STATE,
@@ -46,7 +47,7 @@ class RecordedArm:
         tracks: Streams and reports by their names without the arm.
     """
 
-    arm: Arm
+    arm: ShownArm
     tracks: Mapping[str, Series]
 
     def show(self, time_ns: int, view: ArmView) -> None:
@@ -78,7 +79,7 @@ def recorded_arms(
         RecordingError: The recording lacks the robot's name or its joint positions.
     """
     bags = {name: of_arm(bag, arm) for name, arm in namespaces(bag).items()}
-    arms = [Arm(name, _robot(one, configuration, name)) for name, one in bags.items()]
+    arms = [ShownArm(name, _robot(one, configuration, name)) for name, one in bags.items()]
     thinning = max(1, -(-sum(_size(bags[arm.name], arm.robot.n) for arm in arms) // most))
     found = [RecordedArm(arm, _tracks(bags[arm.name], arm, thinning)) for arm in arms]
     return tuple(found), thinning
@@ -127,7 +128,7 @@ def _size(bag: Bag, joints: int) -> int:
     return sum(info.count * (8 * widths[topic.name] + _STAMP_BYTES) for topic, info in infos if info is not None)
 
 
-def _tracks(bag: Bag, arm: Arm, thinning: int) -> dict[str, Series]:
+def _tracks(bag: Bag, arm: ShownArm, thinning: int) -> dict[str, Series]:
     """Streams and reports of one arm by their names without the arm."""
     wanted = [
         topic

@@ -8,9 +8,10 @@ import viser
 from teleop_console.arm_nodes import ArmNodes, Path
 from teleop_console.cameras import ASPECT, FIELD, Camera, around, corners, from_tool, microscope
 from teleop_console.fixture_outlines import Look
-from teleop_console.link import Arm, Parameters, Setting, View
+from teleop_console.link import Parameters, Setting, ShownArm, View
 from teleop_console.look import DARK, GRID, GRID_DARK, LIGHT, TARGET
 from teleop_console.stand import PUBLISHED_AXES
+from teleop_console.surrounding_nodes import SurroundingNodes
 from teleop_core.base.errors import TeleopError
 from teleop_core.hand.operators.rest import REST_POSITION
 from teleop_core.kernels.axes import axis_map
@@ -70,7 +71,7 @@ class Scene:
         arms: Arms of the session, at least one.
     """
 
-    def __init__(self, server: viser.ViserServer, arms: Iterable[Arm]) -> None:
+    def __init__(self, server: viser.ViserServer, arms: Iterable[ShownArm]) -> None:
         self._server = server
         self.arms: dict[str, ArmNodes] = {}
         side = 0.0
@@ -79,12 +80,17 @@ class Scene:
         server.scene.configure_environment_map(None)
         server.scene.add_light_hemisphere("/light", intensity=1.5)
         with server.atomic():
-            for arm in arms:
+            each = list(arms)
+            self._surroundings = SurroundingNodes(server, each[0].robot)
+            for arm in each:
                 nodes = ArmNodes(server, arm)
                 low, high = nodes.low, nodes.high
                 if self.arms:  # to the right of the previous arm
                     side -= float(high[1])
-                nodes.place(side)
+                if arm.robot.world_base is None:
+                    nodes.place(side)
+                else:
+                    nodes.stand_beside(each[0].robot)
                 side += float(low[1]) - 0.1 * nodes.bodies.size
                 self.arms[arm.name] = nodes
             self._ground()
@@ -99,6 +105,8 @@ class Scene:
             for name, nodes in self.arms.items():
                 if (seen := view.arms.get(name)) is not None:
                     nodes.draw(view.time, seen)
+            if (seen := view.arms.get(next(iter(self.arms)))) is not None:
+                self._surroundings.draw(seen)
 
     def retune(self, parameters: Parameters) -> None:
         """Apply the session's parameters that change the picture: axes, fixture, targets and object.
@@ -140,6 +148,14 @@ class Scene:
         with self._server.atomic():
             for nodes in self.arms.values():
                 nodes.show(what, is_shown=is_shown)
+
+    def give_way(self, *, is_hidden: bool) -> None:
+        """Hide all but the masters while the picture of a camera takes the place of the scene."""
+        with self._server.atomic():
+            self._floor.visible = not is_hidden
+            self._surroundings.show(is_shown=not is_hidden)
+            for nodes in self.arms.values():
+                nodes.give_way(is_hidden=is_hidden)
 
     def set_dark(self, *, is_dark: bool) -> None:
         """Set the colours for a dark or a light page."""

@@ -23,7 +23,7 @@ _USED = "most used"
 _MOST = 40  # largest number of parameters that are shown together
 Renew = Callable[[tuple[str, ...]], str]
 """Function that begins a new session with other settings; it returns the reason of a refusal, else an empty text."""
-Guard = Callable[[int | None], bool]
+MayDrive = Callable[[int | None], bool]
 """Function that returns whether a browser may change parameters; if not, it shows the reason in the browser."""
 
 
@@ -47,7 +47,7 @@ class SettingsPanel:
         self,
         server: viser.ViserServer,
         link: SessionLink,
-        may_drive: Guard,
+        may_drive: MayDrive,
         renew: Renew | None = None,
         of_session: Parameters | None = None,
     ) -> None:

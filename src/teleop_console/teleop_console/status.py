@@ -5,10 +5,11 @@ import math
 
 from teleop_console.answers import Situation
 from teleop_console.link import ArmView, View
+from teleop_core.graph.operation import State
 from teleop_core.graph.topics import SLAVE_JAW_MEASURED_JS, TASK_STATE
 from teleop_core.hand.input_device import UNHELD
 from teleop_core.hand.tasks import Act, Miss
-from teleop_core.slave.operation import Fault, State
+from teleop_core.slave.operation import Fault
 
 _SIGNALS = {State.ENABLED: "good", State.PAUSED: "held", State.DISABLED: "idle", State.FAULT: "wrong"}
 _PRESSED = (

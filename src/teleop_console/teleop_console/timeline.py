@@ -14,7 +14,7 @@ from pathlib import Path
 from teleop_console.curves import bands, thinned
 from teleop_console.drivers import Drivers
 from teleop_console.link import SessionLink, View
-from teleop_console.past import ERROR, Past, Seen
+from teleop_console.past import ERROR, Past, Views
 from teleop_console.recorded import RecordedLink
 from teleop_console.recorded_past import Recorded
 from teleop_console.recordings import Recordings
@@ -50,7 +50,7 @@ class Timeline:
         if isinstance(link, RecordedLink):
             self._replay, self._past = link, link.past
         else:
-            self._seen = self._past = Seen(link.arms)
+            self._seen = self._past = Views(link.arms)
         self._over: Recorded | None = None
         self._over_name, self._align = "", _ALIGNMENTS[0]
         self._wanted = (0.0, -math.inf)  # requested time [s], and clock time until which the request is valid [s]

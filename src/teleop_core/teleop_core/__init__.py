@@ -15,7 +15,8 @@ Everything a user needs is here:
   :class:`Operator`, :class:`Metric` and the ``register_...`` functions: parts of your own;
 - :func:`kernel`, :func:`parameter`, ``topics``: building blocks of parts.
 
-The packages ``teleop_console``, ``teleop_exchange``, ``teleop_lab`` and ``teleop_drill`` use this package.
+The packages ``teleop_console``, ``teleop_exchange``, ``teleop_scene``, ``teleop_lab`` and ``teleop_drill`` use this
+package.
 """
 
 import lazy_loader

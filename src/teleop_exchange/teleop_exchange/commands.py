@@ -10,6 +10,7 @@ from teleop_core.base import ParameterError, printable
 from teleop_core.commands.options import Words
 from teleop_exchange.options import ImportOptions
 
+Format = Literal["csv", "parquet", "lerobot"]
 Arms = Annotated[
     tuple[tuple[str, str], ...], Parameter(consume_multiple=False, allow_leading_hyphen=True, metavar="NAME OPTIONS")
 ]
@@ -91,37 +92,56 @@ def export(
     bags: tuple[Path, ...],
     /,
     *,
-    out: Path,
-    format_: Annotated[Literal["csv", "parquet", "lerobot"] | None, Parameter(name="--format")] = None,
+    out: Path | None = None,
+    to: tuple[Format, Path] | None = None,
+    format_: Annotated[Format | None, Parameter(name="--format")] = None,
     topics: Words = (),
     rate: float | None = None,
     units: bool = False,
-    action: Literal["joints", "tip"] = "joints",
+    state: Words = (),
+    action: Words = ("joints",),
+    cameras: Words = (),
+    video: Literal["av1", "h264"] = "av1",
     task: str = "teleoperation",
 ) -> None:
     """Write recordings as tables or a data set.
 
     Writes a recording as CSV or Parquet, with a column for each number of each topic over the time. Or writes
-    recordings as a LeRobot data set (version 3.0 of its format, no pictures) with an episode each.
+    recordings as a LeRobot data set (version 3.0 of its format) with an episode each, and a video of each camera.
 
     For example:
 
         teleop export bags/coarse --out coarse.csv
         teleop export bags/coarse --out tip.parquet --topics slave/measured_cp slave/servo_cp
         teleop export bags/coarse --out coarse_100hz.csv --rate 100 --units
-        teleop export bags/a bags/b --out dataset --format lerobot --task "follow the edge"
+        teleop export bags/a bags/b --to lerobot dataset --task "follow the edge"
+        teleop export drive.db3 --to lerobot drive --state joint_states --action cmd_vel --cameras front/image_raw
 
     Args:
-        bags: Recordings to export.
+        bags: Recordings to export; for a data set also those of other writers (rosbag2 as MCAP or db3, ROS 1 .bag).
         out: New file (.csv, .csv.gz or .parquet), or new directory without an ending for a data set.
+        to: Format and output in one: 'lerobot dataset' is '--format lerobot --out dataset'.
         format_: Format; without it, by the ending of --out.
         topics: Only these topics.
-        rate: Rows per second [Hz], each with the newest values; without it, a row per message, or 50 Hz for lerobot.
+        rate: Rows per second [Hz], each with the newest values; without it, a row per message. For lerobot a whole
+            number; without it, the rate of the fastest camera, or 50 Hz without cameras.
         units: Add the unit to the name of each column: 'tip.x [m]'.
-        action: Of lerobot: topic of the actions, slave/servo_jp for joints or slave/servo_cp for tip.
+        state: Of lerobot: topics of observation.state; without it, the slave's joints and tip.
+        action: Of lerobot: joints (slave/servo_jp), tip (slave/servo_cp), or topics of the action.
+        cameras: Of lerobot: topics of pictures; without it all of them, 'none' for none.
+        video: Of lerobot: codec of the videos. h264 is made four times as fast as av1, and its files are larger.
         task: Of lerobot: description of the task.
     """
     from teleop_exchange import export_recording
 
-    report = export_recording(list(bags), out, format_, topics=topics, rate=rate, units=units, action=action, task=task)
+    if (out is None) == (to is None):
+        raise ParameterError("--out", out, "given, or --to FORMAT OUT, not both")
+    if to is not None:
+        format_, out = to
+    assert out is not None
+    seen = None if not cameras else () if tuple(cameras) == ("none",) else cameras
+    report = export_recording(
+        list(bags), out, format_,
+        topics=topics, rate=rate, units=units, state=state, action=action, cameras=seen, video=video, task=task,
+    )  # fmt: skip
     print(printable(str(report)))

@@ -5,6 +5,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pyarrow as pa
@@ -16,6 +17,9 @@ from teleop_core.base.errors import ParameterError, RecordingError, UnknownNameE
 from teleop_core.graph.topics import BY_NAME, Kind
 from teleop_core.session.recording import Recording, open_recording
 from teleop_exchange.joining import Joined, Streams
+
+if TYPE_CHECKING:
+    from teleop_exchange.lerobot import DataSet
 
 _BY_COLUMN = {
     **dict.fromkeys("xyz", "m"),
@@ -55,7 +59,6 @@ def _of_number(column: str) -> str:
 
 
 FORMATS = ("csv", "parquet", "lerobot")
-ACTIONS = ("joints", "tip")
 OneRecording = Recording | Path | str
 
 
@@ -68,16 +71,19 @@ class ExportReport:
         rows: Number of rows; for a data set, the number of frames.
         columns: Names of the columns; for a data set, the names of the features.
         episodes: Number of exported recordings.
+        notes: For a data set, a line on the pictures of each episode and camera.
     """
 
     out: Path
     rows: int
     columns: tuple[str, ...]
     episodes: int = 1
+    notes: tuple[str, ...] = ()
 
     def __str__(self) -> str:
         if self.episodes > 1 or self.out.is_dir():
-            return f"{self.out}: {self.episodes} episodes, {self.rows} frames of " + ", ".join(self.columns)
+            told = f"{self.out}: {self.episodes} episodes, {self.rows} frames of " + ", ".join(self.columns)
+            return "\n".join((*self.notes, told))
         return f"{self.out}: {self.rows} rows, {len(self.columns)} columns"
 
 
@@ -89,7 +95,10 @@ def export_recording(
     topics: Iterable[str] = (),
     rate: float | None = None,
     units: bool = False,
-    action: str = "joints",
+    action: str | Sequence[str] = "joints",
+    state: Sequence[str] = (),
+    cameras: Sequence[str] | None = None,
+    video: str = "av1",
     task: str = "teleoperation",
 ) -> ExportReport:
     """Write recordings in a format of other programs.
@@ -99,8 +108,11 @@ def export_recording(
     message gives a row. In this row the columns of topics without a message are empty; only reports such as
     ``teleop/state`` keep their last values. Parquet files contain the units of columns as metadata.
 
-    A LeRobot data set (version 3.0 of the format, without pictures) contains one episode for each recording.
-    ``observation.state`` contains the slave's joints and the pose of its tip; ``action`` contains the commands.
+    A LeRobot data set (version 3.0 of the format) contains one episode for each recording. ``observation.state``
+    contains the slave's joints and the pose of its tip; ``action`` contains the commands. Each camera has a video,
+    ``observation.images.<camera>``, of the newest picture that was taken before each frame, and
+    ``observation.age.<camera>``, the age of that picture [s]. Recordings of other writers may be in any storage that
+    :func:`import_recording` reads.
 
     Args:
         recording: A recording or its path; several for a data set.
@@ -108,9 +120,13 @@ def export_recording(
         format: ``csv``, ``parquet`` or ``lerobot``; None chooses by the extension of ``out``.
         topics: Topics of a table; empty for all topics.
         rate: Rows per second [Hz]; each row contains the newest values. None stands for a row at the time of each
-            message, or for 50 Hz in a data set.
+            message; in a data set for the rate of the fastest camera, or 50 Hz.
         units: Whether names of columns end with the unit, as in ``slave/measured_cp.x [m]``.
-        action: For a data set: ``joints`` (``slave/servo_jp``) or ``tip`` (``slave/servo_cp``).
+        action: For a data set: ``joints`` (``slave/servo_jp``), ``tip`` (``slave/servo_cp``), or topics.
+        state: For a data set: topics of ``observation.state``; empty for those of the slave. In recordings without a
+            slave, joint states are the state, and topics whose names tell a command are the action.
+        cameras: For a data set: topics of pictures; None for all of them.
+        video: For a data set: codec of the videos, ``av1`` or ``h264``, which is made four times as fast.
         task: For a data set: description of the task.
 
     Returns:
@@ -131,9 +147,13 @@ def export_recording(
     check_new(path)
     if not several:
         raise ParameterError("recording", [], "at least one recording")
-    opened = [one if isinstance(one, Recording) else open_recording(one) for one in several]
     if chosen == "lerobot":
-        return _data_set(opened, path, rate, action, task)
+        from teleop_exchange.lerobot import DataSet
+
+        actions = (action,) if isinstance(action, str) else tuple(action)
+        seen = None if cameras is None else tuple(cameras)
+        return _data_set(several, path, DataSet(task, _whole_rate(rate), tuple(state), actions, seen, video))
+    opened = [one if isinstance(one, Recording) else open_recording(one) for one in several]
     if len(opened) > 1:
         raise ParameterError("recordings", len(opened), f"one for {chosen}; lerobot takes several")
     streams = Streams(opened[0], topics)
@@ -159,17 +179,20 @@ def _by_name(path: Path) -> str:
     )
 
 
-def _data_set(recordings: list[Recording], path: Path, rate: float | None, action: str, task: str) -> ExportReport:
-    from teleop_exchange.lerobot import FPS, write_data_set
+def _whole_rate(rate: float | None) -> int:
+    if rate is not None and rate != round(rate):
+        raise ParameterError("--rate", rate, "a whole number for lerobot")
+    return round(rate or 0)
 
-    if action not in ACTIONS:
-        raise UnknownNameError("--action", action, ACTIONS)
-    fps = FPS if rate is None else rate
-    if fps != round(fps):
-        raise ParameterError("--rate", fps, "a whole number for lerobot")
+
+def _data_set(several: Sequence[OneRecording], path: Path, wanted: "DataSet") -> ExportReport:
+    from teleop_exchange.frames import open_any
+    from teleop_exchange.lerobot import write_data_set
+
+    opened = [one if isinstance(one, Recording) else open_any(one) for one in several]
     with whole(path) as draft:
-        frames, features = write_data_set(recordings, draft, round(fps), action, task)
-    return ExportReport(path, frames, features, len(recordings))
+        frames, features, notes = write_data_set(opened, draft, wanted)
+    return ExportReport(path, frames, features, len(opened), notes)
 
 
 @contextmanager

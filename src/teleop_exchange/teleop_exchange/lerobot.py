@@ -1,15 +1,16 @@
 """LeRobot data set: recordings as episodes for learning, in version 3.0 of the format.
 
 A data set is a folder with ``meta/info.json`` (features, rate, counts), ``meta/stats.json``, ``meta/tasks.parquet``,
-``meta/episodes`` (a row for each episode) and ``data`` (a row for each frame, a group of rows for each episode). It
-contains no pictures. The ``lerobot`` package, version 0.4, reads the folder offline: ``LeRobotDataset("name",
-root=FOLDER)``.
+``meta/episodes`` (a row for each episode), ``data`` (a row for each frame, a group of rows for each episode) and
+``videos`` (the pictures of each camera). The ``lerobot`` package, version 0.6, reads the folder offline:
+``LeRobotDataset("name", root=FOLDER)``.
 """
 
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -17,35 +18,46 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
-from teleop_core.bags.arms import topic_prefix
-from teleop_core.base.errors import RecordingError
-from teleop_core.graph.topics import (
-    SLAVE_JAW_OBJECT_CP,
-    SLAVE_MEASURED_CP,
-    SLAVE_MEASURED_JS,
-    SLAVE_SERVO_CP,
-    SLAVE_SERVO_JP,
-    TASK_STATE,
-    Topic,
-)
-from teleop_core.kernels.geometry import Array
+from teleop_core.base.errors import RecordingError, UnknownNameError
 from teleop_core.session.recording import Recording
-from teleop_exchange.joining import Streams
+from teleop_exchange.frames import STATE, Frames, around, frames_of, opened
+from teleop_exchange.pictures import Camera, Decoder, cameras_of
+from teleop_exchange.ros_bags import RosBag
+from teleop_exchange.videos import CODECS, FILE_BYTES, Video
+from teleop_exchange.videos import PATTERN as VIDEO_PATTERN
 
 VERSION = "v3.0"
 FPS = 50
-STATE, ACTION = "observation.state", "action"
-SURROUNDINGS = "observation.environment_state"
-"""Feature with the goal of the task and the pose of the object. Policies such as ACT need this feature or pictures."""
-_GOAL = ("goal_x", "goal_y", "goal_z", "goal_qw", "goal_qx", "goal_qy", "goal_qz", "width")
-_AROUND: dict[Topic, tuple[str, ...]] = {TASK_STATE: _GOAL, SLAVE_JAW_OBJECT_CP: ()}  # all columns of the pose
+PICTURES, AGES = "observation.images.", "observation.age."
+"""Beginnings of the names of a camera's features: its pictures, and their age [s]."""
 _FILE_BYTES = 100 << 20
 _FILES = 1000  # largest number of files in a folder
 _PATTERN = "chunk-{chunk_index:03d}/file-{file_index:03d}.parquet"
 _COUNTERS = ("timestamp", "frame_index", "episode_index", "index", "task_index")
 _QUANTILES = {"q01": 0.01, "q10": 0.1, "q50": 0.5, "q90": 0.9, "q99": 0.99}
 Numbers = dict[str, NDArray[np.float32] | NDArray[np.int64]]
-Statistics = dict[str, dict[str, list[float]]]
+Statistics = dict[str, dict[str, Any]]
+
+
+@dataclass(frozen=True)
+class DataSet:
+    """What a data set shall contain.
+
+    Attributes:
+        task: Description of the task.
+        fps: Frames per second; 0 for the rate of the fastest camera, or 50 without cameras.
+        state: Topics of ``observation.state``; empty for those of the slave.
+        action: ``joints``, ``tip``, or topics.
+        cameras: Topics of pictures; None for all.
+        codec: Codec of the videos.
+    """
+
+    task: str = "teleoperation"
+    fps: int = 0
+    state: tuple[str, ...] = ()
+    action: tuple[str, ...] = ("joints",)
+    cameras: tuple[str, ...] | None = None
+    codec: str = "av1"
 
 
 @dataclass
@@ -85,90 +97,124 @@ def _path(chunk: int, file: int) -> str:
     return _PATTERN.format(chunk_index=chunk, file_index=file)
 
 
+class _Writer:
+    """Writes episodes one after the other."""
+
+    def __init__(self, out: Path, wanted: DataSet, fps: int) -> None:
+        self.out, self.wanted, self.fps = out, wanted, fps
+        self.files, self.videos = _Files(out / "data"), dict[str, Video]()
+        self.names: dict[str, list[str]] = {}
+        self.episodes: list[dict[str, object]] = []
+        self.numbers: list[Numbers] = []
+        self.frames, self.notes = 0, list[str]()
+
+    def add(self, where: Path, found: Frames, bag: RosBag | None, cameras: Sequence[Camera]) -> None:
+        """Write an episode.
+
+        Raises:
+            RecordingError: The joints or the cameras are others than those of the first episode.
+        """
+        names = found.names | {AGES + camera.name: [camera.name] for camera in cameras}
+        if self.episodes and names != self.names:
+            raise RecordingError(where, "has other joints, arms or cameras than the first recording of the data set")
+        self.names, number, told = names, len(self.episodes), dict[str, object]()
+        starts = [int((camera.newest(found.time_ns) >= 0).argmax()) for camera in cameras]
+        found = found.since(max(starts, default=0))
+        numbers: Numbers = dict(found.numbers)
+        for camera in cameras:
+            assert bag is not None
+            numbers[AGES + camera.name] = self._film(where, bag, camera, found, told)
+        numbers |= _counters(len(found.time_ns), number, self.frames, self.fps)
+        self.files.write(_table(numbers))
+        self.episodes.append(told | _about(numbers, number, self.frames, self.wanted.task, self.files.place))
+        self.frames += len(found.time_ns)
+        self.numbers.append(numbers)
+
+    def _film(
+        self, where: Path, bag: RosBag, camera: Camera, found: Frames, told: dict[str, object]
+    ) -> NDArray[np.float32]:
+        """Write the pictures of an episode, and return their ages (n, 1) [s]."""
+        key, count = PICTURES + camera.name, len(found.time_ns)
+        video = self.videos.setdefault(key, Video(self.out, key, self.fps, self.wanted.codec))
+        place, scaled, shown = video.begin(), video.scaled, np.empty(count, np.int64)
+        for k, (number, frame) in enumerate(Decoder(bag, camera).frames(camera.newest(found.time_ns))):
+            video.add(frame, k, count)
+            shown[k] = number
+        place_end, statistics_ = video.end()
+        told |= {f"videos/{key}/{name}": value for name, value in (place | place_end).items()}
+        told |= {f"stats/{key}/{name}": value for name, value in statistics_.items()}
+        age = ((found.time_ns - camera.stamp_ns[shown]) * 1e-9).astype(np.float32)
+        self.notes.append(_note(where, camera, shown, age, video.scaled - scaled))
+        return age[:, None]
+
+    def finish(self, robot: str) -> None:
+        """Write what belongs to the whole data set."""
+        for video in self.videos.values():
+            video.close()
+        whole: Numbers = {key: np.concatenate([one[key] for one in self.numbers]) for key in self.numbers[0]}
+        found = statistics(whole) | {key: video.statistics() for key, video in self.videos.items()}
+        _write_meta(self.out, self.episodes, found, self.wanted.task)
+        info = _info(robot, self.names, self.videos, self.fps, len(self.episodes), self.frames)
+        (self.out / "meta" / "info.json").write_text(json.dumps(info, indent=4), encoding="utf-8")
+
+    def close(self) -> None:
+        """Close all files, also after an error."""
+        self.files.close()
+        for video in self.videos.values():
+            video.close()
+
+
+def _note(where: Path, camera: Camera, shown: NDArray[np.int64], age: NDArray[np.float32], scaled: int) -> str:
+    """A line on the pictures of an episode: how many there were, and how many frames had no new one."""
+    repeated = len(shown) - len(np.unique(shown))
+    told = f"{where.name}: {camera.name} ({camera.topic}): {len(np.unique(shown))} pictures in {len(shown)} frames"
+    told += f", {repeated} frames without a new picture; age {np.median(age):.3f} s, at most {age.max():.3f} s"
+    told += f"; {scaled} frames scaled to the size of the first" * bool(scaled)
+    return "; ".join((told, *camera.notes))
+
+
 def write_data_set(
-    recordings: Sequence[Recording], out: Path, fps: int, action: str, task: str
-) -> tuple[int, tuple[str, ...]]:
+    recordings: Sequence[Recording | Path], out: Path, wanted: DataSet
+) -> tuple[int, tuple[str, ...], tuple[str, ...]]:
     """Write a data set.
 
     Args:
-        recordings: Recordings that become the episodes; all must have the same joints.
+        recordings: Recordings that become the episodes, or paths of those in another storage than MCAP; all must have
+            the same joints and cameras.
         out: Folder of the new data set.
-        fps: Frames per second.
-        action: ``joints`` or ``tip``.
-        task: Description of the task.
+        wanted: What it shall contain.
 
     Returns:
-        Number of frames, and the features that are not counters.
+        Number of frames, the features that are not counters, and a line on the pictures of each episode and camera.
 
     Raises:
-        RecordingError: A recording lacks a needed topic, or its joints differ from those of the first recording.
+        RecordingError: A recording lacks a needed topic, or its joints or cameras differ from those of the first one.
+        UnknownNameError: There is no such topic.
     """
-    files, episodes, frames = _Files(out / "data"), [], 0
-    names: dict[str, list[str]] = {}
-    all_numbers: list[Numbers] = []
-    around = [topic for topic in _AROUND if all(_has(recording, topic) for recording in recordings)]
+    if wanted.codec not in CODECS:
+        raise UnknownNameError("--video", wanted.codec, CODECS)
+    surroundings, writer, robot = around(recordings), None, "teleop_core"
     try:
-        for number, recording in enumerate(recordings):
-            found, numbers = _episode(recording, fps, action, around)
-            if names and found != names:
-                reason = "has other joints or arms than the first recording of the data set"
-                raise RecordingError(recording.bag.path, reason)
-            names = found
-            numbers = numbers | _counters(len(numbers[STATE]), number, frames, fps)
-            files.write(_table(numbers))
-            episodes.append(_about(numbers, number, frames, task, files.place))
-            frames += len(numbers[STATE])
-            all_numbers.append(numbers)
+        for recording in recordings:
+            with opened(recording) as bag:
+                cameras = [] if bag is None else cameras_of(bag, wanted.cameras)
+                if writer is None:
+                    fastest = round(max((camera.rate for camera in cameras), default=0.0)) or FPS
+                    writer = _Writer(out, wanted, wanted.fps or fastest)
+                    robot = _robot(recording)
+                found = frames_of(recording, writer.fps, wanted.state, wanted.action, surroundings)
+                writer.add(recording if isinstance(recording, Path) else recording.bag.path, found, bag, cameras)
+        assert writer is not None
+        writer.finish(robot)
     finally:
-        files.close()
-    whole: Numbers = {key: np.concatenate([one[key] for one in all_numbers]) for key in all_numbers[0]}
-    _write_meta(out, episodes, statistics(whole), task)
-    info = _info(recordings[0], names, fps, len(episodes), frames)
-    (out / "meta" / "info.json").write_text(json.dumps(info, indent=4), encoding="utf-8")
-    return frames, tuple(names)
+        if writer is not None:
+            writer.close()
+    return writer.frames, (*writer.names, *writer.videos), tuple(writer.notes)
 
 
-def _has(recording: Recording, topic: Topic) -> bool:
-    """Whether each arm of a recording has messages of a topic."""
-    names = [topic_prefix(recording.bag, arm) + topic.name for arm in recording.arms]
-    return all(name in recording.bag.topics and recording.bag.topics[name].count for name in names)
-
-
-def _episode(
-    recording: Recording, fps: int, action: str, around: Sequence[Topic]
-) -> tuple[dict[str, list[str]], Numbers]:
-    """Names and numbers (frames, columns) of the features of a recording.
-
-    A frame contains the newest message of each topic. Frames at which a topic has had no message are left out.
-    """
-    keys = (STATE, *[SURROUNDINGS] * bool(around), ACTION)
-    bag, names, topics = recording.bag, {key: list[str]() for key in keys}, []
-    told = SLAVE_SERVO_JP if action == "joints" else SLAVE_SERVO_CP
-    for arm in recording.arms:
-        prefix = topic_prefix(bag, arm)
-        measured = ((STATE, SLAVE_MEASURED_JS), (STATE, SLAVE_MEASURED_CP))
-        for key, topic in (*measured, *((SURROUNDINGS, topic) for topic in around), (ACTION, told)):
-            topics.append((key, prefix, prefix + topic.name))
-    bag.require([name for _, _, name in topics])
-    streams = Streams(recording, [name for _, _, name in topics])
-    parts: dict[str, list[Array]] = {key: [] for key in keys}
-    pieces = list(streams.sampled(fps))
-    for key, prefix, name in topics:
-        columns = [c for c in streams.columns[name] if not c.endswith((".velocity", ".effort"))]
-        if wanted := next((own for topic, own in _AROUND.items() if name == prefix + topic.name), ()):
-            columns = [c for c in columns if c.removesuffix(".position") in wanted]
-        at = [streams.columns[name].index(column) for column in columns]
-        parts[key].append(np.concatenate([piece.values[name][:, at] for piece in pieces]))
-        tip = {SLAVE_MEASURED_CP.name: "tip.", SLAVE_SERVO_CP.name: "tip.", SLAVE_JAW_OBJECT_CP.name: "object."}.get(
-            name.removeprefix(prefix), ""
-        )
-        names[key] += [prefix + tip + column.removesuffix(".position") for column in columns]
-    numbers = {key: np.hstack(found).astype(np.float32) for key, found in parts.items()}
-    is_known = np.isfinite(np.hstack(list(numbers.values()))).all(axis=1)
-    if not is_known.any():
-        raise RecordingError(bag.path, "has no time at which all topics of the data set are known")
-    first = int(is_known.argmax())
-    return names, {key: found[first:] for key, found in numbers.items()}
+def _robot(recording: Recording | Path) -> str:
+    """Name of the robot in a recording of this package."""
+    return (isinstance(recording, Recording) and recording.metadata.get("robot")) or "teleop_core"
 
 
 def _counters(count: int, episode: int, before: int, fps: int) -> Numbers:
@@ -185,11 +231,11 @@ def _counters(count: int, episode: int, before: int, fps: int) -> Numbers:
 def _table(numbers: Numbers) -> pa.Table:
     columns = {}
     for key, values in numbers.items():
-        if values.ndim == 2:
+        if values.ndim == 2 and values.shape[1] > 1:
             flat = pa.array(np.ascontiguousarray(values).reshape(-1))
             columns[key] = pa.FixedSizeListArray.from_arrays(flat, values.shape[1])
         else:
-            columns[key] = pa.array(values)
+            columns[key] = pa.array(values.reshape(-1))
     return pa.table(columns)
 
 
@@ -238,26 +284,27 @@ def _write_meta(out: Path, episodes: Sequence[dict[str, object]], found: Statist
 
 
 def _info(
-    recording: Recording, names: Mapping[str, Sequence[str]], fps: int, episodes: int, frames: int
+    robot: str, names: Mapping[str, Sequence[str]], videos: Mapping[str, Video], fps: int, episodes: int, frames: int
 ) -> dict[str, object]:
     features: dict[str, object] = {
         key: {"dtype": "float32", "shape": [len(found)], "names": list(found)} for key, found in names.items()
     }
+    features |= {key: video.feature() for key, video in videos.items()}
     for key in _COUNTERS:
         kind = "float32" if key == "timestamp" else "int64"
         features[key] = {"dtype": kind, "shape": [1], "names": None}
     return {
         "codebase_version": VERSION,
-        "robot_type": recording.metadata.get("robot") or "teleop_core",
+        "robot_type": robot,
         "total_episodes": episodes,
         "total_frames": frames,
         "total_tasks": 1,
         "chunks_size": _FILES,
         "data_files_size_in_mb": _FILE_BYTES >> 20,
-        "video_files_size_in_mb": 200,
+        "video_files_size_in_mb": FILE_BYTES >> 20,
         "fps": fps,
         "splits": {"train": f"0:{episodes}"},
         "data_path": f"data/{_PATTERN}",
-        "video_path": None,
+        "video_path": VIDEO_PATTERN if videos else None,
         "features": features,
     }

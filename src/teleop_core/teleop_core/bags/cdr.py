@@ -3,7 +3,7 @@
 import struct
 from dataclasses import dataclass, field
 
-from teleop_core.graph.topics import Kind
+from teleop_core.graph.topics import POSES, Kind
 
 NUMPY_CODES = {"i": "i4", "I": "u4", "d": "f8"}
 _ENCAPSULATION = b"\x00\x01"  # plain CDR, little-endian; two bytes of options follow
@@ -72,9 +72,12 @@ def _stamped(frame_id: str) -> Template:
 def template(kind: Kind, joint_names: tuple[str, ...], frame_id: str) -> Template:
     """Bytes of every message of a stream, with gaps for stamp and values."""
     cdr, count = _stamped(frame_id), len(joint_names)
-    if kind is Kind.POSE:
-        for columns in (slice(0, 3), slice(4, 7), slice(3, 4)):
-            cdr.gap("d", columns)
+    if kind in {Kind.POSE, Kind.POSES}:
+        if kind is Kind.POSES:
+            cdr.length(POSES)
+        for begin in range(0, kind.width(0), 7):
+            for first, last in ((0, 3), (4, 7), (3, 4)):
+                cdr.gap("d", slice(begin + first, begin + last))
     elif kind in {Kind.TWIST, Kind.WRENCH}:
         cdr.gap("d", slice(0, 6))
     elif kind is Kind.BUTTONS:

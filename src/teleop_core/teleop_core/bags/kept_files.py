@@ -6,7 +6,8 @@ contain the digests of all other files:
 - ``mesh_file``, beside ``mesh``: a touched mesh or height field;
 - ``fixture_mesh_file``: the mesh of a fixture;
 - ``drives_file``: the drives of a URDF;
-- ``robot_meshes``: the visual meshes of a robot's links, one line of digest and name for each mesh.
+- ``robot_meshes``: the visual meshes of a robot's links, one line of digest and name for each mesh;
+- ``scene_files``: all files of the scene of a robot, one line of digest and path for each file, the scene first.
 
 The entry that has a digest as its name contains the packed bytes of the file. The entry is stored once for all arms,
 up to a total size of all files. If a file is missing or has changed since the recording, its recorded bytes are
@@ -19,17 +20,18 @@ import tempfile
 import warnings
 import zlib
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from functools import cache
 from pathlib import Path
 
-from teleop_core.base import TeleopWarning, printable
+from teleop_core.base import TeleopError, TeleopWarning, printable
 from teleop_core.robots import geometry_of
 from teleop_core.robots.files import visuals, xacro_files
-from teleop_core.robots.parts import DESCRIPTION, arguments_of, file_of
+from teleop_core.robots.parts import DESCRIPTION, SCENES, arguments_of, file_of, is_scene
 
 TOUCHED, FIXTURE = "mesh", "fixture_mesh"
 _PLACES = range(8)  # parts of a combined shape: their meshes are called mesh, mesh1, mesh2
-_ROBOT, _DRIVES, _FILE, _MESHES = "robot", "drives", "_file", "_meshes"
+_ROBOT, _DRIVES, _FILE, _MESHES, _SCENE = "robot", "drives", "_file", "_meshes", "scene_files"
 _PACKED, _DIGEST = "zlib, base64: ", "sha256:"
 _LEVEL = 4  # 27 MB of an arm's meshes take 0.4 s; level 6 takes 1.5 s for 5 % less size
 _MOST = 2**25
@@ -68,6 +70,10 @@ class KeptFiles:
         """
         found = file_of(name)
         if found is None:
+            return
+        if is_scene(name):
+            files = SCENES.find("scene").files(found[0])
+            self._texts[f"{prefix}{_SCENE}"] = "\n".join(f"{self._add(file)} {at}" for at, file in files.items())
             return
         path, text, geometry = found[0], None, geometry_of(settings)
         if path.suffix.lower() == ".xacro":
@@ -140,6 +146,8 @@ def recorded_files(metadata: Mapping[str, str], arm: str = "") -> dict[str, str]
         else:
             _tell(name, path)
     name, text = (metadata.get(f"{prefix}{_ROBOT}{end}", "") for end in ("", _FILE))
+    if name and (scene := metadata.get(f"{prefix}{_SCENE}", "")):
+        found[name] = _scene_now(name, scene, metadata)
     if name and text:
         lines = metadata.get(f"{prefix}{_ROBOT}{_MESHES}", "").split("\n")
         parts = [line.partition(" ") for line in lines]
@@ -183,6 +191,25 @@ def _robot_now(name: str, text: str, digests: Mapping[str, str], metadata: Mappi
         else:
             _written(visuals.kept_mesh(mesh, copy), data)
     return str(_written(copy, text.encode()))
+
+
+def _scene_now(name: str, lines: str, metadata: Mapping[str, str]) -> str:
+    """Name of a scene whose files are as recorded; the path of a temporary copy if a file has changed or is gone."""
+    recorded = {at: digest for digest, _, at in (line.partition(" ") for line in lines.split("\n"))}
+    first = next(iter(recorded))
+    with suppress(TeleopError):  # a scene that cannot be read, or no package that reads scenes
+        now = SCENES.find("scene").files(SCENES.find("scene").file(name))
+        if {at: _digest_now(file) for at, file in now.items()} == recorded:
+            return name
+    folder, room = _place(lines), _MOST
+    for at, digest in recorded.items():
+        data = _unpacked(metadata, digest, room)
+        room -= len(data or b"")
+        if data is None:
+            _tell(at, None)
+        elif (path := (folder / at).resolve()).is_relative_to(folder.resolve()):
+            _written(path, data)
+    return str(folder / first)
 
 
 def _tell(name: str, path: Path | None) -> None:

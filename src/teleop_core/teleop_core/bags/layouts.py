@@ -23,6 +23,7 @@ Stamps = NDArray[np.int64]
 Values = NDArray[np.float64]
 
 SECOND_NS = 1_000_000_000
+_POSES = (Kind.POSE, Kind.POSES)
 
 
 class Layout:
@@ -51,6 +52,7 @@ class Layout:
         mask.flags.writeable = False
         self.mask: Bytes = mask
         self._columns = [columns for *_, columns in cdr.gaps[2:]]
+        self._order = [i for columns in self._columns for i in range(columns.start, columns.stop)]
         self.places = np.zeros(self.width, np.int64)
         for at, code, count, columns in cdr.gaps[2:]:
             first = (at - 4) // 8 if code == "d" else at // 4
@@ -143,8 +145,8 @@ class Layout:
     def encode_one(self, stamp_ns: int, values: Values) -> bytes:
         """Bytes of one message; ``values`` has shape (width,)."""
         numbers = values.tolist()
-        if self.kind is Kind.POSE:
-            numbers.append(numbers.pop(3))
+        if self.kind in _POSES:
+            numbers = [numbers[i] for i in self._order]
         elif self.kind is Kind.BUTTONS:
             numbers = [int(number) for number in numbers]
         for index, text in self._inner:
@@ -164,9 +166,10 @@ class Layout:
         for index, text in reversed(self._inner):
             if numbers.pop(index) != text and not self._is_same_but_padding(data):
                 return None
-        if self.kind is Kind.POSE:
-            numbers.insert(3, numbers.pop())
-        return seconds * SECOND_NS + nanoseconds, np.array(numbers, np.float64)
+        values = np.array(numbers, np.float64)
+        if self.kind in _POSES:
+            values[self._order] = numbers
+        return seconds * SECOND_NS + nanoseconds, values
 
     def _is_same_but_padding(self, data: bytes) -> bool:
         return self.matches(np.frombuffer(data, np.uint8)[np.newaxis])

@@ -31,8 +31,8 @@ from mcap.records import (
 )
 
 from teleop_core import __version__
-from teleop_core.bags.background import SYSTEM, Background
 from teleop_core.bags.chunks import Chunk
+from teleop_core.base.background import SYSTEM, Background
 
 MAGIC = b"\x89MCAP0\r\n"
 _CHUNK_HEAD = struct.Struct("<BQQQQI")  # opcode, length, start, end, uncompressed size, CRC

@@ -108,6 +108,10 @@ def _row(kind: Kind, message: Any, joint_names: tuple[str, ...]) -> list[float] 
     if kind is Kind.POSE:
         p, q = message.pose.position, message.pose.orientation
         return [p.x, p.y, p.z, q.w, q.x, q.y, q.z]
+    if kind is Kind.POSES:
+        found = [(p.position, p.orientation) for p in message.poses]
+        row = [x for p, q in found for x in (p.x, p.y, p.z, q.w, q.x, q.y, q.z)]
+        return row if len(row) == kind.width(0) else Refusal.WRONG_LENGTH
     if kind is Kind.TWIST:
         return _six(message.twist.linear, message.twist.angular)
     if kind is Kind.WRENCH:
@@ -171,6 +175,10 @@ def write_values(
     if kind is Kind.POSE:
         _set(message.pose.position, "xyz", row[:3])
         _set(message.pose.orientation, "wxyz", row[3:])
+    elif kind is Kind.POSES:
+        for i, pose in enumerate(message.poses):  # of which the message has enough
+            _set(pose.position, "xyz", row[7 * i : 7 * i + 3])
+            _set(pose.orientation, "wxyz", row[7 * i + 3 : 7 * i + 7])
     elif kind is Kind.TWIST:
         _set(message.twist.linear, "xyz", row[:3])
         _set(message.twist.angular, "xyz", row[3:])

@@ -1,5 +1,6 @@
 """Recording parameters: which topics are recorded, at what rate and how compressed."""
 
+import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 
@@ -7,6 +8,14 @@ from teleop_core.bags import compression
 from teleop_core.base import ParameterError, UnknownNameError, Within, fixed
 from teleop_core.graph import Stage
 from teleop_core.graph.topics import BY_NAME, Kind, Quality, Stamp, Topic
+
+_TYPE = re.compile(r"\w+/msg/\w+")
+_PICTURES = {
+    "/compressed": "sensor_msgs/msg/CompressedImage",
+    "/image_raw": "sensor_msgs/msg/Image",
+    "/camera_info": "sensor_msgs/msg/CameraInfo",
+}
+"""Message types by the ends of names that ROS's camera drivers use."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -28,6 +37,12 @@ class RecordingParameters:
         "messages of /tf per second; the robot's model is recorded too; 0: neither is recorded",
     )
 
+    also: tuple[str, ...] = fixed(
+        (),
+        doc="topics of other nodes that a live session records too, as NAME=TYPE, e.g. imu/data=sensor_msgs/msg/Imu; "
+        "pictures need no type: camera/front/image_raw/compressed",
+    )
+
     def __post_init__(self) -> None:
         """Refuse unknown names and entries that are not topic=n."""
         if self.compression not in compression.NAMES:
@@ -38,6 +53,23 @@ class RecordingParameters:
             number = entry.partition("=")[2]
             if not (number.isascii() and number.isdigit() and int(number) > 0):
                 raise ParameterError("every_of", entry, "topic=n with a whole number n >= 1")
+        _ = self.others
+
+    @property
+    def others(self) -> tuple[Topic, ...]:
+        """Topics of other nodes that are recorded too.
+
+        Raises:
+            ParameterError: An entry of ``also`` is no NAME=TYPE, or a message of this type is unknown.
+        """
+        found = []
+        for entry in self.also:
+            name, _, given = entry.strip("/").partition("=")
+            kind = given or next((kind for end, kind in _PICTURES.items() if name.endswith(end)), "")
+            if not name or not _TYPE.fullmatch(kind):
+                raise ParameterError("also", entry, "NAME=PACKAGE/msg/TYPE; pictures need no type")
+            found.append(Topic(name, Kind.REPORT, Stamp("of the sender"), message=kind))
+        return tuple(found)
 
     def every_nth(self, topics: Iterable[Topic]) -> dict[str, int]:
         """Decimation of each topic: n if every n-th sample is recorded; 0 if the topic is not recorded.

@@ -13,11 +13,11 @@ import numpy as np
 
 from teleop_core.bags import compression as compressions
 from teleop_core.bags import ending, rosbag2
-from teleop_core.bags.background import SYSTEM, Background
 from teleop_core.bags.chunks import Assembly, Messages, Single, Stretch
 from teleop_core.bags.layouts import SECOND_NS, Layout, Stamps, Values, layout
 from teleop_core.bags.mcap_file import McapFile
 from teleop_core.bags.recording import RecordingParameters
+from teleop_core.base.background import SYSTEM, Background
 from teleop_core.base.errors import ParameterError, RecordingError, ShapeError, UnknownNameError
 from teleop_core.graph.topics import Kind, Topic
 

@@ -15,8 +15,8 @@ else:  # imported at the first use
         "errors": ("ClosureError", "EvaluationError", "KernelError", "ParameterError", "PartError", "RecordingError",
             "SessionError", "ShapeError", "TeleopError", "TeleopWarning", "UnknownNameError"),
         "damage": ("damage_told",),
-        "parameters": ("Choice", "NoParameters", "Spec", "Value", "Within", "build", "choice", "fixed", "parameter",
-            "specs", "values_of"),
+        "parameters": ("Choice", "NoParameters", "Spec", "Value", "Within", "build", "choice", "fill", "fixed",
+            "parameter", "specs", "values_of"),
         "registry": ("Registry", "part_check"),
         "texts": ("one_line", "printable", "shown"),
     }  # fmt: skip

@@ -317,3 +317,23 @@ def values_of(group: object, prefix: str = "") -> dict[str, Value]:
         else:
             out[prefix + entry.name] = value
     return out
+
+
+def fill(record: Any, group: object) -> None:
+    """Write the numbers of parameters into the fields of a record that have the same names.
+
+    A choice among texts becomes its index; see :mod:`teleop_core.kernels.groups` for the fields.
+    """
+    for entry in dataclasses.fields(group):  # type: ignore[arg-type]
+        value = getattr(group, entry.name)
+        if isinstance(value, Choice):
+            parts = {entry.name: entry.metadata["registry"].names().index(value.kind), **value.groups}
+        else:
+            parts = {entry.name: value}
+        for name, part in parts.items():
+            if name not in record.dtype.names:
+                continue
+            if dataclasses.is_dataclass(part):
+                fill(record[name], part)
+            else:
+                record[name] = entry.metadata["choices"].index(part) if isinstance(part, str) else part

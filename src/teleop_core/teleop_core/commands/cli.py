@@ -60,6 +60,11 @@ COMMANDS = {
         "import": "Turn a file from another system into a recording",
         "export": "Write recordings as tables or a data set",
     },
+    "teleop_scene.camera_commands": {
+        "camera": "Publish pictures of a live session with a scene, from a process of its own",
+        "film": "Write a copy of a recording that has the pictures of cameras too",
+    },
+    "teleop_scene.commands": {"scenes": "List MuJoCo models that a session can use, or the arms of one"},
     "teleop_lab.commands.calibrate": {
         "calibrate": "Find joint offsets and link errors of an arm from measured places of its tip"
     },

@@ -9,13 +9,14 @@ import numpy as np
 from teleop_core.evaluation.context import Context
 from teleop_core.evaluation.windows import Window
 from teleop_core.graph.topics import SLAVE_MEASURED_CP
-from teleop_core.slave.controllers.source_pid import SOURCE_PID
 
 SOURCE = "Vongbunyong 2008, Table 8.2"
 POSITION_SHARE = 0.15
 """Largest relative difference at which the root mean square of a position agrees with the published value."""
 ANGLE_FACTOR = 1.6
 """Largest factor between the root mean square of an angle and the published value at which both agree."""
+
+_SOURCE_LAW = "source_pid"  # name of the control law of the source
 
 
 @dataclass(frozen=True)
@@ -93,4 +94,4 @@ class Gains:
     @property
     def is_source(self) -> bool:
         """Whether the slave may be the real machine, or is its simulation here with the source's control law."""
-        return self._origin.plant is None or self._origin.controller == SOURCE_PID.name
+        return self._origin.plant is None or self._origin.controller == _SOURCE_LAW

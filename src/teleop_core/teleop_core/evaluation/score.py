@@ -58,7 +58,7 @@ def key_table() -> str:
 
 
 @dataclass(frozen=True)
-class Session:
+class ScoredRecording:
     """The scored recording. Its texts come from the metadata of the recording; a text that the metadata lack is None.
 
     ``arm`` is empty for the default arm of a recording that names no arms. ``from_s`` and ``to_s`` are the begin and
@@ -157,7 +157,7 @@ class Score:
         results: Results of each metric, in the order of the metrics.
     """
 
-    session: Session
+    session: ScoredRecording
     results: tuple[Result, ...]
 
     def value(self, key: str) -> float | None:

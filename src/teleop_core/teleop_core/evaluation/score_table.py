@@ -10,7 +10,7 @@ from rich.table import Table
 from teleop_core.base.texts import printable
 from teleop_core.evaluation.published import ANGLE_FACTOR, POSITION_SHARE, SOURCE, published_for
 from teleop_core.evaluation.rows import MISSING, TableRow, is_compared, side_by_side
-from teleop_core.evaluation.score import Score, Session
+from teleop_core.evaluation.score import Score, ScoredRecording
 
 MET, NOT_MET = "✓", "✗"
 COLUMN_WIDTH = 18
@@ -50,7 +50,7 @@ def score_table(scores: Sequence[Score]) -> Table:
     return table
 
 
-def heading(session: Session) -> str:
+def heading(session: ScoredRecording) -> str:
     """Heading of a column in three or more lines: name and facts of the recording, mode and arm."""
     gain = "" if session.gain is None else f"gain {session.gain:g}, "
     mode = published_for(session.gain, session.robot, session.plant)

@@ -23,7 +23,7 @@ from teleop_core.evaluation.plain import Plain, leaves, plain
 from teleop_core.evaluation.published import Gains
 from teleop_core.evaluation.registry import METRICS, all_metrics
 from teleop_core.evaluation.rows import TableRow
-from teleop_core.evaluation.score import Result, Score, Session
+from teleop_core.evaluation.score import Result, Score, ScoredRecording
 from teleop_core.evaluation.state_history import StateHistory, read_history
 from teleop_core.evaluation.windows import DisorderError, Seconds, Span, Window, span_of, whole, windows
 from teleop_core.graph.topics import (
@@ -282,10 +282,10 @@ def _checked(metric: Metric, tree: dict[str, Plain]) -> dict[str, Plain]:
     return tree
 
 
-def _session(context: Context) -> Session:
+def _session(context: Context) -> ScoredRecording:
     bag, span = context.bag, context.span
     seed = bag.metadata.get("seed", "")
-    return Session(
+    return ScoredRecording(
         name=bag.path.resolve().name,
         scenario=bag.metadata.get("scenario") or None,
         robot=context.robot,

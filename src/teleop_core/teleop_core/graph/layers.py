@@ -104,6 +104,13 @@ _OF_ROBOT = ("robot", "geometry")
 Layer = dict[str, dict[str, object]]
 
 
+def merge(layers: Iterable[Layer]) -> Layer:
+    """Values of several layers; later layers override earlier ones."""
+    given = list(layers)
+    names = dict.fromkeys(name for layer in given for name in layer)
+    return {name: {key: value for layer in given for key, value in layer.get(name, {}).items()} for name in names}
+
+
 def declared_groups() -> dict[str, type]:
     """Maps the name of each group of a parameter file to its type: the session, then all known stages."""
     return {SESSION: SessionParameters, **{name: STAGES.find(name).parameters for name in STAGES}}

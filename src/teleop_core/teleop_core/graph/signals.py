@@ -13,7 +13,7 @@ from typing import Any
 
 from teleop_core.graph.topics import TELEOP_STATE, Kind, Topic
 from teleop_core.kernels import Array, kernel, records
-from teleop_core.kernels.fields import Field
+from teleop_core.kernels.groups import Field
 from teleop_core.kernels.layout import COUNT, PerJoints
 
 TICK_NS = 1_000_000
@@ -51,6 +51,8 @@ def make_signals(topics: Iterable[Topic], joints: int, notes: Iterable[Field] = 
     for topic in ports:
         if topic.kind is Kind.POSE:
             signals[topic.field][:, 3] = 1.0
+        elif topic.kind is Kind.POSES:
+            signals[topic.field][:, 3::7] = 1.0
     return signals
 
 

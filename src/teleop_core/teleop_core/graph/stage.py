@@ -13,11 +13,11 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from teleop_core.base import PartError, Registry, Value, specs, values_of
+from teleop_core.base import PartError, Registry, fill, specs
 from teleop_core.graph.signals import DT, assign, make_signals
 from teleop_core.graph.topics import Topic
 from teleop_core.kernels import Fields, fields_of, held, raise_pending, records
-from teleop_core.kernels.fields import Field
+from teleop_core.kernels.groups import Field, group_fields
 
 __all__ = ["STAGES", "Runner", "RunningStage", "Stage", "joints_of", "register_stage"]
 
@@ -295,8 +295,8 @@ class _Plain(RunningStage):
         super().__init__(stage, joints, dt)
         assert stage.step is not None
         self.kernel = stage.step
-        declared = [(spec, value) for spec, value in _numbers(parameters)]
-        self._parameters = records([_field(name, value) for name, value in declared] or [("none", "i8")])[0]
+        declared = group_fields(type(parameters), parameters)
+        self._parameters = records(declared or [("none", "i8")])[0]
         self._state = records(stage.remembered(joints) or [("none", "i8")])[0]
         self.arguments = (self._parameters, self._state)
         self._begin = self.signals.copy()
@@ -332,29 +332,8 @@ class _Plain(RunningStage):
         assign(self.signals, self._begin)
 
     def retune(self, parameters: Any) -> None:
-        """Use new parameters; a text parameter becomes its index in the choices."""
-        for name, value in _numbers(parameters):
-            self._parameters[name] = value
-
-
-def _numbers(parameters: Any) -> list[tuple[str, Any]]:
-    """Fields of a parameter record: dots become underscores, texts become indices in their choices."""
-    found: list[tuple[str, Any]] = []
-    values = values_of(parameters)
-    for spec in specs(type(parameters)):
-        value: Value = values[spec.name]
-        if spec.element is str:
-            if spec.choices and isinstance(value, str):
-                found.append((spec.name.replace(".", "_"), spec.choices.index(value)))
-            continue
-        found.append((spec.name.replace(".", "_"), value))
-    return found
-
-
-def _field(name: str, value: Any) -> Field:
-    if isinstance(value, tuple):
-        return (name, "f8", (len(value),))
-    return (name, "f8" if isinstance(value, float) else "i8")
+        """Use new parameters."""
+        fill(self._parameters, parameters)
 
 
 def _checked(name: str, part: object) -> Stage:

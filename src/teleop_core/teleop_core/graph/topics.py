@@ -75,6 +75,7 @@ class Kind(Enum):
     STATE    position, velocity, effort of all joints: 3 n columns
     NUMBERS  the numbers that the topic names in ``columns``
     JAW      position [rad], velocity [rad/s], effort [N·m] of a jaw, a joint of its own
+    POSES    :data:`POSES` poses, each as in POSE; those beyond the bodies of a scene are the identity
     REPORT   no fixed columns: key-value pairs
     ======== ==================================================================
     """
@@ -84,6 +85,7 @@ class Kind(Enum):
     WRENCH = "wrench", "geometry_msgs/msg/WrenchStamped"
     BUTTONS = "buttons", "sensor_msgs/msg/Joy"
     JAW = "jaw", "sensor_msgs/msg/JointState"
+    POSES = "poses", "geometry_msgs/msg/PoseArray"
     NUMBERS = "numbers", "sensor_msgs/msg/JointState"
     JOINTS = "joints", "sensor_msgs/msg/JointState"
     STATE = "state", "sensor_msgs/msg/JointState"  # unknown topics of this message type are read with this kind
@@ -120,9 +122,12 @@ class Kind(Enum):
     def width(self, joints: int) -> int:
         """Number of columns for a robot with this many joints, or for a topic with this many names."""
         fixed = {Kind.POSE: 7, Kind.TWIST: 6, Kind.WRENCH: 6, Kind.BUTTONS: 3, Kind.REPORT: 0, Kind.JAW: 3}
+        fixed[Kind.POSES] = 7 * POSES
         return {Kind.NUMBERS: joints, Kind.JOINTS: joints, Kind.STATE: 3 * joints, **fixed}[self]
 
 
+POSES = 48
+"""Number of poses in a message of :attr:`Kind.POSES`."""
 JAW = ("jaw",)
 """Name of the only joint of a jaw."""
 _COLUMNS = {
@@ -131,6 +136,7 @@ _COLUMNS = {
     Kind.WRENCH: ("fx", "fy", "fz", "tx", "ty", "tz"),
     Kind.BUTTONS: ("clutch", "fixture", "mode"),
     Kind.JAW: ("position", "velocity", "effort"),
+    Kind.POSES: tuple(f"{name}{i}" for i in range(POSES) for name in ("x", "y", "z", "qw", "qx", "qy", "qz")),
     Kind.REPORT: (),
 }
 
@@ -406,6 +412,12 @@ NETWORK_MASTER_ENERGY = Topic(
 NETWORK_SLAVE_ENERGY = Topic(
     "network/slave_energy", Kind.NUMBERS, arrived("slave/energy"), "slave_base", columns=ENERGY
 )
+SCENE_POSES = Topic("scene/poses", Kind.POSES, SAMPLED, "world", is_seldom=True)
+"""Poses of the moving bodies of a scene in its world, in the order of the model; only a simulator knows them."""
+SCENE_ENERGY = Topic(
+    "scene/energy", Kind.NUMBERS, SAMPLED, "world", is_seldom=True, columns=("kinetic", "potential", "given")
+)
+"""Kinetic and potential energy of a scene, and the work that drives have done on it since the start [J]."""
 HAND_SERVO_CP = Topic("hand/servo_cp", Kind.POSE, SAMPLED, "master_base")
 """Pose of the stylus that the operator wants; without messages the stylus is released."""
 HAND_BUTTONS = Topic("hand/buttons", Kind.BUTTONS, SAMPLED, "master_base", is_seldom=True)
@@ -478,6 +490,8 @@ JAW_TOPICS = (
 """Topics of a session with a jaw; the third exists only if there is a network too."""
 PORTS_BETWEEN_ARMS = (FIRST_JAW_BOARD, FIRST_JAW_GRIP, SECOND_TRUE_CP, SECOND_JAW_GRIP)
 """Ports of one arm for topics of another arm; no stage writes topics with these names."""
+SCENE_TOPICS = (SCENE_POSES, SCENE_ENERGY)
+"""Topics of a session with a scene."""
 TASK_TOPICS = (DISPLAY_MEASURED_CP, TASK_STATE)
 """Topic of a session with a display, and topic of a session with a task."""
 ALL = (*STREAMS, HAND_BUTTONS, HAND_TREMOR, SLAVE_MEASURED_CF, SLAVE_ESTIMATED_CF, SLAVE_TRUE_CF, *REPORTS, DIAGNOSTICS)
@@ -485,6 +499,6 @@ BY_NAME = {
     topic.name: topic
     for topic in (
         *ALL, *NETWORK_TOPICS, *PASSIVITY_TOPICS, *IMPEDANCE_TOPICS, MASTER_FILTERED_CP,
-        MASTER_FILTERED_OUT, REMOTE_CENTRE_SERVO_CP, REMOTE_CENTRE, *JAW_TOPICS, *TASK_TOPICS,
+        MASTER_FILTERED_OUT, REMOTE_CENTRE_SERVO_CP, REMOTE_CENTRE, *JAW_TOPICS, *SCENE_TOPICS, *TASK_TOPICS,
     )
 }  # fmt: skip

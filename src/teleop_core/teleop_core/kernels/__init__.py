@@ -277,6 +277,7 @@ if TYPE_CHECKING:
     from teleop_core.kernels.addresses import *  # noqa: F403
     from teleop_core.kernels.fields import *  # noqa: F403
     from teleop_core.kernels.geometry import *  # noqa: F403
+    from teleop_core.kernels.groups import *  # noqa: F403
     from teleop_core.kernels.parts import *  # noqa: F403
     from teleop_core.kernels.portable import *  # noqa: F403
 else:  # imported when they are first used
@@ -286,6 +287,7 @@ else:  # imported when they are first used
             "fields_of", "record", "record_array"),
         "geometry": ("Array", "checked_array", "is_rigid", "multiply_quaternions", "pose_from_transform", "rotation",
             "rotations_from_quaternions", "transform", "turn_by"),
+        "groups": ("group_fields",),
         "parts": ("fenced", "is_whole", "numbers_of"),
         "portable": ("arctangent", "dot", "inverse_motion", "length", "product"),
     }  # fmt: skip

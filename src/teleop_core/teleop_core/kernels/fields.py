@@ -10,9 +10,13 @@ A class names the fields of a kind of record and gives each field a type::
 
 ``record(Spring, joints)`` makes a record with all fields zero. Kernels annotate it as ``s: Spring``: the type checker
 and numba then report unknown fields. A record of several parts inherits from their classes. ``int`` and ``float`` have
-64 bits; a truth value is an ``int``.
+64 bits; a truth value is an ``int``, and a choice among texts, of the type ``str``, its index.
+
+A class that inherits from a parameter group, or names one as the type of a field, has the numbers of the group as
+fields; see :mod:`teleop_core.kernels.groups`.
 """
 
+import dataclasses
 from inspect import get_annotations
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar, cast, get_args, get_origin
 
@@ -20,10 +24,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from teleop_core.kernels.geometry import Array
-from teleop_core.kernels.layout import PerJoints, records
+from teleop_core.kernels.groups import Field, group_fields
+from teleop_core.kernels.layout import PerJoints, record_dtype, records
 
-Field = tuple[str, str] | tuple[str, str, tuple[int, ...]]
-"""Name and type of a field, and its shape if it is an array."""
 Integers = NDArray[np.int64]
 PerJoint = Annotated[Array, "joints"]
 """Array with one number for each joint."""
@@ -70,26 +73,30 @@ class Cells:
         self._own[name][...] = value
 
 
-_R = TypeVar("_R", bound=Fields)
+_R = TypeVar("_R")
 
 
-def fields_of(kind: type[Fields], joints: int = 0) -> list[Field]:
+def fields_of(kind: type, joints: int = 0) -> list[Field]:
     """Names and types of the fields of a class; fields of its base classes come first.
 
     Args:
-        kind: The class.
+        kind: The class, of :class:`Fields` or of parameters.
         joints: Number of joints, for arrays with one number for each joint.
     """
     found: dict[str, Field] = {}
     for base in reversed(kind.__mro__):
-        for name, hint in get_annotations(base).items():
-            found[name] = _field(name, hint, joints)
+        if "__dataclass_fields__" in vars(base):
+            found |= {field[0]: field for field in group_fields(base)}
+        else:
+            found |= {name: _field(name, hint, joints) for name, hint in get_annotations(base).items()}
     return list(found.values())
 
 
 def _field(name: str, hint: Any, joints: int) -> Field:
+    if dataclasses.is_dataclass(hint):
+        return name, record_dtype(fields_of(cast(type, hint)))
     if get_origin(hint) is not Annotated:
-        return name, "i8" if hint is int else "f8"
+        return name, "f8" if hint is float else "i8"
     array, *shape = get_args(hint)
     sizes = tuple(PerJoints(joints) if size == "joints" else size for size in shape)
     return name, "i8" if array == Integers else "f8", sizes

@@ -102,8 +102,8 @@ class Agenda:
         return True
 
 
-class Guard:
-    """See :class:`~teleop_core.middleware.world.Guard`.
+class GuardCondition:
+    """See :class:`~teleop_core.middleware.world.GuardCondition`.
 
     Args:
         agenda: Agenda of the node.

@@ -16,7 +16,7 @@ from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 
-from teleop_core.bags.background import SYSTEM, Background
+from teleop_core.base.background import SYSTEM, Background
 from teleop_core.graph.layers import RealTimeParameters
 from teleop_core.middleware import real_time, ros_lifecycle, ros_node, ros_taking, world
 from teleop_core.middleware.domains import checked_domain, domain_of_environment

@@ -13,12 +13,12 @@ from teleop_core.base import ParameterError, Spec, Value
 from teleop_core.middleware.ros_node import RosNode, RosPublisher, profile_of
 from teleop_core.middleware.ros_parameters import declare, plain, typed
 from teleop_core.middleware.ros_taking import Unattended
-from teleop_core.middleware.world import Hooks, Outcome, Qos
+from teleop_core.middleware.world import Hooks, Qos, TransitionResult
 
 _CODES = {
-    Outcome.SUCCESS: TransitionCallbackReturn.SUCCESS,
-    Outcome.FAILURE: TransitionCallbackReturn.FAILURE,
-    Outcome.ERROR: TransitionCallbackReturn.ERROR,
+    TransitionResult.SUCCESS: TransitionCallbackReturn.SUCCESS,
+    TransitionResult.FAILURE: TransitionCallbackReturn.FAILURE,
+    TransitionResult.ERROR: TransitionCallbackReturn.ERROR,
 }
 _OUTCOMES = {code: outcome for outcome, code in _CODES.items()}
 _SIM_TIME = "use_sim_time"
@@ -77,7 +77,7 @@ class RosLifecycleNode(RosNode):
         finally:
             self._shows = False
 
-    def trigger(self, transition: str) -> Outcome:
+    def trigger(self, transition: str) -> TransitionResult:
         """Execute a transition."""
         return _OUTCOMES[getattr(self.own, f"trigger_{transition}")()]
 

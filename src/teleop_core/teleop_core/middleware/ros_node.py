@@ -13,7 +13,7 @@ from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPo
 from rclpy.service import Service
 from rclpy.subscription import Subscription
 
-from teleop_core.middleware.agenda import Agenda, Guard, Timer
+from teleop_core.middleware.agenda import Agenda, GuardCondition, Timer
 from teleop_core.middleware.ros_taking import RosTaker
 from teleop_core.middleware.world import Endpoint, Qos
 
@@ -117,16 +117,16 @@ class RosNode:
         """Timer whose function the executor calls."""
         return self.agenda.timer(period, callback)
 
-    def create_guard_condition(self, callback: Callable[[], None]) -> Guard:
+    def create_guard_condition(self, callback: Callable[[], None]) -> GuardCondition:
         """Guard whose function the executor calls."""
-        return Guard(self.agenda, callback)
+        return GuardCondition(self.agenda, callback)
 
     def destroy(self, entity: Any) -> None:
         """Destroy an object that one of the methods above has made."""
         if isinstance(entity, Timer):
             self.agenda.drop(entity)
             return
-        if isinstance(entity, Guard):
+        if isinstance(entity, GuardCondition):
             entity.cancel()
             return
         own = entity.own if isinstance(entity, RosPublisher) else entity

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Any, NamedTuple, Protocol
 
-from teleop_core.bags.background import Background
+from teleop_core.base.background import Background
 from teleop_core.base.parameters import Spec, Value
 from teleop_core.graph.layers import RealTimeParameters
 
@@ -66,7 +66,7 @@ class Endpoint(NamedTuple):
     is_latched: bool
 
 
-class Outcome(Enum):
+class TransitionResult(Enum):
     """Result of a transition of the lifecycle."""
 
     SUCCESS = "done"
@@ -202,7 +202,7 @@ class Timer(Protocol):
         """Whether the timer is paused."""
 
 
-class Guard(Protocol):
+class GuardCondition(Protocol):
     """Calls a function once in the executor, after it was triggered."""
 
     def trigger(self) -> None:
@@ -276,7 +276,7 @@ class Node(Protocol):
     def create_timer(self, period: float, callback: Callable[[], None]) -> Timer:
         """Call ``callback`` periodically; the period is in [s]."""
 
-    def create_guard_condition(self, callback: Callable[[], None]) -> Guard:
+    def create_guard_condition(self, callback: Callable[[], None]) -> GuardCondition:
         """Guard that calls ``callback`` when it is triggered."""
 
     def destroy(self, entity: Any) -> None:
@@ -307,22 +307,22 @@ class Node(Protocol):
 class Hooks(Protocol):
     """Functions that a lifecycle node calls in its transitions."""
 
-    def on_configure(self) -> Outcome:
+    def on_configure(self) -> TransitionResult:
         """Make everything that the node needs."""
 
-    def on_activate(self) -> Outcome:
+    def on_activate(self) -> TransitionResult:
         """Begin the node's work; the publishers of the node are already open."""
 
-    def on_deactivate(self) -> Outcome:
+    def on_deactivate(self) -> TransitionResult:
         """Stop the node's work; the publishers of the node are still open."""
 
-    def on_cleanup(self) -> Outcome:
+    def on_cleanup(self) -> TransitionResult:
         """Close everything, so that the node can be configured again."""
 
-    def on_shutdown(self) -> Outcome:
+    def on_shutdown(self) -> TransitionResult:
         """Stop the node's work and close everything; the node cannot be configured again."""
 
-    def on_error(self) -> Outcome:
+    def on_error(self) -> TransitionResult:
         """Close everything after a crash."""
 
     def on_no_transition(self, wanted: str) -> None:
@@ -356,7 +356,7 @@ class LifecycleNode(Node, Protocol):
     def show(self, values: Mapping[str, Value]) -> None:
         """Show values that the node has changed by itself; ``accept`` is not called."""
 
-    def trigger(self, transition: str) -> Outcome:
+    def trigger(self, transition: str) -> TransitionResult:
         """Execute ``configure``, ``activate``, ``deactivate`` or ``shutdown``."""
 
 

@@ -12,7 +12,7 @@ from teleop_core.graph.signals import TICK_NS
 from teleop_core.graph.stage import STAGES, Stage, joints_of
 from teleop_core.graph.topics import Kind, Topic
 from teleop_core.graph.warming import warm_up
-from teleop_core.middleware.world import Outcome, Publisher
+from teleop_core.middleware.world import Publisher, TransitionResult
 from teleop_core.nodes.diagnostics import Reporter, input_values, recent_values, tick_values
 from teleop_core.nodes.feed import Feed
 from teleop_core.nodes.loop import Loop
@@ -209,35 +209,35 @@ class CoreNode(TunedNode):
 
     # -- lifecycle -------------------------------------------------------------------------------
 
-    def on_configure(self) -> Outcome:
+    def on_configure(self) -> TransitionResult:
         """Make the stage and open its topics. If this is refused, nothing stays open."""
         self._fresh_counts()
         result = self._guard("configure", lambda: self.setup(self.parameters), "inactive")
-        if result is not Outcome.SUCCESS:
+        if result is not TransitionResult.SUCCESS:
             self._close()
         return result
 
-    def on_activate(self) -> Outcome:
+    def on_activate(self) -> TransitionResult:
         """Start working."""
         return self._guard("activate", self._begin, "active")
 
-    def on_deactivate(self) -> Outcome:
+    def on_deactivate(self) -> TransitionResult:
         """Stop working."""
         return self._guard("deactivate", self._halt, "inactive")
 
-    def on_cleanup(self) -> Outcome:
+    def on_cleanup(self) -> TransitionResult:
         """Close everything; afterwards the node can be configured again."""
         return self._guard("cleanup", self._clear, "unconfigured")
 
-    def on_shutdown(self) -> Outcome:
+    def on_shutdown(self) -> TransitionResult:
         """Stop and close everything for good."""
         self.has_ended = True
         result = self._guard("shutdown", self._clear, "finalized")
-        if result is not Outcome.SUCCESS:
+        if result is not TransitionResult.SUCCESS:
             self.exit_code = self.exit_code or 1
         return result
 
-    def on_error(self) -> Outcome:
+    def on_error(self) -> TransitionResult:
         """After a crash: close everything, so that a supervisor can configure the node again."""
         return self._guard("recovery", self._clear, "unconfigured")
 
@@ -296,20 +296,20 @@ class CoreNode(TunedNode):
             finally:
                 self._close()
 
-    def _guard(self, transition: str, action: Callable[[], None], word: str) -> Outcome:
+    def _guard(self, transition: str, action: Callable[[], None], word: str) -> TransitionResult:
         try:
             action()
         except TeleopError as error:  # a refused configuration, as one readable line
             self.ros.get_logger().error(f"{transition} refused: {error}")
-            return Outcome.FAILURE
+            return TransitionResult.FAILURE
         except Exception:  # rclpy would convert it to ERROR without a message
             self.ros.get_logger().fatal(f"{transition} crashed:\n{traceback.format_exc()}")
-            return Outcome.ERROR
+            return TransitionResult.ERROR
         if self._word not in {"unconfigured", "failed"} or word != "finalized":
             self.ros.get_logger().info(self.news(_NEWS.get(word, word)))
         self._word = word
         self.report()
-        return Outcome.SUCCESS
+        return TransitionResult.SUCCESS
 
     def prepare(self) -> None:
         """Apply the real-time options to the calling thread; log the options that the system refuses."""

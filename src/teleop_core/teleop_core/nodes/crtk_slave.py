@@ -14,6 +14,7 @@ import numpy as np
 
 from teleop_core.bags.messages import Refusal, layout, read_joints, read_values
 from teleop_core.base.errors import TeleopError
+from teleop_core.graph.operation import State
 from teleop_core.graph.topics import SLAVE_MEASURED_CF, SLAVE_MEASURED_CP, SLAVE_SERVO_CP, SLAVE_SERVO_JP, Kind, Topic
 from teleop_core.kernels.geometry import Array, framed_wrenches, pose_from_transform, transform_from_pose
 from teleop_core.nodes.crtk import SINGLE, STREAMED, Condition, OperatingState, Refusals, is_installed
@@ -21,7 +22,7 @@ from teleop_core.nodes.outside import OutsideCommands
 from teleop_core.nodes.sender import SECOND_NS
 from teleop_core.nodes.streams import message_type, profile
 from teleop_core.slave.motion_commands import Told
-from teleop_core.slave.operation.states import Answer, State
+from teleop_core.slave.operation.states import Answer
 from teleop_core.slave.ownership import Leader
 
 _FRAME = SLAVE_MEASURED_CP.frame_id

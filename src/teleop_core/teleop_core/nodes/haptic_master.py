@@ -2,13 +2,14 @@
 
 from typing import Any
 
+from teleop_core.graph.operation import State
 from teleop_core.graph.topics import HAND_SERVO_CP, MASTER_CONTACT, MASTER_SERVO_CF, OPERATION, SLAVE_OPERATION, Topic
 from teleop_core.hand.input_device import UNHELD
 from teleop_core.hand.master.haptic_master import HapticMasterParameters
 from teleop_core.nodes.crtk import Condition, OperatingState, is_installed
 from teleop_core.nodes.operation import StopInput
 from teleop_core.nodes.ticking import TickingNode
-from teleop_core.slave.operation.states import TABLE, Answer, Event, State, answer_text, command_event
+from teleop_core.slave.operation.states import TABLE, Answer, Event, answer_text, command_event
 
 
 class CrtkMaster:

@@ -21,7 +21,7 @@ from teleop_core.nodes.children import Child, end_all, environment
 from teleop_core.nodes.crews import Crew, Processes, crews
 from teleop_core.nodes.interrupt import Interrupt
 from teleop_core.nodes.keys import Keys
-from teleop_core.nodes.observer import WARNING, Observer, Status
+from teleop_core.nodes.observer import WARNING, ReportReader, Status
 from teleop_core.nodes.remote_control import RemoteControl
 from teleop_core.nodes.sessions import announced
 from teleop_core.nodes.starter import START_TIMEOUT, Starter
@@ -29,7 +29,7 @@ from teleop_core.nodes.task_end import TaskEnd
 from teleop_core.session.configuration import Configuration
 from teleop_core.session.links import link_texts
 from teleop_core.session.notes import notes_of
-from teleop_core.slave.slave import SlaveParameters
+from teleop_core.slave.parameters import SlaveParameters
 
 SILENCE = 30.0
 """A working node that has not reported for this time counts as failed [s].
@@ -93,7 +93,7 @@ def live(
         Starter(configuration.text(), env) as starter,
         interrupt.caught(),
         announced(int(env["ROS_DOMAIN_ID"])),
-        Observer(int(env["ROS_DOMAIN_ID"])) as observer,
+        ReportReader(int(env["ROS_DOMAIN_ID"])) as observer,
     ):
         priority = _priority(configuration, processes)
         parameters.write(written(session_parameters(configuration, str(out), priority=priority)))
@@ -124,7 +124,7 @@ def _priority(configuration: Configuration, processes: Processes) -> int | None:
 
     With one process per node the priority stays 0, because these processes together need more than two processors.
     """
-    if configuration.groups[SESSION].real_time.priority >= 0 or processes is Processes.NODES:
+    if configuration.session.real_time.priority >= 0 or processes is Processes.NODES:
         return None
     return _PRIORITY if is_priority_granted(_PRIORITY) else 0
 
@@ -136,15 +136,15 @@ class _Session:
         self,
         configuration: Configuration,
         console: Console,
-        observer: Observer,
+        observer: ReportReader,
         parameters: IO[Any],
         env: dict[str, str],
         interrupt: Interrupt,
         starter: Starter,
     ) -> None:
-        self._duration = float(configuration.groups[SESSION].duration)
+        self._duration = float(configuration.session.duration)
         self._graph = configuration.graph
-        ends = configuration.groups[SESSION].ends_with_task
+        ends = configuration.session.ends_with_task
         self._task_end = TaskEnd(observer, self._graph) if ends else None
         self._console, self._observer = console, observer
         self._parameters, self._env, self._interrupt = parameters, env, interrupt

@@ -24,7 +24,7 @@ _OWN = ("/parameter_events", "/rosout")  # topics of every node, this one too
 _ELEMENTS = {ParameterType.PARAMETER_INTEGER_ARRAY: int, ParameterType.PARAMETER_STRING_ARRAY: str}
 
 
-class Seen(NamedTuple):
+class FoundTopic(NamedTuple):
     """A discovered topic: type of its messages, and numbers of its publishers and readers."""
 
     ros_type: str
@@ -63,10 +63,10 @@ class Look(Guest):
 
     # -- topics ------------------------------------------------------------------------------------
 
-    def topics(self) -> dict[str, Seen]:
+    def topics(self) -> dict[str, FoundTopic]:
         """All discovered topics, by name."""
         return {
-            name: Seen(ends[0].ros_type, len(self.ros.publishers(name)), len(self.ros.readers(name)))
+            name: FoundTopic(ends[0].ros_type, len(self.ros.publishers(name)), len(self.ros.readers(name)))
             for name in self._discovered(self.ros.get_topic_names_and_types)
             if name not in _OWN and (ends := [*self.ros.publishers(name), *self.ros.readers(name)])
         }

@@ -9,7 +9,7 @@ from teleop_core.bags.transforms import TF
 from teleop_core.graph.topics import MASTER_MEASURED_CP, SLAVE_MEASURED_JS, Topic
 from teleop_core.nodes.base import CoreNode
 from teleop_core.nodes.newest import Newest
-from teleop_core.session.model import ArmModel, Model
+from teleop_core.session.model import DrawnArm, Model
 
 _NOWHERE = np.zeros(7)
 
@@ -43,7 +43,7 @@ class LiveModel:
         due = [message for arm in self._arms for message in self._due(arm, newest)]
         return [(topic, data, latest_ns) for topic, data in due]
 
-    def _due(self, arm: ArmModel, newest: Newest) -> list[tuple[Topic, bytes]]:
+    def _due(self, arm: DrawnArm, newest: Newest) -> list[tuple[Topic, bytes]]:
         joints = newest.values(_joints(arm), arm.robot.joint_names)
         if joints is None:
             return []
@@ -83,11 +83,11 @@ class ModelTopics:
             publisher.publish(data)
 
 
-def _joints(arm: ArmModel) -> Topic:
+def _joints(arm: DrawnArm) -> Topic:
     return SLAVE_MEASURED_JS.of_arm(arm.arm)
 
 
-def _stylus(arm: ArmModel) -> Topic:
+def _stylus(arm: DrawnArm) -> Topic:
     return MASTER_MEASURED_CP.of_arm(arm.arm)
 
 

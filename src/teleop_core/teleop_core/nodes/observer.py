@@ -33,7 +33,7 @@ class Status:
         return number if math.isfinite(number) else 0.0
 
 
-class Observer(Guest):
+class ReportReader(Guest):
     """Node that reads the reports of a session.
 
     Args:

@@ -10,7 +10,7 @@ from typing import Protocol
 
 from teleop_core.base.errors import TeleopError
 from teleop_core.middleware.ros import BAD_ARGUMENTS, ROS
-from teleop_core.middleware.world import Executor, Outcome, World, WorldEndedError
+from teleop_core.middleware.world import Executor, TransitionResult, World, WorldEndedError
 from teleop_core.nodes.base import CoreNode
 from teleop_core.nodes.discovery import beyond_this_machine, choose_transport
 from teleop_core.nodes.files import checked_arguments
@@ -111,12 +111,12 @@ def _autostart(nodes: tuple[CoreNode, ...], world: World) -> int:
     for node in willing:
         if node.ended.done():
             return 0
-        if node.ros.trigger("configure") is not Outcome.SUCCESS:
+        if node.ros.trigger("configure") is not TransitionResult.SUCCESS:
             return 2
     world.tidy()
     if nodes[0].ended.done():
         return 0
-    return 1 if any(node.ros.trigger("activate") is not Outcome.SUCCESS for node in willing) else 0
+    return 1 if any(node.ros.trigger("activate") is not TransitionResult.SUCCESS for node in willing) else 0
 
 
 def _finish(code: int) -> int:

@@ -19,7 +19,7 @@ from teleop_core.graph.layers import SESSION, parse_text
 from teleop_core.graph.stage import Stage
 from teleop_core.graph.topics import DIAGNOSTICS, Quality, Topic
 from teleop_core.kernels.axes import axis_map
-from teleop_core.middleware.world import Outcome
+from teleop_core.middleware.world import TransitionResult
 from teleop_core.nodes.base import CoreNode
 from teleop_core.nodes.display import LiveDisplay
 from teleop_core.nodes.feed import FeedReader
@@ -167,7 +167,7 @@ class RecorderNode(CoreNode):
         configuration = self._configuration(parameters)
         graph = self._graph or (configuration.graph if parameters.configuration else graph_of(sys.argv))
         self._path = Path(parameters.out or time.strftime("bags/live_%Y%m%d_%H%M%S"))
-        topics = (*(topic.of_arm(self.arm) for topic in graph.topics), DIAGNOSTICS)
+        topics = (*(topic.of_arm(self.arm) for topic in graph.topics), DIAGNOSTICS, *parameters.others)
         self._model = self._model_of(configuration, parameters)
         self._model_topics, self._newest = ModelTopics(self, self._model.topics), Newest()
         self._shown: list[LiveMarkers | LiveDisplay] = []
@@ -305,7 +305,7 @@ class RecorderNode(CoreNode):
         """Record again, in a new directory. Raises the errors of :class:`Recorder`."""
         if self.stage is None:
             for transition in ("configure", "activate"):
-                if self.ros.trigger(transition) is not Outcome.SUCCESS:
+                if self.ros.trigger(transition) is not TransitionResult.SUCCESS:
                     raise SessionError("did not start; see its log")
             return f"records to {self._writer.path}"
         self._insist(is_recording=False)

@@ -8,13 +8,14 @@ from std_srvs.srv import Trigger
 
 from teleop_core.bags.messages import read_reports
 from teleop_core.base.errors import SessionError
+from teleop_core.graph.operation import State
 from teleop_core.graph.topics import OPERATION, SLAVE_OPERATION
 from teleop_core.middleware.ros import ROS
 from teleop_core.middleware.world import World
 from teleop_core.nodes.guest import Guest
 from teleop_core.nodes.operation import StopButton
 from teleop_core.nodes.streams import Subscription
-from teleop_core.slave.operation import State, operation_text
+from teleop_core.slave.operation import operation_text
 from teleop_core.slave.operation.states import AT_REST_ONLY
 
 _PERIOD = 0.01

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterable
 
 from teleop_core.bags.messages import Refusal
+from teleop_core.graph.operation import State
 from teleop_core.graph.signals import TICK_NS
 from teleop_core.graph.topics import SLAVE_MEASURED_CP, SLAVE_MEASURED_JS, SLAVE_SERVO_JP, Topic
 from teleop_core.nodes.crtk_slave import CrtkSlave
@@ -10,9 +11,9 @@ from teleop_core.nodes.operation import CommandServices, StopInput
 from teleop_core.nodes.sender import SECOND_NS
 from teleop_core.nodes.ticking import TickingNode
 from teleop_core.slave.commands import CommandStatus
-from teleop_core.slave.operation import Fault, State, operation_text
+from teleop_core.slave.operation import Fault, operation_text
 from teleop_core.slave.ownership import Leader
-from teleop_core.slave.slave import SlaveParameters
+from teleop_core.slave.parameters import SlaveParameters
 
 _SERVO = SLAVE_SERVO_JP.name
 _SELDOM = 10

@@ -4,7 +4,7 @@ import inspect
 from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
-from typing import Protocol, TypeAlias, TypeVar, runtime_checkable
+from typing import Protocol, TypeAlias, TypeVar, cast, runtime_checkable
 
 import numpy as np
 
@@ -18,6 +18,8 @@ _BUILT_IN = {"rcrt1": "arms.rcrt1:make"} | {
 _OF_MACHINES = ("four_bar", "mma", "parallelogram", "rps3", "scara_stewart", "stewart", "three_finger_hand")
 _TABLE_ENDINGS = (".yaml", ".yml")
 _URDF_ENDINGS = (".urdf", ".xacro")
+SCENE_ENDING = ".xml"
+"""Ending of the name of a scene, a MuJoCo model; the distribution ``teleop_scene`` reads it."""
 DESCRIPTION = "_description"
 """Suffix of names of the package ``robot_descriptions``."""
 ARGUMENT = "xacro."
@@ -32,6 +34,24 @@ class RobotSource(Protocol):
 
     def robot(self) -> Robot:
         """The robot."""
+        ...
+
+
+class SceneReader(Protocol):
+    """Reader of scenes."""
+
+    name: str
+
+    def file(self, name: str) -> Path:
+        """File that the name of a scene means."""
+        ...
+
+    def load(self, file: Path, *, tip: str = "", base: str = "", task: str = "", drive: str = "model") -> Robot:
+        """Robot whose tip is a site or body of a scene."""
+        ...
+
+    def files(self, file: Path) -> dict[str, Path]:
+        """All files of a scene, the first one included, by their paths from its folder."""
         ...
 
 
@@ -70,6 +90,8 @@ def from_file(path: str, geometry: Mapping[str, float | str]) -> Robot | None:
     if found is None:
         return None
     file, arguments = found
+    if is_scene(path):
+        return built(path, partial(SCENES.find("scene").load, file), geometry)
     if file.suffix.lower() in _TABLE_ENDINGS:
         from teleop_core.robots.arms.dh import load_table
 
@@ -90,8 +112,15 @@ def file_of(name: str) -> tuple[Path, dict[str, str]] | None:
         from teleop_core.robots.files.descriptions import description_file
 
         return description_file(name)
+    if is_scene(name):
+        return SCENES.find("scene").file(name), {}
     is_file = name.lower().endswith((*_URDF_ENDINGS, *_TABLE_ENDINGS))
     return (Path(name).expanduser(), {}) if is_file else None
+
+
+def is_scene(name: str) -> bool:
+    """Whether a robot's name means a scene."""
+    return name.lower().endswith(SCENE_ENDING)
 
 
 def is_urdf(name: str) -> bool:
@@ -153,6 +182,18 @@ def _try(part: RobotPart) -> None:
         raise PartError("robot", name, f"one whose kernels run at home; {type(error).__name__}: {reason}") from error
 
 
+def _reader(name: str, part: object) -> SceneReader:
+    if not all(callable(getattr(part, each, None)) for each in ("file", "load", "files")):
+        raise PartError("reader of scenes", name, "one with file, load and files")
+    return cast("SceneReader", part)
+
+
+SCENES: Registry[SceneReader] = Registry(
+    "reader of scenes", "scene_readers", {}, _reader, elsewhere={"scene": "teleop_scene"}
+)
+"""Reader of scenes, which the distribution ``teleop_scene`` contains."""
+
+
 def _try_dynamics(robot: Robot) -> None:
     if robot.dynamics is not None:
         q, row, out = robot.home.copy(), robot.dynamics.parameters.copy(), np.zeros(robot.n)
@@ -171,7 +212,7 @@ ROBOTS: Registry[RobotPart] = Registry(
     {name: f"teleop_core.robots.{place}" for name, place in _BUILT_IN.items()},
     _checked,
     _try,
-    others=("FILE.urdf", "FILE.xacro", "FILE.yaml"),
+    others=("FILE.urdf", "FILE.xacro", "FILE.yaml", "SCENE.xml"),
     elsewhere=dict.fromkeys(_OF_MACHINES, "teleop_machines"),
 )
 """All robots by name; see :data:`RobotPart` for what can be added."""

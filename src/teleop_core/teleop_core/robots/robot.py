@@ -35,7 +35,7 @@ from teleop_core.robots.hardware import Hardware
 
 if TYPE_CHECKING:
     from teleop_core.robots.body import Bodies
-    from teleop_core.robots.visual import Visual
+    from teleop_core.robots.visual import Surrounding, Visual
 
 
 class _Start:
@@ -69,6 +69,7 @@ class Robot:
         lower: Smallest joint positions (n,) [rad, m].
         upper: Largest joint positions (n,) [rad, m].
         home: Joint vector (n,) of the published or natural zero, inside the limits.
+        world_base: Pose (4, 4) of the base in the world of a scene; None for an arm without a scene.
         home_is_assumed: Whether home may be no working posture. An example is the zero of a URDF, at which many arms
             are stretched out. No session starts at an assumed home.
         start: Joint vector (n,) at which a session starts, inside the limits. None means a posture with room in all
@@ -108,6 +109,7 @@ class Robot:
     notes: tuple[str, ...] = ()
     describe: "Callable[[Robot], Bodies] | None" = None
     home_is_assumed: bool = False
+    world_base: Array | None = None
     start: _Start = _Start()
     # Writable copies for the kernels, which are compiled only for writable arrays.
     _row: Array = field(init=False)
@@ -152,6 +154,10 @@ class Robot:
 
     def _repr_html_(self) -> str:
         return description.html(self)
+
+    def surroundings(self) -> "tuple[Surrounding, ...]":
+        """Shapes of the scene in which the arm stands, its own included; none by default."""
+        return ()
 
     @cached_property
     def n(self) -> int:

@@ -4,6 +4,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
+import numpy as np
+from numpy.typing import NDArray
+
 from teleop_core.kernels import Array
 
 Color = tuple[float, float, float]
@@ -38,3 +41,20 @@ class Visual:
     urdf: Path
     color: Color | None = None
     travel: Array | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Surrounding:
+    """Shapes of one colour that one body of a scene carries.
+
+    Attributes:
+        place: Index of the body's pose in ``scene/poses``; -1 for shapes that do not move.
+        mesh: Vertices (V, 3) [m] in the frame of the body, and faces (F, 3).
+        color: Colour of the shapes.
+        begin: Pose (7,) of the body in the world of the scene at the start.
+    """
+
+    place: int
+    mesh: tuple[Array, NDArray[np.int64]]
+    color: Color
+    begin: Array

@@ -92,6 +92,8 @@ def configuration(
         TeleopError: An argument is wrong; the error text names it.
     """
     named: dict[str, object] = {}
+    if robot is not None:  # first: a scene implies its plant, which plant= overrides
+        named["robot"] = robot if isinstance(robot, str) else _known(ROBOTS, robot)
     for name, registry, part in (
         ("fixture", SHAPES, fixture),
         ("controller", CONTROLLERS, controller),
@@ -99,8 +101,6 @@ def configuration(
     ):
         if part is not None:
             named[f"{name}.kind"] = part if isinstance(part, str) else _known(registry, part)
-    if robot is not None:
-        named["robot"] = robot if isinstance(robot, str) else _known(ROBOTS, robot)
     if operator is not None:
         named |= _operator_settings(operator)
     if stages:

@@ -2,9 +2,9 @@
 
 import warnings
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from teleop_core.base import ParameterError, PartError, TeleopWarning, UnknownNameError, build, specs, values_of
 from teleop_core.base.plain_yaml import written
@@ -21,11 +21,15 @@ from teleop_core.graph.layers import (
     config_folder,
     declared_groups,
     load_file,
+    merge,
     parse_setting,
     scenario_file,
 )
 from teleop_core.hand.operators import OPERATORS
+from teleop_core.robots.parts import is_scene
 from teleop_core.robots.selection import PUBLISHED, RobotParameters
+
+_Group = TypeVar("_Group")
 
 
 @dataclass(frozen=True)
@@ -53,12 +57,9 @@ class Configuration:
             ParameterError: A value violates its declaration.
             PartError: The graph cannot run.
         """
-        merged: Layer = {}
-        for layer in layers:
-            for name, values in layer.items():
-                merged.setdefault(name, {}).update(values)
+        merged = merge({name: _implied(name, given) | given for name, given in layer.items()} for layer in layers)
         every = merged.pop(EVERY, {})
-        session = build(SessionParameters, merged.get(SESSION, {}), f"{SESSION}.")
+        session = _with_scene(build(SessionParameters, merged.get(SESSION, {}), f"{SESSION}."), merged)
         _check_order(session.stages)
         graph = build_graph(session.arms, session.stages, session.delays)
         _check_names(merged, graph, every)
@@ -74,8 +75,29 @@ class Configuration:
             _check_operator(graph, groups, arm)
         return Configuration(groups, scenario, graph)
 
+    @property
+    def session(self) -> SessionParameters:
+        """Parameters of the session as a whole."""
+        return self.of(SessionParameters)
+
+    def of(self, kind: type[_Group], arm: str = "") -> _Group:
+        """Parameters of the stage whose parameters are a ``kind``.
+
+        Args:
+            kind: Parameter group, such as ``MotionScalingParameters``.
+            arm: Namespace of the arm.
+
+        Raises:
+            UnknownNameError: No stage of the arm has such parameters.
+        """
+        own = {name: group for name, group in self.groups.items() if name.rpartition("/")[0] == arm}
+        found = next((group for group in own.values() if type(group) is kind), None)
+        if found is None:
+            raise UnknownNameError("parameter group", kind.__name__, [type(group).__name__ for group in own.values()])
+        return found
+
     def group(self, stage: str, arm: str = "") -> Any:
-        """Parameters of a stage of the arm with the namespace ``arm``."""
+        """Parameters of a stage, by its name, of the arm with the namespace ``arm``."""
         return self.groups[f"{arm}/{stage}" if arm else stage]
 
     def value(self, name: str, arm: str = "") -> Any:
@@ -102,11 +124,25 @@ class Configuration:
         }
 
 
+_PLANT, _SCENE = "slave_sim", "scene"
 _SHARED = ("seed", "device.workspace", "device.start")
 """Parameters that operator and haptic master share: a value set for only one of them applies to both."""
 
 _SAID_TO_ALL = ("seed", "robot", "geometry")
 """Parameters that a file may set for every stage that has them, even for stages that the session leaves out."""
+
+
+def _implied(name: str, values: Mapping[str, object]) -> dict[str, object]:
+    """Values that the robot of a layer implies for a group: a scene moves its arms itself."""
+    is_plant, robot = name.rpartition("/")[2] == _PLANT, values.get("robot")
+    return {"plant.kind": _SCENE} if is_plant and isinstance(robot, str) and is_scene(robot) else {}
+
+
+def _with_scene(session: SessionParameters, merged: Layer) -> SessionParameters:
+    """Session with the stage of a scene if a scene moves an arm, and without it otherwise."""
+    plants = [values.get("plant.kind") for name, values in merged.items() if name.rpartition("/")[2] == _PLANT]
+    stages = tuple(name for name in session.stages if name != _SCENE)
+    return replace(session, stages=(*stages, _SCENE) if _SCENE in plants else stages)
 
 
 def _values_for(member: Member, merged: Layer, graph: Graph) -> dict[str, object]:
@@ -141,7 +177,9 @@ def with_changes(recorded: Layer, changes: Iterable[Layer]) -> list[Layer]:
         robots = [layer.get(f"{arm}{slash}slave", {}).get("robot") for layer in (recorded, *changes)]
         now = [robot for robot in robots if robot is not None]
         if now and now[-1] != now[0]:
-            for key, value in PUBLISHED.get(str(now[0]), {}).get(stage, {}).items():
+            of_scene = _implied(f"{arm}{slash}{stage}", {"robot": now[0]})
+            implied: dict[str, Any] = {**PUBLISHED.get(str(now[0]), {}).get(stage, {}), **of_scene}
+            for key, value in implied.items():
                 if values.get(key) in (value, list(value)):
                     del values[key]
     return [kept, *changes]

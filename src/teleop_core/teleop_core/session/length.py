@@ -33,10 +33,10 @@ def as_long_as_followed(made: Configuration, given: Iterable[Layer]) -> Configur
     if not lengths:
         return made
     if made.scenario and not any(map(_chooses_operator, said)):
-        lengths.append(made.groups[SESSION].duration)
+        lengths.append(made.session.duration)
     bounds = next(f for f in fields(SessionParameters) if f.name == "duration").metadata
     duration = float(np.clip(max(lengths), bounds["lower"], bounds["upper"]))
-    session = replace(made.groups[SESSION], duration=duration)
+    session = replace(made.session, duration=duration)
     return replace(made, groups=made.groups | {SESSION: session})
 
 

@@ -20,6 +20,7 @@ from teleop_core.kernels.axes import axis_map
 from teleop_core.kernels.geometry import Array, quaternion_from_rotation
 from teleop_core.robots import load_robot_set
 from teleop_core.robots.bodies import bodies_of, urdf_of
+from teleop_core.robots.bodies.frames import pose_of
 from teleop_core.robots.robot import Robot
 from teleop_core.session.configuration import Configuration
 
@@ -33,7 +34,7 @@ _APART = 2.0  # distance between two slaves, as a multiple of the robot's reach
 
 
 @dataclass(frozen=True, eq=False)
-class ArmModel:
+class DrawnArm:
     """Robot, master and frames of one arm.
 
     Args:
@@ -106,7 +107,7 @@ class Model:
     def __init__(self, configuration: Configuration, rate: float | None = None, namespace: str = "") -> None:
         if rate is None:
             rate = configuration.groups[RECORDER_NAME].tf_rate
-        self.arms: tuple[ArmModel, ...] = _arms(configuration, namespace) if rate else ()
+        self.arms: tuple[DrawnArm, ...] = _arms(configuration, namespace) if rate else ()
         self.period_ns = round(1e9 / rate) if rate else 0
 
     @property
@@ -115,8 +116,8 @@ class Model:
         return (*(arm.description for arm in self.arms), TF) if self.arms else ()
 
 
-def _arms(configuration: Configuration, namespace: str) -> tuple[ArmModel, ...]:
-    arms: list[ArmModel] = []
+def _arms(configuration: Configuration, namespace: str) -> tuple[DrawnArm, ...]:
+    arms: list[DrawnArm] = []
     side = 0.0
     for name in configuration.graph.namespaces:
         robot = configuration.value("robot", name)
@@ -127,10 +128,12 @@ def _arms(configuration: Configuration, namespace: str) -> tuple[ArmModel, ...]:
         side -= _APART * reach if arms else 0.0
         base = _HERE.copy()
         base[1] = side
+        if loaded.world_base is not None:  # arms of a scene stand where the scene has them
+            base = pose_of(loaded.world_base)
         axes = configuration.value("axes", name)
         master = _master(base, reach, np.eye(3) if axes is None else axis_map("axes", axes))
         where = "/".join(filter(None, (namespace, name)))
-        arms.append(ArmModel(where, loaded, base, master))
+        arms.append(DrawnArm(where, loaded, base, master))
         side -= _ASIDE
     return tuple(arms)
 
@@ -170,7 +173,7 @@ class ModelRecords:
             for found in messages:
                 writer.write(TF, int(now_ns[row]), found[at])
 
-    def _of(self, arm: ArmModel, block: Any, rows: NDArray[np.int64]) -> list[bytes]:
+    def _of(self, arm: DrawnArm, block: Any, rows: NDArray[np.int64]) -> list[bytes]:
         joints = block[SLAVE_MEASURED_JS.of_arm(arm.arm).field][rows, : arm.robot.n]
         stylus = block[MASTER_MEASURED_CP.of_arm(arm.arm).field][rows]
         return arm.transforms(block["now_ns"][rows], joints, stylus)

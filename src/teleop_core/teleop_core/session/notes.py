@@ -8,7 +8,8 @@ from teleop_core.robots import load_robot_set
 from teleop_core.robots.parts import is_urdf
 from teleop_core.robots.robot_notes import assumed_note, notes_on_robot
 from teleop_core.session.configuration import Configuration
-from teleop_core.slave.slave import SLAVE, SlaveParameters
+from teleop_core.slave.parameters import SlaveParameters
+from teleop_core.slave.slave import SLAVE
 
 _MASTER, _MAPPING = BUILT_IN[1:3]
 

@@ -53,7 +53,7 @@ def simulate(configuration: Configuration, out: Path, progress: Progress = silen
 
 def session_ticks(configuration: Configuration, session: virtual.VirtualTime) -> int:
     """Number of ticks until the hand has moved for the configured duration. The hand first waits for the arms."""
-    return session.lead + max(1, round(configuration.groups[SESSION].duration * 1e9 / TICK_NS))
+    return session.lead + max(1, round(configuration.session.duration * 1e9 / TICK_NS))
 
 
 def run_blocks(session: virtual.VirtualTime, ticks: int) -> Iterator[Any]:
@@ -63,7 +63,7 @@ def run_blocks(session: virtual.VirtualTime, ticks: int) -> Iterator[Any]:
     """
     rows = session.rows(min(virtual.BLOCK, ticks))
     tasks = [t.field for t in session.graph.streams if t == topics.TASK_STATE.of_arm(t.arm)]
-    may_end = session.configuration.groups[SESSION].ends_with_task and bool(tasks)
+    may_end = session.configuration.session.ends_with_task and bool(tasks)
     for done in range(0, ticks, virtual.BLOCK):
         count = min(virtual.BLOCK, ticks - done)
         block = session.run(count, rows[:count])

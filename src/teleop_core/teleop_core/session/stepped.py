@@ -9,10 +9,11 @@ import numpy as np
 
 from teleop_core.base import ParameterError, SessionError, ShapeError, UnknownNameError
 from teleop_core.graph import STATE, TICK_NS, topics
+from teleop_core.graph.operation import State
+from teleop_core.hand.master.haptic_master import HapticMasterParameters
 from teleop_core.hand.operators import Operator
 from teleop_core.kernels.geometry import Array
 from teleop_core.session import api, virtual
-from teleop_core.slave.operation import State
 
 _NUMBERS = count()
 _STATE = topics.OPERATION.index("state")
@@ -107,7 +108,7 @@ class Session:
         given: dict[str, api.Setting] = {"tremor_amplitude": 0.0} | dict(settings or {})
         made = api.configuration(scenario, files=files, settings=given, operator=hand)
         self.runner = virtual.VirtualTime(made)
-        half = 0.5 * np.array(made.group("haptic_master").device.workspace)
+        half = 0.5 * np.array(made.of(HapticMasterParameters).device.workspace)
         most = np.array([*half, *[np.pi] * 3])
         names = ("x", "y", "z", "turn_x", "turn_y", "turn_z")
         self.command_space = Space(-most, most, names)

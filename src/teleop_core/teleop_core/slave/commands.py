@@ -4,14 +4,15 @@ import math
 from enum import IntEnum
 
 from teleop_core.graph import Row, copy
+from teleop_core.graph.operation import State
 from teleop_core.kernels import Array, PerJoint, Wrench, inner
 from teleop_core.kernels.filters import lag_step
 from teleop_core.slave import ownership
 from teleop_core.slave.arm import ArmModel
-from teleop_core.slave.interpolation import WayParameters, WayState, begin_way
+from teleop_core.slave.interpolation import WayRecord, WayState, begin_way
 from teleop_core.slave.operation.faults import Fault
-from teleop_core.slave.operation.states import State
-from teleop_core.slave.operation.watch import ServerParameters, ServerState, fail
+from teleop_core.slave.operation.watch import ServerRecord, ServerState, fail
+from teleop_core.slave.parameters import SlaveParameters
 
 
 class CommandStatus(IntEnum):
@@ -31,21 +32,16 @@ class SlaveRow(Row):
     command_status: int
 
 
-class SlaveNumbers(ServerParameters, WayParameters, ownership.OwnershipNumbers):
+class SlaveRecord(SlaveParameters, ServerRecord, WayRecord, ownership.OwnershipRecord):
     """Parameter record of an arm's server."""
 
-    start: PerJoint  # joint position at which the arm starts to follow commands [rad or m]
+    start_jp: PerJoint  # joint position at which the arm starts to follow commands [rad or m]
     braking: PerJoint  # deceleration of the drives [rad/s² or m/s²]
     acceleration: PerJoint
     rest_speed: PerJoint
     near: PerJoint
-    filter_gain: float
-    filter_zero: float
-    filter_pole: float
-    start_speed: float  # largest speed of moves, divided by the rated speeds
     tool_speed: float  # [m/s]
     tool_acceleration: float  # [m/s²]
-    is_filtered: int
 
 
 class SlaveState(ServerState, WayState, ownership.OwnershipState):
@@ -89,7 +85,7 @@ _SERVO_JP = int(ownership.Leader.SERVO_JP)
 
 
 @inner
-def plan_move(p: SlaveNumbers, s: SlaveState, arm: ArmModel, dt: float) -> None:
+def plan_move(p: SlaveRecord, s: SlaveState, arm: ArmModel, dt: float) -> None:
     """Begin the cubic move from the setpoint to ``move_to``, as fast as all limits allow.
 
     Joints stay within their share of the speed limits and within the acceleration of their drives. The tip stays
@@ -134,7 +130,7 @@ def advance_move(s: SlaveState) -> None:
 
 
 @inner
-def move_joint(p: SlaveNumbers, s: SlaveState, i: int, step: float, dt: float) -> None:
+def move_joint(p: SlaveRecord, s: SlaveState, i: int, step: float, dt: float) -> None:
     """Move a joint's setpoint by a step, within the speed limit of its drive and the joint limits."""
     reach, before = p.speed_limit[i] * dt, s.setpoint[i]
     step = min(max(step, -reach), reach)
@@ -151,7 +147,7 @@ def forget_way(s: SlaveState) -> None:
 
 
 @inner
-def come_to_rest(p: SlaveNumbers, s: SlaveState, how: int, dt: float) -> None:
+def come_to_rest(p: SlaveRecord, s: SlaveState, how: int, dt: float) -> None:
     """Stop the setpoint: as fast as the drives can brake, at once, or where the brakes hold the arm.
 
     Args:
@@ -182,7 +178,7 @@ def _not_followed(s: SlaveState) -> int:
 
 
 @inner
-def _age_of_command(p: SlaveNumbers, s: SlaveState, now_ns: int) -> int:
+def _age_of_command(p: SlaveRecord, s: SlaveState, now_ns: int) -> int:
     """Status FRESH or STALE; the arm changes to PAUSED if no command of the stream came for too long."""
     silence_ns = now_ns - s.arrival_ns
     if silence_ns <= p.timeout_ns:
@@ -194,7 +190,7 @@ def _age_of_command(p: SlaveNumbers, s: SlaveState, now_ns: int) -> int:
 
 
 @inner
-def take_command(p: SlaveNumbers, s: SlaveState, row: SlaveRow, dt: float) -> int:
+def take_command(p: SlaveRecord, s: SlaveState, row: SlaveRow, dt: float) -> int:
     """Accept a new servo_jp, or a reference that came by another command; return the :class:`CommandStatus`."""
     stamp_ns, asked_ns = row.slave_servo_jp_ns, s.asked_ns
     if stamp_ns < s.seen_ns - ownership.AHEAD_NS:  # stamps of another clock after a silence: a new stream
@@ -217,7 +213,7 @@ def take_command(p: SlaveNumbers, s: SlaveState, row: SlaveRow, dt: float) -> in
 
 @inner
 def _take_reference(
-    p: SlaveNumbers, s: SlaveState, wanted: Array, stamp_ns: int, last_ns: int, leader: int, now_ns: int, dt: float
+    p: SlaveRecord, s: SlaveState, wanted: Array, stamp_ns: int, last_ns: int, leader: int, now_ns: int, dt: float
 ) -> int:
     """Accept a joint reference, unless it is a jump, of a wrong age, or of a stream that may not move the arm.
 
@@ -263,7 +259,7 @@ def _take_reference(
 
 
 @inner
-def follows(p: SlaveNumbers, s: SlaveState, now_ns: int) -> bool:
+def follows(p: SlaveRecord, s: SlaveState, now_ns: int) -> bool:
     """Whether to follow the command.
 
     A fresh command is followed. An old command is followed if it is a single command, but not if it is the last command
@@ -275,7 +271,7 @@ def follows(p: SlaveNumbers, s: SlaveState, now_ns: int) -> bool:
 
 
 @inner
-def advance_setpoint(p: SlaveNumbers, s: SlaveState, before: Array, dt: float) -> None:
+def advance_setpoint(p: SlaveRecord, s: SlaveState, before: Array, dt: float) -> None:
     """Filter the command and move the setpoint to it, within the limits of speed and acceleration.
 
     Args:
@@ -286,10 +282,9 @@ def advance_setpoint(p: SlaveNumbers, s: SlaveState, before: Array, dt: float) -
     """
     for i in range(before.shape[0]):
         lagged = s.filtered[i]
-        if p.is_filtered:
-            s.filtered[i] = lag_step(
-                s.command[i], before[i], s.filtered[i], p.filter_gain, p.filter_zero, p.filter_pole, dt
-            )
+        if p.reference_filter.is_on:
+            lag = p.reference_filter
+            s.filtered[i] = lag_step(s.command[i], before[i], s.filtered[i], lag.gain, lag.zero, lag.pole, dt)
         else:
             s.filtered[i] = s.command[i]
         reach = p.speed_limit[i] * dt
@@ -322,7 +317,7 @@ def _eased(ahead: float, flow: float, step: float, most: float) -> float:
 
 
 @inner
-def limit_tool(p: SlaveNumbers, s: SlaveState, arm: ArmModel, last: Array, dt: float) -> None:
+def limit_tool(p: SlaveRecord, s: SlaveState, arm: ArmModel, last: Array, dt: float) -> None:
     """Shorten the step of all joints if the tip would be too fast; write the setpoint's pose.
 
     Args:

@@ -2,15 +2,17 @@
 
 from teleop_core.kernels import Array, Fields, PerJoint, inner
 
+INTERPOLATIONS = ("none", "linear", "minimum_jerk")
+"""Ways from command to command."""
 _LINEAR, _MINIMUM_JERK = 1, 2
 
 
-class WayParameters(Fields):
+class WayRecord(Fields):
     """Fields of a parameter record that define the interpolation between commands."""
 
     lower: PerJoint
     upper: PerJoint
-    interpolation: int  # index of its name in :data:`~teleop_core.slave.slave.INTERPOLATIONS`
+    interpolation: str  # one of :data:`INTERPOLATIONS`, stored as its index
 
 
 class WayState(Fields):
@@ -27,7 +29,7 @@ class WayState(Fields):
 
 
 @inner
-def begin_way(p: WayParameters, s: WayState, command: Array, period_ns: int, dt: float) -> None:
+def begin_way(p: WayRecord, s: WayState, command: Array, period_ns: int, dt: float) -> None:
     """Begin a path to a new command; it lasts one period of commands if that is longer than a tick.
 
     Args:
@@ -38,18 +40,18 @@ def begin_way(p: WayParameters, s: WayState, command: Array, period_ns: int, dt:
         dt: Tick [s].
     """
     span = 1
-    if p.interpolation >= _LINEAR:
+    if int(p.interpolation) >= _LINEAR:
         span = max(1, round(period_ns * 1e-9 / dt))
     for i in range(command.shape[0]):
         goal = min(max(command[i], p.lower[i]), p.upper[i])
-        if p.interpolation == _MINIMUM_JERK and s.span > 0:
+        if int(p.interpolation) == _MINIMUM_JERK and s.span > 0:
             slope, bend = _slopes(s, i)
             longer = span / s.span
             s.slope[i], s.bend[i] = slope * longer, bend * longer * longer
             s.end_slope[i] = goal - s.target[i]
         else:  # a straight path or a jump, stored so that a minimum-jerk path may continue from it
             s.bend[i] = 0.0
-            s.slope[i] = s.end_slope[i] = goal - s.command[i] if p.interpolation == _LINEAR else 0.0
+            s.slope[i] = s.end_slope[i] = goal - s.command[i] if int(p.interpolation) == _LINEAR else 0.0
         s.begin[i], s.target[i] = s.command[i], goal
     s.ticks, s.span = 0, span
 
@@ -79,7 +81,7 @@ def _slopes(s: WayState, i: int) -> tuple[float, float]:
 
 
 @inner
-def advance_on_way(p: WayParameters, s: WayState) -> None:
+def advance_on_way(p: WayRecord, s: WayState) -> None:
     """Advance the command by one tick; at the end of the path it equals the newest command exactly.
 
     The minimum-jerk path is the polynomial of fifth degree with given positions, speeds and accelerations at both ends.
@@ -92,7 +94,7 @@ def advance_on_way(p: WayParameters, s: WayState) -> None:
     for i in range(s.command.shape[0]):
         if x >= 1.0:
             s.command[i] = s.target[i]
-        elif p.interpolation == _MINIMUM_JERK:
+        elif int(p.interpolation) == _MINIMUM_JERK:
             c1, c2, c3, c4, c5 = _coefficients(s, i)
             way = x * (c1 + x * (c2 + x * (c3 + x * (c4 + x * c5))))
             s.command[i] = min(max(s.begin[i] + way, p.lower[i]), p.upper[i])

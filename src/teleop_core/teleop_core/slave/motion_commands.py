@@ -15,14 +15,15 @@ from typing import Any, Protocol
 import numpy as np
 
 from teleop_core.base.errors import ShapeError
+from teleop_core.graph.operation import State
 from teleop_core.graph.topics import NO_COMMAND_NS
 from teleop_core.kernels import Array, length, records
 from teleop_core.kinematics import IkStatus
 from teleop_core.robots.robot import Robot
 from teleop_core.slave import ownership
-from teleop_core.slave.operation.states import Answer, Event, State
+from teleop_core.slave.operation.states import Answer, Event
 from teleop_core.slave.ownership import Leader
-from teleop_core.slave.velocity import Motion
+from teleop_core.slave.velocity import MotionSource
 
 _REACHED = (IkStatus.FOLLOWED, IkStatus.NEAR_SINGULAR)
 # A goal may exceed a limit by this much [rad or m], because a setpoint at the limit is rounded.
@@ -76,7 +77,7 @@ class MotionCommands:
         s = self._slave.state
         if s["is_busy"]:
             return "home" if s["is_homing"] else "move"
-        if s["motion"] != Motion.FOLLOWING:
+        if s["motion"] != MotionSource.FOLLOWING:
             return "velocity"
         return "servo" if s["arrival_ns"] > 0 else "nothing"
 
@@ -100,7 +101,7 @@ class MotionCommands:
         answer, text = self._slave.request(Event.MOVE)
         if answer is not Answer.DONE:
             return answer, text
-        s["move_to"], s["motion"] = wanted, Motion.FOLLOWING
+        s["move_to"], s["motion"] = wanted, MotionSource.FOLLOWING
         return answer, "move: on the way"
 
     def move_by(self, step: object) -> Told:
@@ -212,7 +213,7 @@ class MotionCommands:
         if s["is_homing"]:
             return Answer.REFUSED, "hold refused: it is homing; pause or disable it"
         s["is_busy"] = s["must_plan"] = 0
-        s["motion"], s["drive"], s["driven_ns"] = Motion.JOINTS, 0.0, 0
+        s["motion"], s["drive"], s["driven_ns"] = MotionSource.JOINTS, 0.0, 0
         return Answer.DONE, "hold: done"
 
     def _drive(self, leader: Leader, wanted: Array, most: Array, now_ns: int) -> Told:
@@ -227,10 +228,10 @@ class MotionCommands:
         if refusal := self._refusal() or self._refusal_beside(leader, now_ns):
             return refusal
         s, is_joints = self._slave.state, leader is Leader.SERVO_JV
-        if s["motion"] == Motion.FOLLOWING:
+        if s["motion"] == MotionSource.FOLLOWING:
             s["command_stamp_ns"] = NO_COMMAND_NS
         s["drive" if is_joints else "twist"], s["driven_ns"] = wanted, now_ns
-        s["motion"] = Motion.JOINTS if is_joints else Motion.TIP
+        s["motion"] = MotionSource.JOINTS if is_joints else MotionSource.TIP
         ownership.lead(s, int(leader), now_ns)
         return Answer.DONE, "velocity: taken"
 

@@ -28,7 +28,7 @@ class Leader(IntEnum):
         return self.name.lower()
 
 
-class OwnershipNumbers(Fields):
+class OwnershipRecord(Fields):
     """Fields of a parameter record with the bounds of silence and age."""
 
     timeout_ns: int
@@ -49,19 +49,19 @@ AHEAD_NS = 1_000_000_000
 
 
 @kernel
-def has_wrong_age(p: OwnershipNumbers, stamp_ns: int, now_ns: int) -> bool:
+def has_wrong_age(p: OwnershipRecord, stamp_ns: int, now_ns: int) -> bool:
     """Whether a command's stamp is too old, or too far ahead of the slave's clock."""
     return stamp_ns > now_ns + AHEAD_NS or (p.oldest_ns > 0 and stamp_ns < now_ns - p.oldest_ns)
 
 
 @kernel
-def longest_gap(p: OwnershipNumbers, s: OwnershipState) -> int:
+def longest_gap(p: OwnershipRecord, s: OwnershipState) -> int:
     """Silence [ns] after which a stream counts as broken; for a slow stream twice its period."""
     return max(p.timeout_ns, 2 * s.gap_ns)
 
 
 @kernel
-def is_led_by_another(p: OwnershipNumbers, s: OwnershipState, leader: int, now_ns: int) -> bool:
+def is_led_by_another(p: OwnershipRecord, s: OwnershipState, leader: int, now_ns: int) -> bool:
     """Whether a stream other than ``leader`` moves the arm."""
     if s.leader in (0, leader):
         return False

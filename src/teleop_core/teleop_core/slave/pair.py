@@ -7,14 +7,15 @@ import numpy as np
 from teleop_core.graph import DT, RunningStage, Stage, assign
 from teleop_core.kernels import Integers, addressed, call_address, kernel
 from teleop_core.slave import commands, slave, slave_sim
+from teleop_core.slave.parameters import SlaveParameters
 
 
 @dataclass(frozen=True, kw_only=True)
-class ArmParameters(slave.SlaveParameters, slave_sim.SlaveSimParameters):
+class ArmParameters(SlaveParameters, slave_sim.SlaveSimParameters):
     """Parameters of a server and of its simulated arm."""
 
     @staticmethod
-    def of(server: slave.SlaveParameters, simulated: slave_sim.SlaveSimParameters) -> "ArmParameters":
+    def of(server: SlaveParameters, simulated: slave_sim.SlaveSimParameters) -> "ArmParameters":
         """Parameters from two groups, which must name the same robot."""
         groups = (simulated, server)
         return ArmParameters(**{f.name: getattr(g, f.name) for g in groups for f in fields(g)})

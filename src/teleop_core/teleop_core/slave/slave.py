@@ -5,21 +5,21 @@ the arm's measured joints.
 """
 
 import math
-from dataclasses import dataclass, field
 
 import numpy as np
 
-from teleop_core.base import ParameterError, Within, fixed, parameter
+from teleop_core.base import ParameterError, fill
 from teleop_core.graph import DT, RunningStage, Stage, assign, topics
-from teleop_core.kernels import Array, kernel, length, pointer, pose_from_transform, record, records
+from teleop_core.graph.operation import State
+from teleop_core.kernels import kernel, length, pointer, pose_from_transform, record, records
 from teleop_core.kinematics import FK
 from teleop_core.robots import load_robot_set
 from teleop_core.robots.robot import Robot
-from teleop_core.robots.selection import RobotParameters
 from teleop_core.slave import arm, commands, motion_commands, simulation, step, trajectory
-from teleop_core.slave.operation import Answer, Event, Fault, OperationParameters, State, command_event
+from teleop_core.slave.operation import Answer, Event, Fault, OperationParameters, command_event
 from teleop_core.slave.operation.states import answer_text, change
 from teleop_core.slave.operation.watch import fail
+from teleop_core.slave.parameters import SlaveParameters
 
 _TIMES = {
     "heartbeat": "heartbeat_ns",
@@ -30,63 +30,29 @@ _TIMES = {
     "pressing_time": "pressing_ns",
 }
 _STOP, _PRESSED = int(Event.STOP), int(Fault.STOP)
-_FILTER_SOURCE = "published: Vongbunyong 2008, eq. 6.2.8"
 _NEAR = 1e-3  # an arm farther from home than this plus an encoder step is not at home [rad or m]
-INTERPOLATIONS = ("none", "linear", "minimum_jerk")
 
 
-@dataclass(frozen=True, kw_only=True)
-class ReferenceFilterParameters:
-    """First-order lag on every joint reference; at rest its output is its input."""
-
-    is_on: bool = parameter(True, doc="whether joint references pass through the reference filter")
-    gain: float = parameter(
-        0.1, Within(0.0, 1.0), "gain of the reference filter at high frequencies", source=_FILTER_SOURCE
-    )
-    zero: float = parameter(100.0, Within(0.0, 1000.0, "rad/s"), "zero of the reference filter", source=_FILTER_SOURCE)
-    pole: float = parameter(10.0, Within(0.01, 1000.0, "rad/s"), "pole of the reference filter", source=_FILTER_SOURCE)
-
-    def __post_init__(self) -> None:
-        if not math.isclose(self.gain * self.zero, self.pole, rel_tol=1e-9):
-            needed = f"one for which gain ({self.gain}) * zero = pole ({self.pole})"
-            raise ParameterError("reference_filter.zero", self.zero, needed)
-
-
-@dataclass(frozen=True, kw_only=True)
-class SlaveParameters(RobotParameters):
-    """Parameters of :class:`Slave`."""
-
-    command_timeout: float = parameter(
-        0.1, Within(0.002, 5.0, "s"), "if no command arrives for this time, the slave holds the last reference"
-    )
-    start: tuple[float, ...] = fixed(
-        (),
-        Within(unit="rad or m"),
-        "joint positions to which the slave moves from home before it follows; empty: the robot's start",
-    )
-    starts_at_home: bool = fixed(
-        False,
-        doc="whether the slave stays at home before it follows, if start is empty; no effect for a "
-        "robot from a URDF, which states no home",
-    )
-    start_speed: float = fixed(
-        0.5, Within(0.01, 1.0), "share of the joints' speed limits that the move from home to the start uses"
-    )
-    interpolation: str = parameter(
-        "linear",
-        choices=INTERPOLATIONS,
-        doc="interpolation between commands that arrive less often than once a tick; it delays the "
-        "motion by one period of the commands",
-    )
-    reference_filter: ReferenceFilterParameters = field(default_factory=ReferenceFilterParameters)
-    operation: OperationParameters = field(default_factory=OperationParameters)
-
-    def start_of(self, robot: Robot) -> Array:
-        """Start joints (n,), from which a robot follows commands [rad or m]."""
-        if self.start:
-            return np.array(self.start, dtype=np.float64)
-        is_home = self.starts_at_home and not robot.home_is_assumed
-        return robot.home.copy() if is_home else robot.start.copy()
+def derive(p: commands.SlaveRecord, parameters: SlaveParameters, robot: Robot) -> None:
+    """Write what follows from the parameters and the robot; bounds that are not given come from the drives."""
+    drives, given = robot.drives, parameters.operation
+    assert drives is not None
+    p.lower[:], p.upper[:] = robot.lower, robot.upper
+    p.effort_limit[:], p.speed_limit[:] = drives.effort_limit, drives.speed_limit
+    p.near[:] = _NEAR + drives.encoder_step
+    p.rest_speed[:] = 0.01 * drives.speed_limit + drives.encoder_step / simulation.SPEED_LAG
+    p.braking[:] = drives.effort_limit / drives.inertia
+    p.acceleration[:] = p.braking * given.acceleration_share
+    reach = length(robot.jacobian(robot.home)[:3].T)
+    p.tool_speed = given.tool_speed or np.max(reach * drives.speed_limit)
+    p.tool_acceleration = given.tool_acceleration or np.max(reach * p.acceleration)
+    p.lag[:] = drives.speed_limit * given.longest_lag
+    p.tip_error = given.tip_error or p.tool_speed * given.longest_lag
+    p.timeout_ns = round(parameters.command_timeout * 1e9)
+    for name, field_ns in _TIMES.items():
+        p[field_ns] = round(getattr(given, name) * 1e9)
+    p.brakes = given.standstill == "brake"
+    p.reported[:] = [fault.word in given.reported for fault in Fault]
 
 
 class Slave(RunningStage):
@@ -105,7 +71,7 @@ class Slave(RunningStage):
             raise ParameterError("slave.robot", parameters.robot, "a robot with drives")
         n = self.robot.n
         super().__init__(SLAVE, n, dt)
-        self.parameters = record(commands.SlaveNumbers, n)
+        self.parameters = record(commands.SlaveRecord, n)
         self.state = record(commands.SlaveState, n)
         self.arm = arm.ArmModel(
             fk=self.robot.fk_pointer,
@@ -137,18 +103,8 @@ class Slave(RunningStage):
 
     def retune(self, parameters: SlaveParameters) -> None:
         """Take new parameters from the next tick on."""
-        robot, p, drives = self.robot, self.parameters, self.robot.drives
-        assert drives is not None
-        p["lower"], p["upper"] = robot.lower, robot.upper
-        p["effort_limit"], p["speed_limit"] = drives.effort_limit, drives.speed_limit
-        p["near"] = _NEAR + drives.encoder_step
-        lag = parameters.reference_filter
-        p["is_filtered"], p["filter_gain"] = lag.is_on, lag.gain
-        p["filter_zero"], p["filter_pole"] = lag.zero, lag.pole
-        p["timeout_ns"] = round(parameters.command_timeout * 1e9)
-        p["interpolation"] = INTERPOLATIONS.index(parameters.interpolation)
-        p["start_speed"] = parameters.start_speed
-        self._take_operation(parameters.operation)
+        fill(self.parameters, parameters)
+        derive(self.parameters, parameters, self.robot)
 
     def _take_start(self, parameters: SlaveParameters) -> None:
         """Plan the move from home to the slave's start.
@@ -167,7 +123,7 @@ class Slave(RunningStage):
             raise ParameterError("slave.start", parameters.start, needed)
         speed = robot.drives.speed_limit * parameters.start_speed
         time = trajectory.shortest_move_time(robot.home, start, speed)
-        p["start"], self._start_ticks = start, math.ceil(time / self.dt)
+        p.start_jp[:], self._start_ticks = start, math.ceil(time / self.dt)
 
     @property
     def lead(self) -> int:
@@ -186,7 +142,7 @@ class Slave(RunningStage):
         """Begin enabled and moving to the start, or disabled and not homed."""
         s = self.state
         s["command_stamp_ns"], s["fault_joint"] = topics.NO_COMMAND_NS, -1
-        s["move_to"], s["move_ticks"] = self.parameters["start"], self._start_ticks
+        s["move_to"], s["move_ticks"] = self.parameters.start_jp, self._start_ticks
         if self._starts_enabled:
             s["state"] = State.ENABLED
             s["is_homed"] = self._start_ticks == 0
@@ -195,28 +151,10 @@ class Slave(RunningStage):
     def _take_script(self, given: OperationParameters) -> None:
         """Write the scripted commands into the record."""
         self._starts_enabled, script = given.starts_enabled, given.script()
-        self.parameters["event_count"] = len(script)
+        p = self.parameters
+        p.event_count = len(script)
         for index, (seconds, event) in enumerate(script):
-            self.parameters["event"][index] = event
-            self.parameters["event_ns"][index] = round(seconds * 1e9)
-
-    def _take_operation(self, given: OperationParameters) -> None:
-        """Write bounds of motion and of faults; bounds that are not given are computed from the drives."""
-        robot, p, drives = self.robot, self.parameters, self.robot.drives
-        assert drives is not None
-        p["braking"] = drives.effort_limit / drives.inertia
-        p["acceleration"] = p["braking"] * given.acceleration_share
-        reach = length(robot.jacobian(robot.home)[:3].T)
-        p["tool_speed"] = given.tool_speed or np.max(reach * drives.speed_limit)
-        p["tool_acceleration"] = given.tool_acceleration or np.max(reach * p["acceleration"])
-        p["lag"] = drives.speed_limit * given.longest_lag
-        p["tip_error"] = given.tip_error or p["tool_speed"] * given.longest_lag
-        p["overspeed"] = given.overspeed
-        p["rest_speed"] = 0.01 * drives.speed_limit + drives.encoder_step / simulation.SPEED_LAG
-        for name, field_ns in _TIMES.items():
-            p[field_ns] = round(getattr(given, name) * 1e9)
-        p["brakes"] = given.standstill == "brake"
-        p["reported"] = [fault.word in given.reported for fault in Fault]
+            p.event[index], p.event_ns[index] = event, round(seconds * 1e9)
 
     def request(self, event: Event | str) -> tuple[Answer, str]:
         """Take a command such as ``"enable"`` between two ticks.
@@ -283,7 +221,7 @@ class Slave(RunningStage):
 
 
 @kernel
-def _request(p: commands.SlaveNumbers, s: commands.SlaveState, event: int) -> int:
+def _request(p: commands.SlaveRecord, s: commands.SlaveState, event: int) -> int:
     """Take a command; a stop also records the stop fault."""
     if event == _STOP:
         was = s.is_stopped
@@ -293,7 +231,7 @@ def _request(p: commands.SlaveNumbers, s: commands.SlaveState, event: int) -> in
 
 
 @kernel
-def _fail(p: commands.SlaveNumbers, s: commands.SlaveState, fault: int, value: float, bound: float) -> None:
+def _fail(p: commands.SlaveRecord, s: commands.SlaveState, fault: int, value: float, bound: float) -> None:
     fail(p, s, fault, -1, value, bound)
 
 

@@ -12,14 +12,14 @@ from teleop_core.robots import load_robot_set
 from teleop_core.robots.drives import ACCELERATION, GRAVITY
 from teleop_core.robots.selection import RobotParameters
 from teleop_core.slave import handover, simulation, stability, transmission
-from teleop_core.slave.arm import Arm
+from teleop_core.slave.arm import SimulatedArm
 from teleop_core.slave.controllers import CONTROLLERS, per_joint
 from teleop_core.slave.elastic import gear_damping
 from teleop_core.slave.force_sensor import ForceSensorParameters, SensorNoise
 from teleop_core.slave.friction import bristle_damping
-from teleop_core.slave.plants import PER_JOINT, PLANTS, Physics
+from teleop_core.slave.plants import PER_JOINT, PLANTS, Mover, Physics
 from teleop_core.slave.world import WORLD_OBJECTS, contact, puncture
-from teleop_core.slave.world.button import ButtonNumbers
+from teleop_core.slave.world.button import ButtonRecord
 from teleop_core.slave.world.contents import WorldParameters
 
 
@@ -85,7 +85,7 @@ class SlaveSim(RunningStage):
             raise ParameterError("slave_sim.robot", parameters.robot, "a robot with drives")
         n, model = self.robot.n, self.robot.dynamics
         super().__init__(SLAVE_SIM, n, dt)
-        self.parameters = record(simulation.SimulationNumbers, n)
+        self.parameters = record(simulation.SimulationRecord, n)
         self.state = record(simulation.SimulationState, n)
         self._law = CONTROLLERS.find(parameters.controller.kind.kind)
         self._seed, physics = parameters.seed, self._physics(parameters)
@@ -93,7 +93,7 @@ class SlaveSim(RunningStage):
         gains = self._gains(parameters, physics.viscous)
         is_as_drawn = len(physics.tip_geometry) == 0
         touched = WORLD_OBJECTS.find(parameters.world.kind.kind)
-        self.arm = Arm(
+        self.arm = SimulatedArm(
             tip_fk=self.robot.fk_pointer if is_as_drawn else pointer(dh_kernels.fk, FK),
             jacobian=pointer(self.robot.kernels.jacobian if is_as_drawn else dh_kernels.jacobian, FK),
             distance=touched.pointer,
@@ -125,6 +125,7 @@ class SlaveSim(RunningStage):
         )
         self.kernel, self.arguments = simulation.simulation_step, (self.parameters, self.state, self.arm)
         self._take(parameters)
+        self._mover = self._moved_by(parameters)
         self.reset()
         self._check_world(parameters.world)
         self._check_loop(parameters)
@@ -157,6 +158,8 @@ class SlaveSim(RunningStage):
         row["slave_true_cf"] = row["slave_measured_cf"] = row["slave_estimated_cf"] = 0.0
         row["slave_measured_js"][: self.robot.n] = s["measured"]
         row["slave_measured_js_ns"] = topics.NO_COMMAND_NS  # position before the first tick
+        if self._mover is not None:
+            self._mover.reset()
 
     @property
     def punctures(self) -> int:
@@ -179,6 +182,10 @@ class SlaveSim(RunningStage):
         if self.parameters["has_noise"]:
             self._noise.prepare(self.state, ticks)
 
+    def concerns(self) -> list[str]:
+        """Problems of a simulator of others that moves the arm."""
+        return [] if self._mover is None else self._mover.concerns()
+
     def examine(self, parameters: SlaveSimParameters) -> None:
         """Try parameters on a separate copy of the arm, at home and at the present position.
 
@@ -190,6 +197,8 @@ class SlaveSim(RunningStage):
                 the integrator; or an error would grow, or not decay.
         """
         trial = SlaveSim(parameters, self.dt)
+        if trial._mover is not None:
+            trial._mover.close()
         if stability.loop_key(trial.parameters, trial.arm) != stability.loop_key(self.parameters, self.arm):
             trial._rest_at(self.arm.q.clip(self.robot.lower, self.robot.upper))
             trial._check_loop(parameters)
@@ -206,6 +215,22 @@ class SlaveSim(RunningStage):
             self.examine(parameters)
         self._take(parameters)
         self._hand_over()
+
+    def _moved_by(self, parameters: SlaveSimParameters) -> Mover | None:
+        """Simulator of the plant that moves the arm, with its kernels in the parameter record; None for our own."""
+        kind, p = parameters.plant.kind, self.parameters
+        make = PLANTS.find(kind.kind).mover
+        if make is None:
+            return None
+        if p["has_world"]:
+            raise ParameterError(
+                "world.kind", parameters.world.kind.kind, f"empty, because plant={kind.kind} has a world"
+            )
+        mover = make(kind.parameters, self.robot, self.arm, self.signals, self.dt)
+        p["see"], p["see_block"] = mover.see.address, mover.see.block_address
+        p["move"], p["move_block"] = mover.move.address, mover.move.block_address
+        p["has_servos"] = mover.has_servos
+        return mover
 
     def _take(self, parameters: SlaveSimParameters) -> None:
         """Write parameters into the records that the step reads."""
@@ -241,9 +266,9 @@ class SlaveSim(RunningStage):
         p["tool_length"], p["tool_radius"] = world.tool_length, world.tool_radius
         p["world_stiffness"], p["world_damping"] = made_of.stiffness, made_of.damping
         p["world_friction"] = made_of.friction
-        for name, *_ in fields_of(puncture.PunctureNumbers):
+        for name, *_ in fields_of(puncture.PunctureRecord):
             p[name] = getattr(world, name)
-        for name, *_ in fields_of(ButtonNumbers):
+        for name, *_ in fields_of(ButtonRecord):
             p[name] = getattr(world.kind.parameters, name, 0.0)
         self.arm.shape[:] = world.shape
 
@@ -276,7 +301,10 @@ class SlaveSim(RunningStage):
     def _check_loop(self, parameters: SlaveSimParameters) -> None:
         """Try the present control loop at the arm's position; see :mod:`teleop_core.slave.stability`."""
         assert self.robot.drives is not None
-        stability.check_friction(self.parameters, self.robot.drives.inertia, self.dt)
+        if self.parameters["has_servos"]:
+            return
+        if self._mover is None:
+            stability.check_friction(self.parameters, self.robot.drives.inertia, self.dt)
         loop = stability.ClosedLoop(self.parameters, self.state, self.arm, self.signals, self.dt)
         stability.check_stable(self._law, self.robot, loop, are_large_tried=parameters.trials == "all")
 

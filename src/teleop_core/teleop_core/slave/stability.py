@@ -15,10 +15,10 @@ from teleop_core.kernels import IS_COMPILED, Array, bound, records
 from teleop_core.kernels.callables import raise_pending
 from teleop_core.robots.drives import independent_acceleration
 from teleop_core.robots.robot import Robot
-from teleop_core.slave.arm import Arm
+from teleop_core.slave.arm import SimulatedArm
 from teleop_core.slave.controllers import CONTROLLERS, Controller
 from teleop_core.slave.plants import PER_JOINT
-from teleop_core.slave.simulation import SimulationNumbers, SimulationState, simulation_step
+from teleop_core.slave.simulation import SimulationRecord, SimulationState, simulation_step
 
 _TICKS = 400  # duration of a trial [ticks]
 _LAST = 100  # number of ticks at the end of a trial in which the error is measured
@@ -38,13 +38,14 @@ _LEFT = 0.5  # the error must fall to this share of the largest error of the das
 _ROOM = 0.8
 # Stability limit of classical Runge-Kutta: -h times a real pole.
 _STABLE = 2.785
+_STIFFEST = 0.5  # rate of viscous friction in a trial of an arm that others move, times the tick
 _LOOP = (*PER_JOINT, "bristle_damping", "gear_damping", "effort_limit", "speed_limit",
          "compensated", "steps", "delay_ticks")  # fmt: skip
 _ARM = ("gains", "dynamics", "model", "coupling")
 _passed: set[tuple[object, ...]] = set()
 
 
-def check_friction(p: SimulationNumbers, inertia: Array, dt: float) -> None:
+def check_friction(p: SimulationRecord, inertia: Array, dt: float) -> None:
     """Refuse friction that the drives cannot overcome, or that the integration steps cannot follow.
 
     Args:
@@ -78,19 +79,26 @@ def check_friction(p: SimulationNumbers, inertia: Array, dt: float) -> None:
 class ClosedLoop(NamedTuple):
     """A simulated arm with its control law: the arguments of one tick."""
 
-    p: SimulationNumbers
+    p: SimulationRecord
     s: SimulationState
-    arm: Arm
+    arm: SimulatedArm
     row: Row
     dt: float
 
     def copied(self) -> "ClosedLoop":
-        """Return a separate copy of the arm without objects to touch, because the loop is judged without contact."""
+        """Return a separate copy of the arm without objects to touch, because the loop is judged without contact.
+
+        The copy moves by our own equations, also if another simulator moves the arm.
+        """
         p, s, row = (_copy(record) for record in (self.p, self.s, self.row))
         p["has_world"] = 0
+        if p["see"]:  # others integrate friction that our steps cannot resolve
+            p["see"] = p["move"] = 0
+            p["coulomb"], inertia = 0.0, self.arm.limit / p["braking"]
+            p["viscous"] = np.minimum(p["viscous"], _STIFFEST * inertia / self.dt)
         p["is_ideal"], p["has_noise"], p["is_estimated"] = 1, 0, 0
         parts = (np.array(part) if isinstance(part, np.ndarray) else part for part in self.arm)
-        arm = Arm(*parts)
+        arm = SimulatedArm(*parts)
         arm.contacts["is_near"] = 0
         return ClosedLoop(p, s, arm, row, self.dt)
 
@@ -106,7 +114,7 @@ class ClosedLoop(NamedTuple):
         return made
 
 
-def loop_key(p: SimulationNumbers, arm: Arm) -> tuple[bytes, ...]:
+def loop_key(p: SimulationRecord, arm: SimulatedArm) -> tuple[bytes, ...]:
     """Numbers that define the control loop of an arm, independent of its position.
 
     Args:

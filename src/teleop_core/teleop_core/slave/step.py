@@ -3,12 +3,13 @@
 import math
 
 from teleop_core.graph import copy, topics
+from teleop_core.graph.operation import State
 from teleop_core.kernels import Array, inner, kernel, pose_from_transform
 from teleop_core.slave import commands, interpolation, velocity
 from teleop_core.slave.arm import ArmModel
 from teleop_core.slave.operation import watch
 from teleop_core.slave.operation.faults import Fault
-from teleop_core.slave.operation.states import AFTER_RESET, Event, State, change
+from teleop_core.slave.operation.states import AFTER_RESET, Event, change
 
 _ENABLED, _FAULT = int(State.ENABLED), int(State.FAULT)
 _PAUSED, _SETPOINT = int(State.PAUSED), int(Fault.SETPOINT)
@@ -17,7 +18,7 @@ _ARRIVED, _HOME, _BLIND = int(Event.ARRIVED), int(Event.HOME), int(commands.Comm
 
 
 @inner
-def _moves(p: commands.SlaveNumbers, s: commands.SlaveState) -> bool:
+def _moves(p: commands.SlaveRecord, s: commands.SlaveState) -> bool:
     """Whether the setpoint or the arm moves in this tick."""
     moving = 0
     for i in range(s.setpoint.shape[0]):
@@ -34,7 +35,7 @@ def _is_still(s: commands.SlaveState) -> bool:
 
 
 @inner
-def _is_near(p: commands.SlaveNumbers, s: commands.SlaveState) -> bool:
+def _is_near(p: commands.SlaveRecord, s: commands.SlaveState) -> bool:
     """Whether the arm is at its setpoint."""
     off = 0
     for i in range(s.setpoint.shape[0]):
@@ -43,7 +44,7 @@ def _is_near(p: commands.SlaveNumbers, s: commands.SlaveState) -> bool:
 
 
 @inner
-def _begin_where_it_is(p: commands.SlaveNumbers, s: commands.SlaveState, arm: ArmModel, row: commands.SlaveRow) -> None:
+def _begin_where_it_is(p: commands.SlaveRecord, s: commands.SlaveState, arm: ArmModel, row: commands.SlaveRow) -> None:
     """Set the setpoint of an arm that is not at home to its measured position; homing starts from there."""
     if _is_near(p, s):
         return
@@ -58,7 +59,7 @@ def _begin_where_it_is(p: commands.SlaveNumbers, s: commands.SlaveState, arm: Ar
 
 
 @inner
-def _take_measured(p: commands.SlaveNumbers, s: commands.SlaveState, arm: ArmModel, row: commands.SlaveRow) -> None:
+def _take_measured(p: commands.SlaveRecord, s: commands.SlaveState, arm: ArmModel, row: commands.SlaveRow) -> None:
     """Take a new sample of the arm, and look for faults in it.
 
     The sample was measured at the time of the present setpoint.
@@ -92,7 +93,7 @@ def _take_measured(p: commands.SlaveNumbers, s: commands.SlaveState, arm: ArmMod
 
 @inner
 def _go_on(
-    p: commands.SlaveNumbers, s: commands.SlaveState, arm: ArmModel, row: commands.SlaveRow, before: Array, dt: float
+    p: commands.SlaveRecord, s: commands.SlaveState, arm: ArmModel, row: commands.SlaveRow, before: Array, dt: float
 ) -> None:
     """Move the setpoint: to a goal, at a speed, after the command, or to rest."""
     if s.state in (_ENABLED, _PAUSED):
@@ -118,7 +119,7 @@ def _go_on(
 
 
 @inner
-def _insist_on_numbers(p: commands.SlaveNumbers, s: commands.SlaveState, arm: ArmModel, row: commands.SlaveRow) -> None:
+def _insist_on_numbers(p: commands.SlaveRecord, s: commands.SlaveState, arm: ArmModel, row: commands.SlaveRow) -> None:
     """Hold the last setpoint, and report the fault, if the new setpoint is not finite."""
     for i in range(s.setpoint.shape[0]):
         if not math.isfinite(s.setpoint[i]):
@@ -136,7 +137,7 @@ def _insist_on_numbers(p: commands.SlaveNumbers, s: commands.SlaveState, arm: Ar
 
 @kernel
 def slave_step(
-    p: commands.SlaveNumbers, s: commands.SlaveState, arm: ArmModel, row: commands.SlaveRow, dt: float
+    p: commands.SlaveRecord, s: commands.SlaveState, arm: ArmModel, row: commands.SlaveRow, dt: float
 ) -> None:
     """One tick of the arm's server: write the slave's setpoint, measured pose and operation.
 
@@ -159,7 +160,7 @@ def slave_step(
         row.command_status, s.motion, s.must_plan = _BLIND, 0, s.is_busy
     if s.must_plan and row.command_status != _BLIND and _is_still(s):
         if s.is_homing:
-            copy(p.start, s.move_to)
+            copy(p.start_jp, s.move_to)
         commands.plan_move(p, s, arm, dt)
         s.command_stamp_ns, s.motion = topics.NO_COMMAND_NS, 0
     copy(s.command, joints)

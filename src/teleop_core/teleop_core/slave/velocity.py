@@ -8,10 +8,10 @@ from teleop_core.kernels.room import room
 from teleop_core.kinematics.damped import eliminate, gram, weigh
 from teleop_core.slave import commands
 from teleop_core.slave.arm import ArmModel
-from teleop_core.slave.commands import SlaveNumbers, SlaveState
+from teleop_core.slave.commands import SlaveRecord, SlaveState
 
 
-class Motion(IntEnum):
+class MotionSource(IntEnum):
     """Source of the setpoint's motion while an enabled slave does not move to a goal."""
 
     FOLLOWING = 0  # the setpoint follows joint references
@@ -19,7 +19,7 @@ class Motion(IntEnum):
     TIP = 2  # the setpoint moves with a twist of the tip
 
 
-_FOLLOWING, _TIP = int(Motion.FOLLOWING), int(Motion.TIP)
+_FOLLOWING, _TIP = int(MotionSource.FOLLOWING), int(MotionSource.TIP)
 # Length [m] that relates rotation to translation: 1 rad/s of the tip counts as much as this length per second.
 _LENGTH = 0.1
 # Damping added to the squares of the weighted singular values; assumed. With singular values of 1, it reduces speeds by
@@ -59,7 +59,7 @@ def joint_speeds(arm: ArmModel, q: Array, twist: Array, speed: Array) -> None:
 
 
 @inner
-def _share_of_limits(p: SlaveNumbers, s: SlaveState, dt: float) -> float:
+def _share_of_limits(p: SlaveRecord, s: SlaveState, dt: float) -> float:
     """Largest factor, at most 1, by which the wanted speeds stay within speed limits and, for a twist, joint limits."""
     share = 1.0
     for i in range(s.drive.shape[0]):
@@ -75,7 +75,7 @@ def _share_of_limits(p: SlaveNumbers, s: SlaveState, dt: float) -> float:
 
 
 @inner
-def advance_velocity(p: SlaveNumbers, s: SlaveState, arm: ArmModel, now_ns: int, dt: float) -> None:
+def advance_velocity(p: SlaveRecord, s: SlaveState, arm: ArmModel, now_ns: int, dt: float) -> None:
     """Move the setpoint at the wanted speed; without a fresh command the setpoint brakes to rest.
 
     All joints stay within their speed limits, change their speed no faster than their drives can brake, and stop at

@@ -52,17 +52,17 @@ def conformance(
     from rich.console import Console
 
     from teleop_core.robots import load_robot
-    from teleop_drill.conformance import Verdict, exit_code, findings_json, findings_table
+    from teleop_drill.conformance import RowResult, exit_code, findings_json, findings_table
 
     ros_module("conformance", "teleop_drill.nodes")
     from teleop_core.nodes.children import environment
     from teleop_core.nodes.interrupt import Interrupt
     from teleop_drill.nodes.conformance import examine, left_behind
-    from teleop_drill.nodes.conformance_arm import Arm
+    from teleop_drill.nodes.conformance_arm import ArmClient
 
     model = None if robot is None else load_robot(robot)
     environment()
-    with Arm(namespace, domain) as arm:
+    with ArmClient(namespace, domain) as arm:
         with arm.interrupt.caught():
             is_there = arm.is_there(wait)
         if not is_there:
@@ -84,8 +84,8 @@ def conformance(
     else:
         Console().print(findings_table(arm.namespace, findings))
         count = Counter(finding.verdict for finding in findings)
-        there, failed = len(findings) - count[Verdict.ABSENT], count[Verdict.FAILED]
-        print(f"{there} of {len(findings)} rows are there, {failed} failed, {count[Verdict.SKIPPED]} not tried")
+        there, failed = len(findings) - count[RowResult.ABSENT], count[RowResult.FAILED]
+        print(f"{there} of {len(findings)} rows are there, {failed} failed, {count[RowResult.SKIPPED]} not tried")
     return exit_code(findings)
 
 

@@ -14,7 +14,7 @@ from teleop_core.commands.options import SessionOptions, ros_module
 from teleop_drill.commands.options import Options
 
 if TYPE_CHECKING:
-    from teleop_drill.drill import Exercise, Outcome
+    from teleop_drill.drill import Exercise, FaultOutcome
 
 
 def drill(
@@ -71,7 +71,7 @@ def drill(
     return code
 
 
-def _outcomes(exercises: "tuple[Exercise, ...]", options: Options, settings: SessionOptions) -> "list[Outcome]":
+def _outcomes(exercises: "tuple[Exercise, ...]", options: Options, settings: SessionOptions) -> "list[FaultOutcome]":
     from rich.console import Console
 
     console = Console()
@@ -105,7 +105,7 @@ def _outcomes(exercises: "tuple[Exercise, ...]", options: Options, settings: Ses
         )
 
 
-def _write(outcomes: "list[Outcome]", options: Options) -> None:
+def _write(outcomes: "list[FaultOutcome]", options: Options) -> None:
     from teleop_core import __version__
     from teleop_core.evaluation.command import write_whole
     from teleop_drill.drill.drill_table import markdown
@@ -119,7 +119,7 @@ def _write(outcomes: "list[Outcome]", options: Options) -> None:
         write_whole(options.markdown, markdown(outcomes))
 
 
-def _show(outcomes: "list[Outcome]") -> int:
+def _show(outcomes: "list[FaultOutcome]") -> int:
     from rich.console import Console
 
     from teleop_drill.drill.drill_table import drill_table, summary

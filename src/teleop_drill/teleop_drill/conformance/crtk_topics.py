@@ -17,7 +17,7 @@ class Group(Enum):
     COMMAND = "command"
 
 
-class Verdict(Enum):
+class RowResult(Enum):
     """Result of a row."""
 
     OK = "ok"
@@ -88,6 +88,6 @@ class Finding:
     """
 
     row: CrtkTopic
-    verdict: Verdict
+    verdict: RowResult
     found: str = ""
     note: str = ""

@@ -7,21 +7,21 @@ from rich.markup import escape
 from rich.table import Table
 
 from teleop_core.base.texts import one_line
-from teleop_drill.conformance.crtk_topics import Finding, Verdict
+from teleop_drill.conformance.crtk_topics import Finding, RowResult
 
 _STYLES = {
-    Verdict.OK: "green",
-    Verdict.ABSENT: "dim",
-    Verdict.SKIPPED: "yellow",
-    Verdict.NOTED: "yellow",
-    Verdict.FAILED: "bold red",
+    RowResult.OK: "green",
+    RowResult.ABSENT: "dim",
+    RowResult.SKIPPED: "yellow",
+    RowResult.NOTED: "yellow",
+    RowResult.FAILED: "bold red",
 }
 
 
 def exit_code(findings: Iterable[Finding]) -> int:
     """Exit code of the test: 1 if a row failed, else 3 if a row was not tried, which is no pass, else 0."""
     verdicts = {finding.verdict for finding in findings}
-    return 1 if Verdict.FAILED in verdicts else 3 if Verdict.SKIPPED in verdicts else 0
+    return 1 if RowResult.FAILED in verdicts else 3 if RowResult.SKIPPED in verdicts else 0
 
 
 def findings_table(namespace: str, findings: Iterable[Finding]) -> Table:

@@ -2,14 +2,22 @@
 
 from teleop_core.base.errors import PartError, UnknownNameError
 from teleop_core.base.registry import Registry
-from teleop_drill.drill.exercise import Cure, Exercise, Master, Motion, Rig
-from teleop_drill.drill.outcome import Outcome
+from teleop_drill.drill.exercise import AllowedMotion, Cure, Exercise, Master, Rig
+from teleop_drill.drill.outcome import FaultOutcome
 from teleop_drill.drill.processes import PROCESSES
 from teleop_drill.drill.samples import SAMPLES
 from teleop_drill.drill.stops import STOPS
 
 __all__ = [
-    "EXERCISES", "SHORT", "Cure", "Exercise", "Master", "Motion", "Outcome", "Rig", "chosen",
+    "EXERCISES",
+    "SHORT",
+    "AllowedMotion",
+    "Cure",
+    "Exercise",
+    "FaultOutcome",
+    "Master",
+    "Rig",
+    "chosen",
     "register_exercise",
 ]  # fmt: skip
 

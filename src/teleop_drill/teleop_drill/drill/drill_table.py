@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from rich.markup import escape
 from rich.table import Table
 
-from teleop_drill.drill.exercise import Cure, Motion
-from teleop_drill.drill.outcome import Outcome
+from teleop_drill.drill.exercise import AllowedMotion, Cure
+from teleop_drill.drill.outcome import FaultOutcome
 
 _COLUMNS = (
     ("fault", "left"),
@@ -21,12 +21,12 @@ _COLUMNS = (
 )
 
 
-def rows(outcomes: Sequence[Outcome]) -> list[list[str]]:
+def rows(outcomes: Sequence[FaultOutcome]) -> list[list[str]]:
     """Cells of each outcome, in the order of the columns."""
     return [_row(outcome) for outcome in outcomes]
 
 
-def drill_table(outcomes: Sequence[Outcome]) -> Table:
+def drill_table(outcomes: Sequence[FaultOutcome]) -> Table:
     """The table for a terminal."""
     table = Table(title="drill", title_justify="left")
     for name, side in _COLUMNS:
@@ -36,14 +36,14 @@ def drill_table(outcomes: Sequence[Outcome]) -> Table:
     return table
 
 
-def markdown(outcomes: Sequence[Outcome]) -> str:
+def markdown(outcomes: Sequence[FaultOutcome]) -> str:
     """The table for a document."""
     head = [name for name, _ in _COLUMNS]
     lines = [head, ["---"] * len(head), *rows(outcomes)]
     return "\n".join("| " + " | ".join(line) + " |" for line in lines) + "\n"
 
 
-def summary(outcomes: Sequence[Outcome]) -> list[str]:
+def summary(outcomes: Sequence[FaultOutcome]) -> list[str]:
     """Text below the table: the stopping times, the load of the machine, and all unexpected results."""
     lines = []
     for outcome in outcomes:
@@ -61,7 +61,7 @@ def summary(outcomes: Sequence[Outcome]) -> list[str]:
     return lines
 
 
-def _row(outcome: Outcome) -> list[str]:
+def _row(outcome: FaultOutcome) -> list[str]:
     return [
         outcome.exercise.text,
         _number(1e3 * outcome.detected, 0),
@@ -74,15 +74,15 @@ def _row(outcome: Outcome) -> list[str]:
     ]
 
 
-def _travel(outcome: Outcome) -> str:
+def _travel(outcome: FaultOutcome) -> str:
     found = outcome.measured("travel_m")
-    if outcome.exercise.motion is Motion.LED:
+    if outcome.exercise.motion is AllowedMotion.LED:
         return "is led"
-    goes = "goes on, " if outcome.exercise.motion is Motion.GOES_ON else ""
+    goes = "goes on, " if outcome.exercise.motion is AllowedMotion.GOES_ON else ""
     return f"{goes}{_number(1e3 * found.value, 1)} of {_number(1e3 * found.most, 1)}"
 
 
-def _recovered(outcome: Outcome) -> str:
+def _recovered(outcome: FaultOutcome) -> str:
     if math.isnan(outcome.recovered):
         return "never"
     if outcome.cure is Cure.NOTHING and outcome.recovered < 0.1:

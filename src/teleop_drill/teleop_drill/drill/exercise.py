@@ -6,9 +6,10 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Protocol
 
+from teleop_core.graph.operation import State
 from teleop_core.graph.topics import Topic
 from teleop_core.kernels.geometry import Array
-from teleop_core.slave.operation import Fault, State
+from teleop_core.slave.operation import Fault
 from teleop_drill.drill.hand import SPEED, Distortion
 from teleop_drill.drill.numbers import Numbers
 
@@ -20,7 +21,7 @@ class Master(Enum):
     DRILL = "the drill itself, which publishes the samples of a device"
 
 
-class Motion(Enum):
+class AllowedMotion(Enum):
     """Allowed motion of the arm under a fault."""
 
     RESTS = "the arm comes to rest by itself"
@@ -203,7 +204,7 @@ class Exercise:
     text: str
     inject: Callable[[Rig], None]
     undo: Callable[[Rig], None] = nothing
-    motion: Motion = Motion.RESTS
+    motion: AllowedMotion = AllowedMotion.RESTS
     states: tuple[State | None, ...] = (State.ENABLED,)
     faults: tuple[Fault, ...] = ()
     cures: tuple[Cure, ...] = (Cure.NOTHING,)

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from teleop_core.slave.operation import State
+from teleop_core.graph.operation import State
 from teleop_drill.drill import measure
-from teleop_drill.drill.exercise import Exercise, Motion
+from teleop_drill.drill.exercise import AllowedMotion, Exercise
 from teleop_drill.drill.hand import RADIUS
 from teleop_drill.drill.measure import Trace
 from teleop_drill.drill.numbers import OVERSHOOT, WARNED, Numbers, Scheduling
@@ -64,7 +64,7 @@ class Measured:
 
 
 @dataclass(frozen=True, eq=False)
-class Seen:
+class Tapped:
     """Messages that an independent tap received during one fault.
 
     Attributes:
@@ -94,21 +94,21 @@ class Seen:
         return math.inf if time_ns is None else 1e-9 * (time_ns - self.begin_ns)
 
 
-def judge(exercise: Exercise, seen: Seen, numbers: Numbers) -> Iterator[Measured]:
+def judge(exercise: Exercise, seen: Tapped, numbers: Numbers) -> Iterator[Measured]:
     """All measurements of one fault, each with its bounds."""
     yield from _always(exercise, seen, numbers)
     yield from _told(exercise, seen, numbers)
     if exercise.brakes:
         yield _unpowered(seen, numbers)
-    if exercise.motion in {Motion.RESTS, Motion.HOLDS}:
+    if exercise.motion in {AllowedMotion.RESTS, AllowedMotion.HOLDS}:
         yield from _stops(exercise, seen, numbers)
-    elif exercise.motion is Motion.GOES_ON:
+    elif exercise.motion is AllowedMotion.GOES_ON:
         yield from _goes_on(exercise, seen, numbers)
     else:
         yield _speed(exercise, seen, numbers)
 
 
-def late(seen: Seen, numbers: Numbers) -> float:
+def late(seen: Tapped, numbers: Numbers) -> float:
     """Delay that transport and machine may add to any time [s].
 
     The delay is a tick for each topic from hand to setpoint, plus twice the wake-up delay of the drill's own thread:
@@ -117,7 +117,7 @@ def late(seen: Seen, numbers: Numbers) -> float:
     return _HOPS * numbers.tick + 2.0 * seen.scheduling.worst
 
 
-def _always(exercise: Exercise, seen: Seen, numbers: Numbers) -> Iterator[Measured]:
+def _always(exercise: Exercise, seen: Tapped, numbers: Numbers) -> Iterator[Measured]:
     """Check the limits that are valid for every fault."""
     robot, setpoints = numbers.robot, seen.setpoint_js
     ratio = measure.step_ratio(setpoints, numbers.speed_limit, numbers.tick)
@@ -138,7 +138,7 @@ def _always(exercise: Exercise, seen: Seen, numbers: Numbers) -> Iterator[Measur
     yield Measured("silent_s", text, silence, numbers.command_timeout + late(seen, numbers))
 
 
-def _tool(exercise: Exercise, seen: Seen, numbers: Numbers) -> Measured:
+def _tool(exercise: Exercise, seen: Tapped, numbers: Numbers) -> Measured:
     """Compare steps of the tip's setpoint with the speed limit of the tool.
 
     The slave slows all joints by one factor. For the tip this is exact, except for an error of the order of a joint
@@ -154,7 +154,7 @@ def _tool(exercise: Exercise, seen: Seen, numbers: Numbers) -> Measured:
     return Measured("tool_ratio", text, ratio, most, scale=1.0)
 
 
-def _told(exercise: Exercise, seen: Seen, numbers: Numbers) -> Iterator[Measured]:
+def _told(exercise: Exercise, seen: Tapped, numbers: Numbers) -> Iterator[Measured]:
     """Check the times of the slave's report of the fault and of the warning in ``diagnostics``."""
     if exercise.told is not None:
         most = seen.deaf + exercise.told(numbers) + late(seen, numbers)
@@ -166,7 +166,7 @@ def _told(exercise: Exercise, seen: Seen, numbers: Numbers) -> Iterator[Measured
         yield Measured("warned_s", text, seen.since(seen.warned_ns), most)
 
 
-def _unpowered(seen: Seen, numbers: Numbers) -> Measured:
+def _unpowered(seen: Tapped, numbers: Numbers) -> Measured:
     """Check that drives which are off give no effort in the last samples of the fault."""
     last = seen.measured_js.within(seen.end_ns - _NOW_NS, seen.end_ns).values[:, -numbers.robot.n :]
     effort = float(np.max(np.abs(last), initial=0.0)) if last.size else math.nan
@@ -174,12 +174,12 @@ def _unpowered(seen: Seen, numbers: Numbers) -> Measured:
     return Measured("effort_n", text, effort, _ROUNDING, scale=1.0)
 
 
-def _stops(exercise: Exercise, seen: Seen, numbers: Numbers) -> Iterator[Measured]:
+def _stops(exercise: Exercise, seen: Tapped, numbers: Numbers) -> Iterator[Measured]:
     """Check the stopping distance, the speed until rest, and that the tip then stays at rest."""
     going = exercise.allowed(numbers) + late(seen, numbers)
     yield _travel_to_rest(exercise, seen, numbers, going)
     yield _speed(exercise, seen, numbers)
-    if exercise.motion is Motion.HOLDS:
+    if exercise.motion is AllowedMotion.HOLDS:
         yield _held(exercise, seen, numbers)
         return
     if None not in exercise.states:  # a slave that has ended sends nothing
@@ -190,7 +190,7 @@ def _stops(exercise: Exercise, seen: Seen, numbers: Numbers) -> Iterator[Measure
     yield Measured("braking_share", text, share, least=_FULL, scale=1.0)
 
 
-def _travel_to_rest(exercise: Exercise, seen: Seen, numbers: Numbers, going: float) -> Measured:
+def _travel_to_rest(exercise: Exercise, seen: Tapped, numbers: Numbers, going: float) -> Measured:
     """Check the distance to rest.
 
     The tip may continue for the time ``going`` [s], brake, and catch up with its setpoint.
@@ -202,13 +202,13 @@ def _travel_to_rest(exercise: Exercise, seen: Seen, numbers: Numbers, going: flo
     jacobian = robot.jacobian(joints[-1] if len(joints) else robot.home)
     bound = measure.RESOLUTION + measure.lag(wanted, seen.true_cp, begin_ns)
     bound += measure.braking_way(setpoints, begin_ns, jacobian, numbers.braking)
-    settling = numbers.filter_time if exercise.motion is Motion.HOLDS else 0.0
+    settling = numbers.filter_time if exercise.motion is AllowedMotion.HOLDS else 0.0
     bound += speed * (going + numbers.coast + settling)
     went = measure.travel(seen.true_cp, begin_ns, seen.end_ns)
     return Measured("travel_m", "the tip moved {0:.1f} mm, at most {1:.1f}", went, bound)
 
 
-def _rests(exercise: Exercise, seen: Seen, numbers: Numbers, going: float) -> Iterator[Measured]:
+def _rests(exercise: Exercise, seen: Tapped, numbers: Numbers, going: float) -> Iterator[Measured]:
     """Check the times at which the setpoints stop and the tip is at rest.
 
     Setpoints do not brake if an arm is in FAULT, but its drives must.
@@ -233,7 +233,7 @@ def _or_never(time: float) -> float:
     return math.inf if math.isnan(time) else time
 
 
-def _held(exercise: Exercise, seen: Seen, numbers: Numbers) -> Measured:
+def _held(exercise: Exercise, seen: Tapped, numbers: Numbers) -> Measured:
     """Check the speed of a tip that must not move, after the filter has settled."""
     settling = exercise.allowed(numbers) + _SETTLED * (numbers.filter_time + numbers.coast)
     since_ns = seen.begin_ns + round(1e9 * (settling + late(seen, numbers)))
@@ -244,7 +244,7 @@ def _held(exercise: Exercise, seen: Seen, numbers: Numbers) -> Measured:
     )
 
 
-def _speed(exercise: Exercise, seen: Seen, numbers: Numbers) -> Measured:
+def _speed(exercise: Exercise, seen: Tapped, numbers: Numbers) -> Measured:
     """Check the speed of the tip, which must never exceed the speed that the hand commands."""
     moving = seen.true_cp.within(seen.begin_ns, seen.end_ns)
     gap = exercise.gap(numbers) + late(seen, numbers)
@@ -255,7 +255,7 @@ def _speed(exercise: Exercise, seen: Seen, numbers: Numbers) -> Measured:
     return Measured("tip_speed_m_s", text, measure.tip_speed(moving), most)
 
 
-def _goes_on(exercise: Exercise, seen: Seen, numbers: Numbers) -> Iterator[Measured]:
+def _goes_on(exercise: Exercise, seen: Tapped, numbers: Numbers) -> Iterator[Measured]:
     """Check that a moving arm follows the hand: at most as far and as fast as the hand, and nearly as far."""
     begin_ns, end_ns = seen.begin_ns, seen.end_ns
     yield _speed(exercise, seen, numbers)

@@ -5,10 +5,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from teleop_core.coupling.mapping.gains import MotionScalingParameters
 from teleop_core.graph.signals import DT
+from teleop_core.hand.master.haptic_master import HapticMasterParameters
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots.robot import Robot
 from teleop_core.session.configuration import Configuration
+from teleop_core.slave.parameters import SlaveParameters
 from teleop_core.slave.slave import Slave
 from teleop_drill.drill import hand
 
@@ -105,7 +108,7 @@ class Numbers:
     @staticmethod
     def of(configuration: Configuration) -> "Numbers":
         """Compute the numbers of a session from its configuration."""
-        given, scaling = configuration.group("slave"), configuration.group("motion_scaling")
+        given, scaling = configuration.of(SlaveParameters), configuration.of(MotionScalingParameters)
         slave, lag = Slave(given), given.reference_filter
         drives = slave.robot.drives
         assert drives is not None
@@ -120,7 +123,7 @@ class Numbers:
             longest_outage=given.operation.longest_outage or math.inf,
             longest_silence=given.operation.longest_silence,
             longest_pause=scaling.longest_pause,
-            hand_timeout=configuration.group("haptic_master").hand_timeout,
+            hand_timeout=configuration.of(HapticMasterParameters).hand_timeout,
             button_silence=scaling.plausible.button_silence,
             effort_time=given.operation.effort_time,
             pressing_time=given.operation.pressing_time,

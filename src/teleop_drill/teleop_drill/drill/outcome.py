@@ -3,7 +3,8 @@
 import math
 from dataclasses import dataclass, field
 
-from teleop_core.slave.operation import Fault, State
+from teleop_core.graph.operation import State
+from teleop_core.slave.operation import Fault
 from teleop_drill.drill.exercise import Cure, Exercise
 from teleop_drill.drill.judging import Measured
 
@@ -11,7 +12,7 @@ _SHORT = 20  # largest number of characters of a note that is shown beside the s
 
 
 @dataclass(kw_only=True)
-class Outcome:
+class FaultOutcome:
     """One fault and the reaction of the session.
 
     Attributes:

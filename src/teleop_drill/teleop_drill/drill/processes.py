@@ -3,8 +3,20 @@
 from collections.abc import Callable
 from functools import partial
 
-from teleop_core.slave.operation import Fault, State
-from teleop_drill.drill.exercise import Cure, Exercise, Master, Motion, Rig, after, at_once, outage, silence, unheard
+from teleop_core.graph.operation import State
+from teleop_core.slave.operation import Fault
+from teleop_drill.drill.exercise import (
+    AllowedMotion,
+    Cure,
+    Exercise,
+    Master,
+    Rig,
+    after,
+    at_once,
+    outage,
+    silence,
+    unheard,
+)
 from teleop_drill.drill.hand import SPEED
 from teleop_drill.drill.inside import HANGS, RAISES, SLOWS, WORKS
 from teleop_drill.drill.numbers import Numbers
@@ -123,7 +135,7 @@ def _broken(name: str, text: str, inject: Callable[[Rig], None]) -> tuple[Exerci
 PROCESSES = (
     Exercise(  # the hand releases the stylus, and the arm holds its position as with the clutch pressed
         name="kill_operator", text="operator killed", inject=partial(_kill, "operator"),
-        motion=Motion.HOLDS, allowed=_let_go, master=Master.DEVICE, watch=2.6, warns=True,
+        motion=AllowedMotion.HOLDS, allowed=_let_go, master=Master.DEVICE, watch=2.6, warns=True,
         ways=(False,),
     ),
     *(_killed(node) for node in _STAGES),
@@ -139,7 +151,7 @@ PROCESSES = (
     ),
     Exercise(
         name="kill_recorder", text="recorder killed", inject=partial(_kill_writer, "recorder"),
-        motion=Motion.GOES_ON, master=Master.DEVICE, watch=1.0, ways=(False,), cuts_recording=True,
+        motion=AllowedMotion.GOES_ON, master=Master.DEVICE, watch=1.0, ways=(False,), cuts_recording=True,
     ),
     Exercise(
         name="kill_session", text="whole session killed", inject=partial(_kill_writer, "slave"),
@@ -162,7 +174,7 @@ PROCESSES = (
     ),
     Exercise(
         name="freeze_recorder", text=f"recorder stopped for {FREEZE:g} s",
-        inject=partial(_freeze, "recorder"), motion=Motion.GOES_ON, master=Master.DEVICE,
+        inject=partial(_freeze, "recorder"), motion=AllowedMotion.GOES_ON, master=Master.DEVICE,
         lost=FREEZE, ways=(False,),
     ),
     Exercise(
@@ -173,18 +185,18 @@ PROCESSES = (
     ),
     Exercise(
         name="kill_bystander", text="foreign subscriber of all streams killed", inject=_bystander,
-        motion=Motion.GOES_ON, master=Master.DEVICE,
+        motion=AllowedMotion.GOES_ON, master=Master.DEVICE,
     ),
     Exercise(
-        name="hog", text="all cores kept busy for 3 s", inject=_hog, motion=Motion.GOES_ON,
+        name="hog", text="all cores kept busy for 3 s", inject=_hog, motion=AllowedMotion.GOES_ON,
         states=(State.ENABLED, State.PAUSED), cures=(Cure.NOTHING, Cure.RESUME),
         master=Master.DEVICE,
     ),
     *_broken("stage_hangs", "a stage hangs in a step", partial(_break, HANGS)),
     Exercise(  # ticks are skipped, so the arm follows the hand in larger steps
         name="stage_slow", text="a stage takes 3 ms for a step", inject=partial(_break, SLOWS), undo=_mend,
-        motion=Motion.GOES_ON, watch=6.0, warns=True, allowed=after(4.0), stands=after(3.0), hand_speed=2.0 * SPEED,
-        ways=(True,),
+        motion=AllowedMotion.GOES_ON, watch=6.0, warns=True, allowed=after(4.0), stands=after(3.0),
+        hand_speed=2.0 * SPEED, ways=(True,),
     ),
     *_broken("stage_raises", "a stage raises in a step", partial(_break, RAISES)),
     Exercise(
@@ -199,7 +211,7 @@ PROCESSES = (
     ),
     Exercise(
         name="disk_full", text="disk full under the recording", inject=_fill_disk,
-        motion=Motion.GOES_ON, ways=(False,), cuts_recording=True,
+        motion=AllowedMotion.GOES_ON, ways=(False,), cuts_recording=True,
     ),
     Exercise(
         name="disk_full", text="disk full under the recording: ends the session",

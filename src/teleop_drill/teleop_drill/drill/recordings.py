@@ -13,7 +13,7 @@ from teleop_core.base.errors import TeleopError
 from teleop_core.graph.topics import DIAGNOSTICS, SLAVE_MEASURED_JS, SLAVE_OPERATION
 from teleop_drill.drill.exercise import Cure
 from teleop_drill.drill.measure import Stamps
-from teleop_drill.drill.outcome import Outcome
+from teleop_drill.drill.outcome import FaultOutcome
 
 Counted = dict[str, tuple[Stamps, Stamps]]
 """Sending times and stamps of the messages of each stream [ns], by the name of the stream."""
@@ -29,7 +29,7 @@ ticks and a turn of the recorder."""
 
 
 @dataclass(frozen=True)
-class Verdict:
+class RecordingState:
     """State of a recording.
 
     Attributes:
@@ -45,7 +45,7 @@ class Verdict:
     bag: Bag | None = None
 
 
-def check_recording(path: Path, killed_ns: int | None = None) -> Verdict:
+def check_recording(path: Path, killed_ns: int | None = None) -> RecordingState:
     """Open a recording with our reader and with that of the ``mcap`` package.
 
     Args:
@@ -57,10 +57,10 @@ def check_recording(path: Path, killed_ns: int | None = None) -> Verdict:
             return _opened(Bag(path))
         return _saved(path, killed_ns)
     except (TeleopError, McapError, OSError) as error:
-        return Verdict(" ".join(str(error).split()), is_good=False)
+        return RecordingState(" ".join(str(error).split()), is_good=False)
 
 
-def _opened(bag: Bag) -> Verdict:
+def _opened(bag: Bag) -> RecordingState:
     ours = sum(topic.count for topic in bag.topics.values())
     theirs = 0
     for file in mcap_files(bag.path):
@@ -68,22 +68,22 @@ def _opened(bag: Bag) -> Verdict:
             reader = make_reader(opened, validate_crcs=True)
             summary = reader.get_summary()
             if summary is None or summary.statistics is None:
-                return Verdict("mcap finds no summary", is_good=False)
+                return RecordingState("mcap finds no summary", is_good=False)
             theirs += summary.statistics.message_count
             for _ in reader.iter_messages(topics=[f"/{SLAVE_OPERATION.name}"]):
                 pass
     if ours != theirs:
-        return Verdict(f"{ours} messages, mcap finds {theirs}", is_good=False)
-    return Verdict("intact", is_good=True, is_saved=True, bag=bag)
+        return RecordingState(f"{ours} messages, mcap finds {theirs}", is_good=False)
+    return RecordingState("intact", is_good=True, is_saved=True, bag=bag)
 
 
-def _saved(path: Path, killed_ns: int) -> Verdict:
+def _saved(path: Path, killed_ns: int) -> RecordingState:
     saved, _ = recover(path, path.with_name(f"{path.name}_recovered"))
     bag = Bag(saved)
     last_ns = int(bag.read(SLAVE_MEASURED_JS).log_ns[-1])
     lost = max(0.0, 1e-9 * (killed_ns - last_ns))
     text = f"all but the last {lost:.3f} s"
-    return Verdict(text, is_good=lost <= LONGEST_LOSS, is_saved=True, bag=bag)
+    return RecordingState(text, is_good=lost <= LONGEST_LOSS, is_saved=True, bag=bag)
 
 
 def missing(bag: Bag, name: str, heard: tuple[Stamps, Stamps]) -> Stamps:
@@ -132,7 +132,7 @@ class Recorded:
     """
 
     path: Path
-    outcomes: list[tuple[int, Outcome]]
+    outcomes: list[tuple[int, FaultOutcome]]
     heard: Counted
     until_ns: int
     killed_ns: int | None

@@ -5,6 +5,7 @@ from functools import partial
 
 import numpy as np
 
+from teleop_core.graph.operation import State
 from teleop_core.graph.topics import (
     MASTER_BUTTONS,
     MASTER_MEASURED_CP,
@@ -13,9 +14,9 @@ from teleop_core.graph.topics import (
     TELEOP_STATE,
     Topic,
 )
-from teleop_core.slave.operation import Fault, State
+from teleop_core.slave.operation import Fault
 from teleop_drill.drill import hand
-from teleop_drill.drill.exercise import Cure, Exercise, Motion, Rig, Time, after, never, outage
+from teleop_drill.drill.exercise import AllowedMotion, Cure, Exercise, Rig, Time, after, never, outage
 from teleop_drill.drill.hand import Distortion
 
 _FOR = 1.0  # duration of the disturbance of a stream [s]
@@ -48,7 +49,7 @@ def _disturbed(
     text: str,
     distortion: Distortion,
     *,
-    motion: Motion = Motion.GOES_ON,
+    motion: AllowedMotion = AllowedMotion.GOES_ON,
     stands: Time = never,
     warns: bool = False,
 ) -> Exercise:
@@ -56,7 +57,7 @@ def _disturbed(
 
     The arm follows, or stays at its position as with the clutch pressed.
     """
-    is_going = motion is Motion.GOES_ON
+    is_going = motion is AllowedMotion.GOES_ON
     return Exercise(
         name=name,
         text=text,
@@ -209,55 +210,55 @@ SAMPLES = (
     _disturbed("delay", "hand's samples 0.2 s late", hand.delayed(100), stands=after(0.2)),
     _disturbed("reordered", "hand's samples in reverse order, five at a time", hand.reordered(5)),
     _disturbed("replayed", "hand's samples of 0.2 s ago between the new ones", hand.replayed(100)),
-    _disturbed("nan", "hand sends NaN", hand.filled(math.nan), motion=Motion.RESTS),
-    _disturbed("infinite", "hand sends 1e308 m", hand.filled(1e308), motion=Motion.HOLDS,
+    _disturbed("nan", "hand sends NaN", hand.filled(math.nan), motion=AllowedMotion.RESTS),
+    _disturbed("infinite", "hand sends 1e308 m", hand.filled(1e308), motion=AllowedMotion.HOLDS,
                warns=True),
     _disturbed("teleport", "hand jumps by 10 cm", hand.shifted((0.1, 0.0, 0.0)), warns=True),
     _disturbed("turn", "hand turns by 1 rad at once", hand.turned(_TURN), warns=True),
     _disturbed("random", "hand at random places in 20 cm", hand.scattered(0.2),
-               motion=Motion.HOLDS, warns=True),
+               motion=AllowedMotion.HOLDS, warns=True),
     _disturbed("stamps_frozen", "hand's stamps stand still", hand.frozen_stamps(),
-               motion=Motion.RESTS, warns=True),
+               motion=AllowedMotion.RESTS, warns=True),
     _disturbed("stamps_zero", "hand's stamps are 0", hand.stamped(lambda _: 0),
-               motion=Motion.RESTS, warns=True),
+               motion=AllowedMotion.RESTS, warns=True),
     _disturbed("stamps_ahead", "hand's stamps 2 s ahead", hand.stamped(lambda ns: ns + _AHEAD_NS),
-               motion=Motion.RESTS, warns=True),
+               motion=AllowedMotion.RESTS, warns=True),
     Exercise(
         name="buttons_silent", text="buttons silent for 1.5 s, hand goes on", inject=_mute,
-        undo=_unmute, motion=Motion.HOLDS, allowed=lambda numbers: numbers.button_silence,
+        undo=_unmute, motion=AllowedMotion.HOLDS, allowed=lambda numbers: numbers.button_silence,
         warns=True,
     ),
     Exercise(
         name="fast_hand", text=f"hand shakes at {_SHAKEN:.1f} m/s, tool speed {_SLOW:g} m/s",
-        inject=_shake, undo=_calm, motion=Motion.LED, hand_speed=_SHAKEN, tool_speed=_SLOW,
+        inject=_shake, undo=_calm, motion=AllowedMotion.LED, hand_speed=_SHAKEN, tool_speed=_SLOW,
     ),
     Exercise(
         name="press_limit", text="servo_jv drives a joint into its limit", inject=_press_limit,
-        undo=_straighten, motion=Motion.LED, faults=(Fault.JOINT_LIMIT,),
+        undo=_straighten, motion=AllowedMotion.LED, faults=(Fault.JOINT_LIMIT,),
         told=lambda numbers: _PRESS + numbers.pressing_time,
     ),
     Exercise(
         name="second_master", text="second master for 0.5 s", inject=_second_master,
-        undo=_leave(MASTER_MEASURED_CP), motion=Motion.GOES_ON,
+        undo=_leave(MASTER_MEASURED_CP), motion=AllowedMotion.GOES_ON,
         states=(State.ENABLED, State.PAUSED), cures=(Cure.NOTHING, Cure.RESUME),
     ),
     Exercise(
         name="second_master_in_gaps", text="second master for 0.5 s, hand with gaps of 0.08 s",
-        inject=_second_master_in_gaps, undo=_leave_gaps, motion=Motion.GOES_ON,
+        inject=_second_master_in_gaps, undo=_leave_gaps, motion=AllowedMotion.GOES_ON,
         states=(State.ENABLED, State.PAUSED), cures=(Cure.NOTHING, Cure.RESUME), gap=after(_GAP),
     ),
     Exercise(
         name="named_joints", text="servo_jv names the joints in another order", inject=_drive_named,
-        undo=_straighten, motion=Motion.LED, said="by name",
+        undo=_straighten, motion=AllowedMotion.LED, said="by name",
     ),
     Exercise(
         name="second_commander", text="second publisher of slave/servo_jp",
-        inject=_second_commander, undo=_leave(SLAVE_SERVO_JP), motion=Motion.GOES_ON,
+        inject=_second_commander, undo=_leave(SLAVE_SERVO_JP), motion=AllowedMotion.GOES_ON,
         states=(State.ENABLED, State.PAUSED), faults=_WRONG, cures=(Cure.NOTHING, Cure.RESUME),
     ),
     Exercise(
         name="spoofed_setpoint", text="forged slave/setpoint_js, 0.05 rad off, stamp 0",
-        inject=_spoof, undo=_leave(SLAVE_SETPOINT_JS), motion=Motion.GOES_ON,
+        inject=_spoof, undo=_leave(SLAVE_SETPOINT_JS), motion=AllowedMotion.GOES_ON,
         states=(State.ENABLED, State.PAUSED), faults=_WRONG,
         cures=(Cure.NOTHING, Cure.RESUME),
     ),
@@ -266,13 +267,13 @@ SAMPLES = (
         undo=_leave(
             MASTER_MEASURED_CP, MASTER_BUTTONS, SLAVE_SERVO_JP, SLAVE_SETPOINT_JS, TELEOP_STATE
         ),
-        motion=Motion.GOES_ON, states=(State.ENABLED, State.PAUSED), faults=_WRONG,
+        motion=AllowedMotion.GOES_ON, states=(State.ENABLED, State.PAUSED), faults=_WRONG,
         cures=(Cure.NOTHING, Cure.RESUME),
     ),
     Exercise(
         name="flood", text="20,000 old samples at once", inject=_flood, stands=after(1.0),
         gap=lambda numbers: numbers.longest_pause, lost=1.0,
-        undo=_leave(MASTER_MEASURED_CP), motion=Motion.GOES_ON,
+        undo=_leave(MASTER_MEASURED_CP), motion=AllowedMotion.GOES_ON,
         states=(State.ENABLED, State.PAUSED), cures=(Cure.NOTHING, Cure.RESUME),
     ),
 )  # fmt: skip

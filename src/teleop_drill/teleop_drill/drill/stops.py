@@ -3,9 +3,10 @@
 import math
 from functools import partial
 
-from teleop_core.slave.operation import Fault, State
+from teleop_core.graph.operation import State
+from teleop_core.slave.operation import Fault
 from teleop_drill.drill import hand
-from teleop_drill.drill.exercise import Cure, Exercise, Motion, Rig, Time, after, at_once
+from teleop_drill.drill.exercise import AllowedMotion, Cure, Exercise, Rig, Time, after, at_once
 from teleop_drill.drill.inside import RACES, STICKS, WORKS
 
 HEARTBEAT = 0.5
@@ -256,18 +257,18 @@ STOPS = (
     _stuck(Fault.EFFORT, lambda numbers: numbers.effort_time + 0.25 * _ROUNDS),
     Exercise(
         name="overspeed", text="a joint runs away; overspeed alone may stop it",
-        inject=_run_away, undo=_let_go, motion=Motion.LED, states=(State.FAULT,),
+        inject=_run_away, undo=_let_go, motion=AllowedMotion.LED, states=(State.FAULT,),
         faults=(Fault.OVERSPEED,), cures=(Cure.RESET,), told=after(_RACE), hand_speed=math.inf,
         breaks_simulator=True, brakes=True,
     ),
     Exercise(
         name="wild_gains", text="gains that are unstable at 1 kHz", inject=_take_bad_gains,
-        undo=_take_good_gains, motion=Motion.GOES_ON, states=(State.ENABLED,), said=_REFUSED,
+        undo=_take_good_gains, motion=AllowedMotion.GOES_ON, states=(State.ENABLED,), said=_REFUSED,
         cures=(Cure.NOTHING,),
     ),
     Exercise(
         name="slack_gains", text="gains that follow nothing", inject=_take_slack_gains,
-        undo=_take_good_gains, motion=Motion.GOES_ON, watch=2.0, said=_REFUSED,
+        undo=_take_good_gains, motion=AllowedMotion.GOES_ON, watch=2.0, said=_REFUSED,
     ),
 )  # fmt: skip
 """Exercises with correct and wrong actions of people."""

@@ -7,8 +7,8 @@ arm needs no software of this project.
 from collections.abc import Callable, Iterable
 
 from teleop_core.robots.robot import Robot
-from teleop_drill.conformance.crtk_topics import CRTK_TOPICS, CrtkTopic, Finding, Group, Verdict
-from teleop_drill.nodes.conformance_arm import Arm
+from teleop_drill.conformance.crtk_topics import CRTK_TOPICS, CrtkTopic, Finding, Group, RowResult
+from teleop_drill.nodes.conformance_arm import ArmClient
 from teleop_drill.nodes.conformance_queries import look
 from teleop_drill.nodes.conformance_trials import TRIALS, TURN, Outcome, Trials
 from teleop_drill.nodes.conformance_watch import Watch
@@ -23,7 +23,9 @@ NEVER_TRIED = {
 }
 
 
-def examine(arm: Arm, *, may_move: bool, report: Report = lambda _: None, robot: Robot | None = None) -> list[Finding]:
+def examine(
+    arm: ArmClient, *, may_move: bool, report: Report = lambda _: None, robot: Robot | None = None
+) -> list[Finding]:
     """Test all rows of the table and return the findings.
 
     Args:
@@ -45,7 +47,7 @@ def examine(arm: Arm, *, may_move: bool, report: Report = lambda _: None, robot:
     return [findings[row.name] for row in CRTK_TOPICS]
 
 
-def left_behind(arm: Arm, *, may_move: bool) -> str:
+def left_behind(arm: ArmClient, *, may_move: bool) -> str:
     """Text about the state in which an interrupted test has left an arm."""
     if not may_move:
         return "nothing was commanded"
@@ -58,25 +60,27 @@ def left_behind(arm: Arm, *, may_move: bool) -> str:
 def _insist_on_one(findings: dict[str, Finding]) -> None:
     """Raise an error if the arm publishes no measured position."""
     pair = [findings[name] for name in ("measured_js", "measured_cp")]
-    if all(found.verdict is Verdict.ABSENT for found in pair):
+    if all(found.verdict is RowResult.ABSENT for found in pair):
         row = pair[0].row
-        findings[row.name] = Finding(row, Verdict.FAILED, "no publisher", "neither measured_js nor measured_cp exists")
+        findings[row.name] = Finding(
+            row, RowResult.FAILED, "no publisher", "neither measured_js nor measured_cp exists"
+        )
 
 
 def _commands(findings: dict[str, Finding]) -> Iterable[tuple[str, CrtkTopic]]:
     """Commands whose topics passed the test."""
     for name, found in list(findings.items()):
-        if found.row.group is not Group.QUERY and found.verdict is Verdict.OK:
+        if found.row.group is not Group.QUERY and found.verdict is RowResult.OK:
             yield name, found.row
 
 
 def _skip(findings: dict[str, Finding], why: str) -> None:
     for name, row in _commands(findings):
         if row.name != "operating_state":
-            findings[name] = Finding(row, Verdict.SKIPPED, findings[name].found, why)
+            findings[name] = Finding(row, RowResult.SKIPPED, findings[name].found, why)
 
 
-def _try(arm: Arm, findings: dict[str, Finding], report: Report, robot: Robot | None) -> None:
+def _try(arm: ArmClient, findings: dict[str, Finding], report: Report, robot: Robot | None) -> None:
     trials = Trials(arm)
     refusal = trials.unfit()
     if refusal:
@@ -86,9 +90,9 @@ def _try(arm: Arm, findings: dict[str, Finding], report: Report, robot: Robot | 
         if name == "operating_state":
             continue
         if name in NEVER_TRIED:
-            verdict, note = Verdict.SKIPPED, NEVER_TRIED[name]
+            verdict, note = RowResult.SKIPPED, NEVER_TRIED[name]
         elif arm.others(name):
-            verdict, note = (Verdict.SKIPPED, f"{arm.others(name)} others command it: stop them first")
+            verdict, note = (RowResult.SKIPPED, f"{arm.others(name)} others command it: stop them first")
         else:
             report(f"trying {name}")
             verdict, note = _watched(trials, name, findings, robot)
@@ -107,7 +111,7 @@ def _watched(trials: Trials, name: str, findings: dict[str, Finding], robot: Rob
     lies = watch.lies()
     for topic, lie in lies.items():
         told = findings[topic]
-        if told.verdict is not Verdict.FAILED:
-            findings[topic] = Finding(told.row, Verdict.FAILED, told.found, f"{name}: {lie}")
+        if told.verdict is not RowResult.FAILED:
+            findings[topic] = Finding(told.row, RowResult.FAILED, told.found, f"{name}: {lie}")
     missed = [lie for lie in lies.values() if "setpoint" in lie]
-    return (Verdict.FAILED, missed[0]) if verdict is Verdict.OK and missed else (verdict, note)
+    return (RowResult.FAILED, missed[0]) if verdict is RowResult.OK and missed else (verdict, note)

@@ -65,7 +65,7 @@ class Tap:
         return [(sent_ns, read_message(data, self._taker.type)) for sent_ns, data in self._kept]
 
 
-class Arm(Guest):
+class ArmClient(Guest):
     """Client of one arm.
 
     Args:

@@ -7,8 +7,8 @@ import numpy as np
 
 from teleop_core.bags.messages import SECOND_NS
 from teleop_core.middleware.world import Endpoint
-from teleop_drill.conformance.crtk_topics import STATES, CrtkTopic, Finding, Group, Verdict
-from teleop_drill.nodes.conformance_arm import Arm, numbers_of, stamp_of
+from teleop_drill.conformance.crtk_topics import STATES, CrtkTopic, Finding, Group, RowResult
+from teleop_drill.nodes.conformance_arm import ArmClient, numbers_of, stamp_of
 
 _LOOK = 0.5  # time in which messages are counted [s]
 _FIRST = 2.5  # time within which the first message must arrive [s]
@@ -16,23 +16,23 @@ _OLD = 1.0  # largest age of a measurement [s]
 _UNIT = 1e-3
 
 
-def look(arm: Arm, row: CrtkTopic) -> Finding:
+def look(arm: ArmClient, row: CrtkTopic) -> Finding:
     """Finding of one row, without any command to the arm."""
     is_command = row.group is Group.COMMAND or row.name == "state_command"
     ends = arm.readers(row.name) if is_command else arm.publishers(row.name)
     side = "reader" if is_command else "publisher"
     if not ends:
-        verdict = Verdict.FAILED if row.is_required else Verdict.ABSENT
-        return Finding(row, verdict, "" if verdict is Verdict.ABSENT else f"no {side}")
+        verdict = RowResult.FAILED if row.is_required else RowResult.ABSENT
+        return Finding(row, verdict, "" if verdict is RowResult.ABSENT else f"no {side}")
     wrong = {end.ros_type for end in ends} - {row.ros_type}
     if wrong:
-        return Finding(row, Verdict.FAILED, ", ".join(sorted(wrong)), f"must be {row.ros_type}")
+        return Finding(row, RowResult.FAILED, ", ".join(sorted(wrong)), f"must be {row.ros_type}")
     if is_command:
-        return Finding(row, Verdict.OK, f"{len(ends)} {side}{'s' * (len(ends) > 1)}")
+        return Finding(row, RowResult.OK, f"{len(ends)} {side}{'s' * (len(ends) > 1)}")
     return _listen(arm, row, ends)
 
 
-def _listen(arm: Arm, row: CrtkTopic, ends: list[Endpoint]) -> Finding:
+def _listen(arm: ArmClient, row: CrtkTopic, ends: list[Endpoint]) -> Finding:
     """Result for a topic with publishers of the right type."""
     messages: list[Any] = []
     tap = arm.tap(row.name)
@@ -44,17 +44,17 @@ def _listen(arm: Arm, row: CrtkTopic, ends: list[Endpoint]) -> Finding:
     rate = (tap.count - before) / looked
     arm.untap(row.name)
     if not messages:
-        return Finding(row, Verdict.FAILED, "no message", f"no message came within {_FIRST:g} s")
+        return Finding(row, RowResult.FAILED, "no message", f"no message came within {_FIRST:g} s")
     found = f"{rate:.0f} Hz" if rate > 0 else "1 message"
     faults = [*_stamps(row, messages, arm.world.time_ns()), *_content(row, messages)]
     if faults:
-        return Finding(row, Verdict.FAILED, found, faults[0])
+        return Finding(row, RowResult.FAILED, found, faults[0])
     if len(ends) > 1:
-        return Finding(row, Verdict.NOTED, found, f"{len(ends)} publishers: who speaks for the arm?")
+        return Finding(row, RowResult.NOTED, found, f"{len(ends)} publishers: who speaks for the arm?")
     if not any(end.is_reliable for end in ends):
         note = "offered best effort: ordinary clients, which are reliable, receive nothing"
-        return Finding(row, Verdict.FAILED, found, note)
-    return Finding(row, Verdict.OK, found)
+        return Finding(row, RowResult.FAILED, found, note)
+    return Finding(row, RowResult.OK, found)
 
 
 def _stamps(row: CrtkTopic, messages: list[Any], now_ns: int) -> list[str]:

@@ -10,8 +10,8 @@ import numpy as np
 
 from teleop_core.base.errors import SessionError
 from teleop_core.kernels.geometry import Array
-from teleop_drill.conformance.crtk_topics import Verdict
-from teleop_drill.nodes.conformance_arm import Arm, numbers_of
+from teleop_drill.conformance.crtk_topics import RowResult
+from teleop_drill.nodes.conformance_arm import ArmClient, numbers_of
 
 TURN = 0.01
 """Distance by which a joint is moved [rad or m]."""
@@ -25,8 +25,8 @@ _PATIENCE = 10.0  # longest duration of a move [s]
 _NOTHING = 1.5  # time after which a command that has caused no motion is assumed to cause none [s]
 _STATE = 3.0  # longest duration of a change of state [s]
 _STILL = 1e-4  # motion of a joint at rest [rad or m]
-Outcome = tuple[Verdict, str]
-_OK: Outcome = (Verdict.OK, "")
+Outcome = tuple[RowResult, str]
+_OK: Outcome = (RowResult.OK, "")
 
 
 class Trials:
@@ -36,7 +36,7 @@ class Trials:
         arm: The arm.
     """
 
-    def __init__(self, arm: Arm) -> None:
+    def __init__(self, arm: ArmClient) -> None:
         self.arm = arm
         self._start = np.empty(0)
         self._joint, self._axis = ((-1, 0.0), (-1, 0.0))  # joint or axis whose direction is known to be free, and the
@@ -100,9 +100,9 @@ class Trials:
         self._say("no such command")
         arm.pause(0.3)
         if self._state() != "ENABLED":
-            return Verdict.FAILED, "a text that is no command changed the state"
+            return RowResult.FAILED, "a text that is no command changed the state"
         if not self._reaches("pause", "PAUSED"):
-            return Verdict.FAILED, f"pause: {self._state()} in place of PAUSED after {_STATE:g} s"
+            return RowResult.FAILED, f"pause: {self._state()} in place of PAUSED after {_STATE:g} s"
         before = self.joints()
         if arm.readers("move_jp"):
             goal = before.copy()
@@ -111,9 +111,9 @@ class Trials:
             arm.pause(0.7)
         moved = float(np.abs(self.joints() - before).max())
         if not self._reaches("resume", "ENABLED"):
-            return Verdict.FAILED, f"resume: {self._state()} in place of ENABLED"
+            return RowResult.FAILED, f"resume: {self._state()} in place of ENABLED"
         if moved > _STILL:
-            return Verdict.FAILED, f"moved by {moved:.3g} while PAUSED"
+            return RowResult.FAILED, f"moved by {moved:.3g} while PAUSED"
         return _OK
 
     def _say(self, word: str) -> None:
@@ -137,7 +137,7 @@ class Trials:
             if outcome is not None:
                 self._joint = joint, sign
                 return outcome
-        return Verdict.FAILED, "no joint moves in either direction"
+        return RowResult.FAILED, "no joint moves in either direction"
 
     def _move(self, name: str, begin: Array, goal: Array, sent: Array) -> Outcome | None:
         """Result of a move of joints; None if nothing moved."""
@@ -155,7 +155,7 @@ class Trials:
             if outcome is not None:
                 self._axis = axis, sign
                 return self._unturned(outcome)
-        return Verdict.FAILED, "the tip moves along no axis in either direction"
+        return RowResult.FAILED, "the tip moves along no axis in either direction"
 
     def _position(self, orientation: Array) -> Array:
         """Position of the tip; its turn away from an orientation (4,) is noted."""
@@ -165,8 +165,8 @@ class Trials:
 
     def _unturned(self, outcome: Outcome) -> Outcome:
         """The outcome of a trial in which the tip must not turn."""
-        if outcome[0] is Verdict.OK and self._turned > _TURNED:
-            return Verdict.FAILED, f"the tip turned by {self._turned:.2g} rad, but its orientation was to stay"
+        if outcome[0] is RowResult.OK and self._turned > _TURNED:
+            return RowResult.FAILED, f"the tip turned by {self._turned:.2g} rad, but its orientation was to stay"
         return outcome
 
     def _watch_move(
@@ -190,14 +190,14 @@ class Trials:
         if not self.arm.wait(lambda: off() < way * (1.0 - _MOVED), _NOTHING):
             return None
         if not self.arm.wait(lambda: off() < way * _NEAR, _PATIENCE):
-            return Verdict.FAILED, f"{off():.2g} short of its goal after {_PATIENCE:g} s"
+            return RowResult.FAILED, f"{off():.2g} short of its goal after {_PATIENCE:g} s"
         self.arm.wait(lambda: tap.read(watch) > 0 and not tap.newest.is_busy and busy[0], 2.0)
         if not busy[0]:
-            return Verdict.FAILED, "is_busy never became true: clients that wait for the move wait without end"
+            return RowResult.FAILED, "is_busy never became true: clients that wait for the move wait without end"
         if tap.newest.is_busy:
-            return Verdict.FAILED, "still busy at its goal"
+            return RowResult.FAILED, "still busy at its goal"
         text = f"left the range between begin and goal, {way:.2g}, by {beyond[0]:.2g}"
-        return (Verdict.FAILED, text) if beyond[0] > _BEYOND * way else _OK
+        return (RowResult.FAILED, text) if beyond[0] > _BEYOND * way else _OK
 
     def _joints(self) -> list[tuple[int, float]]:
         """Joints to try, each with a sign; those of :attr:`_first` first."""
@@ -222,7 +222,7 @@ class Trials:
             if outcome is not None:
                 self._joint = joint, sign
                 return outcome
-        return Verdict.FAILED, "no joint follows in either direction"
+        return RowResult.FAILED, "no joint follows in either direction"
 
     def _along_joint(self, begin: Array, joint: int, sign: float) -> float:
         return float(sign * (self.joints() - begin)[joint] / TURN)
@@ -242,7 +242,7 @@ class Trials:
             if outcome is not None:
                 self._axis = axis, sign
                 return self._unturned(outcome)
-        return Verdict.FAILED, "the tip follows along no axis in either direction"
+        return RowResult.FAILED, "the tip follows along no axis in either direction"
 
     def _along_axis(self, begin: tuple[Array, Array], axis: int, sign: float) -> float:
         return float(sign * (self._position(begin[1]) - begin[0])[axis] / WAY)
@@ -263,9 +263,9 @@ class Trials:
                 return None
         self.arm.wait(lambda: abs(where()) < _NEAR, 1.0)
         if farthest < 1.0 - _MOVED:
-            return Verdict.FAILED, f"followed {farthest:.0%} of the distance"
+            return RowResult.FAILED, f"followed {farthest:.0%} of the distance"
         rest = abs(where())
-        return (Verdict.FAILED, f"{rest:.0%} of the way off in the end") if rest > _NEAR else _OK
+        return (RowResult.FAILED, f"{rest:.0%} of the way off in the end") if rest > _NEAR else _OK
 
     def run_joints(self, name: str) -> Outcome:
         """Command a speed of a joint, then send nothing; the joint must come to rest by itself."""
@@ -277,7 +277,7 @@ class Trials:
             outcome = self._run(name, message, self.arm.message(name), where)
             if outcome is not None:
                 return outcome
-        return Verdict.FAILED, "no joint reacts to a speed in either direction"
+        return RowResult.FAILED, "no joint reacts to a speed in either direction"
 
     def run_tip(self, name: str) -> Outcome:
         """Command a speed of the tip, then send nothing; the tip must come to rest by itself."""
@@ -288,7 +288,7 @@ class Trials:
             outcome = self._run(name, message, self.arm.message(name), where)
             if outcome is not None:
                 return outcome
-        return Verdict.FAILED, "the tip reacts to a speed along no axis in either direction"
+        return RowResult.FAILED, "the tip reacts to a speed along no axis in either direction"
 
     def _run(self, name: str, message: Any, halt: Any, where: Callable[[], float]) -> Outcome | None:
         """Result of a speed of twice the displacement per second, commanded for half a second."""
@@ -307,8 +307,8 @@ class Trials:
             halt.velocity = [0.0] * len(self._start)
         self.arm.send(name, halt)
         if drift > _STILL:
-            return Verdict.NOTED, "still moves a second after the last message: the arm has no watchdog"
-        return _OK if 0.3 < went < 3.0 else (Verdict.FAILED, f"moved {went:.0%} of the commanded distance")
+            return RowResult.NOTED, "still moves a second after the last message: the arm has no watchdog"
+        return _OK if 0.3 < went < 3.0 else (RowResult.FAILED, f"moved {went:.0%} of the commanded distance")
 
     def hold(self) -> Outcome:
         """Command hold; the arm must not move and must stay enabled."""
@@ -318,9 +318,9 @@ class Trials:
         self.arm.pause(0.5)
         moved = float(np.abs(self.joints() - before).max())
         if moved > _STILL:
-            return Verdict.FAILED, f"moved by {moved:.3g}"
+            return RowResult.FAILED, f"moved by {moved:.3g}"
         is_enabled = self._state() == "ENABLED"
-        return _OK if is_enabled else (Verdict.FAILED, f"{self._state()} afterwards")
+        return _OK if is_enabled else (RowResult.FAILED, f"{self._state()} afterwards")
 
 
 def _filled(message: Any, p: Array, q: Array) -> Any:

@@ -9,7 +9,7 @@ from teleop_core.bags.messages import SECOND_NS
 from teleop_core.kernels.geometry import rotations_from_quaternions
 from teleop_core.robots.robot import Robot
 from teleop_drill.conformance.agreement import Trail, adds_up, follows, obeys, rotation_vectors, turns, turns_add_up
-from teleop_drill.nodes.conformance_arm import Arm, numbers_of, stamp_of
+from teleop_drill.nodes.conformance_arm import ArmClient, numbers_of, stamp_of
 
 JOINTS, TIP = "measured_js", "measured_cp"
 _JOINTS = ("setpoint_js", JOINTS)
@@ -27,7 +27,7 @@ class Watch:
         robot: Model of the arm; None if unknown.
     """
 
-    def __init__(self, arm: Arm, robot: Robot | None) -> None:
+    def __init__(self, arm: ArmClient, robot: Robot | None) -> None:
         self._arm, self._robot = arm, robot
         arm.keep([name for name in _NAMES if arm.publishers(name)])
 

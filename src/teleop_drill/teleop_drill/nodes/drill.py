@@ -17,12 +17,12 @@ from teleop_drill.drill import hand, inside
 from teleop_drill.drill.exercise import Exercise, Master
 from teleop_drill.drill.judging import judge
 from teleop_drill.drill.numbers import WARNED, Numbers, Scheduling
-from teleop_drill.drill.outcome import Outcome
+from teleop_drill.drill.outcome import FaultOutcome
 from teleop_drill.drill.recordings import Counted, Recorded, judge_recording
 from teleop_drill.nodes.drill_evidence import help_on, note_state, recover, seen_of
 from teleop_drill.nodes.drill_rig import LiveRig
 from teleop_drill.nodes.drill_session import ARM, SIMULATOR, LiveSite
-from teleop_drill.nodes.drill_site import Session, Site
+from teleop_drill.nodes.drill_site import SessionProcesses, Site
 
 _PRIORITY = 30
 _BEFORE = 0.2  # time of normal motion before a fault [s]
@@ -52,7 +52,7 @@ def drill(
     texts: Sequence[str] = (),
     drives: Sequence[str] = (),
     arm: Sequence[str] = (),
-) -> list[Outcome]:
+) -> list[FaultOutcome]:
     """Run exercises in separate sessions, on a separate ROS domain.
 
     Loops and the drill's own tap use SCHED_FIFO if the system allows it and ``texts`` set no priority. Without it,
@@ -97,7 +97,7 @@ def drill_at(
     say: Say,
     files: Sequence[Path] = (),
     texts: Sequence[str] = (),
-) -> list[Outcome]:
+) -> list[FaultOutcome]:
     """Run exercises like :func:`drill`, but in sessions of any site.
 
     Args:
@@ -108,7 +108,7 @@ def drill_at(
         files: Parameter files that override the scenario ``free_motion``.
         texts: Parameters ``key=value`` that override all files.
     """
-    outcomes: list[Outcome] = []
+    outcomes: list[FaultOutcome] = []
     for master in Master:
         own = [one for one in exercises if one.master is master]
         if own:
@@ -132,18 +132,18 @@ class _Drill:
         self._numbers, self._scheduling = Numbers.of(configuration), Scheduling()
         self._rig: LiveRig | None = None
         self._sessions = 0
-        self._open: dict[Path, list[tuple[int, Outcome]]] = {}
+        self._open: dict[Path, list[tuple[int, FaultOutcome]]] = {}
         self._killed: dict[Path, int] = {}
         self._counted: dict[Path, Counted] = {}
-        self._sessions_of: dict[Path, Session] = {}
+        self._sessions_of: dict[Path, SessionProcesses] = {}
         self.interrupt = Interrupt()
         """Object that ends a wait of this drill with KeyboardInterrupt."""
         self.is_over = False
         """Whether the drill was stopped before its end."""
 
-    def run(self, exercises: Sequence[Exercise]) -> list[Outcome]:
+    def run(self, exercises: Sequence[Exercise]) -> list[FaultOutcome]:
         """Run the exercises, and check the recordings at the end."""
-        outcomes: list[Outcome] = []
+        outcomes: list[FaultOutcome] = []
         try:
             for exercise in exercises:
                 rig = self._prepared()
@@ -236,7 +236,7 @@ class _Drill:
 
     # -- one exercise ----------------------------------------------------------------------------
 
-    def _judged(self, exercise: Exercise, rig: LiveRig) -> Outcome:
+    def _judged(self, exercise: Exercise, rig: LiveRig) -> FaultOutcome:
         """Outcome of an exercise, which is repeated once if it failed while the machine itself stood still."""
         outcome = self._repeated(exercise, rig)
         for _ in range(_MORE):
@@ -252,7 +252,7 @@ class _Drill:
             outcome = self._repeated(exercise, rig)
         return outcome
 
-    def _repeated(self, exercise: Exercise, rig: LiveRig) -> Outcome:
+    def _repeated(self, exercise: Exercise, rig: LiveRig) -> FaultOutcome:
         """Repeat an exercise until the first failure; returns the worst outcome with the medians of all repetitions."""
         found = [self._once(exercise, rig)]
         while len(found) < exercise.repeats and not found[-1].failures():
@@ -270,12 +270,12 @@ class _Drill:
         worst.extra["repeats"] = len(found)
         return worst
 
-    def _once(self, exercise: Exercise, rig: LiveRig) -> Outcome:
+    def _once(self, exercise: Exercise, rig: LiveRig) -> FaultOutcome:
         if exercise.warns:
             rig.await_calm(1.2 * WARNED)
         rig.wait(_BEFORE)
         rig.tap.clear()
-        outcome = Outcome(exercise=exercise, load=rig.site.load())
+        outcome = FaultOutcome(exercise=exercise, load=rig.site.load())
         self._open.setdefault(rig.session.recordings[-1], []).append((rig.now_ns(), outcome))
         before = rig.operation()
         rig.mark()
@@ -310,7 +310,7 @@ def _who(master: Master) -> str:
     return "the simulated device" if master is Master.DEVICE else "the drill"
 
 
-def _line(outcome: Outcome) -> str:
+def _line(outcome: FaultOutcome) -> str:
     failures = outcome.failures()
     mark = "✗" if failures else "✓"
     note = f" ({outcome.note})" if math.isnan(outcome.recovered) else ""

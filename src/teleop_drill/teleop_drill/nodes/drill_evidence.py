@@ -1,11 +1,12 @@
 """Evidence of a drill: the reports of a session about a fault, the messages of the tap, and the recovery."""
 
 from teleop_core.graph import topics
-from teleop_core.slave.operation import Fault, State
+from teleop_core.graph.operation import State
+from teleop_core.slave.operation import Fault
 from teleop_drill.drill.exercise import Cure, Exercise
-from teleop_drill.drill.judging import Seen
+from teleop_drill.drill.judging import Tapped
 from teleop_drill.drill.numbers import Scheduling
-from teleop_drill.drill.outcome import Outcome
+from teleop_drill.drill.outcome import FaultOutcome
 from teleop_drill.nodes.drill_rig import LiveRig
 
 _PATIENCE = 1.0  # waiting time for an arm that resumes by itself [s]
@@ -13,7 +14,7 @@ _LONGEST = 60.0  # longest time until an arm follows again [s]
 _STRENGTH = (Cure.NOTHING, Cure.RESUME, Cure.RESET, Cure.RESTART)
 
 
-def note_state(outcome: Outcome, rig: LiveRig, before: dict[str, float]) -> None:
+def note_state(outcome: FaultOutcome, rig: LiveRig, before: dict[str, float]) -> None:
     """Store in the outcome the state that followed, and the node that reported it first."""
     begin_ns = rig.begin_ns
     told: list[tuple[int, str]] = []
@@ -37,7 +38,7 @@ def note_state(outcome: Outcome, rig: LiveRig, before: dict[str, float]) -> None
         outcome.state, outcome.is_braked = State(int(operation["state"])), bool(operation["is_braked"])
 
 
-def seen_of(outcome: Outcome, rig: LiveRig, time_ns: tuple[int, int], scheduling: Scheduling) -> Seen:
+def seen_of(outcome: FaultOutcome, rig: LiveRig, time_ns: tuple[int, int], scheduling: Scheduling) -> Tapped:
     """Return the messages that the tap received during a fault, and the slave's own reports.
 
     Args:
@@ -53,7 +54,7 @@ def seen_of(outcome: Outcome, rig: LiveRig, time_ns: tuple[int, int], scheduling
     tip = true_cp if len(true_cp) else measured_cp  # only a simulator publishes the true pose
     told_ns = None if outcome.told is None else begin_ns + round(1e9 * outcome.told)
     warned = [ns for ns in rig.warned.values() if ns >= begin_ns]
-    return Seen(
+    return Tapped(
         begin_ns, end_ns, setpoints, joints, tip, told_ns, min(warned, default=None),
         rig.tap.scheduling(begin_ns).beside(scheduling), max(0.0, 1e-9 * (rig.woken_ns - begin_ns)),
     )  # fmt: skip
@@ -69,7 +70,7 @@ def _is_expected(report: dict[str, float], exercise: Exercise) -> bool:
     return is_fault and State(int(report["state"])) in exercise.states
 
 
-def recover(outcome: Outcome, rig: LiveRig) -> None:
+def recover(outcome: FaultOutcome, rig: LiveRig) -> None:
     """Wait until the arm follows again, and send more and more of the commands that it may need."""
     begin, used = rig.now(), Cure.NOTHING
     while (elapsed := rig.now() - begin) < _LONGEST:

@@ -12,23 +12,22 @@ from std_msgs.msg import Bool
 from std_srvs.srv import Trigger
 
 from teleop_core.bags.messages import layout
-from teleop_core.graph.layers import SESSION
+from teleop_core.graph.operation import State
 from teleop_core.graph.topics import SLAVE_MEASURED_JS, SLAVE_OPERATION, SLAVE_SETPOINT_JS, TELEOP_STATE, Topic
 from teleop_core.kernels.geometry import Array
 from teleop_core.middleware.ros_parameters import to_message
 from teleop_core.middleware.world import Qos
 from teleop_core.nodes.guest import Guest
-from teleop_core.nodes.observer import WARNING, Observer
+from teleop_core.nodes.observer import WARNING, ReportReader
 from teleop_core.nodes.operation import RELEASE, STOP_TOPIC
 from teleop_core.nodes.streams import message_type, profile
 from teleop_core.robots.robot import Robot
 from teleop_core.session.configuration import Configuration
-from teleop_core.slave.operation import State
 from teleop_core.slave.operation.states import COMMANDS
 from teleop_drill.drill import measure
 from teleop_drill.drill.exercise import Master
 from teleop_drill.drill.hand import Distortion
-from teleop_drill.nodes.drill_site import Session, Site
+from teleop_drill.nodes.drill_site import SessionProcesses, Site
 from teleop_drill.nodes.drill_tap import Tap
 
 _NUMBERS = re.compile(r"[-+]?[0-9][0-9.e]*")
@@ -57,8 +56,8 @@ class LiveRig:
         self._world, domain = world, site.domain
         self._speed_limit = np.array(robot.drives.speed_limit)
         self._control = site.control
-        self.observer = Observer(domain, world=world)
-        self.session: Session = site.session(self.observer)
+        self.observer = ReportReader(domain, world=world)
+        self.session: SessionProcesses = site.session(self.observer)
         self._node, self._own = Guest("drill", domain, world), Guest("drill_hand", domain, world)
         self._executor = self._node.world.executor()
         self._executor.add_node(self._node.ros)
@@ -79,7 +78,7 @@ class LiveRig:
         self.begin_ns, self.warned, self.said = 0, dict[str, int](), ""
         self.woken_ns, self._warned_before = 0, dict[str, str]()
         self.tap = Tap(
-            self._own, robot.joint_names, configuration.groups[SESSION].real_time, has_hand=site.master is Master.DRILL
+            self._own, robot.joint_names, configuration.session.real_time, has_hand=site.master is Master.DRILL
         )
 
     def close(self) -> None:

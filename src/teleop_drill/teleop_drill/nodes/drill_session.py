@@ -21,7 +21,7 @@ from teleop_core.middleware.world import World
 from teleop_core.nodes.children import Child, end_all, environment, free_domain
 from teleop_core.nodes.interrupt import Interrupt
 from teleop_core.nodes.live import session_parameters
-from teleop_core.nodes.observer import Observer
+from teleop_core.nodes.observer import ReportReader
 from teleop_core.nodes.start import SESSION as SESSION_NODE
 from teleop_core.nodes.starter import START_TIMEOUT, Starter
 from teleop_core.session.configuration import Configuration
@@ -58,7 +58,7 @@ class DrillSession:
     """
 
     def __init__(
-        self, configuration: Configuration, folder: Path, env: dict[str, str], observer: Observer,
+        self, configuration: Configuration, folder: Path, env: dict[str, str], observer: ReportReader,
         *, is_composed: bool, master: Master, foreign: Mapping[str, Sequence[str]],
         interrupt: Interrupt,
     ) -> None:  # fmt: skip
@@ -267,7 +267,7 @@ class LiveSite:
         """Load of the machine, divided by the number of processors."""
         return os.getloadavg()[0] / (os.cpu_count() or 1)
 
-    def session(self, observer: Observer) -> DrillSession:
+    def session(self, observer: ReportReader) -> DrillSession:
         """Return the processes of a session; the observer receives their reports."""
         return DrillSession(
             self._configuration,

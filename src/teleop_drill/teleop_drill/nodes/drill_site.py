@@ -5,12 +5,12 @@ from typing import Protocol
 
 from teleop_core.middleware.world import World
 from teleop_core.nodes.interrupt import Interrupt
-from teleop_core.nodes.observer import Observer
+from teleop_core.nodes.observer import ReportReader
 from teleop_drill.drill import inside
 from teleop_drill.drill.exercise import Master
 
 
-class Session(Protocol):
+class SessionProcesses(Protocol):
     """Processes of a session, which a drill starts, breaks and ends.
 
     Attributes:
@@ -85,7 +85,7 @@ class Site(Protocol):
     control: Steering
     interrupt: Interrupt
 
-    def session(self, observer: Observer) -> Session:
+    def session(self, observer: ReportReader) -> SessionProcesses:
         """Return the processes of a session; the observer receives their reports."""
 
     def load(self) -> float:

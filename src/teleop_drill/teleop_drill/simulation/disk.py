@@ -6,7 +6,7 @@ from collections import deque
 from collections.abc import Callable
 from typing import Any, BinaryIO
 
-from teleop_core.bags.background import SYSTEM
+from teleop_core.base.background import SYSTEM
 from teleop_drill.simulation.machine import Process
 from teleop_drill.simulation.scheduler import Strand
 
@@ -15,7 +15,7 @@ _BYTE_NS = 2
 
 
 class Jobs:
-    """Simulated form of :class:`~teleop_core.bags.background.Jobs`."""
+    """Simulated form of :class:`~teleop_core.base.background.Jobs`."""
 
     def __init__(self, process: Process, size: int) -> None:
         self._scheduler, self._size = process.machine.scheduler, size
@@ -52,7 +52,7 @@ class Jobs:
 
 
 class Disk:
-    """Simulated form of :class:`~teleop_core.bags.background.Background` in one process.
+    """Simulated form of :class:`~teleop_core.base.background.Background` in one process.
 
     Args:
         process: Process that writes.

@@ -8,11 +8,11 @@ from teleop_core.graph.graph import RECORDER_NAME
 from teleop_core.middleware.world import World
 from teleop_core.nodes.crews import Processes, crews
 from teleop_core.nodes.interrupt import Interrupt
-from teleop_core.nodes.observer import Observer
+from teleop_core.nodes.observer import ReportReader
 from teleop_core.nodes.start import SESSION
 from teleop_core.session.configuration import Configuration
 from teleop_drill.drill.exercise import Exercise, Master
-from teleop_drill.drill.outcome import Outcome
+from teleop_drill.drill.outcome import FaultOutcome
 from teleop_drill.nodes.drill import Say, drill_at
 from teleop_drill.nodes.drill_site import Site, Steering
 from teleop_drill.simulation.bus import Bus
@@ -57,7 +57,7 @@ class SimulatedSite:
         """Load of the machine by other programs, which is always zero."""
         return 0.0
 
-    def session(self, observer: Observer) -> SimulatedSession:
+    def session(self, observer: ReportReader) -> SimulatedSession:
         """Return the processes of a session; the observer receives their topics."""
         graph = self._configuration.graph
         shared = {n: nodes for crew in crews(graph, self._processes) for n, nodes in crew.items()}
@@ -81,7 +81,7 @@ def simulated_drill(
     texts: Sequence[str] = (),
     drives: Work | None = None,
     arm: Work | None = None,
-) -> list[Outcome]:
+) -> list[FaultOutcome]:
     """Run exercises on a simulated machine.
 
     Args:
@@ -112,7 +112,7 @@ def simulated_drill(
     machine = Machine(Scheduler(seed))
     bus = Bus(machine.scheduler)
 
-    def work(owner: Process) -> list[Outcome]:
+    def work(owner: Process) -> list[FaultOutcome]:
         bus.watch(owner)
 
         def site(master: Master, made: Configuration, place: Path, interrupt: Interrupt) -> Site:
@@ -122,5 +122,5 @@ def simulated_drill(
         with SimulatedSteering.installed(machine):
             return drill_at(site, own, folder, say, files, given)
 
-    found: list[Outcome] = machine.run(work)
+    found: list[FaultOutcome] = machine.run(work)
     return found

@@ -12,16 +12,16 @@ import numpy as np
 
 from teleop_core.bags.messages import layout
 from teleop_core.bags.reader import Bag, recover
+from teleop_core.graph.operation import State
 from teleop_core.graph.signals import DT
 from teleop_core.graph.topics import NO_COMMAND_NS, SLAVE_SETPOINT_JS
 from teleop_core.kernels.geometry import Array
 from teleop_core.middleware.world import Taken
 from teleop_core.slave.commands import CommandStatus
-from teleop_core.slave.operation import State
 from teleop_drill.drill.numbers import Numbers
+from teleop_drill.simulation.drilled_session import DrilledSession
 from teleop_drill.simulation.machine import Process
 from teleop_drill.simulation.owner import Owner
-from teleop_drill.simulation.stage import Stage
 
 _LOOK_NS = 5_000_000
 _BAD = ("error", "fatal")
@@ -95,7 +95,7 @@ class Laws:
         under: Number of checks of each law by present fault and state of the arm.
     """
 
-    def __init__(self, stage: Stage, numbers: Numbers) -> None:
+    def __init__(self, stage: DrilledSession, numbers: Numbers) -> None:
         self._stage, self._numbers = stage, numbers
         self._scheduler = stage.machine.scheduler
         self._form = layout(SLAVE_SETPOINT_JS, stage.robot.joint_names)

@@ -11,7 +11,7 @@ from rcl_interfaces.srv import DescribeParameters, GetParameters, ListParameters
 
 from teleop_core.base.parameters import Spec, Value
 from teleop_core.middleware.ros_parameters import descriptor, from_message, to_message
-from teleop_core.middleware.world import Hooks, Outcome, Qos
+from teleop_core.middleware.world import Hooks, Qos, TransitionResult
 from teleop_drill.simulation.bus import Bus
 from teleop_drill.simulation.ends import Writer
 from teleop_drill.simulation.machine import Process
@@ -87,21 +87,21 @@ class SimulatedLifecycleNode(SimulatedNode):
         """Show values that the node has changed by itself."""
         self._values |= values
 
-    def trigger(self, transition: str) -> Outcome:
+    def trigger(self, transition: str) -> TransitionResult:
         """Execute a transition."""
         goal = _STATES.get((self.state, transition))
         if goal is None:
             self._hooks.on_no_transition(transition)
-            return Outcome.ERROR
+            return TransitionResult.ERROR
         if transition == "activate":
             self._open(is_active=True)
-        found: Outcome = getattr(self._hooks, f"on_{transition}")()
+        found: TransitionResult = getattr(self._hooks, f"on_{transition}")()
         if transition in {"deactivate", "shutdown"}:
             self._open(is_active=False)
-        if found is Outcome.SUCCESS:
+        if found is TransitionResult.SUCCESS:
             self.state = goal
-        elif found is Outcome.ERROR:
-            is_mended = self._hooks.on_error() is Outcome.SUCCESS
+        elif found is TransitionResult.ERROR:
+            is_mended = self._hooks.on_error() is TransitionResult.SUCCESS
             self.state = "unconfigured" if is_mended else "finalized"
         return found
 
@@ -151,7 +151,7 @@ class SimulatedLifecycleNode(SimulatedNode):
             self._hooks.on_no_transition(word or str(request.transition.id))
             response.success = False
         else:
-            response.success = self.trigger(word) is Outcome.SUCCESS
+            response.success = self.trigger(word) is TransitionResult.SUCCESS
         return response
 
     def _get(self, request: Any, response: Any) -> Any:

@@ -82,8 +82,8 @@ class Timer:
             self._callback()
 
 
-class Guard:
-    """Simulated form of :class:`~teleop_core.middleware.world.Guard`."""
+class GuardCondition:
+    """Simulated form of :class:`~teleop_core.middleware.world.GuardCondition`."""
 
     def __init__(self, node: "SimulatedNode", callback: Callable[[], None]) -> None:
         self._node, self._callback, self._is_due = node, callback, False
@@ -101,11 +101,11 @@ class Guard:
             self._callback()
 
 
-class Answer:
+class FutureAnswer:
     """Future answer of a service, with the methods of a future that callers use."""
 
     def __init__(self) -> None:
-        self._told: list[Callable[[Answer], None]] = []
+        self._told: list[Callable[[FutureAnswer], None]] = []
         self._value: Any = None
         self._is_done = False
 
@@ -117,7 +117,7 @@ class Answer:
         """Return the answer."""
         return self._value
 
-    def add_done_callback(self, told: Callable[["Answer"], None]) -> None:
+    def add_done_callback(self, told: Callable[["FutureAnswer"], None]) -> None:
         """Call a function when the answer has arrived."""
         self._told.append(told)
 
@@ -151,9 +151,9 @@ class Client:
             scheduler.sleep(0.01)
         return True
 
-    def call_async(self, request: Any) -> Answer:
+    def call_async(self, request: Any) -> FutureAnswer:
         """Send a request, and return the future answer."""
-        answer, bus, own = Answer(), self._node.bus, self._node.process
+        answer, bus, own = FutureAnswer(), self._node.bus, self._node.process
         service = bus.services.get(self.srv_name)
         if service is None:
             return answer
@@ -269,9 +269,9 @@ class SimulatedNode:
         """Create a timer that calls a function with a period [s]."""
         return Timer(self, period, callback)
 
-    def create_guard_condition(self, callback: Callable[[], None]) -> Guard:
+    def create_guard_condition(self, callback: Callable[[], None]) -> GuardCondition:
         """Create a guard condition that calls a function when it is triggered."""
-        return Guard(self, callback)
+        return GuardCondition(self, callback)
 
     def destroy(self, entity: Any) -> None:
         """Remove an object that one of these methods has created."""
@@ -285,7 +285,7 @@ class SimulatedNode:
             entity.is_open = False
             for name in [n for n, one in self.bus.services.items() if one is entity]:
                 del self.bus.services[name]
-        elif isinstance(entity, Guard):
+        elif isinstance(entity, GuardCondition):
             entity.is_open = False
 
     def post(self, work: Callable[[], object]) -> None:

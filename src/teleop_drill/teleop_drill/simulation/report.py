@@ -3,12 +3,12 @@
 from collections import Counter
 from dataclasses import dataclass, field
 
+from teleop_core.graph.operation import State
 from teleop_core.nodes.crews import Processes
-from teleop_core.slave.operation import State
+from teleop_drill.simulation.drilled_session import NO_STATE
 from teleop_drill.simulation.laws import LAWS
 from teleop_drill.simulation.schedules import KINDS
 from teleop_drill.simulation.seeds import Found
-from teleop_drill.simulation.stage import NO_STATE
 
 
 @dataclass

@@ -11,7 +11,7 @@ from teleop_core.bags.messages import layout
 from teleop_core.graph.topics import MASTER_BUTTONS, SLAVE_SERVO_JP
 from teleop_core.slave.operation.states import COMMANDS
 from teleop_drill.simulation.bus import Line
-from teleop_drill.simulation.stage import Stage
+from teleop_drill.simulation.drilled_session import DrilledSession
 
 BEGIN = 1.0
 """Earliest time in a session at which a fault begins [s]."""
@@ -50,7 +50,7 @@ class Fault:
         return f"at {self.at:.3f} s {self.kind}{where} for {self.seconds:.3f} s ({self.amount:.2f})"
 
 
-Act = Callable[[Stage, Fault], Callable[[], None] | None]
+Act = Callable[[DrilledSession, Fault], Callable[[], None] | None]
 """Function that begins a fault; it returns a function that ends the fault, or None."""
 
 
@@ -84,39 +84,39 @@ def _led(lead: str, at: float, processes: tuple[str, ...]) -> list[Fault]:
     return [Fault(at, lead, where, 1.0, 0.5)] if lead else []
 
 
-def _stop(stage: Stage, fault: Fault) -> Callable[[], None]:
+def _stop(stage: DrilledSession, fault: Fault) -> Callable[[], None]:
     process = stage.process(fault.where)
     process.stop()
     stage.note_stop(process)
     return process.go_on
 
 
-def _slow(stage: Stage, fault: Fault) -> Callable[[], None]:
+def _slow(stage: DrilledSession, fault: Fault) -> Callable[[], None]:
     """Make each turn of a process longer, up to several ticks."""
     process = stage.process(fault.where)
     process.slow_ns = round(3e6 * fault.amount)
     return lambda: setattr(process, "slow_ns", 0)
 
 
-def _kill(stage: Stage, fault: Fault) -> Callable[[], None]:
+def _kill(stage: DrilledSession, fault: Fault) -> Callable[[], None]:
     stage.kill(fault.where)
     return lambda: stage.restart(fault.where)
 
 
-def _crowd(stage: Stage, fault: Fault) -> Callable[[], None]:
+def _crowd(stage: DrilledSession, fault: Fault) -> Callable[[], None]:
     costs = stage.machine.scheduler.costs
     costs.crowd_ns = 1e7 * fault.amount
     return lambda: setattr(costs, "crowd_ns", 0.0)
 
 
-def _hiccups(stage: Stage, fault: Fault) -> Callable[[], None]:
+def _hiccups(stage: DrilledSession, fault: Fault) -> Callable[[], None]:
     costs, before = stage.machine.scheduler.costs, stage.machine.scheduler.costs.hiccups
     costs.hiccups = 0.1 * fault.amount
     return lambda: setattr(costs, "hiccups", before)
 
 
 def _line(make: Callable[[float], Line]) -> Act:
-    def act(stage: Stage, fault: Fault) -> Callable[[], None]:
+    def act(stage: DrilledSession, fault: Fault) -> Callable[[], None]:
         keys = ((fault.where, "*"), ("*", fault.where))
         for key in keys:
             stage.bus.lines[key] = make(fault.amount)
@@ -130,7 +130,7 @@ def _line(make: Callable[[float], Line]) -> Act:
     return act
 
 
-def _clock(stage: Stage, fault: Fault) -> Callable[[], None]:
+def _clock(stage: DrilledSession, fault: Fault) -> Callable[[], None]:
     least, most = _CLOCK_NS
     offset_ns = round(least * (most / least) ** fault.amount)
     clock = stage.machine.clock
@@ -138,12 +138,12 @@ def _clock(stage: Stage, fault: Fault) -> Callable[[], None]:
     return lambda: setattr(clock, "offset_ns", 0)
 
 
-def _drift(stage: Stage, fault: Fault) -> Callable[[], None]:
+def _drift(stage: DrilledSession, fault: Fault) -> Callable[[], None]:
     stage.machine.clock.drift = 1e-3 * (fault.amount - 0.5)
     return lambda: setattr(stage.machine.clock, "drift", 0.0)
 
 
-def _disk(stage: Stage, fault: Fault) -> Callable[[], None]:
+def _disk(stage: DrilledSession, fault: Fault) -> Callable[[], None]:
     process = stage.process("recorder")
     process.disk_delay = 0.2 * fault.amount
     return lambda: setattr(process, "disk_delay", 0.0)
@@ -153,17 +153,17 @@ def _failing_disk(error: int) -> Act:
     return lambda stage, _: stage.fail_disk(error)
 
 
-def _press(stage: Stage, fault: Fault) -> Callable[[], None]:
+def _press(stage: DrilledSession, fault: Fault) -> Callable[[], None]:
     button = int(1e6 * fault.amount) % 2
     stage.press(button, is_pressed=True)
     return lambda: stage.press(button, is_pressed=False)
 
 
-def _command(stage: Stage, fault: Fault) -> None:
+def _command(stage: DrilledSession, fault: Fault) -> None:
     stage.command(_NAMES[int(fault.amount * len(_NAMES)) % len(_NAMES)])
 
 
-def _drive(stage: Stage, fault: Fault) -> Callable[[], None]:
+def _drive(stage: DrilledSession, fault: Fault) -> Callable[[], None]:
     """Drive the joints as a CRTK client does, far beyond their speed limits.
 
     While the hand's commands arrive, the arm refuses commands of others. So this fault first stops the hand's commands.
@@ -182,7 +182,7 @@ def _drive(stage: Stage, fault: Fault) -> Callable[[], None]:
     return give_back
 
 
-def _intrude(stage: Stage, fault: Fault) -> Callable[[], None]:
+def _intrude(stage: DrilledSession, fault: Fault) -> Callable[[], None]:
     """Publish joint commands near the present ones, as a second publisher of the same topic."""
     form, drives = layout(SLAVE_SERVO_JP, stage.robot.joint_names), stage.robot.drives
     assert drives is not None
@@ -195,13 +195,13 @@ def _intrude(stage: Stage, fault: Fault) -> Callable[[], None]:
     return stage.every(0.002, send)
 
 
-def _garbage(stage: Stage, fault: Fault) -> Callable[[], None]:
+def _garbage(stage: DrilledSession, fault: Fault) -> Callable[[], None]:
     """Send bytes that are not a valid message."""
     data = bytes(int(255 * fault.amount) ^ k & 255 for k in range(int(200 * fault.amount)))
     return stage.every(0.001, lambda: stage.publish(SLAVE_SERVO_JP, data))
 
 
-def _clutch(stage: Stage, fault: Fault) -> Callable[[], None]:
+def _clutch(stage: DrilledSession, fault: Fault) -> Callable[[], None]:
     """Press the buttons of the stylus as a second publisher does."""
     form = layout(MASTER_BUTTONS, ())
     pressed = np.array([1.0, float(fault.amount > 0.5), 0.0])

@@ -11,18 +11,18 @@ from pathlib import Path
 
 from teleop_core.base.workers import workers
 from teleop_core.graph.graph import RECORDER_NAME
+from teleop_core.graph.operation import State
 from teleop_core.nodes.crews import Processes
 from teleop_core.nodes.start import SESSION
 from teleop_core.session import api
-from teleop_core.slave.operation import State
 from teleop_drill.drill import hand
 from teleop_drill.drill.numbers import Numbers
 from teleop_drill.simulation.bus import Bus
+from teleop_drill.simulation.drilled_session import DrilledSession
 from teleop_drill.simulation.laws import Broken, Laws
 from teleop_drill.simulation.machine import Machine, Process
 from teleop_drill.simulation.scheduler import BEGIN_NS, Scheduler
 from teleop_drill.simulation.schedules import KINDS, Fault, draw
-from teleop_drill.simulation.stage import Stage
 
 PROCESSES = {Processes.SIDES: ("hand_side", "slave_side", RECORDER_NAME), Processes.ONE: (SESSION, RECORDER_NAME)}
 """Processes that a schedule may affect, by the distribution of the nodes."""
@@ -107,7 +107,7 @@ class _Run:
         made = api.configuration("free_motion", texts=(*_CIRCLE, "real_time.priority=20"))
         numbers = Numbers.of(made)
         self._found, self._scheduler = found, owner.machine.scheduler
-        self._stage = Stage(bus, owner, made, numbers.robot, folder, found.processes)
+        self._stage = DrilledSession(bus, owner, made, numbers.robot, folder, found.processes)
         self._laws = Laws(self._stage, numbers)
         self._ends: list[Callable[[], None]] = []
 

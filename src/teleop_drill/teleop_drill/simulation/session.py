@@ -11,7 +11,7 @@ from teleop_core.graph.stage import STAGES
 from teleop_core.nodes.base import CoreNode
 from teleop_core.nodes.live import session_parameters
 from teleop_core.nodes.making import make_node
-from teleop_core.nodes.observer import Observer
+from teleop_core.nodes.observer import ReportReader
 from teleop_core.nodes.process import serve
 from teleop_core.nodes.start import SESSION
 from teleop_core.nodes.teleop_session import TeleopSession
@@ -36,7 +36,7 @@ Processes = Mapping[str, tuple[str, ...]]
 
 
 class SimulatedSession:
-    """Simulated form of :class:`~teleop_drill.nodes.drill_site.Session`.
+    """Simulated form of :class:`~teleop_drill.nodes.drill_site.SessionProcesses`.
 
     Args:
         bus: The middleware.
@@ -52,7 +52,7 @@ class SimulatedSession:
 
     def __init__(
         self, bus: Bus, owner: Process, configuration: Configuration, processes: Processes,
-        folder: Path, observer: Observer, master: Master, foreign: Mapping[str, Work] | None = None,
+        folder: Path, observer: ReportReader, master: Master, foreign: Mapping[str, Work] | None = None,
     ) -> None:  # fmt: skip
         self._bus, self._machine, self._configuration = bus, owner.machine, configuration
         self._folder, self.observer, self._master = folder, observer, master

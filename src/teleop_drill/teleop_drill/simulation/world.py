@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from teleop_core.bags.background import Background
+from teleop_core.base.background import Background
 from teleop_core.graph.layers import RealTimeParameters
 from teleop_core.middleware.world import Hooks
 from teleop_drill.simulation.bus import Bus

@@ -97,7 +97,7 @@ def _write(outcomes: "list[Outcome]", json_file: Path | None, html_file: Path | 
         write_whole(json_file, text + "\n")
         written.append(f"numbers: {json_file}")
     if html_file is not None:
-        from teleop_lab.experiments.page import experiments_page
+        from teleop_lab.experiments.results_page import experiments_page
 
         write_whole(html_file, experiments_page(outcomes))
         written.append(f"page: {html_file}")

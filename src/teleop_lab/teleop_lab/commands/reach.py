@@ -50,7 +50,7 @@ def reach(
     found = [_reach(source, arm, share, keep_axes, settings) for source in sources]
     print("\n\n".join(map(str, found)))
     if html is not None:
-        from teleop_lab.planning.page import write_reach_page
+        from teleop_lab.planning.motion_page import write_reach_page
 
         write_reach_page(found, html)
         print(f"page: {html}")

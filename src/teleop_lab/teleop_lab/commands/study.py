@@ -52,7 +52,7 @@ def study(
     """
     from teleop_core.commands.progress import shown_progress
     from teleop_lab.studies import read_study
-    from teleop_lab.studies.page import study_page
+    from teleop_lab.studies.study_page import study_page
     from teleop_lab.studies.summary import study_table
 
     wanted = read_study(file)

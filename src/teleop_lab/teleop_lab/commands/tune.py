@@ -45,7 +45,7 @@ def tune(
         outputs: Files with the trials.
     """
     from teleop_core.commands.progress import shown_progress
-    from teleop_lab.studies.page import tuning_page
+    from teleop_lab.studies.study_page import tuning_page
     from teleop_lab.studies.tuning import read_tuning
 
     tuning = read_tuning(file)

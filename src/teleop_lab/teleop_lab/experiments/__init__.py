@@ -8,7 +8,7 @@
 
 from collections.abc import Callable, Iterable
 
-from teleop_lab.experiments.bench import SEEDS, Bench, Session, mean, pooled
+from teleop_lab.experiments.bench import SEEDS, Bench, ScoredSession, mean, pooled
 from teleop_lab.experiments.comparison import EXACT, Comparison, Findings, Tolerance, absolute, factor, percent
 from teleop_lab.experiments.experiment import EXPERIMENTS, Experiment, register_experiment
 from teleop_lab.experiments.outcome import Outcome
@@ -22,7 +22,7 @@ __all__ = [
     "Experiment",
     "Findings",
     "Outcome",
-    "Session",
+    "ScoredSession",
     "Tolerance",
     "absolute",
     "factor",

@@ -17,6 +17,8 @@ from teleop_core.kernels.geometry import Array
 from teleop_core.session.recording import Recording, Stream
 from teleop_core.session.runner import silent
 from teleop_core.slave.pair import ArmParameters
+from teleop_core.slave.parameters import SlaveParameters
+from teleop_core.slave.slave_sim import SlaveSimParameters
 
 Setting = float | str | bool | tuple[float, ...] | tuple[str, ...]
 Settings = Mapping[str, Setting]
@@ -42,7 +44,7 @@ _OF_SLAVE = ("slave/setpoint_js", "slave/setpoint_cp", "slave/measured_js", "sla
 
 
 @dataclass(frozen=True, eq=False)
-class Session:
+class ScoredSession:
     """Score of one session, and the streams that experiments read.
 
     Attributes:
@@ -117,7 +119,7 @@ class Bench:
             raise ParameterError("seed", seed, "0 or more")
         self.seed, self.progress, self.workers = seed, progress, workers
         self._settings = dict(settings or {})
-        self._known: dict[object, Session] = {}
+        self._known: dict[object, ScoredSession] = {}
         self._streams: dict[object, Mapping[str, Stream]] = {}  # streams of the last sessions
 
     @property
@@ -132,7 +134,7 @@ class Bench:
 
     def session(
         self, scenario: str, seed: int | None = None, settings: Settings | None = None, *, is_scored: bool = True
-    ) -> Session:
+    ) -> ScoredSession:
         """Return a session; it is run unless the bench has run an equal session before.
 
         Args:
@@ -161,7 +163,7 @@ class Bench:
             def judge() -> Score:
                 return score or self._run(scenario, number, given).score()
 
-            self._known[key] = Session(scenario, number, judge, read)
+            self._known[key] = ScoredSession(scenario, number, judge, read)
         return self._known[key]
 
     def _keep(self, key: object, streams: Mapping[str, Stream]) -> None:
@@ -170,7 +172,9 @@ class Bench:
         if len(self._streams) > _WHOLE:
             del self._streams[next(iter(self._streams))]
 
-    def sessions(self, scenario: str, settings: Settings | None = None, *, is_scored: bool = True) -> list[Session]:
+    def sessions(
+        self, scenario: str, settings: Settings | None = None, *, is_scored: bool = True
+    ) -> list[ScoredSession]:
         """Run one session for each of several hands; see :meth:`session`."""
         return [self.session(scenario, seed, settings, is_scored=is_scored) for seed in self.seeds]
 
@@ -184,7 +188,7 @@ class Bench:
 
         given = {"seed": self.seed, **self._settings, **dict(settings or {})}
         made = configuration(settings=given)
-        return ArmParameters.of(made.group("slave"), made.group("slave_sim"))
+        return ArmParameters.of(made.of(SlaveParameters), made.of(SlaveSimParameters))
 
     def signals(
         self, scenario: str, seconds: float, settings: Settings | None = None, motion: Motion | None = None

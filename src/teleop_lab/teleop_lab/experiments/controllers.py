@@ -25,7 +25,7 @@ from teleop_core.evaluation.published import COARSE, FINE
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots import load_robot
 from teleop_lab.experiments import experiment, joint_steps
-from teleop_lab.experiments.bench import Bench, Session, Settings, mean, pooled, rms
+from teleop_lab.experiments.bench import Bench, ScoredSession, Settings, mean, pooled, rms
 from teleop_lab.experiments.comparison import Comparison, Findings, percent
 
 _PLANT: Settings = {"plant": "hardware"}
@@ -73,7 +73,7 @@ class Tracking(NamedTuple):
     chatter: float
 
 
-def tracking_of(session: Session) -> Tracking:
+def tracking_of(session: ScoredSession) -> Tracking:
     """Tracking of a session of the RCRT-1, evaluated from the time at which the slave begins to follow."""
     kept = session.is_followed
     wanted, seen, true = (
@@ -91,7 +91,7 @@ def tracking_of(session: Session) -> Tracking:
     )
 
 
-def _effort_shares(session: Session) -> Array:
+def _effort_shares(session: ScoredSession) -> Array:
     """Efforts (N, n), divided by the limits of the drives."""
     robot = load_robot("rcrt1")
     assert robot.drives is not None
@@ -99,7 +99,7 @@ def _effort_shares(session: Session) -> Array:
     return efforts / robot.drives.effort_limit
 
 
-def compared(bench: Bench, scenario: str, law: str) -> list[Session]:
+def compared(bench: Bench, scenario: str, law: str) -> list[ScoredSession]:
     """Run sessions of several hands with a law of :data:`LAWS` on the hardware plant."""
     return bench.sessions(scenario, {**_PLANT, **LAWS[law]}, is_scored=False)
 
@@ -199,7 +199,7 @@ def _trade_figure(scenario: str, found: Mapping[str, list[Tracking]]) -> Figure:
     return Figure(f"Error and its price, {MODES[scenario].mode}", sentence, traces, layout, 420)
 
 
-def _error_trace(session: Session, law: str, color: str) -> Trace:
+def _error_trace(session: ScoredSession, law: str, color: str) -> Trace:
     kept = session.is_followed
     wanted, seen = (session.places_mm(f"slave/{k}_cp")[kept] for k in ("setpoint", "measured"))
     error = 1e3 * np.linalg.norm(seen - wanted, axis=1)[::_CURVE]

@@ -5,14 +5,14 @@ import numpy as np
 from teleop_core.evaluation.figure import COMMAND, MEASURED, Figure, axis, line, time_axis
 from teleop_core.robots import load_robot
 from teleop_lab.experiments import conditions, experiment, master_slave
-from teleop_lab.experiments.bench import Bench, Session, pooled
+from teleop_lab.experiments.bench import Bench, ScoredSession, pooled
 from teleop_lab.experiments.comparison import Comparison, Findings, percent
 
 _OFF = {"gravity_compensation": "none"}
 _CURVE = 2
 
 
-def _rms(sessions: list[Session]) -> float:
+def _rms(sessions: list[ScoredSession]) -> float:
     return pooled(float(s.score.position_error_mm.rms or 0.0) for s in sessions)
 
 
@@ -77,7 +77,7 @@ def _effort_rows() -> list[Comparison]:
     return rows
 
 
-def _figure(mode: str, on: Session, off: Session) -> Figure:
+def _figure(mode: str, on: ScoredSession, off: ScoredSession) -> Figure:
     traces = []
     for session, name, color in ((off, "without", COMMAND), (on, "with compensation", MEASURED)):
         found = master_slave.drawn_of(session)

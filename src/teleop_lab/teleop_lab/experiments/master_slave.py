@@ -20,7 +20,7 @@ from teleop_core.evaluation.published import ANGLE_FACTOR, BOX_OVERSHOOT_MM, COA
 from teleop_core.kernels.geometry import Array, roll_pitch_yaw, rotations_from_quaternions
 from teleop_core.shapes.basis.drawing import edges_of
 from teleop_lab.experiments import conditions, experiment
-from teleop_lab.experiments.bench import Bench, Session, mean, pooled
+from teleop_lab.experiments.bench import Bench, ScoredSession, mean, pooled
 from teleop_lab.experiments.comparison import Comparison, Findings, Tolerance, absolute, factor, percent
 
 MODES = {"coarse_box": COARSE, "fine_box": FINE}
@@ -53,7 +53,7 @@ class Figures(NamedTuple):
     """RMS of the position error about the mean error [mm]."""
 
 
-def figures_of(session: Session) -> Figures:
+def figures_of(session: ScoredSession) -> Figures:
     """Compute the errors of one session that are compared."""
     score = session.score
     turn = score.orientation_error_deg
@@ -167,7 +167,7 @@ class Drawn(NamedTuple):
     size: Array
 
 
-def drawn_of(session: Session) -> Drawn:
+def drawn_of(session: ScoredSession) -> Drawn:
     """Return the samples of a session from the time at which its box was enabled."""
     state = session["teleop/state"]
     on = int(np.argmax(state["is_fixture_on"] > 0.0))
@@ -188,7 +188,7 @@ def drawn_of(session: Session) -> Drawn:
     )
 
 
-def _figures(name: str, session: Session) -> list[Figure]:
+def _figures(name: str, session: ScoredSession) -> list[Figure]:
     found, mode = drawn_of(session), MODES[name].mode
     return [
         _path_figure(mode, found),
@@ -273,7 +273,7 @@ def _turn_figure(name: str, found: Drawn) -> Figure:
     return Figure(f"Roll, pitch and yaw errors, {printed.mode}", sentence, traces, layout, 440)
 
 
-def _both_boxes(sessions: dict[str, Session]) -> Figure:
+def _both_boxes(sessions: dict[str, ScoredSession]) -> Figure:
     """Plot both boxes around one centre, as the source does in its figure."""
     traces = []
     for name, color in (("coarse_box", COMMAND), ("fine_box", MEASURED)):

@@ -9,10 +9,11 @@ from teleop_core.base.errors import TeleopError
 from teleop_core.coupling.mapping.gains import MotionScalingParameters
 from teleop_core.evaluation.figure import COMMAND, FIRST, MEASURED, Figure, axis, line
 from teleop_core.graph.signals import DT
+from teleop_core.hand.operators.behaviour import OperatorParameters
 from teleop_core.hand.operators.tour import TourParameters
 from teleop_core.kernels.axes import axis_map
 from teleop_core.kernels.geometry import Array
-from teleop_lab.experiments.bench import Bench, Session, Settings, mean
+from teleop_lab.experiments.bench import Bench, ScoredSession, Settings, mean
 from teleop_lab.experiments.comparison import EXACT, Comparison, Findings
 from teleop_lab.experiments.conditions import OURS, PREDICTED
 from teleop_lab.experiments.experiment import Experiment
@@ -47,7 +48,7 @@ class Visits(NamedTuple):
     tracing: Array
 
 
-def visits_of(session: Session, p: TourParameters, center: Array, approach_s: float) -> Visits:
+def visits_of(session: ScoredSession, p: TourParameters, center: Array, approach_s: float) -> Visits:
     """Compute the result of the task in a session.
 
     Args:
@@ -96,7 +97,7 @@ def _visits(bench: Bench, settings: Settings, *, seeing: bool) -> list[Visits]:
     """Results of all hands. A hand that sees repeats the task and corrects the errors of the first run."""
     from teleop_core.session.api import configuration
 
-    made = configuration(SCENARIO).group("operator")
+    made = configuration(SCENARIO).of(OperatorParameters)
     center, p, approach = np.array(made.center), made.kind.parameters, float(made.approach_time)
     first = [visits_of(s, p, center, approach) for s in bench.sessions(SCENARIO, settings)]
     if not seeing:

@@ -9,6 +9,8 @@ from teleop_core.kernels.geometry import Array
 from teleop_core.robots import load_robot
 from teleop_core.session.configuration import configure
 from teleop_core.slave.pair import ArmParameters
+from teleop_core.slave.parameters import SlaveParameters
+from teleop_core.slave.slave_sim import SlaveSimParameters
 from teleop_lab.experiments import conditions, experiment
 from teleop_lab.experiments.bench import Bench, Settings, rms
 from teleop_lab.experiments.comparison import Comparison, Findings, factor, percent
@@ -52,7 +54,7 @@ def simulated_rests(bench: Bench, settings: Settings) -> Rests:
     table = _table()
     pairs = {"robot": "rcrt1", "seed": bench.seed, **settings}
     group = configure(None, settings=[f"{name}={value}" for name, value in pairs.items()])
-    parameters = ArmParameters.of(group.group("slave"), group.group("slave_sim"))
+    parameters = ArmParameters.of(group.of(SlaveParameters), group.of(SlaveSimParameters))
     robot = load_robot("rcrt1")
     inside = np.clip(table.targets, robot.lower, robot.upper)
     rests = rest_positions(parameters, inside, _RUNS)

@@ -8,8 +8,8 @@ from teleop_core.evaluation.figure import COMMAND, FIRST, MEASURED, Figure, axis
 from teleop_core.graph.signals import DT
 from teleop_core.kernels.filters import lag_step
 from teleop_core.kernels.geometry import Array
-from teleop_core.slave.slave import ReferenceFilterParameters
-from teleop_lab.experiments.bench import Bench, Session, Settings
+from teleop_core.slave.parameters import ReferenceFilterParameters
+from teleop_lab.experiments.bench import Bench, ScoredSession, Settings
 from teleop_lab.experiments.comparison import EXACT, Comparison, Findings, absolute, factor
 from teleop_lab.experiments.experiment import Experiment
 
@@ -123,7 +123,7 @@ def _ramp_lag_ms() -> float:
     return ticks - last
 
 
-def _quiet(session: Session, name: str) -> tuple[Array, Array, Array]:
+def _quiet(session: ScoredSession, name: str) -> tuple[Array, Array, Array]:
     """Times [s] and references before and after the filter [rad], while the stylus rests."""
     before, after = session["slave/servo_jp"], session["slave/setpoint_js"]
     start = float(before.time[np.argmax(session.is_followed)]) + _QUIET_S
@@ -131,13 +131,13 @@ def _quiet(session: Session, name: str) -> tuple[Array, Array, Array]:
     return before.time[kept] - start, before[name][kept], after[name][same]
 
 
-def _jitter(session: Session, name: str) -> tuple[float, float]:
+def _jitter(session: ScoredSession, name: str) -> tuple[float, float]:
     """Jitter of a joint's reference before and after the filter [rad], as half of the peak-to-peak value."""
     _, before, after = _quiet(session, name)
     return 0.5 * float(np.ptp(before)), 0.5 * float(np.ptp(after))
 
 
-def _jitter_figure(session: Session) -> Figure:
+def _jitter_figure(session: ScoredSession) -> Figure:
     times, before, after = _quiet(session, "theta5")
     middle = float(before.mean())
     traces = [

@@ -54,7 +54,7 @@ class SampledDevice:
     def __init__(self, grip: one_axis.Grip, wall: Wall, **own: float) -> None:
         self.master = HapticMaster(one_axis.ideal_device(grip, **own))
         self._wall, self._tick = wall, self.master.load()
-        self._most = float(self.master.parameters["peak_force"])
+        self._most = float(self.master.parameters.device.peak_force)
         self._depth, self._push, self._left = np.zeros(3), np.zeros(3), 0
         self._late = deque([0.0] * wall.late)
         self.origin = self._before = self.reading

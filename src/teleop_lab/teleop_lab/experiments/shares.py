@@ -5,16 +5,16 @@ import numpy as np
 from teleop_core.evaluation.figure import FIRST, SECOND, Figure, axis
 from teleop_core.slave.plants.hardware import FAULTS
 from teleop_lab.experiments import conditions, experiment
-from teleop_lab.experiments.bench import Bench, Session, Settings
+from teleop_lab.experiments.bench import Bench, ScoredSession, Settings
 from teleop_lab.experiments.comparison import Comparison, Findings
 
 
-def _without(bench: Bench, *faults: str) -> Session:
+def _without(bench: Bench, *faults: str) -> ScoredSession:
     off: Settings = {"plant.hardware.without": faults}
     return bench.session("coarse_box", settings={**conditions.PREDICTED, **off})
 
 
-def _errors(session: Session) -> tuple[float, float]:
+def _errors(session: ScoredSession) -> tuple[float, float]:
     score = session.score
     return float(score.position_error_mm.rms or 0.0), float(score.true_error_mm.rms or 0.0)
 

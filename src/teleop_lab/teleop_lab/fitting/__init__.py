@@ -11,6 +11,8 @@ from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
 from teleop_core.session.runner import silent
+from teleop_core.slave.parameters import SlaveParameters
+from teleop_core.slave.slave_sim import SlaveSimParameters
 from teleop_lab.fitting.fit import LOSSES, FitError, default_free, fit
 from teleop_lab.fitting.fit_result import FitResult, Fitted
 from teleop_lab.fitting.rest_table import PUBLISHED, RestTable, read_rests
@@ -60,7 +62,7 @@ def fit_plant(
 
     given = [f"robot={robot}", "plant=hardware", "controller=source_pid"]
     made = configure(None, [Path(file) for file in files], [*given, *texts])
-    slave = ArmParameters.of(made.group("slave"), made.group("slave_sim"))
+    slave = ArmParameters.of(made.of(SlaveParameters), made.of(SlaveSimParameters))
     arm = load_robot_set(slave.robot, slave.geometry)
     rests = read_rests(Path(table or PUBLISHED), arm)
     return fit(rests, slave, free, progress, loss=loss)

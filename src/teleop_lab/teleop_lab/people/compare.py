@@ -9,7 +9,7 @@ from teleop_core.evaluation.figure import FIRST, SECOND
 from teleop_lab.people.journal import DONE, Journal
 from teleop_lab.people.plan import Plan
 from teleop_lab.studies.dataset import swept_coordinates, units_of_scores
-from teleop_lab.studies.page import condition_figure, condition_lines
+from teleop_lab.studies.study_page import condition_figure, condition_lines
 from teleop_lab.studies.summary import Mean, apart, conditions, differences, median_of, table_text
 
 if TYPE_CHECKING:

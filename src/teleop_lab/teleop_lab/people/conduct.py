@@ -9,7 +9,7 @@ from teleop_console.server import ConsoleServer
 from teleop_core.base.errors import TeleopError
 from teleop_core.session.recording import open_recording
 from teleop_lab.people.journal import DONE, FAILED, Journal
-from teleop_lab.people.page import PeoplePage
+from teleop_lab.people.people_page import PeoplePage
 from teleop_lab.people.plan import Plan
 
 IF_STOPPED = "The arm is stopped. Call the person who conducts the study."

@@ -6,9 +6,12 @@ from pathlib import Path
 
 from teleop_core.bags import arms, reader
 from teleop_core.base import ParameterError, RecordingError, UnknownNameError
+from teleop_core.coupling.mapping.gains import MotionScalingParameters
+from teleop_core.coupling.mapping.inverse_kinematics import InverseKinematicsParameters
 from teleop_core.graph import Layer, config_folder
 from teleop_core.graph.layers import list_scenarios, load_file, parse_setting, scenario_file, setting
 from teleop_core.session import api, configuration, master_bag, recording, runner
+from teleop_core.slave.parameters import SlaveParameters
 from teleop_lab.planning.aim import Aim
 from teleop_lab.planning.asked import AskedPath, asked_path
 from teleop_lab.planning.placement import Placement
@@ -118,9 +121,9 @@ def _of_scenario(name: str, changes: list[Layer]) -> configuration.Configuration
 def _reach(
     path: AskedPath, made: configuration.Configuration, goal: float, arm: str, progress: Progress, *, keeps_axes: bool
 ) -> Reach:
-    scaling, solving = made.group("motion_scaling", arm), made.group("inverse_kinematics", arm)
+    scaling, solving = made.of(MotionScalingParameters, arm), made.of(InverseKinematicsParameters, arm)
     whole = Walker(path.limited(_WHOLE), scaling, solving)
-    start = made.group("slave", arm).start_of(whole.robot)
+    start = made.of(SlaveParameters, arm).start_of(whole.robot)
     given = Placement.of(scaling, solving, tuple(start))
     done = 0
 

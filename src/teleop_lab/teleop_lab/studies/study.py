@@ -140,7 +140,7 @@ class Study:
         made = api.configuration(self.scenario, settings=given)
         insist_on_scores(made, self.metrics)
         insist_on_reach(made)
-        recipe, length = recipe_of(made), float(made.groups[SESSION].duration)
+        recipe, length = recipe_of(made), float(made.session.duration)
         for seed in self.seeds:
             place = {**chosen, SEED: int(seed)}
             key = point_key(recipe, int(seed), self.metrics, code)

@@ -11,11 +11,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from teleop_core.base import Choice, Within, choice, parameter
+from teleop_core.base import Choice, Within, choice, fill, parameter
 from teleop_core.coupling.filters import LONGEST_NS, MEMORY, TREMOR_FILTERS
 from teleop_core.coupling.mapping import plausibility
 from teleop_core.graph import DT, Row, RunningStage, Stage, assign, topics
-from teleop_core.kernels import Array, Vector3, inner, kernel, record
+from teleop_core.kernels import Array, Fields, Vector3, inner, kernel, record
 
 _FADE = 0.2
 """Time constant with which the step at a change of parameters decays [s]."""
@@ -30,6 +30,12 @@ class TremorFilterParameters:
         0.3, Within(0.002, 5.0, "s"), "after a longer pause of the master the filter restarts at the next reading"
     )
     plausible: plausibility.HandLimits = field(default_factory=plausibility.HandLimits)
+
+
+class FilterRecord(TremorFilterParameters, Fields):
+    """Parameter record of the tremor filter."""
+
+    pause_ns: int
 
 
 class FilterState(plausibility.PlausibilityState):
@@ -107,7 +113,7 @@ def _follow(s: FilterState, part: Part, pose: Array, elapsed_ns: int, filtered: 
 
 
 @kernel
-def tremor_filter_step(p: plausibility.PlausibilityNumbers, s: FilterState, part: Part, row: Row, dt: float) -> None:
+def tremor_filter_step(p: FilterRecord, s: FilterState, part: Part, row: Row, dt: float) -> None:
     """One master sample: write master_filtered_cp and master_filtered_out.
 
     The position is filtered coordinate by coordinate, over the time between stamps; the orientation passes unchanged.
@@ -127,7 +133,7 @@ def tremor_filter_step(p: plausibility.PlausibilityNumbers, s: FilterState, part
     if not _is_finite(pose) or (elapsed_ns == 0 and s.begun > 0):
         return
     goes_on = s.begun > 0 and 0 < elapsed_ns <= p.pause_ns
-    goes_on = plausibility.is_plausible(p, s, pose, row.master_measured_cp_ns) and goes_on
+    goes_on = plausibility.is_plausible(p.plausible, p.pause_ns, s, pose, row.master_measured_cp_ns) and goes_on
     for i in range(3, 7):
         filtered[i] = pose[i]
     if goes_on:
@@ -144,7 +150,7 @@ class RunningTremorFilter(RunningStage):
 
     def __init__(self, parameters: TremorFilterParameters, dt: float = DT) -> None:
         super().__init__(TREMOR_FILTER, 0, dt)
-        self.parameters, self.state = record(plausibility.PlausibilityNumbers), record(FilterState)
+        self.parameters, self.state = record(FilterRecord), record(FilterState)
         self.kernel = tremor_filter_step
         self._part = Part(None, np.empty(0), np.zeros((3, MEMORY)))
         self._begin = self.signals.copy()
@@ -160,8 +166,8 @@ class RunningTremorFilter(RunningStage):
 
     def retune(self, parameters: TremorFilterParameters) -> None:
         """Take new parameters from the next sample on; the output does not jump, because the difference fades."""
-        plausibility.take_hand(self.parameters, parameters.plausible)
-        self.parameters["pause_ns"] = math.floor(parameters.longest_pause * 1e9 + 0.5)
+        fill(self.parameters, parameters)
+        self.parameters.pause_ns = round(parameters.longest_pause * 1e9)
         kind = TREMOR_FILTERS.find(parameters.kind.kind)
         numbers, step = kind.numbers(parameters.kind.parameters), kind.filter_pointer
         if step is self._part.filter and len(numbers) == len(self._part.numbers):

@@ -10,7 +10,7 @@ from teleop_core.graph import Row, topics
 from teleop_core.kernels import Fields, inner
 
 
-class FollowingNumbers(Fields):
+class FollowingRecord(Fields):
     """Fields of a parameter record with waiting times."""
 
     timeout_ns: int
@@ -52,19 +52,19 @@ def hear(s: FollowingState, row: Row) -> None:
 
 
 @inner
-def is_felt(p: FollowingNumbers, s: FollowingState, row: Row) -> bool:
+def is_felt(p: FollowingRecord, s: FollowingState, row: Row) -> bool:
     """Whether a force of the slave arrived recently; a constant force is sent rarely."""
     return bool(row.master_measured_cp_ns - s.felt_at_ns <= p.timeout_ns + topics.SELDOM_NS)
 
 
 @inner
-def is_seen(p: FollowingNumbers, s: FollowingState, row: Row) -> bool:
+def is_seen(p: FollowingRecord, s: FollowingState, row: Row) -> bool:
     """Whether a measured pose of the slave arrived recently."""
     return bool(row.master_measured_cp_ns - s.seen_at_ns <= p.timeout_ns)
 
 
 @inner
-def follows(p: FollowingNumbers, s: FollowingState, row: Row) -> bool:
+def follows(p: FollowingRecord, s: FollowingState, row: Row) -> bool:
     """Whether the slave follows the last command, or continues to report newer commands.
 
     After a pause of the master the slave does not follow.
@@ -76,7 +76,7 @@ def follows(p: FollowingNumbers, s: FollowingState, row: Row) -> bool:
 
 
 @inner
-def is_in_doubt(p: FollowingNumbers, s: FollowingState, is_following: bool, row: Row) -> bool:
+def is_in_doubt(p: FollowingRecord, s: FollowingState, is_following: bool, row: Row) -> bool:
     """Whether the position of a slave that does not follow is unknown, because its values are delayed or missing."""
     now_ns = row.master_measured_cp_ns
     if is_following:

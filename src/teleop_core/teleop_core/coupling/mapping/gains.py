@@ -22,7 +22,7 @@ MODES = ("coarse", "fine")
 
 
 @dataclass(frozen=True, kw_only=True)
-class FixtureParameters:
+class FixtureParameters(walls.WallParameters):
     """The fixture that a press of the fixture button puts around the hand."""
 
     kind: Choice = choice(SHAPES, "box", doc="shape of the fixture")
@@ -38,32 +38,6 @@ class FixtureParameters:
         choices=SIDES,
         doc="hand: the fixture pushes the hand, and the slave follows the hand; slave: the fixture "
         "bounds the slave's command, and the hand feels nothing; both: it does both",
-    )
-    wall: str = parameter(
-        "damped",
-        choices=tuple(walls.WALLS),
-        doc="damped: spring and damper up to max_force, passive up to some 1000 N/m; hard: the "
-        "stiffest spring that sampling allows; source: the published spring, at full force after "
-        "1 mm; soft: a spring only; step: max_force at once, which vibrates",
-    )
-    stiffness: float = parameter(
-        1000.0,
-        Within(1.0, 5000.0, "N/m"),
-        "stiffness of the damped and the soft wall",
-        source="assumed: less than the smallest stiffness of the device, 1020 N/m; the source states no value",
-    )
-    damping: float = parameter(
-        10.0,
-        Within(0.0, 50.0, "N·s/m"),
-        "damping of the damped and the hard wall; a value below stiffness times tick is raised to it",
-        source="assumed: keeps slow contacts of a trembling hand passive too; twenty times K T / 2 of "
-        "1000 N/m at 1 kHz (Colgate and Schenkel 1997)",
-    )
-    max_force: float = parameter(
-        3.3,
-        Within(0.0, 10.0, "N"),
-        "largest force on the hand; the device may limit it further",
-        source="published: Vongbunyong 2008, section 6.3, the peak force of the device",
     )
 
     @property

@@ -2,16 +2,17 @@
 
 import math
 from dataclasses import dataclass
-from typing import Annotated, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from teleop_core.base import Within, parameter
+from teleop_core.base import Within, fill, parameter
 from teleop_core.graph import DT, Row, RunningStage, Stage, assign, copy, topics
 from teleop_core.kernels import Array, Fields, PerJoint, inner, kernel, record
 from teleop_core.kernels.geometry import rotation_vector_between, transform_from_pose
 from teleop_core.kinematics import IkStatus
 from teleop_core.robots import load_robot_set
+from teleop_core.robots.robot import Robot
 from teleop_core.robots.selection import RobotParameters
 
 
@@ -46,13 +47,19 @@ class InverseKinematicsParameters(RobotParameters):
     )
 
 
-class SolverNumbers(Fields):
+class SolverRecord(InverseKinematicsParameters, Fields):
     """Parameter record of the inverse kinematics."""
 
-    speed: PerJoint  # rated speeds [rad/s or m/s]
+    speed: PerJoint  # largest speeds [rad/s or m/s]
     longest_ns: int
     timeout_ns: int
-    tolerance: Annotated[Array, 2]  # tolerances of position and rotation [m, rad]
+
+
+def derive(p: SolverRecord, parameters: InverseKinematicsParameters, robot: Robot) -> None:
+    """Write what follows from the parameters and the robot."""
+    p.speed[:] = robot.speed_limit * parameters.speed_share
+    p.longest_ns = round(parameters.longest_pause * 1e9)
+    p.timeout_ns = round(parameters.feedback_timeout * 1e9)
 
 
 class SolverState(Fields):
@@ -112,7 +119,7 @@ def _joint_at_limit(q: Array, limits: Array) -> int:
 
 
 @inner
-def _explain(p: SolverNumbers, solver: Solver, reach: Array) -> None:
+def _explain(p: SolverRecord, solver: Solver, reach: Array) -> None:
     """Write the reason why the arm does not reach the command, and the distance by which it is out of reach.
 
     The pose is solved again without a time limit. If this solution reaches the command, the arm only lags. A lag is
@@ -128,7 +135,7 @@ def _explain(p: SolverNumbers, solver: Solver, reach: Array) -> None:
     if _is_reached(status):
         solver.fk(q, solver.geometry, solver.reached)
         status = solver.ik(solver.reached, q, limits, solver.geometry, free, solver.residual)
-        is_near = reach[_RESIDUAL] <= p.tolerance[0] and reach[_RESIDUAL + 1] <= p.tolerance[1]
+        is_near = reach[_RESIDUAL] <= p.position_tolerance and reach[_RESIDUAL + 1] <= p.rotation_tolerance
         if is_near:
             reach[_STATUS] = status
         else:
@@ -155,7 +162,7 @@ def _has_own_way(s: SolverState, solver: Solver, row: Row, timeout_ns: int) -> b
 
 
 @inner
-def _goes_far(p: SolverNumbers, solver: Solver) -> bool:
+def _goes_far(p: SolverRecord, solver: Solver) -> bool:
     """Whether the answer turns a joint farther than small motions of the tip need."""
     for i in range(solver.q.shape[0]):  # noqa: SIM110 - compiled
         if abs(solver.q[i] - solver.seed[i]) > _FAR * p.speed[i]:
@@ -164,7 +171,7 @@ def _goes_far(p: SolverNumbers, solver: Solver) -> bool:
 
 
 @inner
-def _solve(p: SolverNumbers, solver: Solver, time: float, is_alone: bool) -> int:
+def _solve(p: SolverRecord, solver: Solver, time: float, is_alone: bool) -> int:
     """Write the joints that the arm can reach in ``time`` [s] at full speed; for a single command, the final joints.
 
     Next to a singularity a tremor of the first command would cause large useless joint motions. So joints move far
@@ -176,7 +183,7 @@ def _solve(p: SolverNumbers, solver: Solver, time: float, is_alone: bool) -> int
         for i in range(solver.q.shape[0]):
             solver.limits[2, i] = p.speed[i] * longest
         status = solver.ik(solver.T, solver.seed, solver.limits, solver.geometry, solver.q, solver.residual)
-        near = solver.residual[0] <= p.tolerance[0] and solver.residual[1] <= p.tolerance[1]
+        near = solver.residual[0] <= p.position_tolerance and solver.residual[1] <= p.rotation_tolerance
         if attempt == 0 and is_alone and _goes_far(p, solver):
             longest = time
         elif attempt == 1 and not near:
@@ -187,7 +194,7 @@ def _solve(p: SolverNumbers, solver: Solver, time: float, is_alone: bool) -> int
 
 
 @kernel
-def inverse_kinematics_step(p: SolverNumbers, s: SolverState, solver: Solver, row: Row, dt: float) -> None:
+def inverse_kinematics_step(p: SolverRecord, s: SolverState, solver: Solver, row: Row, dt: float) -> None:
     """One slave pose: write slave_servo_jp and slave_reach.
 
     The answer is the solution nearest to the last answer. While the slave does not follow, it is the solution nearest
@@ -229,7 +236,7 @@ class InverseKinematics(RunningStage):
         self.robot = load_robot_set(parameters.robot, parameters.geometry)
         n = self.robot.n
         super().__init__(INVERSE_KINEMATICS, n, dt)
-        self.parameters, self.state = record(SolverNumbers, n), record(SolverState)
+        self.parameters, self.state = record(SolverRecord, n), record(SolverState)
         self._solver = Solver(
             self.robot.fk_pointer, self.robot.ik_pointer, self.robot.limits(),
             self.robot.geometry_row.copy(), np.zeros((4, 4)), np.zeros((4, 4)), np.zeros(n),
@@ -258,11 +265,8 @@ class InverseKinematics(RunningStage):
 
     def retune(self, parameters: InverseKinematicsParameters) -> None:
         """Take new parameters from the next pose on."""
-        self.parameters["speed"] = self.robot.speed_limit * parameters.speed_share
-        p = parameters
-        self.parameters["tolerance"] = p.position_tolerance, p.rotation_tolerance
-        self.parameters["longest_ns"] = round(parameters.longest_pause * 1e9)
-        self.parameters["timeout_ns"] = round(parameters.feedback_timeout * 1e9)
+        fill(self.parameters, parameters)
+        derive(self.parameters, parameters, self.robot)
 
 
 INVERSE_KINEMATICS = Stage(

@@ -44,15 +44,6 @@ class JawCommandParameters:
             raise ParameterError("jaw_command.closed_angle", self.closed_angle, text)
 
 
-class JawCommandNumbers(Fields):
-    """Parameter record of the jaw's command."""
-
-    source: int
-    toggles: int
-    open_angle: float
-    closed_angle: float
-
-
 class JawCommandState(Fields):
     """State record of the jaw's command."""
 
@@ -61,7 +52,7 @@ class JawCommandState(Fields):
 
 
 @kernel
-def jaw_command_step(p: JawCommandNumbers, s: JawCommandState, row: Row, dt: float) -> None:
+def jaw_command_step(p: JawCommandParameters, s: JawCommandState, row: Row, dt: float) -> None:
     """Write slave_jaw_servo_jp for a sample of the master.
 
     Args:
@@ -70,7 +61,8 @@ def jaw_command_step(p: JawCommandNumbers, s: JawCommandState, row: Row, dt: flo
         row: Signals.
         dt: Tick [s].
     """
-    closing = row.hand_jaw[0] if p.source == _HAND else row.master_buttons[p.source - 1]
+    source = int(p.source)  # a choice among texts is stored as its index
+    closing = row.hand_jaw[0] if source == _HAND else row.master_buttons[source - 1]
     closing = min(max(closing, 0.0), 1.0)
     if p.toggles:
         is_pressed = 1 if closing > _PRESSED else 0

@@ -24,16 +24,16 @@ class Sent(Fields):
     turned: Quaternion
 
 
-class TurnNumbers(Fields):
+class TurnRecord(Fields):
     """Fields of a parameter record with the frame in which the tool repeats the hand's turns."""
 
-    is_aligned: int  # 1: the tool's own frame, as the stylus turns in its own; 0: the slave's base
+    has_tool_axes: int  # 1: the tool's own frame, as the stylus turns in its own; 0: the slave's base
 
 
 class LimitState(Fields):
     """Fields of a state record with the limit that hand and slave meet.
 
-    Positions [m] are in the slave's axes, rotations [rad] in the frame of :class:`TurnNumbers`. The hand is beyond the
+    Positions [m] are in the slave's axes, rotations [rad] in the frame of :class:`TurnRecord`. The hand is beyond the
     limit while a depth is positive.
     """
 
@@ -102,7 +102,7 @@ def _found(s: LimitState, sent: Sequence[Sent], stamp_ns: int) -> int:
 
 
 @inner
-def draw_back(p: TurnNumbers, s: LimitState, sent: Sequence[Sent], gain: float, row: Row) -> None:
+def draw_back(p: TurnRecord, s: LimitState, sent: Sequence[Sent], gain: float, row: Row) -> None:
     """Take the answer to an earlier command: draw the present command back by the cut of the earlier command.
 
     Cuts that were made since the earlier command was sent are not made again.
@@ -152,7 +152,7 @@ def _move_back(s: LimitState, entry: Sent, gain: float, reach: geometry.Array) -
 
 
 @inner
-def _turn_back(p: TurnNumbers, s: LimitState, entry: Sent, reach: geometry.Array) -> None:
+def _turn_back(p: TurnRecord, s: LimitState, entry: Sent, reach: geometry.Array) -> None:
     wanted, cut = room(4), room(3)
     for i in range(4):
         wanted[i] = entry.turned[i]
@@ -176,38 +176,38 @@ def _turn_back(p: TurnNumbers, s: LimitState, entry: Sent, reach: geometry.Array
 
 
 @inner
-def align(p: TurnNumbers, s: LimitState) -> None:
+def align(p: TurnRecord, s: LimitState) -> None:
     """Align: from now on the hand's present orientation corresponds to the orientation of the command."""
     inverse = room(4)
     geometry.invert_quaternion(s.tool, inverse)
-    if p.is_aligned:
+    if p.has_tool_axes:
         geometry.multiply_quaternions(s.command[3:7], inverse, s.alignment)
     else:
         geometry.multiply_quaternions(inverse, s.command[3:7], s.alignment)
 
 
 @inner
-def follow_hand(p: TurnNumbers, s: LimitState) -> None:
+def follow_hand(p: TurnRecord, s: LimitState) -> None:
     """Turn the command as the hand has turned since the alignment."""
-    if p.is_aligned:
+    if p.has_tool_axes:
         geometry.multiply_quaternions(s.alignment, s.tool, s.command[3:7])
     else:
         geometry.multiply_quaternions(s.tool, s.alignment, s.command[3:7])
 
 
 @inner
-def turn_from(p: TurnNumbers, a: geometry.Array, b: geometry.Array, vector: geometry.Array) -> None:
+def turn_from(p: TurnRecord, a: geometry.Array, b: geometry.Array, vector: geometry.Array) -> None:
     """Write the rotation vector (3,) [rad] from quaternion ``a`` to ``b``."""
-    if p.is_aligned:
+    if p.has_tool_axes:
         geometry.turn_within(a, b, vector)
     else:
         geometry.turn_between(a, b, vector)
 
 
 @inner
-def turn_on(p: TurnNumbers, start: geometry.Array, vector: geometry.Array, end: geometry.Array) -> None:
+def turn_on(p: TurnRecord, start: geometry.Array, vector: geometry.Array, end: geometry.Array) -> None:
     """Write the quaternion ``start``, rotated by a vector (3,) [rad], into ``end``."""
-    if p.is_aligned:
+    if p.has_tool_axes:
         geometry.rotate_by_vector(start, vector[0], vector[1], vector[2], end)
         return
     turned = room(4)
@@ -219,7 +219,7 @@ def turn_on(p: TurnNumbers, start: geometry.Array, vector: geometry.Array, end: 
 
 
 @inner
-def _anchor_turn(p: TurnNumbers, s: LimitState) -> None:
+def _anchor_turn(p: TurnRecord, s: LimitState) -> None:
     """Set the anchor to the hand's orientation, rotated back by the depth."""
     back = room(3)
     for i in range(3):
@@ -228,7 +228,7 @@ def _anchor_turn(p: TurnNumbers, s: LimitState) -> None:
 
 
 @inner
-def measure_depth(p: TurnNumbers, s: LimitState, most: float, now_ns: int) -> None:
+def measure_depth(p: TurnRecord, s: LimitState, most: float, now_ns: int) -> None:
     """Measure how far the hand is now beyond the limit; a hand that has left the limit reports none.
 
     Args:

@@ -2,16 +2,16 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Annotated
 
 import numpy as np
 
+from teleop_core.base import fill
 from teleop_core.coupling.architectures import ARCHITECTURES
 from teleop_core.coupling.fixtures import Held, fixture_depth
 from teleop_core.coupling.mapping import following, gains, limits, plausibility, side, walls
 from teleop_core.coupling.mapping.reflection import (
     Law,
-    ReflectionNumbers,
+    ReflectionRecord,
     ReflectionState,
     lead_by_force,
     make_law,
@@ -21,30 +21,47 @@ from teleop_core.coupling.passivity import PASSIVITIES
 from teleop_core.graph import DT, STATE, Row, RunningStage, Stage, assign, copy, topics
 from teleop_core.kernels import inner, kernel
 from teleop_core.kernels.axes import axis_map
-from teleop_core.kernels.fields import Integers, Quaternion, Vector3, record, record_array
+from teleop_core.kernels.fields import Quaternion, Vector3, record, record_array
 from teleop_core.kernels.geometry import Array, multiply_quaternions
 from teleop_core.kernels.room import room
 
 
-class ScalingNumbers(
-    walls.WallNumbers,
-    side.SideNumbers,
-    ReflectionNumbers,
-    plausibility.PlausibilityNumbers,
-    following.FollowingNumbers,
-    limits.TurnNumbers,
-):
+class ScalingRecord(gains.MotionScalingParameters, ReflectionRecord, limits.TurnRecord):
     """Parameter record of the motion scaling."""
 
-    gain: Annotated[Array, 2]  # gains of the coarse and the fine mode
     stylus_tool: Quaternion
     slave_master: Quaternion
-    axis: Annotated[Integers, 3]
-    sign: Vector3
     size: Vector3  # size of the fixture [m]
-    rotation_gain: float
+    spring: float  # stiffness of the fixture's wall [N/m]
+    is_damped: int  # whether the wall is damped
+    holds_hand: int  # whether the fixture confines the hand
+    holds_slave: int
     reach_stiffness: float  # [N/m]
     reach_depth: float  # [m]
+    silence_ns: int  # allowed silence of the buttons
+
+
+def derive(p: ScalingRecord, parameters: gains.MotionScalingParameters) -> None:
+    """Write what follows from the parameters."""
+    fixture, force, reflection = parameters.fixture, parameters.reach_force, parameters.reflection
+    axes, wall = axis_map("axes", parameters.axes), walls.WALLS[fixture.wall]
+    p.gain[:] = parameters.coarse_gain, parameters.fine_gain
+    p.axis[:], p.sign[:] = np.abs(axes).argmax(axis=1), axes.sum(axis=1)
+    p.slave_master[:], p.stylus_tool[:], p.has_tool_axes = gains.tool_map(parameters)
+    p.spring, p.is_damped = wall.spring(fixture.stiffness, fixture.max_force), wall.is_damped
+    p.size[:] = fixture.made.size()
+    p.holds_hand, p.holds_slave = fixture.side != "slave", fixture.side != "hand"
+    stiffness = force.stiffness if force.is_on else 0.0
+    p.reach_depth = force.max_force / stiffness if stiffness * force.max_force > 0.0 else _SHALLOW
+    p.reach_stiffness = stiffness if force.max_force > 0.0 else 0.0
+    law = ARCHITECTURES.find(reflection.architecture.kind)
+    p.is_reflected = law.name != "unilateral"
+    p.force_scale = law.force_scale(reflection.architecture.parameters)
+    p.lead_gain = law.lead_gain(reflection.architecture.parameters)
+    p.law = PASSIVITIES.names().index(reflection.passivity.kind)
+    p.timeout_ns = round(parameters.feedback_timeout * 1e9)
+    p.pause_ns = round(parameters.longest_pause * 1e9)
+    p.silence_ns = round(parameters.plausible.button_silence * 1e9)
 
 
 class ScalingState(
@@ -77,21 +94,21 @@ _LONG = 1e-3
 
 
 @kernel
-def to_slave_axes(p: ScalingNumbers, master: Array, slave: Array) -> None:
+def to_slave_axes(p: ScalingRecord, master: Array, slave: Array) -> None:
     """Rotate a vector (3,) from the master's base to the slave's axes, and write it into ``slave``."""
     x, y, z = (p.sign[0] * master[p.axis[0]], p.sign[1] * master[p.axis[1]], p.sign[2] * master[p.axis[2]])
     slave[0], slave[1], slave[2] = x, y, z
 
 
 @kernel
-def mapped_orientation(p: ScalingNumbers, stylus: Array, tool: Array) -> None:
+def mapped_orientation(p: ScalingRecord, stylus: Array, tool: Array) -> None:
     """Write the quaternion of the slave's tool that corresponds to a stylus quaternion, before alignment."""
     multiply_quaternions(p.slave_master, stylus, tool)
     multiply_quaternions(tool, p.stylus_tool, tool)
 
 
 @inner
-def _take_tool(p: ScalingNumbers, s: ScalingState, pose: Array, turn: Array) -> None:
+def _take_tool(p: ScalingRecord, s: ScalingState, pose: Array, turn: Array) -> None:
     """Store the orientation that the hand commands, and its rotation if only a share of it is used."""
     if p.rotation_gain == 1.0:
         mapped_orientation(p, pose[3:7], s.tool)
@@ -120,7 +137,7 @@ def _toggle_fixture(s: ScalingState, buttons: Array, position: Array) -> None:
 
 
 @inner
-def _latch(p: ScalingNumbers, s: ScalingState, stylus: Array) -> None:
+def _latch(p: ScalingRecord, s: ScalingState, stylus: Array) -> None:
     """Hold the command, and measure later motion from the present pose, so that the command never jumps.
 
     The fixture moves with the hand, so that it does not move relative to the slave.
@@ -133,7 +150,7 @@ def _latch(p: ScalingNumbers, s: ScalingState, stylus: Array) -> None:
 
 
 @inner
-def _move(p: ScalingNumbers, s: ScalingState, fixture: Held, gain: float, position: Array, turn: Array) -> None:
+def _move(p: ScalingRecord, s: ScalingState, fixture: Held, gain: float, position: Array, turn: Array) -> None:
     """Add the scaled step of the hand to the command; rotate the tool like the hand, or like the aligned stylus."""
     step = room(3)
     for i in range(3):
@@ -161,7 +178,7 @@ def _move(p: ScalingNumbers, s: ScalingState, fixture: Held, gain: float, positi
 
 
 @inner
-def _wall(p: ScalingNumbers, s: ScalingState, fixture: Held, period: float, stylus: Array, force: Array) -> None:
+def _wall(p: ScalingRecord, s: ScalingState, fixture: Held, period: float, stylus: Array, force: Array) -> None:
     """Write the push (3,) [N] of the fixture's wall; after a pause the wall restarts without a previous position."""
     offset, out, length = room(3), room(3), 0.0
     for i in range(3):
@@ -169,16 +186,16 @@ def _wall(p: ScalingNumbers, s: ScalingState, fixture: Held, period: float, styl
     if s.is_fixture_on and p.holds_hand:
         length = fixture_depth(fixture, offset, out)
     if p.is_damped == 0:
-        walls.wall_force(out, length, p.stiffness, p.max_force, force)
+        walls.wall_force(out, length, p.spring, p.fixture.max_force, force)
         return
     if period <= 0.0 or period > 1e-9 * p.pause_ns:
         walls.forget_wall(s, stylus)
         period = _LONG
-    walls.damped_wall(p, s, stylus, out, length, period, force)
+    walls.damped_wall(p.fixture, p.spring, s, stylus, out, length, period, force)
 
 
 @inner
-def _push_back(p: ScalingNumbers, s: ScalingState, force: Array) -> None:
+def _push_back(p: ScalingRecord, s: ScalingState, force: Array) -> None:
     """Add the push that the slave's limit causes to the force (3,) [N], in the master's base."""
     push = p.reach_stiffness * s.depth
     if push > 0.0:
@@ -187,7 +204,7 @@ def _push_back(p: ScalingNumbers, s: ScalingState, force: Array) -> None:
 
 
 @inner
-def _report(p: ScalingNumbers, s: ScalingState, gain: float, is_following: bool, row: Row) -> None:
+def _report(p: ScalingRecord, s: ScalingState, gain: float, is_following: bool, row: Row) -> None:
     """Write teleop_state; the fixture is given in the slave's base, where it confines the slave."""
     state = row.teleop_state
     state[_FOLLOWING] = 1.0 if is_following else 0.0
@@ -209,7 +226,7 @@ def _report(p: ScalingNumbers, s: ScalingState, gain: float, is_following: bool,
 
 @inner
 def _refuse(
-    p: ScalingNumbers,
+    p: ScalingRecord,
     s: ScalingState,
     sent: Sequence[limits.Sent],
     is_following: bool,
@@ -235,7 +252,7 @@ def _refuse(
 
 @kernel
 def motion_scaling_step(
-    p: ScalingNumbers, s: ScalingState, sent: Sequence[limits.Sent], fixture: Held, law: Law, row: Row, dt: float
+    p: ScalingRecord, s: ScalingState, sent: Sequence[limits.Sent], fixture: Held, law: Law, row: Row, dt: float
 ) -> None:
     """One master sample: write slave_servo_cp, master_servo_cf and teleop_state.
 
@@ -267,10 +284,10 @@ def motion_scaling_step(
     is_following = following.follows(p, s, row)
     is_doubtful = following.is_in_doubt(p, s, is_following, row)
     limits.draw_back(p, s, sent, p.gain[s.is_fine], row)
-    if not plausibility.is_plausible(p, s, pose, row.master_measured_cp_ns):
+    if not plausibility.is_plausible(p.plausible, p.pause_ns, s, pose, row.master_measured_cp_ns):
         _refuse(p, s, sent, is_following, is_doubtful, stylus, row)
         return
-    clutch = 1.0 if plausibility.has_lost_buttons(p, s, row) else buttons[0]
+    clutch = 1.0 if plausibility.has_lost_buttons(p.silence_ns, s, row) else buttons[0]
     _toggle_mode(s, buttons)
     gain = p.gain[s.is_fine]
     turn = room(3)
@@ -310,7 +327,7 @@ class MotionScaling(RunningStage):
     def __init__(self, parameters: gains.MotionScalingParameters, dt: float = DT) -> None:
         super().__init__(MOTION_SCALING, 0, dt)
         self.changes_itself = True  # a button changes the stage's mode
-        self.parameters, self.state = record(ScalingNumbers), record(ScalingState)
+        self.parameters, self.state = record(ScalingRecord), record(ScalingState)
         self._sent = record_array(limits.Sent, limits.SENT)
         self._values = parameters
         self.kernel = motion_scaling_step
@@ -330,22 +347,9 @@ class MotionScaling(RunningStage):
 
     def retune(self, parameters: gains.MotionScalingParameters) -> None:
         """Take new parameters from the next sample on, without any motion. A new mode takes effect."""
-        p, fixture = self.parameters, parameters.fixture
-        p["gain"] = parameters.coarse_gain, parameters.fine_gain
-        axes = axis_map("axes", parameters.axes)
-        p["slave_master"], p["stylus_tool"], p["is_aligned"] = gains.tool_map(parameters)
-        p["axis"], p["sign"] = np.abs(axes).argmax(axis=1), axes.sum(axis=1)
-        self._take_fixture(fixture)
-        wall = walls.WALLS[fixture.wall]
-        p["stiffness"] = wall.spring(fixture.stiffness, fixture.max_force)
-        p["max_force"], p["damping"] = fixture.max_force, fixture.damping
-        p["is_damped"] = wall.is_damped
-        p["timeout_ns"] = round(parameters.feedback_timeout * 1e9)
-        p["pause_ns"] = round(parameters.longest_pause * 1e9)
-        p["rotation_gain"] = parameters.rotation_gain
-        plausibility.take_hand(p, parameters.plausible)
-        p["silence_ns"] = round(parameters.plausible.button_silence * 1e9)
-        self._take_reach_force(parameters.reach_force)
+        fill(self.parameters, parameters)
+        derive(self.parameters, parameters)
+        self._take_fixture(parameters.fixture)
         self._take_reflection(parameters.reflection)
         if parameters.mode != self._values.mode:
             self.state["is_fine"] = gains.MODES.index(parameters.mode)
@@ -361,17 +365,8 @@ class MotionScaling(RunningStage):
             self._values = replace(self._values, mode=mode)
         return self._values
 
-    def _take_reach_force(self, force: gains.ReachForceParameters) -> None:
-        stiffness = force.stiffness if force.is_on else 0.0
-        depth = force.max_force / stiffness if stiffness * force.max_force > 0.0 else _SHALLOW
-        self.parameters["reach_stiffness"] = stiffness if force.max_force > 0.0 else 0.0
-        self.parameters["reach_depth"] = depth
-
     def _take_fixture(self, fixture: gains.FixtureParameters) -> None:
-        held, last = fixture.made.held, self._held
-        p, s = self.parameters, self.state
-        p["size"] = fixture.made.size()
-        p["holds_hand"], p["holds_slave"] = fixture.side != "slave", fixture.side != "hand"
+        held, last, s = fixture.made.held, self._held, self.state
         if fixture.made != self._values.fixture.made:  # a new fixture begins at the slave's position
             s["center"] += s["beyond"]
             s["beyond"] = 0.0
@@ -383,15 +378,9 @@ class MotionScaling(RunningStage):
         self._compose_anew()
 
     def _take_reflection(self, reflection: gains.ReflectionParameters) -> None:
-        p, chosen = self.parameters, reflection.architecture
-        p["is_reflected"] = chosen.kind != "unilateral"
-        p["reflected_most"] = reflection.max_force
-        part = ARCHITECTURES.find(chosen.kind)
+        part = ARCHITECTURES.find(reflection.architecture.kind)
         passivity = PASSIVITIES.find(reflection.passivity.kind)
-        p["law"] = PASSIVITIES.names().index(passivity.name)
-        p["force_scale"] = part.force_scale(chosen.parameters)
-        p["lead_gain"] = part.lead_gain(chosen.parameters)
-        numbers = part.numbers(chosen.parameters)
+        numbers = part.numbers(reflection.architecture.parameters)
         kept = passivity.numbers(reflection.passivity.parameters)
         law = self._law
         if (part.push_pointer, passivity.hand_pointer) == (law.push, law.hand) and (len(numbers), len(kept)) == (

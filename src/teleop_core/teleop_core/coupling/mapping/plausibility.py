@@ -55,17 +55,6 @@ class PlausibilityParameters(HandLimits):
     )
 
 
-class PlausibilityNumbers(Fields):
-    """Fields of a parameter record with the bounds of a hand's motion."""
-
-    hand_speed: float  # [m/s]
-    hand_acceleration: float  # [m/s²]
-    hand_turn: float  # [rad/s]
-    hand_reach: float  # [m]
-    silence_ns: int  # allowed silence of the buttons
-    pause_ns: int  # pause after which any sample is plausible
-
-
 class PlausibilityState(Fields):
     """Fields of a state record with the last readings."""
 
@@ -92,25 +81,20 @@ _STREAM = 20
 _STREAM_NS = 100_000_000  # a longer time between two messages is a pause [ns]
 
 
-def take_hand(p: PlausibilityNumbers, hand: HandLimits) -> None:
-    """Write the bounds of a hand's motion into a parameter record."""
-    p["hand_speed"], p["hand_acceleration"] = hand.speed, hand.acceleration
-    p["hand_turn"], p["hand_reach"] = hand.turn, hand.reach
-
-
 @inner
-def is_plausible(p: PlausibilityNumbers, s: PlausibilityState, pose: Array, stamp_ns: int) -> bool:
+def is_plausible(hand: HandLimits, pause_ns: int, s: PlausibilityState, pose: Array, stamp_ns: int) -> bool:
     """Whether a hand can have moved from the last sample to this one; counts implausible samples.
 
     Args:
-        p: Parameters.
+        hand: Bounds of the hand's motion.
+        pause_ns: Pause after which any sample is plausible [ns].
         s: State; written.
         pose: Sample (7,).
         stamp_ns: Stamp of the sample [ns].
     """
     elapsed_ns = stamp_ns - s.raw_ns
     period = max(1e-9 * elapsed_ns, _SHORTEST)
-    is_first = s.raw_ns == 0 or elapsed_ns > p.pause_ns
+    is_first = s.raw_ns == 0 or elapsed_ns > pause_ns
     far, fast, sudden = 0.0, 0.0, 0.0
     for i in range(3):
         rate = 0.0 if is_first else (pose[i] - s.raw[i]) / period
@@ -122,10 +106,10 @@ def is_plausible(p: PlausibilityNumbers, s: PlausibilityState, pose: Array, stam
     turn = 0.0 if is_first else _turn(s.raw[3:7], pose[3:7]) / period
     share = min(1.0, max(_GAP, 2e-9 * s.raw_elapsed_ns) / period)
     is_sound = (
-        math.sqrt(far) <= p.hand_reach
-        and math.sqrt(fast) <= p.hand_speed * share
-        and math.sqrt(sudden) <= p.hand_acceleration
-        and turn <= p.hand_turn * share
+        math.sqrt(far) <= hand.reach
+        and math.sqrt(fast) <= hand.speed * share
+        and math.sqrt(sudden) <= hand.acceleration
+        and turn <= hand.turn * share
     )
     for i in range(7):
         s.raw[i] = pose[i]
@@ -146,10 +130,11 @@ def _turn(before: Array, after: Array) -> float:
 
 
 @inner
-def has_lost_buttons(p: PlausibilityNumbers, s: PlausibilityState, row: Row) -> bool:
+def has_lost_buttons(longest_ns: int, s: PlausibilityState, row: Row) -> bool:
     """Whether a stream of button messages has stopped, so that the state of the clutch is unknown.
 
-    A master that sends buttons only at a change has no such stream.
+    A master that sends buttons only at a change has no such stream. ``longest_ns`` [ns] is the longest silence that is
+    allowed; 0: any.
     """
     stamp_ns = row.master_buttons_ns
     if stamp_ns != s.buttons_ns:
@@ -157,5 +142,5 @@ def has_lost_buttons(p: PlausibilityNumbers, s: PlausibilityState, row: Row) -> 
         s.in_row = min(s.in_row + 1, 2 * _STREAM) if is_next else max(s.in_row - _STREAM, 0)
         s.buttons_ns = stamp_ns
     silence_ns = row.master_measured_cp_ns - stamp_ns
-    s.is_lost = 1 if s.in_row >= _STREAM and 0 < p.silence_ns < silence_ns else 0
+    s.is_lost = 1 if s.in_row >= _STREAM and 0 < longest_ns < silence_ns else 0
     return bool(s.is_lost)

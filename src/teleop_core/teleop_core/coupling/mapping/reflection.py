@@ -6,7 +6,8 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 
 from teleop_core.coupling.architectures import MEMORY, Architecture
-from teleop_core.coupling.mapping.following import FollowingNumbers, FollowingState, is_felt, is_seen
+from teleop_core.coupling.mapping.following import FollowingRecord, FollowingState, is_felt, is_seen
+from teleop_core.coupling.mapping.gains import ReflectionParameters
 from teleop_core.coupling.passivity import MEMORY as PASSIVE_MEMORY
 from teleop_core.coupling.passivity import Passivity
 from teleop_core.coupling.passivity.port import (
@@ -27,11 +28,11 @@ from teleop_core.graph import Row, copy, topics
 from teleop_core.kernels import Array, Integers, PoseRow, Vector3, inner
 
 
-class ReflectionNumbers(FollowingNumbers):
+class ReflectionRecord(FollowingRecord):
     """Fields of a parameter record with the force reflection."""
 
+    reflection: ReflectionParameters
     is_reflected: int
-    reflected_most: float  # [N]
     law: float  # kind of passivity
     force_scale: float  # force at the hand, divided by that on the tip
     lead_gain: float  # force that moves the slave, divided by that of the hand
@@ -101,7 +102,7 @@ def make_law(part: Architecture, numbers: Array, passivity: Passivity, kept: Arr
 
 @inner
 def reflect(
-    p: ReflectionNumbers, s: ReflectionState, law: Law, is_following: bool, period: float, stylus: Array, row: Row
+    p: ReflectionRecord, s: ReflectionState, law: Law, is_following: bool, period: float, stylus: Array, row: Row
 ) -> None:
     """Add the reflected force of the slave (3,) [N] to the hand's force; it fades out if the slave's values stop.
 
@@ -127,7 +128,7 @@ def reflect(
         law.felt[i] = s.heard * row.slave_measured_cf[i]
         law.away[i] = s.seen * (row.slave_measured_cp[i] - s.command[i])
     law.push(law.numbers, law.memory, law.felt, law.away, period, law.out)
-    _bound(law.out, p.reflected_most, 1.0)
+    _bound(law.out, p.reflection.max_force, 1.0)
     for i in range(3):
         law.asked[p.axis[i]] = p.sign[i] * law.out[i]
     _make_passive(p, s, law, period, row)
@@ -157,7 +158,7 @@ def _hold_wall(law: Law, force: Array) -> None:
 
 
 @inner
-def lead_by_force(p: ReflectionNumbers, s: ReflectionState, row: Row) -> None:
+def lead_by_force(p: ReflectionRecord, s: ReflectionState, row: Row) -> None:
     """Write slave_servo_cf: the force with which the hand resists the slave's push.
 
     A freely movable device has no force sensor. So the hand's force is taken as the opposite of the push.
@@ -179,7 +180,7 @@ def _bound(push: Array, most: float, rounding: float) -> None:
 
 
 @inner
-def _count(p: ReflectionNumbers, s: ReflectionState, law: Law, is_following: bool, stylus: Array, row: Row) -> None:
+def _count(p: ReflectionRecord, s: ReflectionState, law: Law, is_following: bool, stylus: Array, row: Row) -> None:
     """Add the work of the last push on the hand; a restarted law has zero energy.
 
     Energies are reset to zero when law or scale changes, and while the slave does not follow the hand.
@@ -207,12 +208,12 @@ def _count(p: ReflectionNumbers, s: ReflectionState, law: Law, is_following: boo
 
 
 @inner
-def _make_passive(p: ReflectionNumbers, s: ReflectionState, law: Law, period: float, row: Row) -> None:
+def _make_passive(p: ReflectionRecord, s: ReflectionState, law: Law, period: float, row: Row) -> None:
     """Limit the wanted push to a passive one, and report the energies."""
     for i in range(3):
         law.last[i], s.push[i] = s.push[i], law.asked[i]
     law.hand(law.kept, law.left, law.last, law.moved, law.led, law.flow, law.heard, law.port, s.push, s.scale, period)
-    _bound(s.push, p.reflected_most, _ROUNDING)
+    _bound(s.push, p.reflection.max_force, _ROUNDING)
     for i in range(3):
         lost = (s.push[i] - law.asked[i]) * law.moved[i] / s.scale
         if lost > 0.0:

@@ -22,13 +22,6 @@ SIDES = ("hand", "slave", "both")
 """Which side a fixture confines."""
 
 
-class SideNumbers(Fields):
-    """Fields of a parameter record with the side that the fixture confines."""
-
-    holds_hand: int
-    holds_slave: int
-
-
 class SideState(Fields):
     """Fields of a state record with hand and proxy [m], in the master's base."""
 

@@ -11,18 +11,11 @@ are passive with the damper alone then generated energy.
 """
 
 import math
+from dataclasses import dataclass
 from typing import NamedTuple
 
+from teleop_core.base import Within, parameter
 from teleop_core.kernels import Array, Fields, Vector3, inner, kernel
-
-
-class WallNumbers(Fields):
-    """Fields of a parameter record with the wall of a fixture."""
-
-    stiffness: float  # [N/m]
-    max_force: float  # [N]
-    damping: float  # [N·s/m]
-    is_damped: int
 
 
 class WallState(Fields):
@@ -87,6 +80,38 @@ WALLS = {
 is the wall of the source with the stiffness of the parameters. ``step`` has its full force at any depth."""
 
 
+@dataclass(frozen=True, kw_only=True)
+class WallParameters:
+    """The wall of a fixture."""
+
+    wall: str = parameter(
+        "damped",
+        choices=tuple(WALLS),
+        doc="damped: spring and damper up to max_force, passive up to some 1000 N/m; hard: the "
+        "stiffest spring that sampling allows; source: the published spring, at full force after "
+        "1 mm; soft: a spring only; step: max_force at once, which vibrates",
+    )
+    stiffness: float = parameter(
+        1000.0,
+        Within(1.0, 5000.0, "N/m"),
+        "stiffness of the damped and the soft wall",
+        source="assumed: less than the smallest stiffness of the device, 1020 N/m; the source states no value",
+    )
+    damping: float = parameter(
+        10.0,
+        Within(0.0, 50.0, "N·s/m"),
+        "damping of the damped and the hard wall; a value below stiffness times tick is raised to it",
+        source="assumed: keeps slow contacts of a trembling hand passive too; twenty times K T / 2 of "
+        "1000 N/m at 1 kHz (Colgate and Schenkel 1997)",
+    )
+    max_force: float = parameter(
+        3.3,
+        Within(0.0, 10.0, "N"),
+        "largest force on the hand; the device may limit it further",
+        source="published: Vongbunyong 2008, section 6.3, the peak force of the device",
+    )
+
+
 @kernel
 def wall_force(depth: Array, length: float, stiffness: float, largest: float, force: Array) -> None:
     """Write the wall's push (3,) [N] back into the fixture; zero inside.
@@ -115,7 +140,14 @@ def _along(rate: Array, depth: Array, length: float) -> float:
 
 @kernel
 def damped_wall(
-    p: WallNumbers, s: WallState, place: Array, depth: Array, length: float, period: float, force: Array
+    wall: WallParameters,
+    spring: float,
+    s: WallState,
+    place: Array,
+    depth: Array,
+    length: float,
+    period: float,
+    force: Array,
 ) -> None:
     """Write the force (3,) [N] of a damped wall; the wall is dissipative up to :func:`passive_stiffness`.
 
@@ -124,7 +156,8 @@ def damped_wall(
     period. The extra damping absorbs the energy added by encoder steps and device compliance.
 
     Args:
-        p: Parameters.
+        wall: Parameters of the wall.
+        spring: Stiffness of the chosen wall [N/m].
         s: State; written.
         place: Measured position of the hand (3,) [m].
         depth: Vector (3,) [m] from the nearest point of the fixture to the hand.
@@ -143,9 +176,9 @@ def damped_wall(
         s.rate[i] += ((place[i] - s.felt[i]) / period - s.rate[i]) * share
         s.felt[i] = place[i]
     speed = _along(s.rate, depth, length)
-    damping = max(p.damping, p.stiffness * period) * min(length / _RAMP, 1.0)
-    spring = p.stiffness * length
-    push = min(max(spring + damping * speed, _LEAST * spring), p.max_force)
+    damping = max(wall.damping, spring * period) * min(length / _RAMP, 1.0)
+    elastic = spring * length
+    push = min(max(elastic + damping * speed, _LEAST * elastic), wall.max_force)
     for i in range(3):
         force[i] = -push * depth[i] / length if length > 0.0 else 0.0
 

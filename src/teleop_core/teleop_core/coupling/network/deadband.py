@@ -18,17 +18,6 @@ from teleop_core.coupling.network.link import LinkState
 from teleop_core.kernels import Array, Fields, inner
 
 
-class DeadbandNumbers(Fields):
-    """Fields of a parameter record with the deadband."""
-
-    has_deadband: int
-    place: float  # [m]
-    chord: float  # chord between quaternions
-    force_share: float
-    least_force: float  # [N]
-    longest_ticks: int
-
-
 class DeadbandState(LinkState):
     """Fields of a state record with the values of the last packets."""
 
@@ -60,23 +49,22 @@ class DeadbandParameters:
     )
 
 
-def take_deadband(p: DeadbandNumbers, parameters: DeadbandParameters, dt: float) -> None:
-    """Write the fields of the deadband in a parameter record.
+class DeadbandRecord(Fields):
+    """Fields of a parameter record with the deadband."""
 
-    Args:
-        p: Record; written.
-        parameters: Parameters of the deadband.
-        dt: Tick [s].
-    """
-    p["has_deadband"] = parameters.is_on
-    p["place"], p["force_share"] = parameters.place, parameters.force
-    p["chord"] = 2.0 * math.sin(0.25 * parameters.turn)
-    p["least_force"] = parameters.least_force
-    p["longest_ticks"] = max(1, math.floor(parameters.longest_pause / dt + 0.5))
+    deadband: DeadbandParameters
+    chord: float  # chord between quaternions
+    longest_ticks: int
+
+
+def derive(p: DeadbandRecord, parameters: DeadbandParameters, dt: float) -> None:
+    """Write what follows from the parameters and the tick [s]."""
+    p.chord = 2.0 * math.sin(0.25 * parameters.turn)
+    p.longest_ticks = max(1, math.floor(parameters.longest_pause / dt + 0.5))
 
 
 @inner
-def is_worth_telling(p: DeadbandNumbers, s: DeadbandState, k: int, pose: Array, force: Array) -> bool:
+def is_worth_telling(p: DeadbandRecord, s: DeadbandState, k: int, pose: Array, force: Array) -> bool:
     """Whether a packet of direction ``k`` with this pose (7,) and force (3,) must be sent.
 
     Args:
@@ -86,7 +74,7 @@ def is_worth_telling(p: DeadbandNumbers, s: DeadbandState, k: int, pose: Array, 
         pose: Position [m], then quaternion w, x, y, z.
         force: Force [N].
     """
-    if p.has_deadband == 0 or s.sent[k] == 0 or s.tick - s.sent_tick[k] >= p.longest_ticks:
+    if p.deadband.is_on == 0 or s.sent[k] == 0 or s.tick - s.sent_tick[k] >= p.longest_ticks:
         return True
     return _has_moved(p, s.told_pose[k], pose) or _has_changed(p, s.told_force[k], force)
 
@@ -101,7 +89,7 @@ def remember_told(s: DeadbandState, k: int, pose: Array, force: Array) -> None:
 
 
 @inner
-def _has_moved(p: DeadbandNumbers, told: Array, pose: Array) -> bool:
+def _has_moved(p: DeadbandRecord, told: Array, pose: Array) -> bool:
     """Whether a pose (7,) is outside the deadband around the last sent pose."""
     way = turn = other = 0.0
     for i in range(3):
@@ -112,15 +100,16 @@ def _has_moved(p: DeadbandNumbers, told: Array, pose: Array) -> bool:
     # Squares of the distances to the sent quaternion and to its negative, which describes the same attitude. A distance
     # is twice the sine of a quarter of the rotation angle.
     chord = min(turn, other)
-    return bool(way > p.place * p.place or chord > p.chord * p.chord)
+    place = p.deadband.place
+    return bool(way > place * place or chord > p.chord * p.chord)
 
 
 @inner
-def _has_changed(p: DeadbandNumbers, told: Array, force: Array) -> bool:
+def _has_changed(p: DeadbandRecord, told: Array, force: Array) -> bool:
     """Whether a force (3,) is outside the deadband around the last sent force."""
     change = before = 0.0
     for i in range(force.shape[0]):
         change += (force[i] - told[i]) * (force[i] - told[i])
         before += told[i] * told[i]
-    least = max(p.force_share * math.sqrt(before), p.least_force)
+    least = max(p.deadband.force * math.sqrt(before), p.deadband.least_force)
     return bool(change > least * least)

@@ -23,7 +23,7 @@ BLOCK = 1000
 _BothWays = Annotated[Integers, 2]
 
 
-class LinkNumbers(Fields):
+class LinkRecord(Fields):
     """Fields of a parameter record with the numbers of both directions."""
 
     least_delay: Annotated[Array, 2]  # [s]
@@ -95,13 +95,13 @@ def make_way(width: int, sizes: Array, draw: Any, numbers: Array) -> Way:
 
 
 @inner
-def may_send(p: LinkNumbers, s: LinkState, k: int) -> bool:
+def may_send(p: LinkRecord, s: LinkState, k: int) -> bool:
     """Whether the rate of packets of direction ``k`` allows another packet in this tick."""
     return bool(s.sent[k] == 0 or s.tick - s.sent_tick[k] >= p.every[k])
 
 
 @inner
-def _due(p: LinkNumbers, s: LinkState, way: Way, k: int, dt: float) -> int:
+def _due(p: LinkRecord, s: LinkState, way: Way, k: int, dt: float) -> int:
     """Arrival tick of the packet whose transmission ends at ``s.free``; 0 if the packet is lost."""
     chances = way.chances[s.next]
     drawn = way.draw(way.numbers, way.memory, chances[:CHANCES], s.tick * dt)
@@ -128,7 +128,7 @@ def _packet_bytes(way: Way) -> float:
 
 
 @inner
-def send_packet(p: LinkNumbers, s: LinkState, way: Way, k: int, dt: float) -> None:
+def send_packet(p: LinkRecord, s: LinkState, way: Way, k: int, dt: float) -> None:
     """Send ``way.packet`` with the motion in ``way.moved[0]``.
 
     If the queue is full, its oldest packet is lost. If the order of packets is kept, the new packet is lost instead.
@@ -171,7 +171,7 @@ def _leave_queue(s: LinkState, k: int) -> None:
 
 
 @inner
-def serve_line(p: LinkNumbers, s: LinkState, way: Way, k: int, dt: float) -> None:
+def serve_line(p: LinkRecord, s: LinkState, way: Way, k: int, dt: float) -> None:
     """Begin the transmission of waiting packets while the line is free.
 
     Args:

@@ -8,6 +8,7 @@ import math
 
 import numpy as np
 
+from teleop_core.base import fill
 from teleop_core.coupling.network import CHANCES, NETWORKS, deadband, link, packet_size
 from teleop_core.coupling.network.presets import NetworkParameters, WayParameters
 from teleop_core.graph import DT, Row, RunningStage, Stage, assign
@@ -56,12 +57,23 @@ _CARRIED = (
 """Topics of a packet to the slave, and topics of a packet from the slave, in the order of their stamps."""
 
 
-class NetworkNumbers(link.LinkNumbers, deadband.DeadbandNumbers):
+class NetworkRecord(NetworkParameters, link.LinkRecord, deadband.DeadbandRecord):
     """Parameter record of the network."""
 
     is_incremental: int
     clock_offset_ns: int
-    clock_drift: float
+
+
+def derive(p: NetworkRecord, parameters: NetworkParameters, dt: float) -> None:
+    """Write what follows from the parameters, their preset and the tick [s]."""
+    p.is_incremental = parameters.commands == "incremental"
+    p.clock_offset_ns = round(1e9 * parameters.clock_offset)
+    deadband.derive(p, parameters.deadband, dt)
+    for k, given in enumerate(parameters.ways):
+        p.least_delay[k], p.loss[k], p.queue[k] = given.least_delay, given.loss, given.queue
+        p.keeps_order[k] = given.packet_order == "kept"
+        p.every[k] = max(1, math.floor(1.0 / (given.packet_rate * dt) + 0.5))
+        p.byte_ticks[k] = 8.0 / (given.bandwidth * dt) if given.bandwidth else 0.0
 
 
 class NetworkState(deadband.DeadbandState):
@@ -85,13 +97,13 @@ def _unpack(packet: Array, at: int, row_values: Array) -> None:
 
 
 @inner
-def _clock_ahead(p: NetworkNumbers, s: NetworkState, time_ns: int) -> int:
+def _clock_ahead(p: NetworkRecord, s: NetworkState, time_ns: int) -> int:
     """Lead of the slave's clock over our clock [ns], at a time [ns] of our clock."""
-    return p.clock_offset_ns + int(p.clock_drift * (time_ns - s.first_ns))
+    return p.clock_offset_ns + int(1e-6 * p.clock_drift * (time_ns - s.first_ns))
 
 
 @inner
-def _as_stamped_there(p: NetworkNumbers, s: NetworkState, stamp_ns: int) -> int:
+def _as_stamped_there(p: NetworkRecord, s: NetworkState, stamp_ns: int) -> int:
     """Stamp on the slave's clock of a sample whose time on our clock is ``stamp_ns`` [ns]."""
     if stamp_ns <= NO_COMMAND_NS:
         return stamp_ns
@@ -100,7 +112,7 @@ def _as_stamped_there(p: NetworkNumbers, s: NetworkState, stamp_ns: int) -> int:
 
 
 @inner
-def _send_there(p: NetworkNumbers, s: NetworkState, there: link.Way, row: Row, dt: float) -> None:
+def _send_there(p: NetworkRecord, s: NetworkState, there: link.Way, row: Row, dt: float) -> None:
     """Send the command if it is new, and if the master's side has received a pose of the slave."""
     is_new = row.slave_servo_cp_ns not in (0, s.sent_ns)
     if not (is_new and s.newest[BACK] > 0 and link.may_send(p, s, THERE)):
@@ -124,7 +136,7 @@ def _send_there(p: NetworkNumbers, s: NetworkState, there: link.Way, row: Row, d
 
 
 @inner
-def _send_back(p: NetworkNumbers, s: NetworkState, back: link.Way, row: Row, dt: float) -> None:
+def _send_back(p: NetworkRecord, s: NetworkState, back: link.Way, row: Row, dt: float) -> None:
     """Send the slave's values as soon as there are values."""
     if row.slave_setpoint_cp_ns == 0 or not link.may_send(p, s, BACK):
         return
@@ -146,7 +158,7 @@ def _send_back(p: NetworkNumbers, s: NetworkState, back: link.Way, row: Row, dt:
 
 
 @inner
-def _take_there(p: NetworkNumbers, s: NetworkState, there: link.Way, row: Row) -> None:
+def _take_there(p: NetworkRecord, s: NetworkState, there: link.Way, row: Row) -> None:
     """Take the command that arrived; increments are added to the slave's setpoint, or to its last command."""
     link.take_packet(s, there, THERE)
     if s.arrived[THERE]:
@@ -183,7 +195,7 @@ def _take_back(s: NetworkState, back: link.Way, row: Row) -> None:
 
 
 @kernel
-def network_step(p: NetworkNumbers, s: NetworkState, there: link.Way, back: link.Way, row: Row, dt: float) -> None:
+def network_step(p: NetworkRecord, s: NetworkState, there: link.Way, back: link.Way, row: Row, dt: float) -> None:
     """One tick: send the new values of each side, and write the values that arrive at the other side.
 
     Args:
@@ -221,7 +233,7 @@ class NetworkLink(RunningStage):
 
     def __init__(self, parameters: NetworkParameters, dt: float = DT) -> None:
         super().__init__(NETWORK, 0, dt)
-        self.parameters, self.state = record(NetworkNumbers), record(NetworkState)
+        self.parameters, self.state = record(NetworkRecord), record(NetworkState)
         self.kernel, self._seed, self.ahead = network_step, parameters.seed, link.BLOCK
         self._ways = [
             self._made(width, topics, given)
@@ -249,17 +261,9 @@ class NetworkLink(RunningStage):
 
     def retune(self, parameters: NetworkParameters) -> None:
         """Take another network from the next packet on; packets in transit arrive as before."""
-        p = self.parameters
-        p["is_incremental"] = parameters.commands == "incremental"
-        p["clock_offset_ns"] = round(1e9 * parameters.clock_offset)
-        p["clock_drift"] = 1e-6 * parameters.clock_drift
-        deadband.take_deadband(p, parameters.deadband, self.dt)
+        fill(self.parameters, parameters)
+        derive(self.parameters, parameters, self.dt)
         for k, given in enumerate(parameters.ways):
-            p["least_delay"][k], p["loss"][k] = given.least_delay, given.loss
-            p["keeps_order"][k] = given.packet_order == "kept"
-            p["every"][k] = max(1, math.floor(1.0 / (given.packet_rate * self.dt) + 0.5))
-            p["byte_ticks"][k] = 8.0 / (given.bandwidth * self.dt) if given.bandwidth else 0.0
-            p["queue"][k] = given.queue
             self._take_kind(k, given)
 
     def _take_kind(self, k: int, given: WayParameters) -> None:

@@ -9,8 +9,8 @@ import numpy as np
 
 from teleop_core.evaluation import TRACKED, Context, Key, Metric, Window
 from teleop_core.evaluation.metric import figure
+from teleop_core.graph.operation import State
 from teleop_core.graph.topics import SLAVE_OPERATION
-from teleop_core.slave.operation.states import State
 
 _SHORTEST_NS = 100_000_000  # a shorter silence is no gap [ns]
 _PERIODS = 20.0  # a gap is longer than this many periods of the messages

@@ -104,13 +104,6 @@ class Handle(NamedTuple):
     q: Array
 
 
-class ReadingNumbers(Fields):
-    """Fields of a parameter record with the resolution of the device."""
-
-    resolution: float  # resolution of the position [m]
-    gimbal: float  # bound of the noise of its attitude [rad]
-
-
 class ReadingState(Fields):
     """Fields of a state record with the last reading."""
 
@@ -121,15 +114,15 @@ class ReadingState(Fields):
 
 
 @kernel
-def read_phantom(p: ReadingNumbers, position: Array, attitude: Array, noise: Array, pose: Array) -> None:
+def read_phantom(device: DeviceParameters, position: Array, attitude: Array, noise: Array, pose: Array) -> None:
     """Write the pose (7,) that the Phantom reads: position in encoder steps, attitude with noise (3,)."""
     wobble = room(3)
     for i in range(3):
         pose[i] = position[i]
-        if p.resolution > 0.0:
-            pose[i] = round(position[i] / p.resolution) * p.resolution
+        if device.position_resolution > 0.0:
+            pose[i] = round(position[i] / device.position_resolution) * device.position_resolution
         # The bound is taken as two standard deviations; larger noise is clipped to the bound.
-        wobble[i] = p.gimbal * min(max(0.5 * noise[i], -1.0), 1.0)
+        wobble[i] = device.gimbal_noise * min(max(0.5 * noise[i], -1.0), 1.0)
     rotate_by_vector(attitude, wobble[0], wobble[1], wobble[2], pose[3:7])
 
 

@@ -11,6 +11,7 @@ _FRAMES = 512
 """Largest number of frames in the latency of the screen."""
 SHOWS = ("slave", "command")
 """Choices for what a frame shows: the slave's measured pose, or its commanded pose."""
+_COMMAND = SHOWS.index("command")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,14 +43,6 @@ class DisplayParameters:
             raise ParameterError("display.latency", self.latency, needed)
 
 
-class DisplayNumbers(Fields):
-    """Parameter record of the display, with the fields of its parameter group."""
-
-    rate: float
-    latency: float
-    shows: int
-
-
 class DisplayState(Fields):
     """Frames that are taken but not yet shown."""
 
@@ -62,7 +55,7 @@ class DisplayState(Fields):
 
 
 @kernel
-def display_step(p: DisplayNumbers, s: DisplayState, row: Row, dt: float) -> None:
+def display_step(p: DisplayParameters, s: DisplayState, row: Row, dt: float) -> None:
     """One tick: take a frame if one is due, and show the newest frame whose latency is over.
 
     Args:
@@ -71,11 +64,12 @@ def display_step(p: DisplayNumbers, s: DisplayState, row: Row, dt: float) -> Non
         row: Signals; ``display_measured_cp`` is written, with the stamp of the pose that it shows.
         dt: Tick [s].
     """
-    stamp_ns = row.slave_servo_cp_ns if p.shows == 1 else row.slave_measured_cp_ns
+    is_command = int(p.shows) == _COMMAND  # a choice among texts is stored as its index
+    stamp_ns = row.slave_servo_cp_ns if is_command else row.slave_measured_cp_ns
     if row.now_ns >= s.due_ns and stamp_ns > 0:  # without a stamp there is no pose to show yet
         s.due_ns = max(s.due_ns, row.now_ns - 1_000_000_000) + int(1e9 / p.rate)
         at = s.taken % _FRAMES
-        shown = row.slave_servo_cp if p.shows == 1 else row.slave_measured_cp
+        shown = row.slave_servo_cp if is_command else row.slave_measured_cp
         for i in range(7):
             s.frames[7 * at + i] = shown[i]
         s.stamps[at] = stamp_ns

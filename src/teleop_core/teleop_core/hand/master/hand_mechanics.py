@@ -45,10 +45,10 @@ class HandParameters:
     )
 
 
-class HandNumbers(Fields):
+class HandRecord(Fields):
     """Fields of a parameter record with the mechanics of hand and device."""
 
-    friction: float  # dry friction of the device [N]
+    device: DeviceParameters
     steps: int  # number of equal steps in a tick
     flow: Annotated[Array, 2, 3, 4, 6]  # matrices of join()
     center: Vector3  # centre of the workspace [m]
@@ -66,7 +66,7 @@ class HandState(Fields):
 
 
 @inner
-def move_hand(p: HandNumbers, s: HandState, wanted: Array, force: Array, dt: float) -> None:
+def move_hand(p: HandRecord, s: HandState, wanted: Array, force: Array, dt: float) -> None:
     """Advance hand and device by one tick under the motors' force (3,) [N].
 
     The model has two masses on each axis. A spring and a damper pull the hand along its path. The device has motors,
@@ -95,7 +95,7 @@ def move_hand(p: HandNumbers, s: HandState, wanted: Array, force: Array, dt: flo
 
 
 @inner
-def _push_on(p: HandNumbers, s: HandState, aim_speed: Array, force: Array, time: float) -> None:
+def _push_on(p: HandRecord, s: HandState, aim_speed: Array, force: Array, time: float) -> None:
     """Make one step that begins ``time`` [s] after the start of the tick."""
     given, needed = room(3, 6), room(3)
     square, rests = 0.0, True
@@ -108,8 +108,8 @@ def _push_on(p: HandNumbers, s: HandState, aim_speed: Array, force: Array, time:
         needed[i] = _flows(p.flow[0, i, _SPEED], given[i]) / p.flow[0, i, _SPEED, _PUSH]
         square += needed[i] * needed[i]
         rests = rests and s.speed[i] == 0.0
-    sticks = square <= p.friction * p.friction
-    share = 1.0 if sticks else p.friction / math.sqrt(square)
+    sticks = square <= p.device.friction * p.device.friction
+    share = 1.0 if sticks else p.device.friction / math.sqrt(square)
     held = 1 if sticks and rests else 0
     for i in range(3):
         s.speed[i] = (1.0 - share) * needed[i] * p.flow[0, i, _SPEED, _PUSH]
@@ -127,7 +127,7 @@ def _flows(row: Array, given: Array) -> float:
     return total
 
 
-def join(p: HandNumbers, hand: HandParameters, device: DeviceParameters, dt: float) -> None:
+def join(p: HandRecord, hand: HandParameters, device: DeviceParameters, dt: float) -> None:
     """Write the exact step of hand and device, and the number of steps in a tick.
 
     ``flow[0]`` (3, 4, 6) contains a matrix for each axis. The matrix gives four results after a step: displacement and
@@ -143,7 +143,7 @@ def join(p: HandNumbers, hand: HandParameters, device: DeviceParameters, dt: flo
     """
     lightness = 1.0 / hand.mass + 1.0 / device.apparent_mass
     fastest = math.sqrt(max(device.stiffness) * lightness)
-    p["steps"] = max(1, math.ceil(fastest * dt / _FASTEST))
+    p.steps = max(1, math.ceil(fastest * dt / _FASTEST))
     for i, stiffness in enumerate(device.stiffness):
         bend = np.array([0.0, -1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0]) * device.structure_damping
         bend[4] = stiffness
@@ -155,9 +155,9 @@ def join(p: HandNumbers, hand: HandParameters, device: DeviceParameters, dt: flo
         rates[0, 1] = rates[2, 3] = rates[4, 3] = rates[5, 6] = 1.0
         rates[4, 1] = rates[5, 3] = -1.0
         rates[3] = (pull - bend) / hand.mass
-        p["flow"][1, i] = _step(rates, dt / p["steps"])
+        p.flow[1, i] = _step(rates, dt / p.steps)
         rates[1], rates[1, 7] = bend / device.apparent_mass, 1.0 / device.apparent_mass
-        p["flow"][0, i] = _step(rates, dt / p["steps"])
+        p.flow[0, i] = _step(rates, dt / p.steps)
 
 
 def _step(rates: Array, h: float) -> Array:

@@ -5,13 +5,13 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from teleop_core.base import Within, fixed, parameter
+from teleop_core.base import Within, fill, fixed, parameter
 from teleop_core.graph import DT, Noise, Row, RunningStage, Stage, assign, topics
+from teleop_core.graph.operation import State
 from teleop_core.hand.master import contact, hand_mechanics, rendering
 from teleop_core.hand.master.device import (
     DeviceParameters,
     Handle,
-    ReadingNumbers,
     ReadingState,
     make_handle,
     measure_twist,
@@ -22,7 +22,6 @@ from teleop_core.hand.operators.rest import REST_POSITION, REST_TILT, rest_pose
 from teleop_core.hand.operators.shapes import PHASES
 from teleop_core.kernels import Array, PoseRow, inner, kernel, record, rotation, transform
 from teleop_core.kernels.room import room
-from teleop_core.slave.operation.states import State
 
 _DOUBT_NS = 1_000_000_000
 """Time for which forces are ignored after a force was out of range [ns]."""
@@ -60,11 +59,20 @@ class HapticMasterParameters:
     hand: hand_mechanics.HandParameters = field(default_factory=hand_mechanics.HandParameters)
 
 
-class MasterNumbers(hand_mechanics.HandNumbers, ReadingNumbers, rendering.RenderingNumbers):
+class MasterRecord(HapticMasterParameters, hand_mechanics.HandRecord, rendering.RenderingRecord):
     """Parameter record of the haptic master."""
 
-    force_range: float  # a larger force is not applied [N]
-    silence_ns: int
+    silence_ns: int  # of the hand
+
+
+def derive(p: MasterRecord, parameters: HapticMasterParameters, dt: float) -> None:
+    """Write what follows from the parameters and the tick [s]."""
+    device = parameters.device
+    p.warming = -math.expm1(-dt / device.thermal_time)
+    hand_mechanics.join(p, parameters.hand, device, dt)
+    p.silence_ns = round(parameters.hand_timeout * 1e9)
+    p.center[:] = np.subtract(REST_POSITION, device.start)
+    p.half[:] = 0.5 * np.array(device.workspace)
 
 
 class MasterState(hand_mechanics.HandState, ReadingState, rendering.RenderingState, contact.ContactState):
@@ -86,7 +94,7 @@ _MOST = topics.MASTER_CONTACT.columns.index("largest_force")
 
 
 @inner
-def _is_sound(p: MasterNumbers, s: MasterState, force: Array, now_ns: int) -> bool:
+def _is_sound(p: MasterRecord, s: MasterState, force: Array, now_ns: int) -> bool:
     """Whether the force (6,) may be applied: the command was within its range for the last second, and is so now."""
     square = force[0] * force[0] + force[1] * force[1] + force[2] * force[2]
     if not square <= p.force_range * p.force_range:  # also for NaN
@@ -97,7 +105,7 @@ def _is_sound(p: MasterNumbers, s: MasterState, force: Array, now_ns: int) -> bo
 
 
 @inner
-def _holds(p: MasterNumbers, s: MasterState, row: Row) -> bool:
+def _holds(p: MasterRecord, s: MasterState, row: Row) -> bool:
     """Return whether a hand holds the stylus; if so, store its wanted pose.
 
     A hand that jumps, or that is at another position after a silence, begins a new grip. It then brings the stylus to
@@ -119,7 +127,7 @@ def _holds(p: MasterNumbers, s: MasterState, row: Row) -> bool:
 
 
 @kernel
-def haptic_master_step(p: MasterNumbers, s: MasterState, handle: Handle, noises: Array, row: Row, dt: float) -> None:
+def haptic_master_step(p: MasterRecord, s: MasterState, handle: Handle, noises: Array, row: Row, dt: float) -> None:
     """One tick: apply master_servo_cf, move the device, and write its measurements and the contact.
 
     Args:
@@ -144,9 +152,9 @@ def haptic_master_step(p: MasterNumbers, s: MasterState, handle: Handle, noises:
     hand_mechanics.move_hand(p, s, s.aim[0:3], force, dt)
     for i in range(3):
         place[i] = s.position[i] + row.hand_tremor[i]
-    contact.account(s, force, p.friction, contact.distance(before, s.position), place, row.master_contact)
+    contact.account(s, force, p.device.friction, contact.distance(before, s.position), place, row.master_contact)
     if handle is None:
-        read_phantom(p, place, s.aim[3:7], noise[3:6], row.master_measured_cp)
+        read_phantom(p.device, place, s.aim[3:7], noise[3:6], row.master_measured_cp)
     else:
         read_handle(handle, place, s.aim[3:7], row.master_measured_cp)
     measure_twist(s, row.master_measured_cp, row.master_measured_cv, dt)
@@ -170,7 +178,7 @@ class HapticMaster(RunningStage):
 
     def __init__(self, parameters: HapticMasterParameters, dt: float = DT) -> None:
         super().__init__(HAPTIC_MASTER, 0, dt)
-        self.parameters, self.state = record(MasterNumbers), record(MasterState)
+        self.parameters, self.state = record(MasterRecord), record(MasterState)
         self._noise = Noise()
         self._fixed = parameters
         self.kernel = haptic_master_step
@@ -194,23 +202,15 @@ class HapticMaster(RunningStage):
         self.signals["hand_buttons"] = self.signals["hand_tremor"] = 0.0
         place, pose = self.state["position"], self.signals["master_measured_cp"]
         if self.handle is None:
-            read_phantom(self.parameters, place, self.state["aim"][3:], np.zeros(3), pose)
+            read_phantom(self.parameters.device, place, self.state["aim"][3:], np.zeros(3), pose)
         else:
             read_handle(self.handle, place, self.state["aim"][3:], pose)
         self.state["reading"], self.state["attitude"] = pose[:3], pose[3:]
 
     def retune(self, parameters: HapticMasterParameters) -> None:
         """Take new device and hand parameters from the next tick on."""
-        p, device, hand = self.parameters, parameters.device, parameters.hand
-        p["resolution"], p["gimbal"] = device.position_resolution, device.gimbal_noise
-        p["friction"], p["peak_force"] = device.friction, device.peak_force
-        p["continuous"] = device.continuous_force
-        p["warming"] = -math.expm1(-self.dt / device.thermal_time)
-        hand_mechanics.join(p, hand, device, self.dt)
-        p["force_range"] = parameters.force_range
-        p["silence_ns"] = round(parameters.hand_timeout * 1e9)
-        p["center"] = np.subtract(REST_POSITION, device.start)
-        p["half"] = 0.5 * np.array(device.workspace)
+        fill(self.parameters, parameters)
+        derive(self.parameters, parameters, self.dt)
 
     def press(self, *, is_pressed: bool) -> None:
         """While an emergency stop is pressed, apply no force, from the next tick on."""

@@ -13,12 +13,12 @@ import numpy as np
 
 from teleop_core.base import ParameterError, Within, fixed, parameter
 from teleop_core.graph import DT, RunningStage, Stage, topics
+from teleop_core.graph.stamps import wrong_stamp
 from teleop_core.hand.master.joy_rates import JoyParameters, JoyRates
 from teleop_core.kernels import dot, geometry
 from teleop_core.kernels.axes import AXES, axis_map
 from teleop_core.robots import load_robot_set
-from teleop_core.slave.bridges.hearing import wrong_stamp
-from teleop_core.slave.bridges.names import JointMap
+from teleop_core.robots.joint_map import JointMap
 
 POSE_MESSAGES = (
     "geometry_msgs/msg/PoseStamped",

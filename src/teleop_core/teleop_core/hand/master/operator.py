@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from teleop_core.base import PartError, TeleopError
+from teleop_core.base import PartError, TeleopError, fill
 from teleop_core.graph import DT, STATE, Noise, Row, RunningStage, Stage, assign, topics
 from teleop_core.graph.noise import BLOCK
 from teleop_core.hand.operators import OPERATORS, Seen, Setting, follower
@@ -19,12 +19,17 @@ from teleop_core.kernels.geometry import rotate_by_vector
 from teleop_core.kernels.room import room
 
 
-class OperatorNumbers(Fields):
+class OperatorRecord(OperatorParameters, Fields):
     """Parameter record of the operator."""
 
-    tremor: float  # amplitude of the tremor [m]
-    frequency: float  # frequency of the tremor [Hz]
+    tremor: float  # amplitude of the tremor; 0 if the wanted motion contains it [m]
     patience_ns: int
+
+
+def derive(p: OperatorRecord, parameters: OperatorParameters, kind: str) -> None:
+    """Write what follows from the parameters and from the kind of the operator."""
+    p.tremor = 0.0 if OPERATORS.find(kind).trembles else parameters.tremor_amplitude
+    p.patience_ns = round(parameters.patience * 1e9)
 
 
 class OperatorState(Fields):
@@ -42,7 +47,7 @@ _IS_FOLLOWING = STATE["is_following"]
 
 
 @inner
-def _begins(p: OperatorNumbers, s: OperatorState, row: Row) -> bool:
+def _begins(p: OperatorRecord, s: OperatorState, row: Row) -> bool:
     """Whether the operator moves the hand: once the slave has followed, or the operator's patience has ended.
 
     A state older than the first sample belongs to another master.
@@ -58,19 +63,19 @@ def _begins(p: OperatorNumbers, s: OperatorState, row: Row) -> bool:
 
 
 @inner
-def tremble(p: OperatorNumbers, s: OperatorState, noise: Array, tremor: Array, dt: float) -> None:
+def tremble(p: OperatorRecord, s: OperatorState, noise: Array, tremor: Array, dt: float) -> None:
     """Write the wanted tremor (3,) [m]: one sine per axis whose frequency varies within its band."""
     for i in range(3):
         # Ornstein-Uhlenbeck process with unit variance and a time constant of half a second.
         s.wander[i] += -s.wander[i] * (dt / 0.5) + noise[i] * math.sqrt(2.0 * dt / 0.5)
-        width = min(2.0, p.frequency - 8.0, 12.0 - p.frequency)
-        s.phase[i] += 2.0 * math.pi * dt * (p.frequency + width * math.tanh(s.wander[i]))
+        width = min(2.0, p.tremor_frequency - 8.0, 12.0 - p.tremor_frequency)
+        s.phase[i] += 2.0 * math.pi * dt * (p.tremor_frequency + width * math.tanh(s.wander[i]))
         tremor[i] = p.tremor * math.sin(s.phase[i])
 
 
 @kernel
 def operator_step(
-    p: OperatorNumbers, s: OperatorState, wanted: Sequence[follower.Wanted], noises: Array, row: Row, dt: float
+    p: OperatorRecord, s: OperatorState, wanted: Sequence[follower.Wanted], noises: Array, row: Row, dt: float
 ) -> None:
     """One tick: write the wanted pose of the hand, its tremor and the buttons.
 
@@ -115,7 +120,7 @@ class RunningOperator(RunningStage):
 
     def __init__(self, parameters: OperatorParameters, dt: float = DT) -> None:
         super().__init__(OPERATOR, 0, dt)
-        self.parameters, self.state = record(OperatorNumbers), record(OperatorState)
+        self.parameters, self.state = record(OperatorRecord), record(OperatorState)
         # The first record of ``wanted`` is that of the present tick.
         self._wanted, self._noise = record_array(follower.Wanted, BLOCK + 1), Noise()
         self._fixed = parameters
@@ -149,10 +154,8 @@ class RunningOperator(RunningStage):
 
     def retune(self, parameters: OperatorParameters) -> None:
         """Use new values of tremor and patience from the next tick on; the motion continues."""
-        p, operator = self.parameters, OPERATORS.find(self._fixed.kind.kind)
-        p["tremor"] = 0.0 if operator.trembles else parameters.tremor_amplitude
-        p["frequency"] = parameters.tremor_frequency
-        p["patience_ns"] = round(parameters.patience * 1e9)
+        fill(self.parameters, parameters)
+        derive(self.parameters, parameters, self._fixed.kind.kind)
 
     @property
     def has_begun(self) -> bool:

@@ -2,17 +2,17 @@
 
 import math
 
+from teleop_core.hand.master.device import DeviceParameters
 from teleop_core.kernels import Array, Fields, inner
 
 # While the heat rises through the last quarter of its allowed range, the peak force falls to the continuous force.
 _LAST = 0.25
 
 
-class RenderingNumbers(Fields):
+class RenderingRecord(Fields):
     """Fields of a parameter record with the allowed forces of the motors."""
 
-    peak_force: float  # [N]
-    continuous: float  # [N]
+    device: DeviceParameters
     warming: float  # share by which the heat approaches its final value in a tick
 
 
@@ -23,7 +23,7 @@ class RenderingState(Fields):
 
 
 @inner
-def largest_force(p: RenderingNumbers, s: RenderingState) -> float:
+def largest_force(p: RenderingRecord, s: RenderingState) -> float:
     """Force that the device can apply in this tick [N].
 
     The heat of the motors is the mean square of the force, by a first-order lag: a balance of Joule heat and cooling.
@@ -35,17 +35,18 @@ def largest_force(p: RenderingNumbers, s: RenderingState) -> float:
         p: Parameters.
         s: State.
     """
-    bearable = p.continuous * p.continuous
-    if p.continuous >= p.peak_force:
-        return p.peak_force
+    continuous, peak = p.device.continuous_force, p.device.peak_force
+    bearable = continuous * continuous
+    if continuous >= peak:
+        return peak
     left = max(bearable - s.heat, 0.0)
-    square = bearable + (p.peak_force * p.peak_force - bearable) * min(left / (_LAST * bearable), 1.0)
+    square = bearable + (peak * peak - bearable) * min(left / (_LAST * bearable), 1.0)
     # If a tick is long compared with the time constant, the force is limited so that the heat stays in its range.
     return math.sqrt(min(square, s.heat + left / p.warming))
 
 
 @inner
-def render(p: RenderingNumbers, s: RenderingState, command: Array, force: Array) -> float:
+def render(p: RenderingRecord, s: RenderingState, command: Array, force: Array) -> float:
     """Write the force (3,) [N] that the device applies for a command (3,) [N], and update the heat.
 
     Args:

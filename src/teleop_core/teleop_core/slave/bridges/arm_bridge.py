@@ -10,14 +10,14 @@ import numpy as np
 
 from teleop_core.base import Choice, ParameterError, Within, choice, fixed
 from teleop_core.graph import DT, RunningStage, Stage, topics
+from teleop_core.graph.operation import State
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots import load_robot_set
+from teleop_core.robots.joint_map import JointMap
 from teleop_core.robots.selection import RobotParameters
 from teleop_core.slave.bridges import BRIDGES, Command
 from teleop_core.slave.bridges.hearing import Hearing, Sample
 from teleop_core.slave.bridges.leading import Lead
-from teleop_core.slave.bridges.names import JointMap
-from teleop_core.slave.operation.states import State
 
 RATES = (100, 125, 200, 250, 500, 1000)
 """Command rates [Hz] whose period is a whole number of milliseconds."""

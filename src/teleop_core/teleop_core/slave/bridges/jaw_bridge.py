@@ -11,8 +11,8 @@ import numpy as np
 from teleop_core.base import ParameterError, Within, fixed
 from teleop_core.graph import DT, Stage
 from teleop_core.graph.topics import JAW, NO_COMMAND_NS, SLAVE_JAW_MEASURED_JS, SLAVE_JAW_SETPOINT_JS, SLAVE_OPERATION
+from teleop_core.robots.joint_map import JointMap
 from teleop_core.slave.bridges import Command, arm_bridge, leading
-from teleop_core.slave.bridges.names import JointMap
 
 _UPPER = 3.0  # larger than the opening of any jaw [rad]; the jaw's server applies the real limit
 _SAME = 1e-3  # a setpoint that moved by less while the gripper was not commanded counts as unchanged [rad]

@@ -7,21 +7,14 @@ their pads is ``2 L sin(angle / 2)``.
 import math
 
 from teleop_core.kernels import Fields, inner
+from teleop_core.slave.jaw.parameters import JawSimParameters
 
 
-class DriveNumbers(Fields):
-    """Fields of a parameter record with the jaw's drive and the stiffness of what it grips."""
+class DriveRecord(JawSimParameters, Fields):
+    """Parameter record with the jaw's drive and the object that it grips."""
 
-    upper: float  # largest angle [rad]
-    effort: float  # largest effort of the drive [N·m]
     stiffness: float  # stiffness of the control law [N·m/rad]
     damping: float  # damping of the control law [N·m·s/rad]
-    inertia: float  # [kg·m²]
-    friction: float  # viscous friction [N·m·s/rad]
-    length: float  # length of a finger [m]
-    size: float  # size of the object [m]
-    pad_stiffness: float  # stiffness of both pads and the object [N/m]
-    pad_damping: float  # [N·s/m]
 
 
 class DriveState(Fields):
@@ -36,32 +29,32 @@ class DriveState(Fields):
 
 
 @inner
-def width(p: DriveNumbers, angle: float) -> float:
+def width(p: DriveRecord, angle: float) -> float:
     """Distance between the pads [m] at an angle [rad]."""
-    return 2.0 * p.length * math.sin(0.5 * angle)
+    return 2.0 * p.finger_length * math.sin(0.5 * angle)
 
 
 @inner
-def drive(p: DriveNumbers, s: DriveState, setpoint_speed: float, dt: float) -> None:
+def drive(p: DriveRecord, s: DriveState, setpoint_speed: float, dt: float) -> None:
     """Advance the jaw by a tick: by a PD law within the drive's limit, and by the push of an object between the pads.
 
     The law's effort is constant during the tick. The object's push is evaluated at the end of the tick (backward
     Euler). So a stiff object gives no energy to the jaw for any ``dt``.
     """
     asked = p.stiffness * (s.setpoint - s.angle) + p.damping * (setpoint_speed - s.velocity)
-    s.effort = min(max(asked, -p.effort), p.effort)
+    s.effort = min(max(asked, -p.effort_limit), p.effort_limit)
     momentum = p.inertia * s.velocity + dt * s.effort
-    resisted = p.inertia + dt * p.friction
+    resisted = p.inertia + dt * p.viscous
     velocity, s.force = momentum / resisted, 0.0
     if s.is_between:
-        lever = p.length * math.cos(0.5 * s.angle)
-        depth = p.size - width(p, s.angle)
-        pushed = momentum + dt * lever * p.pad_stiffness * depth
+        lever = p.finger_length * math.cos(0.5 * s.angle)
+        depth = p.object.size - width(p, s.angle)
+        pushed = momentum + dt * lever * p.object.stiffness * depth
         # The damper works only after the first touch: a tick that begins without contact has no damper.
-        pad_damping = p.pad_damping if depth > 0.0 else 0.0
-        given = (dt * p.pad_stiffness + pad_damping) * lever
+        pad_damping = p.object.damping if depth > 0.0 else 0.0
+        given = (dt * p.object.stiffness + pad_damping) * lever
         against = pushed / (resisted + dt * lever * given)
-        force = p.pad_stiffness * depth - given * against
+        force = p.object.stiffness * depth - given * against
         if force > 0.0:
             velocity, s.force = against, force
     angle = s.angle + dt * velocity

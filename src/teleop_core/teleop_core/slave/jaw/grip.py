@@ -15,14 +15,13 @@ from teleop_core.graph import Row, copy, topics
 from teleop_core.kernels import Integers, Vector3, geometry, inner, kernel
 from teleop_core.kernels.room import room
 from teleop_core.slave.jaw import drive, sharing
+from teleop_core.slave.jaw.parameters import PEGS
 
 WEIGHT = 9.81
 """Standard weight per mass [m/s²], along -z of the slave's base."""
 SLIP = 1e-3
 """An object that slides by more than this in one grip has slipped [m]; a smaller distance is settling of the
 fingers."""
-PEGS = 12
-"""Largest number of pegs on a board."""
 _NONE = -1  # peg number of an object that is on no peg
 _LOST = 1e-3  # an object lost higher than this above the table has dropped [m]
 _ROUNDS = 20  # iterations for the remaining speed of an object that a peg stops
@@ -30,18 +29,13 @@ _OPEN = 1e-3  # fingers wider than the object by more than this have released it
 _LETS_GO = 0.01  # a setpoint above the smallest of the grip by more than this releases the object [rad]; assumed
 
 
-class GripNumbers(drive.DriveNumbers):
+class GripRecord(drive.DriveRecord):
     """Parameter record of the jaw."""
 
     objects: int  # number of objects
     place: Vector3  # initial position of the first object on the table [m]
-    pegs: int  # number of pegs
+    peg_count: int
     axes: Annotated[geometry.Array, 2 * PEGS]  # axes of the pegs, x and y of each [m]
-    peg_height: float  # [m]
-    clearance: float  # clearance of a peg in an object, on each side [m]
-    mass: float  # [kg]
-    pad_friction: float
-    second_base: Vector3  # position of the second arm's base in the first arm's base [m]
 
 
 class GripState(drive.DriveState):
@@ -89,14 +83,14 @@ def _tip_motion(
 
 
 @inner
-def _most(p: GripNumbers, force: float, dt: float) -> float:
+def _most(p: GripRecord, force: float, dt: float) -> float:
     """Largest change of an object's speed by the friction of both pads in a tick [m/s]."""
-    return 2.0 * p.pad_friction * force * dt / p.mass
+    return 2.0 * p.object.friction * force * dt / p.object.mass
 
 
 @inner
 def _rub(
-    p: GripNumbers, s: GripState, motion: geometry.Array, tip: geometry.Array, force: float, cut: float, dt: float
+    p: GripRecord, s: GripState, motion: geometry.Array, tip: geometry.Array, force: float, cut: float, dt: float
 ) -> float:
     """Change an object's speed (3,) towards the speed of the fingers, within the friction of both pads.
 
@@ -115,7 +109,7 @@ def _rub(
         for _ in range(_ROUNDS):
             left = math.hypot(cut, apart * left / (left + most))
         share = most / (left + most)
-        s.pull = max(s.pull, 2.0 * p.pad_friction * force * cut / left)
+        s.pull = max(s.pull, 2.0 * p.object.friction * force * cut / left)
     for i in range(3):
         motion[i] += share * (tip[i] - motion[i])
     return left
@@ -128,12 +122,12 @@ def _is_opened(s: GripState) -> bool:
 
 
 @inner
-def _count(p: GripNumbers, s: GripState, table: float, is_lost: bool) -> None:
+def _count(p: GripRecord, s: GripState, table: float, is_lost: bool) -> None:
     """Begin or end a grip, and count it; a grip ends when the fingers are wider than the object, or lose the object."""
     if s.force > 0.0 and s.is_gripped == 0:
         s.is_gripped, s.slid, s.tightest = 1, 0.0, s.setpoint
         s.grips += 1
-    elif s.is_gripped and (is_lost or drive.width(p, s.angle) > p.size + _OPEN):
+    elif s.is_gripped and (is_lost or drive.width(p, s.angle) > p.object.size + _OPEN):
         s.is_gripped = 0
         height = s.objects[7 * s.numbers[0] + 2] - table
         if is_lost and not _is_opened(s) and height > _LOST:
@@ -151,16 +145,16 @@ def _slide(s: GripState, way: float) -> None:
 
 
 @inner
-def _is_near(p: GripNumbers, s: GripState, number: int, tip: geometry.Array) -> bool:
+def _is_near(p: GripRecord, s: GripState, number: int, tip: geometry.Array) -> bool:
     """Whether an object's middle is no farther from a tip than half of its size."""
     square = 0.0
     for k in range(3):
         square += (s.objects[7 * number + k] - tip[k]) ** 2
-    return square <= 0.25 * p.size * p.size
+    return square <= 0.25 * p.object.size * p.object.size
 
 
 @inner
-def _find(p: GripNumbers, s: GripState, tip: geometry.Array) -> bool:
+def _find(p: GripRecord, s: GripState, tip: geometry.Array) -> bool:
     """Return whether the object has just left the fingers; write whether the object is between the fingers.
 
     The object comes between the fingers only while their opening is wider than the object. It stays between them as
@@ -170,14 +164,14 @@ def _find(p: GripNumbers, s: GripState, tip: geometry.Array) -> bool:
     is_lost = bool(s.is_between > 0 and not is_near)
     if is_lost:
         s.is_between = 0
-    elif is_near and drive.width(p, s.angle) >= p.size:
+    elif is_near and drive.width(p, s.angle) >= p.object.size:
         s.is_between = 1
     return is_lost
 
 
 @inner
 def _meet_peg(
-    p: GripNumbers, peg: int, pose: geometry.Array, motion: geometry.Array, wanted: geometry.Array, dt: float
+    p: GripRecord, peg: int, pose: geometry.Array, motion: geometry.Array, wanted: geometry.Array, dt: float
 ) -> float:
     """Limit the motion (3,) of an object by the peg that the object is on.
 
@@ -192,9 +186,9 @@ def _meet_peg(
     x = pose[0] + wanted[0] * dt - p.axes[2 * peg]
     y = pose[1] + wanted[1] * dt - p.axes[2 * peg + 1]
     far = math.hypot(x, y)
-    if far <= p.clearance:
+    if far <= p.pegs.clearance:
         return 0.0
-    x, y, cut = x / far, y / far, (far - p.clearance) / dt
+    x, y, cut = x / far, y / far, (far - p.pegs.clearance) / dt
     wanted[0] -= cut * x
     wanted[1] -= cut * y
     across = (wanted[0] - motion[0]) * x + (wanted[1] - motion[1]) * y
@@ -204,16 +198,16 @@ def _meet_peg(
 
 
 @inner
-def _peg_at(p: GripNumbers, x: float, y: float) -> int:
+def _peg_at(p: GripRecord, x: float, y: float) -> int:
     """Number of the peg whose axis is within the clearance of a point; _NONE if there is no such peg."""
-    for k in range(p.pegs):
-        if math.hypot(x - p.axes[2 * k], y - p.axes[2 * k + 1]) <= p.clearance:
+    for k in range(p.peg_count):
+        if math.hypot(x - p.axes[2 * k], y - p.axes[2 * k + 1]) <= p.pegs.clearance:
             return k
     return _NONE
 
 
 @inner
-def _thread(p: GripNumbers, s: GripState, number: int, before: float, is_held: bool) -> None:
+def _thread(p: GripRecord, s: GripState, number: int, before: float, is_held: bool) -> None:
     """Put an object onto a peg or off a peg when it passes the top of the peg, and count where the object rests.
 
     A straight step along the tangent may exceed the clearance; the object is then moved back to the clearance.
@@ -225,18 +219,18 @@ def _thread(p: GripNumbers, s: GripState, number: int, before: float, is_held: b
         before: Height of the object before this tick [m].
         is_held: Whether fingers press on the object.
     """
-    pose, top, peg = s.objects[7 * number : 7 * number + 7], p.place[2] + p.peg_height, _NONE
+    pose, top, peg = s.objects[7 * number : 7 * number + 7], p.place[2] + p.pegs.height, _NONE
     if pose[2] < top:
         peg = _peg_at(p, pose[0], pose[1]) if before >= top else int(s.pegs[number])
     if peg != _NONE and before < top:
         x, y = pose[0] - p.axes[2 * peg], pose[1] - p.axes[2 * peg + 1]
         far = math.hypot(x, y)
-        if far > p.clearance:
-            pose[0] = p.axes[2 * peg] + x / far * p.clearance
-            pose[1] = p.axes[2 * peg + 1] + y / far * p.clearance
+        if far > p.pegs.clearance:
+            pose[0] = p.axes[2 * peg] + x / far * p.pegs.clearance
+            pose[1] = p.axes[2 * peg + 1] + y / far * p.pegs.clearance
     s.pegs[number] = peg
     rests = pose[2] <= p.place[2] and not is_held
-    if p.pegs and rests and peg != s.homes[number]:
+    if p.peg_count and rests and peg != s.homes[number]:
         s.homes[number] = peg
         if peg == _NONE:
             s.dropped += 1
@@ -245,7 +239,7 @@ def _thread(p: GripNumbers, s: GripState, number: int, before: float, is_held: b
 
 
 @inner
-def _choose(p: GripNumbers, s: GripState, hand: int, tip: geometry.Array) -> None:
+def _choose(p: GripRecord, s: GripState, hand: int, tip: geometry.Array) -> None:
     """Let an empty hand select the object that its tip has reached."""
     for i in range(p.objects):
         if i != s.numbers[hand] and _is_near(p, s, i, tip):
@@ -254,7 +248,7 @@ def _choose(p: GripNumbers, s: GripState, hand: int, tip: geometry.Array) -> Non
 
 
 @inner
-def tell_board(p: GripNumbers, s: GripState, board: geometry.Array) -> None:
+def tell_board(p: GripRecord, s: GripState, board: geometry.Array) -> None:
     """Write counts, the peg's pull and the objects' middles into ``board``, in the order of slave/jaw/board."""
     board[0], board[1], board[2] = s.transferred, s.dropped, s.pull
     for i in range(p.objects):
@@ -263,7 +257,7 @@ def tell_board(p: GripNumbers, s: GripState, board: geometry.Array) -> None:
 
 
 @kernel
-def put_objects(p: GripNumbers, s: GripState, places: geometry.Array) -> None:
+def put_objects(p: GripRecord, s: GripState, places: geometry.Array) -> None:
     """Put all objects upright at their initial positions.
 
     Args:
@@ -279,7 +273,7 @@ def put_objects(p: GripNumbers, s: GripState, places: geometry.Array) -> None:
 
 
 @inner
-def _hold(p: GripNumbers, s: GripState, tips: geometry.Array, number: int, hands: int, dt: float) -> None:
+def _hold(p: GripRecord, s: GripState, tips: geometry.Array, number: int, hands: int, dt: float) -> None:
     """Change an object's speed by the friction of the fingers; an object that sticks to the fingers rotates with them.
 
     Args:
@@ -315,7 +309,7 @@ def _hold(p: GripNumbers, s: GripState, tips: geometry.Array, number: int, hands
 
 
 @inner
-def _move(p: GripNumbers, s: GripState, tips: geometry.Array, number: int, dt: float) -> None:
+def _move(p: GripRecord, s: GripState, tips: geometry.Array, number: int, dt: float) -> None:
     """Advance an object by a tick under the forces of fingers, weight, table and peg."""
     pose, motion = s.objects[7 * number : 7 * number + 7], s.motions[3 * number : 3 * number + 3]
     hands = 0
@@ -343,7 +337,7 @@ def _move(p: GripNumbers, s: GripState, tips: geometry.Array, number: int, dt: f
 
 
 @inner
-def _take_hands(p: GripNumbers, s: GripState, tips: geometry.Array, row: Row) -> None:
+def _take_hands(p: GripRecord, s: GripState, tips: geometry.Array, row: Row) -> None:
     """Read both tip poses (2, 7), the forces of both jaws, and the numbers of the objects that they press on."""
     copy(row.slave_true_cp, tips[0])
     copy(row.second_slave_true_cp, tips[1])
@@ -361,7 +355,7 @@ def _take_hands(p: GripNumbers, s: GripState, tips: geometry.Array, row: Row) ->
 
 
 @inner
-def move_objects(p: GripNumbers, s: GripState, row: Row) -> None:
+def move_objects(p: GripRecord, s: GripState, row: Row) -> None:
     """Advance the objects to the stamp of the newest slave_true_cp.
 
     Args:
@@ -384,7 +378,7 @@ def move_objects(p: GripNumbers, s: GripState, row: Row) -> None:
 
 
 @inner
-def see_objects(p: GripNumbers, s: GripState, row: Row) -> None:
+def see_objects(p: GripRecord, s: GripState, row: Row) -> None:
     """Read the object positions from the first arm's simulator, and count the grips of this jaw.
 
     Args:

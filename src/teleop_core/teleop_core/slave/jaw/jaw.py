@@ -6,10 +6,10 @@ The stage moves the jaw's setpoint as ``slave`` moves the arm's setpoint. It rec
 import math
 from dataclasses import dataclass
 
-from teleop_core.base import Within, fixed, parameter
+from teleop_core.base import Within, fill, fixed, parameter
 from teleop_core.graph import DT, Row, RunningStage, Stage, assign, topics
+from teleop_core.graph.operation import State
 from teleop_core.kernels import Fields, inner, kernel, record
-from teleop_core.slave.operation.states import State
 
 _STATE, _ENABLED = topics.OPERATION.index("state"), int(State.ENABLED)
 _NEAR = 1e-3  # a command this near to the held angle has reached it [rad]
@@ -32,11 +32,9 @@ class JawParameters:
     )
 
 
-class JawNumbers(Fields):
+class JawRecord(JawParameters, Fields):
     """Parameter record of the jaw's server."""
 
-    upper: float  # [rad]
-    speed: float  # [rad/s]
     timeout_ns: int
 
 
@@ -55,7 +53,7 @@ class JawState(Fields):
 
 
 @inner
-def _see(p: JawNumbers, s: JawState, row: Row) -> None:
+def _see(p: JawRecord, s: JawState, row: Row) -> None:
     """Take the jaw's measured angle.
 
     Until the first command is followed, the setpoint equals this angle. The setpoint is also set to this angle if no
@@ -74,7 +72,7 @@ def _see(p: JawNumbers, s: JawState, row: Row) -> None:
 
 
 @inner
-def _may_move(p: JawNumbers, s: JawState, row: Row) -> bool:
+def _may_move(p: JawRecord, s: JawState, row: Row) -> bool:
     """Whether the arm may move and both commands and measured angles arrive."""
     if row.slave_jaw_servo_jp_ns != s.told_ns:
         s.told_ns, s.heard_ns = row.slave_jaw_servo_jp_ns, row.now_ns
@@ -102,7 +100,7 @@ def _is_led(s: JawState, wanted: float) -> bool:
 
 
 @kernel
-def jaw_step(p: JawNumbers, s: JawState, row: Row, dt: float) -> None:
+def jaw_step(p: JawRecord, s: JawState, row: Row, dt: float) -> None:
     """One tick: move the setpoint towards the command, if the jaw may move.
 
     Args:
@@ -116,7 +114,7 @@ def jaw_step(p: JawNumbers, s: JawState, row: Row, dt: float) -> None:
         s.is_led, s.lowest, s.highest = 0, math.inf, -math.inf
     else:
         # Below 0 the fingers press on each other, or press a thin object harder.
-        wanted, most = min(max(row.slave_jaw_servo_jp[0], -p.upper), p.upper), p.speed * dt
+        wanted, most = min(max(row.slave_jaw_servo_jp[0], -p.upper), p.upper), p.speed_limit * dt
         if _is_led(s, wanted):
             s.setpoint += min(max(wanted - s.setpoint, -most), most)
             row.slave_jaw_setpoint_js_ns = row.slave_jaw_servo_jp_ns
@@ -128,7 +126,7 @@ class Jaw(RunningStage):
 
     def __init__(self, parameters: JawParameters, dt: float = DT) -> None:
         super().__init__(JAW_STAGE, 0, dt)
-        self.parameters, self.state = record(JawNumbers), record(JawState)
+        self.parameters, self.state = record(JawRecord), record(JawState)
         self.kernel, self.arguments = jaw_step, (self.parameters, self.state)
         self._begin = self.signals.copy()
         self.retune(parameters)
@@ -139,15 +137,14 @@ class Jaw(RunningStage):
         s, row = self.state, self.signals
         assign(s, 0)
         assign(row, self._begin)
-        s["setpoint"] = row["slave_jaw_setpoint_js"] = self.parameters["upper"]
+        s["setpoint"] = row["slave_jaw_setpoint_js"] = self.parameters.upper
         s["lowest"], s["highest"] = math.inf, -math.inf
         row["slave_jaw_setpoint_js_ns"] = topics.NO_COMMAND_NS
 
     def retune(self, parameters: JawParameters) -> None:
         """Take new parameters from the next tick on; the setpoint stays."""
-        p = self.parameters
-        p["upper"], p["speed"] = parameters.upper, parameters.speed_limit
-        p["timeout_ns"] = round(parameters.command_timeout * 1e9)
+        fill(self.parameters, parameters)
+        self.parameters.timeout_ns = round(parameters.command_timeout * 1e9)
 
     def concerns(self) -> list[str]:
         """Report a command that has not yet reached the held angle."""

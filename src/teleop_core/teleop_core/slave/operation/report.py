@@ -2,8 +2,8 @@
 
 from collections.abc import Mapping
 
+from teleop_core.graph.operation import State
 from teleop_core.slave.operation.faults import FAULTS, Fault
-from teleop_core.slave.operation.states import State
 
 
 def operation_text(values: Mapping[str, float], joint_names: tuple[str, ...] = ()) -> str:

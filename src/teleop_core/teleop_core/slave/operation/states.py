@@ -10,16 +10,8 @@ import numpy as np
 
 from teleop_core.base import UnknownNameError
 from teleop_core.graph import topics
+from teleop_core.graph.operation import State
 from teleop_core.kernels import Fields, inner
-
-
-class State(IntEnum):
-    """Operating state of an arm; it moves in ENABLED only."""
-
-    DISABLED = 0
-    ENABLED = 1
-    PAUSED = 2
-    FAULT = 3
 
 
 class Event(IntEnum):

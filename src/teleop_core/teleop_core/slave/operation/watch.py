@@ -5,15 +5,17 @@ from typing import Annotated
 import numpy as np
 
 from teleop_core.graph import TICK_NS
+from teleop_core.graph.operation import State
 from teleop_core.kernels import Array, Fields, IntegerPerJoint, Integers, PerJoint, Vector3, inner
 from teleop_core.slave.operation.faults import FAULTS, Fault, Reaction
-from teleop_core.slave.operation.states import Event, OperatingState, State, change
-from teleop_core.slave.operation.thresholds import MOST_EVENTS
+from teleop_core.slave.operation.states import Event, OperatingState, change
+from teleop_core.slave.operation.thresholds import MOST_EVENTS, OperationParameters
 
 
-class ServerParameters(Fields):
+class ServerRecord(Fields):
     """Fields of the parameter record of an arm's server, with the bounds for commands and faults."""
 
+    operation: OperationParameters
     lower: PerJoint  # limits of the joints [rad or m]
     upper: PerJoint
     effort_limit: PerJoint  # rated efforts [N·m or N]
@@ -27,7 +29,6 @@ class ServerParameters(Fields):
     silence_ns: int
     pressing_ns: int
     tip_error: float
-    overspeed: float
     reported: Annotated[Integers, len(Fault)]
     event_count: int
     event: Annotated[Integers, MOST_EVENTS]
@@ -78,7 +79,7 @@ _FULL = 0.999
 
 
 @inner
-def fail(p: ServerParameters, s: ServerState, fault: int, joint: int, value: float, bound: float) -> None:
+def fail(p: ServerRecord, s: ServerState, fault: int, joint: int, value: float, bound: float) -> None:
     """Record a fault and start its reaction; an active fault is not overwritten."""
     reaction = _REPORT if p.reported[fault] else _REACTION[fault]
     if reaction == _REPORT:
@@ -100,7 +101,7 @@ def fail(p: ServerParameters, s: ServerState, fault: int, joint: int, value: flo
 
 
 @inner
-def begin_tick(p: ServerParameters, s: ServerState, now_ns: int) -> None:
+def begin_tick(p: ServerRecord, s: ServerState, now_ns: int) -> None:
     """Execute the scripted commands that are due; a stop button that sends no more messages counts as pressed."""
     if s.first_ns == 0:
         s.first_ns = now_ns
@@ -123,13 +124,13 @@ def begin_tick(p: ServerParameters, s: ServerState, now_ns: int) -> None:
 
 
 @inner
-def is_braked(p: ServerParameters, s: ServerState) -> bool:
+def is_braked(p: ServerRecord, s: ServerState) -> bool:
     """Whether the drives are off and brakes hold the arm."""
     return bool(s.must_brake or (p.brakes and s.state in (_DISABLED, _FAULT)))
 
 
 @inner
-def watch_joints(p: ServerParameters, s: ServerState, effort: Array, passed_ns: int) -> None:
+def watch_joints(p: ServerRecord, s: ServerState, effort: Array, passed_ns: int) -> None:
     """Find joints that are too far from their setpoint, too fast, or at the effort limit of their drives.
 
     Args:
@@ -142,7 +143,7 @@ def watch_joints(p: ServerParameters, s: ServerState, effort: Array, passed_ns: 
         off = abs(s.setpoint[i] - s.measured[i])
         if not off <= p.lag[i]:  # also for NaN
             fail(p, s, _TRACKING, i, off, p.lag[i])
-        fast = p.overspeed * p.speed_limit[i]
+        fast = p.operation.overspeed * p.speed_limit[i]
         if not abs(s.speed[i]) <= fast:
             fail(p, s, _OVERSPEED, i, abs(s.speed[i]), fast)
         is_full = abs(effort[i]) >= _FULL * p.effort_limit[i]
@@ -152,7 +153,7 @@ def watch_joints(p: ServerParameters, s: ServerState, effort: Array, passed_ns: 
 
 
 @inner
-def watch_tip(p: ServerParameters, s: ServerState, setpoint: Array, measured: Array) -> None:
+def watch_tip(p: ServerRecord, s: ServerState, setpoint: Array, measured: Array) -> None:
     """Find a tip that is too far from its setpoint; both are poses (7,)."""
     square = 0.0
     for i in range(3):
@@ -162,7 +163,7 @@ def watch_tip(p: ServerParameters, s: ServerState, setpoint: Array, measured: Ar
 
 
 @inner
-def watch_limits(p: ServerParameters, s: ServerState, now_ns: int) -> None:
+def watch_limits(p: ServerRecord, s: ServerState, now_ns: int) -> None:
     """Find commands that push a joint against its limit."""
     pressed = -1
     for i in range(s.target.shape[0]):
@@ -210,7 +211,7 @@ def find_rest(s: ServerState, moves: bool, now_ns: int) -> None:
 
 
 @inner
-def watch_feedback(p: ServerParameters, s: ServerState, now_ns: int) -> None:
+def watch_feedback(p: ServerRecord, s: ServerState, now_ns: int) -> None:
     """Find an arm whose position has been unknown for too long."""
     silence_ns = now_ns - s.heard_of_ns
     if silence_ns > p.silence_ns:
@@ -218,13 +219,13 @@ def watch_feedback(p: ServerParameters, s: ServerState, now_ns: int) -> None:
 
 
 @inner
-def is_blind(p: ServerParameters, s: ServerState, now_ns: int) -> bool:
+def is_blind(p: ServerRecord, s: ServerState, now_ns: int) -> bool:
     """Whether no measured position of the arm came within the command timeout."""
     return bool(now_ns - s.heard_of_ns > p.timeout_ns)
 
 
 @inner
-def tell(p: ServerParameters, s: ServerState, row: Array) -> None:
+def tell(p: ServerRecord, s: ServerState, row: Array) -> None:
     """Write the numbers of :data:`~teleop_core.graph.topics.OPERATION`."""
     row[0], row[1], row[2], row[3] = s.state, s.is_homed, s.is_busy, s.is_stopped
     row[4], row[5], row[6], row[7] = s.fault, s.fault_joint, s.fault_value, s.fault_bound

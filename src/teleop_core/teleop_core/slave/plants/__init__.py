@@ -6,16 +6,18 @@ behind the encoders. Each file states the origin of its numbers.
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
 from teleop_core.base.errors import ParameterError, PartError, ShapeError
 from teleop_core.base.registry import Registry, part_check, places, tried
+from teleop_core.kernels.addresses import Addressed
 from teleop_core.kernels.geometry import Array
 from teleop_core.robots.robot import Robot
+from teleop_core.slave.arm import SimulatedArm
 
-__all__ = ["PLANTS", "Physics", "Plant", "register_plant"]
+__all__ = ["PLANTS", "Mover", "Physics", "Plant", "register_plant"]
 
 PER_JOINT = (
     "viscous", "coulomb", "friction_speed", "bristle", "wander", "wander_travel", "bias",
@@ -81,6 +83,32 @@ class Physics:
             object.__setattr__(self, name, array)
 
 
+class Mover(Protocol):
+    """Simulator of others that moves an arm in place of our own equations of motion.
+
+    In each tick of the arm, ``see`` is called first and ``move`` last. The kernels of both exchange values with the
+    arrays of the :class:`~teleop_core.slave.arm.SimulatedArm` and the signals for which the mover was made.
+
+    Attributes:
+        see: Writes joint positions and speeds of the present moment, ``slave_true_cf``, and with servos the efforts.
+        move: Takes the efforts of the drives, or with servos the setpoint, for the coming tick.
+        has_servos: Whether drives of the mover follow the setpoint, so that no control law of ours is used.
+    """
+
+    see: Addressed
+    move: Addressed
+    has_servos: bool
+
+    def reset(self) -> None:
+        """Return to the state before the first tick, with the arm at its present position, at rest."""
+
+    def close(self) -> None:
+        """End a trial, which no other stage of the session joins."""
+
+    def concerns(self) -> list[str]:
+        """Sentences for users about present problems."""
+
+
 @dataclass(frozen=True)
 class Plant:
     """A plant.
@@ -89,11 +117,14 @@ class Plant:
         name: Name of the plant in ``--set plant=``.
         parameters: Parameter group of the plant.
         physics: ``physics(parameters, robot)`` returns the numbers of the plant for a robot with drives.
+        mover: ``mover(parameters, robot, arm, signals, dt)`` returns a simulator that moves the arm; None for our own
+            equations of motion. Then the numbers of ``physics`` only serve the checks of the control loop.
     """
 
     name: str
     parameters: type
     physics: Callable[[Any, Robot], Physics]
+    mover: Callable[[Any, Robot, SimulatedArm, Any, float], Mover] | None = None
 
 
 def _try(part: Plant) -> None:
@@ -107,7 +138,12 @@ def _try(part: Plant) -> None:
 
 
 PLANTS: Registry[Plant] = Registry(
-    "plant", "plants", places("teleop_core.slave.plants", "ideal hardware"), part_check("plant", Plant, "physics"), _try
+    "plant",
+    "plants",
+    places("teleop_core.slave.plants", "ideal hardware"),
+    part_check("plant", Plant, "physics"),
+    _try,
+    elsewhere={"scene": "teleop_scene"},
 )
 """All plants by name."""
 

@@ -13,16 +13,16 @@ from std_srvs.srv import Trigger
 from teleop_core.bags.messages import read_numbers
 from teleop_core.base.errors import SessionError
 from teleop_core.graph.graph import RECORDER_NAME
+from teleop_core.graph.operation import State
 from teleop_core.graph.topics import OPERATION, SLAVE_OPERATION, TELEOP_STATE, Topic
 from teleop_core.kernels.geometry import Array
 from teleop_core.middleware.world import Qos, Taken
 from teleop_core.nodes.crews import Processes, crews
-from teleop_core.nodes.observer import Observer
+from teleop_core.nodes.observer import ReportReader
 from teleop_core.nodes.operation import STOP_TOPIC
 from teleop_core.nodes.streams import message_type
 from teleop_core.robots import Robot
 from teleop_core.session.configuration import Configuration
-from teleop_core.slave.operation import State
 from teleop_core.slave.operation.states import COMMANDS
 from teleop_drill.drill.exercise import Master
 from teleop_drill.simulation.bus import Bus
@@ -35,7 +35,7 @@ _RELEASE = "release"
 _FRESH_NS = 200_000_000
 
 
-class Stage:
+class DrilledSession:
     """A session, and the faults and commands applied to it; one process contains the whole drill.
 
     Args:
@@ -62,7 +62,7 @@ class Stage:
         self._node = self.world.node("drill")
         self._executor.add_node(self._node)
         self.world.thread("executor", self._spin).start()
-        observer = Observer(0, world=self.world)
+        observer = ReportReader(0, world=self.world)
         shared = {name: nodes for crew in crews(configuration.graph, processes) for name, nodes in crew.items()}
         self.names = tuple(shared)
         self.session = SimulatedSession(bus, owner, configuration, shared, folder, observer, Master.DEVICE)

@@ -1,0 +1,186 @@
+"""Live cameras: a process that draws a scene while its session runs, and publishes the pictures.
+
+The process reads ``scene/poses`` and nothing waits for it. If drawing takes longer than a period, the periods without a
+picture are counted, and the next picture shows the newest poses.
+"""
+
+import heapq
+import os
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from time import perf_counter
+
+import numpy as np
+
+from teleop_core.bags.layouts import layout
+from teleop_core.bags.messages import read_any
+from teleop_core.bags.reports import report
+from teleop_core.base import ParameterError
+from teleop_core.graph import TICK_NS
+from teleop_core.graph.topics import DIAGNOSTICS, SCENE_POSES, Topic
+from teleop_core.kernels import Array
+from teleop_core.middleware.ros import ROS
+from teleop_core.middleware.world import Publisher, World
+from teleop_core.nodes.discovery import choose_transport
+from teleop_core.nodes.guest import Guest
+from teleop_core.nodes.interrupt import Interrupt
+from teleop_core.nodes.quality import profile
+from teleop_core.nodes.streams import Subscription, message_type
+from teleop_scene.camera import Camera, View
+from teleop_scene.film import SECOND_NS, Way, calibration, encoded, topics_of
+
+NAME = "camera"
+_NICE = 5
+_WAIT = 0.02  # longest wait for poses [s], in which pictures on their way may become due
+_BLOCK = 1024
+
+
+@dataclass
+class Counts:
+    """What cameras did: pictures taken, lost on the way, and not made; times of drawing and encoding [ms]."""
+
+    taken: int = 0
+    lost: int = 0
+    missed: int = 0
+    times_ms: list[float] = field(default_factory=list)
+
+    def values(self) -> dict[str, str]:
+        """The counts as texts, for a report."""
+        median = float(np.median(self.times_ms[-_BLOCK:])) if self.times_ms else 0.0
+        found = {"taken": self.taken, "lost": self.lost, "missed": self.missed, "picture_ms": round(median, 3)}
+        return {name: str(value) for name, value in found.items()}
+
+    def __str__(self) -> str:
+        return ", ".join(f"{name} {value}" for name, value in self.values().items())
+
+
+class _Sender:
+    """Publishes pictures after the time that they are on their way."""
+
+    def __init__(self, guest: Guest, views: Sequence[View], way: Way, counts: Counts) -> None:
+        self._guest, self._counts, self._number = guest, counts, 0
+        self._ways = [replace(way, seed=way.seed + k) for k in range(len(views))]
+        self._late: list[Array] = [np.empty(0)] * len(views)
+        self._made = [[self._publisher(topic) for topic in topics_of(view)] for view in views]
+        self._reports = self._publisher(DIAGNOSTICS)
+        self._waiting: list[tuple[int, int, int, tuple[bytes, bytes]]] = []
+
+    def _publisher(self, topic: Topic) -> Publisher:
+        return self._guest.ros.create_publisher(message_type(topic.ros_type), f"/{topic.name}", profile(topic))
+
+    def send(self, k: int, picture: bytes, calibrated: bytes) -> None:
+        """Send a picture of camera ``k`` and its calibration on their way."""
+        if not len(self._late[k]):
+            self._late[k] = self._ways[k].arrivals(_BLOCK)
+            self._ways[k] = replace(self._ways[k], seed=self._ways[k].seed + 1000)
+        late, self._late[k] = float(self._late[k][0]), self._late[k][1:]
+        if not np.isfinite(late):
+            self._counts.lost += 1
+            return
+        self._number += 1
+        due = self._guest.world.monotonic_ns() + round(late * SECOND_NS)
+        heapq.heappush(self._waiting, (due, self._number, k, (picture, calibrated)))
+
+    def deliver(self) -> None:
+        """Publish the pictures that are due."""
+        while self._waiting and self._waiting[0][0] <= self._guest.world.monotonic_ns():
+            _, _, k, messages = heapq.heappop(self._waiting)
+            for publisher, data in zip(self._made[k], messages, strict=True):
+                publisher.send(data)
+
+    def tell(self) -> None:
+        """Publish the counts."""
+        self._reports.send(report(self._guest.world.time_ns(), NAME, 0, "active", self._counts.values()))
+
+
+class _Cameras:
+    """Draws a picture of each camera at the first poses of each period."""
+
+    def __init__(self, guest: Guest, cameras: Sequence[Camera], rate: float, way: Way, counts: Counts) -> None:
+        self._cameras, self._rate, self._counts, self._world = cameras, rate, counts, guest.world
+        self._form, self._slot, self._told = layout(SCENE_POSES, ()), -1, 0
+        self._poses = Subscription(guest, SCENE_POSES, f"/{SCENE_POSES.name}")
+        self._sender = _Sender(guest, [camera.view for camera in cameras], way, counts)
+        self._calibrated = [calibration(camera) for camera in cameras]
+
+    def turn(self) -> None:
+        """Deliver what is due, then draw the newest poses if a period has begun."""
+        self._sender.deliver()
+        if (now := self._world.monotonic_ns() // SECOND_NS) != self._told:
+            self._told = now
+            self._sender.tell()
+        taken = self._poses.take()
+        if taken is None:
+            self._poses.wait(_WAIT)
+            return
+        found = self._form.decode_one(taken.data) or read_any(SCENE_POSES.kind, taken.data)
+        if isinstance(found, tuple) and self._is_due(found[0]):
+            self._draw(*found)
+
+    def _is_due(self, stamp_ns: int) -> bool:
+        slot, before = int(stamp_ns * self._rate / SECOND_NS + 1e-6), self._slot
+        if slot <= before:
+            return False
+        self._counts.missed += (slot - before - 1) * len(self._cameras) if before >= 0 else 0
+        self._slot = slot
+        return True
+
+    def _draw(self, stamp_ns: int, row: Array) -> None:
+        for k, camera in enumerate(self._cameras):
+            begin = perf_counter()
+            picture = camera.take(row.reshape(-1, 7)[: camera.bodies], stamp_ns // TICK_NS)
+            self._sender.send(k, encoded(picture, stamp_ns, camera.view.name), self._calibrated[k](stamp_ns))
+            self._counts.taken += 1
+            self._counts.times_ms.append(1e3 * (perf_counter() - begin))
+            self._sender.deliver()
+
+
+def run(
+    file: Path,
+    views: Sequence[View],
+    *,
+    rate: float = 30.0,
+    way: Way | None = None,
+    world: World = ROS,
+    interrupt: Interrupt | None = None,
+    say: Callable[[str], object] = print,
+) -> Counts:
+    """Draw and publish pictures of a running session until an ending signal.
+
+    Args:
+        file: File of the scene.
+        views: Cameras.
+        rate: Pictures per second [Hz] of each camera; not above the rate of ``scene/poses``.
+        way: Way of the pictures.
+        world: World of the session.
+        interrupt: Object that ends the cameras, in addition to signals of this process.
+        say: Called with each line for the user.
+
+    Returns:
+        Counts of the pictures.
+
+    Raises:
+        ParameterError: There are no cameras, or the rate is not allowed.
+        TeleopError: As in :class:`~teleop_scene.camera.Camera`.
+    """
+    if not views or not 0.0 < rate <= 1000.0:
+        raise ParameterError("--rate", rate, "above 0 Hz, up to 1000 Hz, for at least one camera")
+    interrupt, counts = interrupt or Interrupt(), Counts()
+    cameras = [Camera(file, view) for view in views]
+    if world is ROS:
+        choose_transport()
+        os.nice(_NICE)
+    with interrupt.caught(), Guest(NAME, world=world) as guest:
+        work = _Cameras(guest, cameras, rate, way or Way(), counts)
+        say(f"{len(cameras)} cameras of {file.name} at {rate:g} Hz: {', '.join(view.topic for view in views)}")
+        try:
+            while True:
+                interrupt.check()
+                work.turn()
+        except KeyboardInterrupt:
+            say(str(counts))
+        finally:
+            for camera in cameras:
+                camera.close()
+    return counts

@@ -1,0 +1,146 @@
+"""Arms of MuJoCo models: kinematics and inertias are the model's own; unusable models are refused in one line."""
+
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+
+import teleop_core as tc
+from teleop_core.base import ParameterError, RecordingError, TeleopError, UnknownNameError
+from teleop_core.robots.dynamics.chain_dynamics import inertia_matrix
+from teleop_scene import models, truth
+from teleop_scene.arm import SceneRobot, arm_of, load_scene
+
+ODD = """<mujoco><compiler angle="radian"/><option gravity="1 2 -9"/><worldbody>
+  <body name="stand" pos="0.3 -0.2 0.1" euler="0.3 -0.2 0.7">
+    <body name="first" pos="0 0 0.2" euler="0 0.4 0">
+      <joint name="a" axis="0 -1 0.2" pos="0.02 0 0.01" ref="0.3" armature="0.02" range="-1 1"/>
+      <geom size="0.05" mass="1" pos="0 0 0.1"/>
+      <body name="second" pos="0.2 0 0">
+        <joint name="s" type="slide" axis="0.1 0 -1" ref="-0.05" armature="0.3" range="-0.2 0.2"/>
+        <joint name="b" axis="1 0 0" armature="0.01" range="-2 2"/>
+        <geom type="box" size="0.05 0.02 0.1" mass="0.7" pos="0.05 0 0"/>
+        <body name="fixed" pos="0 0.1 0"><geom size="0.03" mass="0.2"/>
+          <body name="third" pos="0 0 0.15"><joint name="c" axis="0 0 1" armature="0.01" range="-3 3"/>
+            <geom size="0.03" mass="0.3" pos="0.1 0 0"/><site name="tip" pos="0.1 0.02 0" euler="0.2 0 0.1"/>
+          </body></body></body></body></body>
+  <body name="ball" pos="2 0 1"><freejoint/><geom size="0.1"/></body>
+</worldbody>{more}</mujoco>"""
+
+
+@pytest.fixture
+def rng() -> np.random.Generator:
+    return np.random.default_rng(7)
+
+
+def odd(more: str = "") -> tuple[mujoco.MjModel, SceneRobot]:
+    model = mujoco.MjModel.from_xml_string(ODD.format(more=more))
+    return model, arm_of(Path("odd.xml"), model)
+
+
+def placed(model: mujoco.MjModel, robot: SceneRobot, q: np.ndarray) -> mujoco.MjData:
+    data = mujoco.MjData(model)
+    data.qpos[model.jnt_qposadr[robot.chain.joints]] = q
+    mujoco.mj_forward(model, data)
+    return data
+
+
+def test_the_tip_is_where_mujoco_has_it_in_every_posture(rng: np.random.Generator) -> None:
+    model, robot = odd()
+    for q in rng.uniform(robot.lower, robot.upper, (20, robot.n)):
+        site = placed(model, robot, q).site("tip")
+        T = robot.world_base @ robot.fk(q)
+        np.testing.assert_allclose(T[:3, 3], site.xpos, atol=1e-14)
+        np.testing.assert_allclose(T[:3, :3], site.xmat.reshape(3, 3), atol=1e-14)
+
+
+def test_weight_and_inertia_are_those_of_the_model(rng: np.random.Generator) -> None:
+    model, robot = odd()
+    dynamics, dofs = robot.dynamics, model.jnt_dofadr[robot.chain.joints]
+    assert dynamics is not None
+    row, weight, inertia = dynamics.parameters.copy(), np.zeros(robot.n), np.zeros((robot.n, robot.n))
+    for q in rng.uniform(robot.lower, robot.upper, (20, robot.n)):
+        data = placed(model, robot, q)
+        dynamics.gravity(q, row, weight)
+        np.testing.assert_allclose(weight, data.qfrc_bias[dofs], atol=1e-12)
+        inertia_matrix(q, row, inertia)
+        whole = np.zeros((model.nv, model.nv))
+        mujoco.mj_fullM(model, data, whole)
+        np.testing.assert_allclose(inertia, whole[np.ix_(dofs, dofs)], atol=1e-12)
+
+
+def test_the_arm_begins_where_the_keyframe_says() -> None:
+    more = '<keyframe><key qpos="0.5 0.1 -0.3 1.2 2 0 1 1 0 0 0"/></keyframe>'
+    assert odd(more)[1].home.tolist() == [0.5, 0.1, -0.3, 1.2]
+
+
+@pytest.mark.parametrize("robot", ["cubes.xml", "drawer.xml", "peg_in_hole.xml"])
+def test_our_scenes_begin_at_rest_and_touch_nothing_but_their_table(robot: str) -> None:
+    arm = tc.load_robot(robot)
+    assert isinstance(arm, SceneRobot)
+    model = models.model_of(arm.file)
+    data = mujoco.MjData(model)
+    data.qpos[:] = arm.begin
+    mujoco.mj_forward(model, data)
+    assert data.contact.dist.min(initial=0.0) > -1e-3
+    assert np.isfinite(data.qacc).all()
+
+
+def test_motions_and_contacts_are_those_of_closed_forms() -> None:
+    bounds = (1e-5, 1e-4, 1e-5, 1e-6, 0.01, 1.5, 1e-3)
+    for found, bound in zip(truth.comparisons(), bounds, strict=True):
+        assert abs(found.difference) < bound, found
+
+
+REFUSED = {
+    "equality constraint 0": '<equality><joint joint1="a" joint2="c"/></equality>',
+    "third to world": '<equality><connect body1="third" anchor="0 0 0"/></equality>',
+    "pulls at joint a": '<tendon><fixed><joint joint="a" coef="1"/><joint joint="c" coef="1"/></fixed></tendon>',
+}
+
+
+@pytest.mark.parametrize("words", REFUSED)
+def test_constraints_that_inverse_kinematics_cannot_use_are_refused_by_name(words: str) -> None:
+    with pytest.raises(ParameterError, match=words) as told:
+        odd(REFUSED[words])
+    assert "\n" not in str(told.value)
+
+
+def test_a_weld_to_a_free_body_is_a_load_and_not_refused() -> None:
+    assert odd('<equality><weld body1="third" body2="ball"/></equality>')[1].n == 4
+
+
+@pytest.mark.parametrize(
+    ("tip", "words"), [("hook", "hook"), ("stand", "hinge or slide joint"), ("ball", "free joint")]
+)
+def test_a_missing_or_unmoved_tip_is_refused_by_name(tip: str, words: str) -> None:
+    model = mujoco.MjModel.from_xml_string(ODD.format(more=""))
+    with pytest.raises(ParameterError, match=words):
+        arm_of(Path("odd.xml"), model, tip)
+
+
+def test_files_that_are_no_model_are_refused_in_one_line(tmp_path: Path) -> None:
+    path = tmp_path / "scene.xml"
+    with pytest.raises(RecordingError, match="cannot be read"):
+        load_scene(path)
+    for text in ("<mujoco><worldbody>", '<mujoco><asset><mesh name="m" file="gone.stl"/></asset></mujoco>'):
+        path.write_text(text)
+        with pytest.raises(ParameterError) as told:
+            load_scene(path)
+        assert "\n" not in str(told.value)
+    assert "gone.stl" in str(told.value)
+
+
+def test_other_words_for_the_drive_are_refused() -> None:
+    with pytest.raises(UnknownNameError, match="effort"):
+        tc.load_robot("cubes.xml", drive="magic")
+
+
+def test_a_scene_without_its_package_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+    from teleop_core.robots.parts import SCENES
+
+    monkeypatch.setattr(SCENES, "_parts", {})
+    monkeypatch.setattr(SCENES, "_installed", {})
+    with pytest.raises(TeleopError, match="in the distribution teleop_scene"):
+        tc.load_robot("cubes.xml")
