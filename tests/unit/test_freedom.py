@@ -11,6 +11,7 @@ import pytest
 import teleop_core as tc
 from jointed import urdf
 from present import present
+from teleop_core import kinematics
 from teleop_core.base.errors import ParameterError, ShapeError
 from teleop_core.graph.layers import list_scenarios
 from teleop_core.kernels import IS_COMPILED
@@ -125,6 +126,19 @@ def test_the_start_is_the_nearest_posture_to_home_with_nine_tenths_of_the_most_r
     good = postures[rooms >= freedom.EQUAL * rooms.max() - 1e-9]
     away = np.abs((good - robot.home) / (robot.upper - robot.lower)).max(axis=1)
     np.testing.assert_array_equal(found, good[away.argmin()])
+
+
+def test_a_fan_is_followed_if_every_pose_of_it_is() -> None:
+    robot, rng = tc.load_robot("puma560"), np.random.default_rng(3)
+    seeds = robot.start + rng.uniform(-0.05, 0.05, (12, 4, robot.n))
+    poses = robot.fk(seeds.reshape(-1, robot.n)).reshape(12, 4, 4, 4)
+    far = np.arange(12) % 6  # 4 and 5: none is out of reach
+    for fan in np.flatnonzero(far < 4):
+        poses[fan, far[fan], :3, 3] += 100.0
+    found, q = np.zeros(12, np.bool_), np.empty_like(seeds)
+    kinematics.ik_fans(robot.ik_pointer, poses, seeds, robot.limits(), robot.geometry_row, q, found)
+    np.testing.assert_array_equal(found, far >= 4)
+    np.testing.assert_allclose(q[found], seeds[found], atol=1e-9)
 
 
 @walks_far
