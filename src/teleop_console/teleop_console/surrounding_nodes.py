@@ -41,7 +41,7 @@ class SurroundingNodes:
                 f"{above}/shape{number}",
                 vertices.astype(np.float32),
                 faces.astype(np.uint32),
-                color=tuple(round(255 * x) for x in shape.color),
+                color=np.round(255.0 * np.array(shape.color)).astype(np.uint8),
                 flat_shading=True,
                 cast_shadow=False,
                 receive_shadow=False,
