@@ -5,7 +5,7 @@ from teleop_core.graph import BUILT_IN, DT, topics
 from teleop_core.hand.master.device import DeviceParameters
 from teleop_core.hand.master.haptic_master import HapticMasterParameters
 from teleop_core.robots import load_robot_set
-from teleop_core.robots.parts import is_urdf
+from teleop_core.robots.parts import is_scene, is_urdf
 from teleop_core.robots.robot_notes import assumed_note, notes_on_robot
 from teleop_core.session.configuration import Configuration
 from teleop_core.slave.parameters import SlaveParameters
@@ -29,7 +29,7 @@ def notes_of(configuration: Configuration, transport: float = 0.0) -> list[str]:
             told = (rendered_note(master.device, mapping.fixture), passive_note(master.device, mapping.fixture, delay))
             found += [f"arm {arm!r}: {note}" if arm else note for note in told if note]
         slave = configuration.group(SLAVE.name, arm)
-        if isinstance(slave, SlaveParameters) and is_urdf(slave.robot):
+        if isinstance(slave, SlaveParameters) and (is_urdf(slave.robot) or is_scene(slave.robot)):
             robot = load_robot_set(slave.robot, slave.geometry)
             has_task = any(entry.startswith("task=") for entry in slave.geometry)
             own = notes_on_robot(robot, slave.robot, has_task)
