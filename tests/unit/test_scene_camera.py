@@ -11,7 +11,6 @@ import pytest
 
 import teleop_core as tc
 
-os.environ.setdefault("MUJOCO_GL", "egl")  # for MuJoCo's own renderer, the oracle
 mujoco = pytest.importorskip("mujoco", reason="teleop_scene is not installed")
 simplejpeg = pytest.importorskip("simplejpeg", reason="teleop_scene is not installed")
 from rosbags.typesys import Stores, get_typestore  # noqa: E402
@@ -63,8 +62,12 @@ def poses_at(q: Array, model: Any) -> tuple[Array, Any]:
     return np.hstack([data.xpos[moving], data.xquat[moving]]), data
 
 
-def test_a_picture_from_poses_is_the_picture_from_the_state() -> None:
+def test_a_picture_from_poses_is_the_picture_from_the_state(monkeypatch: pytest.MonkeyPatch) -> None:
     """MuJoCo's own drawing of random states, which moves also what hangs on bodies without joints."""
+    from mujoco import egl
+    from mujoco.rendering.classic import renderer
+
+    monkeypatch.setattr(renderer.gl_context, "GLContext", egl.GLContext)
     model, rng = mujoco.MjModel.from_xml_path(str(SCENE)), np.random.default_rng(3)
     model.vis.quality.offsamples = model.vis.quality.shadowsize = 0
     camera, oracle = Camera(SCENE, View("front", 160, 120)), mujoco.Renderer(model, 120, 160)
@@ -109,7 +112,9 @@ def test_every_picture_belongs_to_the_state_of_its_stamp(session: tc.Recording, 
     stamps = [stamp_of(message) for _, message in messages_of(seen, IMAGE)]
     assert set(np.diff(stamps)[1:]) == {40_000_000}
     assert (report.lost, report.missed) == (0, 0)
-    ((_, info),) = messages_of(seen, "camera/front/camera_info")
+    infos = [info for _, info in messages_of(seen, "camera/front/camera_info")]
+    assert [stamp_of(info) for info in infos] == stamps
+    info = infos[0]
     assert (info.width, info.height) == (320, 240)
     assert info.k[0] == pytest.approx(120.0 / np.tan(np.radians(22.5)))  # 45° from top to bottom
     for name in session.topics:

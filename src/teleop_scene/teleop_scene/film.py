@@ -5,7 +5,7 @@ The session itself never waits for a picture. A way delays, loses and reorders t
 """
 
 import struct
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -68,23 +68,23 @@ def encoded(pixels: Pixels, stamp_ns: int, frame: str) -> bytes:
     return head + data
 
 
-def calibration(camera: Camera, stamp_ns: int) -> bytes:
-    """CDR bytes of the ``CameraInfo`` of a camera: a pinhole without distortion."""
+def calibration(camera: Camera) -> Callable[[int], bytes]:
+    """Maker of the CDR bytes of a camera's ``CameraInfo`` for a stamp [ns]: a pinhole without distortion."""
     types, view = typestore().types, camera.view
-    stamp = types["builtin_interfaces/msg/Time"](*divmod(stamp_ns, SECOND_NS))
-    header = types["std_msgs/msg/Header"](stamp, view.name)
+    header = types["std_msgs/msg/Header"](types["builtin_interfaces/msg/Time"](0, 0), view.name)
     f, x, y = camera.focal, view.width / 2.0, view.height / 2.0
     K = np.array([f, 0.0, x, 0.0, f, y, 0.0, 0.0, 1.0])
     P = np.array([f, 0.0, x, 0.0, 0.0, f, y, 0.0, 0.0, 0.0, 1.0, 0.0])
     whole = types["sensor_msgs/msg/RegionOfInterest"](0, 0, 0, 0, False)
     info = types[INFO](header, view.height, view.width, "plumb_bob", np.zeros(5), K, np.eye(3).ravel(), P, 0, 0, whole)
-    return serialise(info)
+    data = serialise(info)
+    return lambda stamp_ns: data[:4] + struct.pack("<iI", *divmod(stamp_ns, SECOND_NS)) + data[12:]
 
 
 def topics_of(view: View) -> tuple[Topic, Topic]:
     """Topics of the pictures and of the calibration of a camera."""
     image = Topic(view.topic, Kind.REPORT, frame_id=view.name, quality=Quality.STREAM, message=IMAGE)
-    info = Topic(view.info_topic, Kind.REPORT, frame_id=view.name, quality=Quality.LATCHED, message=INFO)
+    info = Topic(view.info_topic, Kind.REPORT, frame_id=view.name, quality=Quality.STREAM, message=INFO)
     return image, info
 
 
@@ -174,13 +174,14 @@ def film(
         camera = Camera(file, view)
         image, info = topics_of(view)
         late = replace(taken_way, seed=taken_way.seed + number).arrivals(len(at))
-        made.append((info, int(poses.log_ns[0]), calibration(camera, int(poses.stamp_ns[0]))))
+        calibrated = calibration(camera)
         for k, index in enumerate(at):
             counts += (1, not np.isfinite(late[k]))
             if np.isfinite(late[k]):
                 stamp = int(poses.stamp_ns[index])
                 picture = camera.take(poses.values[index].reshape(-1, 7)[: camera.bodies], stamp // TICK_NS)
-                made.append((image, int(poses.log_ns[index] + late[k] * 1e9), encoded(picture, stamp, view.name)))
+                came_ns = int(poses.log_ns[index] + late[k] * SECOND_NS)
+                made += [(image, came_ns, encoded(picture, stamp, view.name)), (info, came_ns, calibrated(stamp))]
         camera.close()
     _copy(source, Path(out), sorted(made, key=lambda m: m[1]), [t for view in views for t in topics_of(view)])
     return FilmReport(Path(out), int(counts[0]), int(counts[1]), missed * len(views))

@@ -64,17 +64,13 @@ class _Sender:
         self._late: list[Array] = [np.empty(0)] * len(views)
         self._made = [[self._publisher(topic) for topic in topics_of(view)] for view in views]
         self._reports = self._publisher(DIAGNOSTICS)
-        self._waiting: list[tuple[int, int, Publisher, bytes]] = []
+        self._waiting: list[tuple[int, int, int, tuple[bytes, bytes]]] = []
 
     def _publisher(self, topic: Topic) -> Publisher:
         return self._guest.ros.create_publisher(message_type(topic.ros_type), f"/{topic.name}", profile(topic))
 
-    def calibrate(self, k: int, data: bytes) -> None:
-        """Publish the calibration of camera ``k``."""
-        self._made[k][1].send(data)
-
-    def send(self, k: int, data: bytes) -> None:
-        """Send a picture of camera ``k`` on its way."""
+    def send(self, k: int, picture: bytes, calibrated: bytes) -> None:
+        """Send a picture of camera ``k`` and its calibration on their way."""
         if not len(self._late[k]):
             self._late[k] = self._ways[k].arrivals(_BLOCK)
             self._ways[k] = replace(self._ways[k], seed=self._ways[k].seed + 1000)
@@ -84,17 +80,60 @@ class _Sender:
             return
         self._number += 1
         due = self._guest.world.monotonic_ns() + round(late * SECOND_NS)
-        heapq.heappush(self._waiting, (due, self._number, self._made[k][0], data))
+        heapq.heappush(self._waiting, (due, self._number, k, (picture, calibrated)))
 
     def deliver(self) -> None:
         """Publish the pictures that are due."""
         while self._waiting and self._waiting[0][0] <= self._guest.world.monotonic_ns():
-            _, _, publisher, data = heapq.heappop(self._waiting)
-            publisher.send(data)
+            _, _, k, messages = heapq.heappop(self._waiting)
+            for publisher, data in zip(self._made[k], messages, strict=True):
+                publisher.send(data)
 
     def tell(self) -> None:
         """Publish the counts."""
         self._reports.send(report(self._guest.world.time_ns(), NAME, 0, "active", self._counts.values()))
+
+
+class _Cameras:
+    """Draws a picture of each camera at the first poses of each period."""
+
+    def __init__(self, guest: Guest, cameras: Sequence[Camera], rate: float, way: Way, counts: Counts) -> None:
+        self._cameras, self._rate, self._counts, self._world = cameras, rate, counts, guest.world
+        self._form, self._slot, self._told = layout(SCENE_POSES, ()), -1, 0
+        self._poses = Subscription(guest, SCENE_POSES, f"/{SCENE_POSES.name}")
+        self._sender = _Sender(guest, [camera.view for camera in cameras], way, counts)
+        self._calibrated = [calibration(camera) for camera in cameras]
+
+    def turn(self) -> None:
+        """Deliver what is due, then draw the newest poses if a period has begun."""
+        self._sender.deliver()
+        if (now := self._world.monotonic_ns() // SECOND_NS) != self._told:
+            self._told = now
+            self._sender.tell()
+        taken = self._poses.take()
+        if taken is None:
+            self._poses.wait(_WAIT)
+            return
+        found = self._form.decode_one(taken.data) or read_any(SCENE_POSES.kind, taken.data)
+        if isinstance(found, tuple) and self._is_due(found[0]):
+            self._draw(*found)
+
+    def _is_due(self, stamp_ns: int) -> bool:
+        slot, before = int(stamp_ns * self._rate / SECOND_NS + 1e-6), self._slot
+        if slot <= before:
+            return False
+        self._counts.missed += (slot - before - 1) * len(self._cameras) if before >= 0 else 0
+        self._slot = slot
+        return True
+
+    def _draw(self, stamp_ns: int, row: Array) -> None:
+        for k, camera in enumerate(self._cameras):
+            begin = perf_counter()
+            picture = camera.take(row.reshape(-1, 7)[: camera.bodies], stamp_ns // TICK_NS)
+            self._sender.send(k, encoded(picture, stamp_ns, camera.view.name), self._calibrated[k](stamp_ns))
+            self._counts.taken += 1
+            self._counts.times_ms.append(1e3 * (perf_counter() - begin))
+            self._sender.deliver()
 
 
 def run(
@@ -132,43 +171,16 @@ def run(
     if world is ROS:
         choose_transport()
         os.nice(_NICE)
-    form, slot, told = layout(SCENE_POSES, ()), -1, 0
     with interrupt.caught(), Guest(NAME, world=world) as guest:
-        poses = Subscription(guest, SCENE_POSES, f"/{SCENE_POSES.name}")
-        sender = _Sender(guest, views, way or Way(), counts)
-        for k, camera in enumerate(cameras):
-            sender.calibrate(k, calibration(camera, world.time_ns()))
+        work = _Cameras(guest, cameras, rate, way or Way(), counts)
         say(f"{len(cameras)} cameras of {file.name} at {rate:g} Hz: {', '.join(view.topic for view in views)}")
         try:
             while True:
                 interrupt.check()
-                sender.deliver()
-                if (now := world.monotonic_ns() // SECOND_NS) != told:
-                    told = now
-                    sender.tell()
-                if (taken := poses.take()) is None:
-                    poses.wait(_WAIT)
-                    continue
-                found = form.decode_one(taken.data) or read_any(SCENE_POSES.kind, taken.data)
-                if not isinstance(found, tuple):
-                    continue
-                stamp_ns, row = found
-                now_slot = int(stamp_ns * rate / SECOND_NS + 1e-6)
-                if now_slot <= slot:
-                    continue
-                counts.missed += (now_slot - slot - 1) * len(cameras) if slot >= 0 else 0
-                slot = now_slot
-                for k, (camera, view) in enumerate(zip(cameras, views, strict=True)):
-                    begin = perf_counter()
-                    picture = camera.take(row.reshape(-1, 7)[: camera.bodies], stamp_ns // TICK_NS)
-                    sender.send(k, encoded(picture, stamp_ns, view.name))
-                    counts.taken += 1
-                    counts.times_ms.append(1e3 * (perf_counter() - begin))
-                    sender.deliver()
+                work.turn()
         except KeyboardInterrupt:
             say(str(counts))
         finally:
-            poses.close()
             for camera in cameras:
                 camera.close()
     return counts

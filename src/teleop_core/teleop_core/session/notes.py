@@ -29,12 +29,14 @@ def notes_of(configuration: Configuration, transport: float = 0.0) -> list[str]:
             told = (rendered_note(master.device, mapping.fixture), passive_note(master.device, mapping.fixture, delay))
             found += [f"arm {arm!r}: {note}" if arm else note for note in told if note]
         slave = configuration.group(SLAVE.name, arm)
-        if isinstance(slave, SlaveParameters) and (is_urdf(slave.robot) or is_scene(slave.robot)):
+        if isinstance(slave, SlaveParameters) and is_urdf(slave.robot):
             robot = load_robot_set(slave.robot, slave.geometry)
             has_task = any(entry.startswith("task=") for entry in slave.geometry)
             own = notes_on_robot(robot, slave.robot, has_task)
             own += filter(None, [assumed_note(robot, slave.robot)])
             found += [note for note in own if note not in found]
+        elif isinstance(slave, SlaveParameters) and is_scene(slave.robot):  # models never state limits of speeds
+            found += [f"{slave.robot}: {note}" for note in load_robot_set(slave.robot, slave.geometry).notes]
     return found
 
 
