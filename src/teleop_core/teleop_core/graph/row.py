@@ -109,6 +109,10 @@ class Row(Fields):
     slave_jaw_object_cp_ns: int
     slave_jaw_board: Array
     slave_jaw_board_ns: int
+    scene_poses: Array
+    scene_poses_ns: int
+    scene_energy: Array
+    scene_energy_ns: int
     display_measured_cp: Array
     display_measured_cp_ns: int
     task_state: Array
