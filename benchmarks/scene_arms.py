@@ -54,7 +54,7 @@ def line(name: str, geometry: list[str], seconds: float) -> str:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            settings: dict[str, tc.Setting] = {"robot": name, "geometry": geometry}
+            settings: dict[str, str | list[str]] = {"robot": name, "geometry": geometry}
             arm = tc.load_robot(name, **dict(text.split("=") for text in geometry))
             tc.run("coarse_box", duration=0.1, settings=settings)  # compiles
             begin = process_time()
@@ -72,8 +72,8 @@ def line(name: str, geometry: list[str], seconds: float) -> str:
 
 def drive_of(arm: tc.Robot) -> str:
     """What drives the arm."""
-    model = models.model_of(arm.file) if isinstance(arm, SceneRobot) else None
-    assert model is not None
+    assert isinstance(arm, SceneRobot)
+    model = models.model_of(arm.file)
     drives = [actuators.drive_of(model, j) for j in arm.chain.joints.tolist()]
     if actuators.servos_of(drives):
         return "servos"

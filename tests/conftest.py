@@ -1,5 +1,6 @@
 """Fixtures that several folders of tests share."""
 
+import gc
 import os
 import signal
 import subprocess
@@ -31,6 +32,8 @@ if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
     # A shell without job control starts what runs in the background (`pytest &`) deaf to Ctrl-C,
     # and all its children with it: tests that end a process so would wait for ever.
     signal.signal(signal.SIGINT, signal.default_int_handler)
+
+gc.set_threshold(100_000, 20, 20)  # to look for garbage among all tests and kernels takes a seventh of the time
 
 pytest_plugins = ["forgotten_parts", "middleware_faults"]
 

@@ -122,7 +122,7 @@ def _fly(
 
 
 def _records(points: int, numbers: dict[str, float]) -> tuple[object, NDArray[np.void]]:
-    p, contacts = record(simulation.SimulationNumbers, JOINTS), record_array(ContactState, points, JOINTS)
+    p, contacts = record(simulation.SimulationRecord, JOINTS), record_array(ContactState, points, JOINTS)
     known = {"world_stiffness": 1000.0, "steps": 2, "friction_speed": 1.0, "tool_length": 0.02}
     for key, value in (known | numbers).items():
         p[key] = value

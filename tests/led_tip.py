@@ -8,9 +8,9 @@ import numpy as np
 
 from teleop_core.kernels import Array, fields_of, kernel, pointer, record, record_array
 from teleop_core.kinematics import FK
-from teleop_core.slave.simulation import SimulationNumbers
+from teleop_core.slave.simulation import SimulationRecord
 from teleop_core.slave.world import WORLD_OBJECTS, contact
-from teleop_core.slave.world.button import ButtonNumbers
+from teleop_core.slave.world.button import ButtonRecord
 
 DT = 1e-3
 PIECES = 16  # pieces of way in a tick, along each of which the push does its work
@@ -55,7 +55,7 @@ def needle(name: str, parameters: Any = None, joints: int = 3) -> Needle:
 
 
 @kernel
-def _stored_in_button(p: SimulationNumbers, s: Any, depth: Any) -> Any:
+def _stored_in_button(p: SimulationRecord, s: Any, depth: Any) -> Any:
     """Energy that a button can give back [J] by what moves along its normal."""
     rising, falling = min(depth, p.click_travel), min(depth, p.stroke) - p.click_travel
     energy = 0.5 * p.click_force * rising * rising / p.click_travel
@@ -69,7 +69,7 @@ def _stored_in_button(p: SimulationNumbers, s: Any, depth: Any) -> Any:
 
 
 @kernel
-def _stored(p: SimulationNumbers, s: Any) -> Any:
+def _stored(p: SimulationRecord, s: Any) -> Any:
     """Energy that the object can give back [J]: by its surface, or by springs of the channel."""
     stiffness, depth, square = p.world_stiffness, max(-s.gap, 0.0), 0.0
     for k in range(3):
@@ -85,7 +85,7 @@ def _stored(p: SimulationNumbers, s: Any) -> Any:
 
 
 @kernel
-def _lead(p: SimulationNumbers, contacts: Any, arm: Any, way: Array, felt: Array, lost: Array) -> None:
+def _lead(p: SimulationRecord, contacts: Any, arm: Any, way: Array, felt: Array, lost: Array) -> None:
     """Lead the tip along ``way`` (N, 3), a tick each ``PIECES`` rows.
 
     Writes the force at the begin of each tick (ticks, 6), and the energy lost so far (ticks,): what
@@ -122,7 +122,7 @@ def lead(way: Array, name: str = "plane", parameters: Any = None, **numbers: flo
         numbers: Of it, beside those of soft tissue.
     """
     # Whole records: numba takes a record for another one that begins with the same fields.
-    p, contacts = record(SimulationNumbers, 3), record_array(contact.ContactState, 1, 3)
+    p, contacts = record(SimulationRecord, 3), record_array(contact.ContactState, 1, 3)
     known = {
         "world_stiffness": 200.0,
         "puncture_force": 0.5,
@@ -132,7 +132,7 @@ def lead(way: Array, name: str = "plane", parameters: Any = None, **numbers: flo
     }
     for key, value in (known | numbers).items():
         p[key] = value
-    for key, *_ in fields_of(ButtonNumbers):
+    for key, *_ in fields_of(ButtonRecord):
         p[key] = getattr(parameters, key, 0.0)
     times = np.arange(PIECES * (len(way) - 1) + 1) / PIECES
     fine = np.column_stack([np.interp(times, np.arange(len(way)), column) for column in way.T])

@@ -89,7 +89,7 @@ def test_a_gear_that_moves_a_motor_alone_or_swings_too_fast_is_refused(gears: tu
 
 
 @kernel
-def drive_on(p: simulation.SimulationNumbers, s: simulation.SimulationState, arm: Any, efforts: Array) -> None:
+def drive_on(p: simulation.SimulationRecord, s: simulation.SimulationState, arm: Any, efforts: Array) -> None:
     """What drives give for rows of efforts (N, 6); written in their place."""
     for k in range(efforts.shape[0]):
         for i in range(6):

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import teleop_core as tc
+from jointed import urdf
 from present import present
 from teleop_core.base.errors import ParameterError, ShapeError
 from teleop_core.graph.layers import list_scenarios
@@ -100,6 +101,30 @@ def test_a_stretched_arm_starts_bent() -> None:
     assert abs(robot.start[1]) > math.radians(30.0)
     assert freedom.freedom(robot, robot.start).metres > 0.1
     assert freedom.freedom(robot, robot.start).radians == math.inf  # it controls x and y alone
+
+
+@walks_far
+@pytest.mark.parametrize("joints", [6, 12])
+def test_the_start_is_the_nearest_posture_to_home_with_nine_tenths_of_the_most_room(
+    joints: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(freedom, "SAMPLES", 48)
+    monkeypatch.setattr(freedom, "BATCH", 6)  # of the twelve joints' postures some are not walked at all
+    robot = tc.load_robot(str(urdf(joints, tmp_path)))
+    found = freedom.start_posture(robot)
+    spread = freedom.samples(robot)
+    held = np.array([robot.fk(q) for q in spread])
+    held[:, :3, :3] = robot.fk(robot.home)[:3, :3]
+    answer, lever = robot.ik_batch(held), freedom.lever(robot)
+    looked_at = np.vstack((robot.home, answer.q[answer.status == IkStatus.FOLLOWED]))
+    for postures in (looked_at, np.vstack((looked_at, spread))):
+        walks = [freedom.freedom(robot, q) for q in postures]
+        rooms = np.array([min(metres / lever, radians) for metres, radians in walks])
+        if rooms.max() > math.radians(29.0):
+            break
+    good = postures[rooms >= freedom.EQUAL * rooms.max() - 1e-9]
+    away = np.abs((good - robot.home) / (robot.upper - robot.lower)).max(axis=1)
+    np.testing.assert_array_equal(found, good[away.argmin()])
 
 
 @walks_far

@@ -15,7 +15,7 @@ from teleop_core.graph import DT
 from teleop_core.kernels import Array, kernel
 from teleop_core.slave.friction import wander
 from teleop_core.slave.joints import integrate
-from teleop_core.slave.simulation import SimulationNumbers, SimulationState
+from teleop_core.slave.simulation import SimulationRecord, SimulationState
 from teleop_core.slave.slave_sim import SlaveSim, SlaveSimParameters
 
 JOINT = 3  # theta4 of the rcrt1: an axis that acts on no other
@@ -132,13 +132,13 @@ def test_smooth_friction_creeps_under_the_load_that_sticking_friction_holds() ->
 
 
 @kernel
-def wander_once(p: SimulationNumbers, s: SimulationState) -> None:
+def wander_once(p: SimulationRecord, s: SimulationState) -> None:
     """One tick of :func:`wander`, which only kernels call."""
     wander(p, s)
 
 
 @kernel
-def wander_on(p: SimulationNumbers, s: SimulationState, share: float, ticks: int, found: Array) -> None:
+def wander_on(p: SimulationRecord, s: SimulationState, share: float, ticks: int, found: Array) -> None:
     """Share of dry friction in force, every hundredth tick (ticks / 100, 6).
 
     All joints slip by a ``share`` of the way on which friction changes in every tick.

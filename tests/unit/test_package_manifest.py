@@ -55,7 +55,7 @@ def test_every_python_dependency_is_declared_or_noted_as_one_of_pip(package: str
     note = present(re.search(r"From pip.*?-->", text, re.DOTALL)).group()
     setup = (SOURCES / package / "setup.py").read_text()
     listed = present(re.search(r"install_requires=\[(.*?)\]", setup, re.DOTALL))
-    names = re.findall(r'"([a-z0-9_]+)', listed.group(1))
+    names = re.findall(r'"([a-z0-9_-]+)', listed.group(1))
     assert "numpy" in names
     for name in names:
         key = NAMED_BY.get(name, f"python3-{name}")

@@ -11,6 +11,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from teleop_console.answers import Situation
+from teleop_console.camera_pictures import CameraPictures
 from teleop_console.front import STOPPER
 from teleop_console.link import Parameters, SessionLink
 from teleop_console.panel import Panel
@@ -80,6 +81,7 @@ class Console:
                 Steps(server.viser, self.stylus, arms, drivers.may_drive)
         with self.panel.view_tab:
             ViewTab(server.viser, self.scene, self._visitors)
+            self._pictures = CameraPictures(server.viser, self.scene)
             self._insets = Insets(server.viser, self.scene)
 
     def _stop(self) -> None:
@@ -107,6 +109,7 @@ class Console:
         self.panel.draw(view)
         self.panel.settings.follow(self._link.changes())
         self._insets.say(display_text(view))
+        self._pictures.draw(view.pictures)
         self._visitors.look()
 
     def _ask(self, is_over: Callable[[], bool]) -> None:

@@ -117,11 +117,17 @@ class ArmNodes:
 
         The scene draws the arm's own bodies. Cameras take the arm's position into account, but not its rotation.
         """
-        self.drawn.hide()
+        self.drawn.show(is_shown=False)
         if self._robot.world_base is not None and first.world_base is not None:
             pose = product(inverse(pose_of(first.world_base)), pose_of(self._robot.world_base))
             self._side = float(pose[1])
             move(self._root, pose)
+
+    def give_way(self, *, is_hidden: bool) -> None:
+        """Hide the arm and all paths while a picture takes the place of the scene; the master stays."""
+        self.drawn.show(is_shown=not is_hidden and self._robot.world_base is None)
+        for tail in self._tails:
+            tail.show(is_shown=not is_hidden)
 
     def room(self) -> tuple[Array, Array]:
         """Lowest and highest corner (3,) [m] of arm and master, in the axes of the page."""

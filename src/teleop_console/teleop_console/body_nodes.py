@@ -87,10 +87,10 @@ class BodyNodes:
             self._drawn[body] = poses[body]
         return self._drawn.copy()
 
-    def hide(self) -> None:
-        """Hide the shapes of all bodies, which others draw; frames, axes and halos remain."""
+    def show(self, *, is_shown: bool) -> None:
+        """Show the shapes of all bodies, or hide them; frames, axes and halos remain."""
         for mesh in self._meshes:
-            mesh.visible = False
+            mesh.visible = is_shown
 
     def mark(self, joints: frozenset[int]) -> None:
         """Show a halo around the given joints only; the colours of the bodies do not change."""

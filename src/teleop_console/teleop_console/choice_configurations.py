@@ -8,14 +8,14 @@ from teleop_console.folders import is_own
 from teleop_core.base.errors import ParameterError, TeleopError
 from teleop_core.graph.layers import SESSION, Layer, config_folder, list_scenarios, load_file, parse_setting
 from teleop_core.robots import load_robot_set
-from teleop_core.robots.parts import DESCRIPTION
+from teleop_core.robots.parts import DESCRIPTION, SCENE_ENDING
 from teleop_core.session.configuration import Configuration
 from teleop_core.session.length import as_long_as_followed
 
 
 def is_robot_file(robot: str) -> bool:
     """Whether a robot's word means a file, or a description of an installed package, which has a file too."""
-    return robot.lower().endswith((".urdf", ".xacro", ".yaml", ".yml", DESCRIPTION))
+    return robot.lower().endswith((".urdf", ".xacro", ".yaml", ".yml", SCENE_ENDING, DESCRIPTION))
 
 
 def made(scenario: str, said: Sequence[str], followed: str, *, opens: bool) -> Configuration:

@@ -17,6 +17,7 @@ from std_srvs.srv import Trigger
 from teleop_console.console_streams import SILENCE, Hand, NewestSample, now_of
 from teleop_console.link import ArmView, ParameterInfo, Parameters, Setting, ShownArm, View
 from teleop_console.parameter_client import ParameterClient, ParameterEvents, call
+from teleop_console.picture_streams import PictureStreams
 from teleop_core.bags.messages import read_numbers, read_reports
 from teleop_core.bags.recording import MARKS
 from teleop_core.base.errors import ParameterError, SessionError
@@ -119,6 +120,7 @@ class LiveLink(ReportReader):
         self._told = {arm: [Subscription(self, t, f"/{t.name}") for t in topics] for arm, topics in told.items()}
         self._marks = Subscription(self, MARKS, f"/{self._recorder()}/marks", _MARKS)
         self._hands = {arm.name: Hand(self, arm.name) for arm in self.arms}
+        self._pictures = PictureStreams(self)
         self._view = View(arms={arm.name: ArmView() for arm in self.arms})
         self._begun = self._heard = now_of(self)
 
@@ -160,6 +162,7 @@ class LiveLink(ReportReader):
             self._insist(view)
             self._hear_nodes(view)
             self._hear_marks(view)
+            view.pictures = self._pictures.take()
             view.time, view.age = now - self._begun, now - self._heard
             # frame rate of the display's topic, which is the last one
             view.display = self._seen[self.arms[0].name][-1].rhythm()

@@ -7,6 +7,7 @@ from typing import Protocol
 
 import numpy as np
 
+from teleop_console.picture_streams import Picture
 from teleop_core.base.errors import SessionError
 from teleop_core.graph.topics import Topic
 from teleop_core.kernels.geometry import Array
@@ -66,6 +67,7 @@ class View:
         age: Time since the newest shown sample arrived [s]; NaN if unknown.
         marks: Times [s] and texts of the marks that were set since the page opened.
         display: Frames per second and delay [s] of the operator's display; NaN without a display.
+        pictures: Newest picture of each camera of a live session, by the camera's name.
         recording: Path of the present recording; None if no recording is made.
         run: Number of recordings that were saved in this session.
     """
@@ -79,6 +81,7 @@ class View:
     age: float = float("nan")
     marks: tuple[tuple[float, str], ...] = ()
     display: tuple[float, float] = (float("nan"), float("nan"))
+    pictures: Mapping[str, Picture] = field(default_factory=dict)
     recording: Path | None = None
     run: int = 0
 

@@ -28,8 +28,8 @@
     };
   }
   function thin() { // again and again: viser takes another ratio at any time; ?fixedDpr=1 in the address keeps one
-    const behind = window.__viserMutable?.backgroundMaterial; // a picture behind the scene, which has none
-    if (behind) behind.visible = false;
+    const behind = window.__viserMutable?.backgroundMaterial; // the picture of a camera in place of the scene
+    if (behind) behind.visible = Boolean(behind.uniforms?.enabled?.value); // without one it is not drawn
     const color = getComputedStyle(document.documentElement).getPropertyValue('--t-color-scene').trim();
     if (color) ground = [1, 3, 5].map((at) => parseInt(color.slice(at, at + 2), 16) / 255);
     for (const notice of document.querySelectorAll('.mantine-Notification-root')) // the page adapts to it, see above

@@ -149,6 +149,14 @@ class Scene:
             for nodes in self.arms.values():
                 nodes.show(what, is_shown=is_shown)
 
+    def give_way(self, *, is_hidden: bool) -> None:
+        """Hide all but the masters while the picture of a camera takes the place of the scene."""
+        with self._server.atomic():
+            self._floor.visible = not is_hidden
+            self._surroundings.show(is_shown=not is_hidden)
+            for nodes in self.arms.values():
+                nodes.give_way(is_hidden=is_hidden)
+
     def set_dark(self, *, is_dark: bool) -> None:
         """Set the colours for a dark or a light page."""
         ground, line = (DARK, GRID_DARK) if is_dark else (LIGHT, GRID)

@@ -25,6 +25,7 @@ class SurroundingNodes:
     def __init__(self, server: viser.ViserServer, robot: Robot) -> None:
         shapes = robot.surroundings() if robot.world_base is not None else ()
         self._frames: dict[int, viser.FrameHandle] = {}
+        self._root: viser.FrameHandle | None = None
         if not shapes or robot.world_base is None:
             return
         self._root = server.scene.add_frame(PATH, show_axes=False)
@@ -36,16 +37,21 @@ class SurroundingNodes:
                 if shape.place not in self._frames:
                     self._frames[shape.place] = server.scene.add_frame(above, show_axes=False)
                     move(self._frames[shape.place], shape.begin)
-            vertices, faces = shape.mesh
+            (vertices, faces), (red, green, blue) = shape.mesh, shape.color
             server.scene.add_mesh_simple(
                 f"{above}/shape{number}",
                 vertices.astype(np.float32),
                 faces.astype(np.uint32),
-                color=tuple(round(255 * x) for x in shape.color),
+                color=(round(255 * red), round(255 * green), round(255 * blue)),
                 flat_shading=True,
                 cast_shadow=False,
                 receive_shadow=False,
             )
+
+    def show(self, *, is_shown: bool) -> None:
+        """Show the bodies, or hide them."""
+        if self._root is not None:
+            self._root.visible = is_shown
 
     def draw(self, view: ArmView) -> None:
         """Move the bodies to the newest poses; only changes are sent."""

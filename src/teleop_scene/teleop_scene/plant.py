@@ -205,10 +205,6 @@ class _Mover:
         """Let no other stage share the scene of a trial."""
         leave(self.scene)
 
-    def check(self) -> None:
-        """Raise an error if the scene has become unstable."""
-        self.scene.check()
-
     def concerns(self) -> list[str]:
         """Report a scene that is unstable, or too slow for a live session."""
         return [text for text in (self.scene.problem(), self._slowness) if text]

@@ -12,7 +12,7 @@ import copy
 import ctypes
 import math
 import weakref
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from time import perf_counter
 
@@ -20,7 +20,7 @@ import mujoco
 import numpy as np
 
 from teleop_core.base import TeleopError
-from teleop_core.kernels import Array, Fields, kernel, record
+from teleop_core.kernels import Array, Fields, addressed, call_address, kernel, record
 from teleop_core.kernels.fields import Integers
 from teleop_core.kernels.memory import call
 from teleop_scene import actuators, models
@@ -42,6 +42,8 @@ class SceneState(Fields):
     dt: float  # of a step [s]
     ticks: int  # that the scene has made
     is_lost: int  # whether a number is not finite, so that the scene stands still
+    tell: int  # address of the function that ends the session then, and of its block
+    tell_block: int
     work: float  # that drives have done on the scene since the start [J]
 
 
@@ -87,10 +89,22 @@ def advance(s: SceneState, qpos: Array, qvel: Array, force: Array, given: Array)
         if not abs(qvel[i]) < _HUGE:
             s.is_lost = 1
     s.ticks += 1
+    if s.is_lost != 0:
+        call_address(s.tell, s.tell_block)
+
+
+def _end(scene: "weakref.ref[Scene]") -> None:
+    """End the session of a scene that became unstable.
+
+    Raises:
+        TeleopError: Always; it is raised at the end of the running ticks.
+    """
+    found = scene()
+    raise TeleopError("" if found is None else found.problem())
 
 
 class Scene:
-    """A model in motion.
+    """A model in motion. A session whose scene becomes unstable ends with a TeleopError.
 
     Args:
         file: File of the model.
@@ -119,6 +133,8 @@ class Scene:
         s["step"], s["find_forces"] = address_of("mj_step"), address_of("mj_rnePostConstraint")
         s["model"], s["data"], s["substeps"] = self.model._address, self.data._address, substeps
         s["dt"] = option.timestep
+        self._tell = addressed(partial(_end, weakref.ref(self)))
+        s["tell"], s["tell_block"] = self._tell.address, self._tell.block_address
         data = self.data
         self.arrays = (data.qpos, data.qvel, data.qfrc_actuator, data.qfrc_applied)
         self.begin = np.array(self.model.key_qpos[0] if self.model.nkey else self.model.qpos0)
@@ -156,15 +172,6 @@ class Scene:
         mujoco.mj_forward(self.model, self.data)
         self.data.qacc_warmstart[:] = 0.0
         self.state["ticks"], self.state["is_lost"], self.state["work"] = 0, 0, 0.0
-
-    def check(self) -> None:
-        """Raise an error if the scene cannot go on.
-
-        Raises:
-            TeleopError: A number of the scene is not finite.
-        """
-        if self.state["is_lost"]:
-            raise TeleopError(self.problem())
 
     def problem(self) -> str:
         """Text about a scene that became unstable; empty for a sound one."""

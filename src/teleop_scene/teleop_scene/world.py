@@ -73,8 +73,8 @@ def world_step(
         own: State of the stage; written.
         bodies: Bodies with joints.
         arrays: Positions (nbody, 3) and quaternions (nbody, 4) of the bodies; energies (2,); positions of joints (nq,).
-        jaw: Actuator and place of the position of each joint of the jaw (2, m), positions of closed and open joints
-            (2, m), ratio of control to position (m,), and the scene's controls (nu,), which are written.
+        jaw: Actuators of the jaw's joints and places of their positions (2, m); positions of closed and open joints
+            (2, m); ratios of control to position (m,). The last array contains the scene's controls (nu,); written.
         row: Signals.
         dt: Tick [s].
     """

@@ -49,6 +49,9 @@ class IkStatus(IntEnum):
     UNREACHABLE = 3  # no joint vector reaches the position; the nearest joint vector is returned
 
 
+_FOLLOWED = int(IkStatus.FOLLOWED)
+
+
 class FkStatus(IntEnum):
     """Whether forward kinematics found a pose with which the loops of a robot close."""
 
@@ -214,3 +217,30 @@ def ik_batch(
         statuses[i] = ik(transforms[i], seed, limits, geometry, q[i], residuals[i])
         if statuses[i] < 0:
             return
+
+
+@kernel
+def ik_fans(
+    ik: IkKernel,
+    transforms: Array,
+    seeds: Array,
+    limits: Array,
+    geometry: Array,
+    q: Array,
+    is_followed: NDArray[np.bool_],
+) -> None:
+    """Solve fans of poses (N, k, 4, 4) from seeds (N, k, n), and tell of each fan whether all its poses are followed.
+
+    A fan ends at its first pose that is not: the search for a pose out of reach takes the longest. Joints of the
+    rest of such a fan are left as they are.
+    """
+    residual = np.empty(2)
+    for i in range(transforms.shape[0]):
+        is_followed[i] = True
+        for k in range(transforms.shape[1]):
+            status = ik(transforms[i, k], seeds[i, k], limits, geometry, q[i, k], residual)
+            if status < 0:
+                return
+            if status != _FOLLOWED:
+                is_followed[i] = False
+                break

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from teleop_core import kinematics
 from teleop_core.kernels import Array, length, product, raise_pending, rotations_from_quaternions
-from teleop_core.kinematics import IkStatus
 from teleop_core.robots import arm
 
 # Angle of one step of rotation [rad]. The length of one step of translation is this angle times reach/pi.
@@ -30,7 +29,8 @@ ENOUGH_MOVE = math.radians(12.0)
 EQUAL = 0.9
 # Number of postures that are examined.
 SAMPLES = 512
-_FOLLOWED = int(IkStatus.FOLLOWED)
+# Number of postures that are walked before it is asked whether one of them has all the room that there can be.
+BATCH = 32
 _KNOWN: dict[tuple[object, ...], Array] = {}
 
 
@@ -109,21 +109,41 @@ def start_posture(robot: arm.Arm) -> Array:
     Returns:
         Joint vector (n,) [rad, m], inside the limits; home if no posture has more room.
     """
-    moves, turns = _steps(robot, robot.home[None])
-    if moves[0] >= round(ENOUGH_MOVE / STEP) and turns[0] >= round(ENOUGH / STEP):
+    move, turn = round(ENOUGH_MOVE / STEP), round(ENOUGH / STEP)
+    moves, turns = _steps(robot, robot.home[None], np.array([move]), np.array([turn]))
+    if moves[0] >= move and turns[0] >= turn:
         return robot.home
     spread = samples(robot)
     held = _poses(robot, spread)
     held[:, :3, :3] = robot.fk(robot.home)[:3, :3]
     answer = robot.ik_batch(held)
-    postures = np.vstack((robot.home, answer.q[answer.status == _FOLLOWED]))
-    steps = np.minimum(*_steps(robot, postures))
-    if steps.max() < round(ENOUGH / STEP):
-        postures = np.vstack((postures, spread))
-        steps = np.concatenate((steps, np.minimum(*_steps(robot, spread))))
+    followed = answer.q[answer.status == kinematics.IkStatus.FOLLOWED]
+    postures, steps = _walked(robot, np.vstack((robot.home, followed)))
+    if steps.max() < turn:
+        others, more = _walked(robot, spread)
+        postures, steps = np.vstack((postures, others)), np.concatenate((steps, more))
     good = postures[steps >= EQUAL * steps.max()]
-    away = np.abs((good - robot.home) / (robot.upper - robot.lower)).max(axis=1)
-    return np.asarray(good[int(away.argmin())])
+    return np.asarray(good[int(_away(robot, good).argmin())])
+
+
+def _away(robot: arm.Arm, postures: Array) -> Array:
+    """Distance (N,) of postures from home: the largest joint difference, divided by the range of the joint."""
+    return np.abs((postures - robot.home) / (robot.upper - robot.lower)).max(axis=1)
+
+
+def _walked(robot: arm.Arm, postures: Array) -> tuple[Array, Array]:
+    """Postures (k, n), the nearest to home first, and their steps (k,).
+
+    Those behind the first one with the largest possible room are left out: they are no better, and farther away.
+    """
+    postures = postures[np.argsort(_away(robot, postures), kind="stable")]
+    parts = list[Array]()
+    for begin in range(0, len(postures), BATCH):
+        parts.append(_least_steps(robot, postures[begin : begin + BATCH]))
+        if parts[-1].max() >= STEPS:
+            break
+    steps = np.concatenate(parts)
+    return postures[: len(steps)], steps
 
 
 def free_postures(robot: arm.Arm, count: int) -> Array:
@@ -137,7 +157,7 @@ def free_postures(robot: arm.Arm, count: int) -> Array:
         Postures (k, n) [rad, m] with k >= 1; postures without room are left out.
     """
     spread = samples(robot)
-    steps = np.minimum(*_steps(robot, spread))
+    steps = _least_steps(robot, spread)
     order = np.argsort(-steps, kind="stable")
     wide = spread[order[steps[order] > 0.0]]
     return np.vstack((robot.start, wide[: count - 1]))
@@ -148,13 +168,25 @@ def _poses(robot: arm.Arm, postures: Array) -> Array:
     return robot.solve_fk_batch(postures, search=False).T
 
 
-def _steps(robot: arm.Arm, postures: Array) -> tuple[Array, Array]:
-    """Steps (N,) of translation, and of rotation, that postures allow in the worst direction; inf without direction."""
+def _steps(
+    robot: arm.Arm, postures: Array, move: Array | None = None, turn: Array | None = None
+) -> tuple[Array, Array]:
+    """Steps (N,) of translation, and of rotation, that postures allow in the worst direction; inf without direction.
+
+    ``move`` and ``turn`` (N,) are numbers of steps at which the walk of a posture may end.
+    """
     mask = np.array(robot.task_mask)
     return (
-        _walk(robot, postures, _directions(mask[:3]), is_turn=False),
-        _walk(robot, postures, _directions(mask[3:]), is_turn=True),
+        _walk(robot, postures, _directions(mask[:3]), move, is_turn=False),
+        _walk(robot, postures, _directions(mask[3:]), turn, is_turn=True),
     )
+
+
+def _least_steps(robot: arm.Arm, postures: Array) -> Array:
+    """Steps (N,) that postures allow in translation and in rotation; no more rotations are tried than translations."""
+    mask = np.array(robot.task_mask)
+    moves = _walk(robot, postures, _directions(mask[:3]), is_turn=False)
+    return np.minimum(moves, _walk(robot, postures, _directions(mask[3:]), moves, is_turn=True))
 
 
 def _directions(controlled: NDArray[np.bool_]) -> Array:
@@ -164,32 +196,34 @@ def _directions(controlled: NDArray[np.bool_]) -> Array:
     return kept / length(kept)[:, None]
 
 
-def _walk(robot: arm.Arm, postures: Array, directions: Array, *, is_turn: bool) -> Array:
-    """Number of steps (N,) that each posture allows in its worst direction."""
+def _walk(robot: arm.Arm, postures: Array, directions: Array, enough: Array | None = None, *, is_turn: bool) -> Array:
+    """Number of steps (N,) that each posture allows in its worst direction; the walk ends after ``enough`` (N,)."""
     count, fan = len(postures), len(directions)
     if not fan:
         return np.full(count, np.inf)
+    most = np.full(count, STEPS) if enough is None else np.minimum(enough, STEPS)
     slide = STEP * lever(robot)
     limits, unit = robot.limits(), STEP if is_turn else slide
     jacobian = np.empty((6, robot.n))
     robot.kernels.jacobian(robot.home.copy(), robot.geometry_row, jacobian)
     is_sliding = np.abs(jacobian[3:]).max(axis=0) < 1e-9
     limits[2] = SWIFT * np.where(is_sliding, slide, STEP)
-    begin, alive, steps = _poses(robot, postures), np.arange(count), np.zeros(count)
-    seeds = np.repeat(postures, fan, axis=0)
+    begin, steps = _poses(robot, postures), np.zeros(count)
+    alive, seeds = np.arange(count), np.repeat(postures[:, None], fan, axis=1)
     for step in range(1, STEPS + 1):
-        poses = _moved(begin[alive], step * unit * directions, is_turn)
-        seeds, status = _solve(robot, poses, seeds, limits)
-        is_there = (status == _FOLLOWED).reshape(-1, fan).all(axis=1)
-        alive, seeds = alive[is_there], seeds[np.repeat(is_there, fan)]
-        steps[alive] = step
+        goes_on = most[alive] >= step
+        alive, seeds = alive[goes_on], seeds[goes_on]
         if not len(alive):
             break
+        poses = _moved(begin[alive], step * unit * directions, is_turn)
+        seeds, is_there = _solve(robot, poses, seeds, limits)
+        alive, seeds = alive[is_there], seeds[is_there]
+        steps[alive] = step
     return steps
 
 
 def _moved(begin: Array, offsets: Array, is_turn: bool) -> Array:
-    """Poses (N k, 4, 4): each of the N poses, shifted [m] or rotated [rad] by each of the k offsets (k, 3)."""
+    """Poses (N, k, 4, 4): each of the N poses, shifted [m] or rotated [rad] by each of the k offsets (k, 3)."""
     poses = np.repeat(begin, len(offsets), axis=0).reshape(len(begin), -1, 4, 4)
     if is_turn:
         angle = length(offsets)[:, None]
@@ -197,12 +231,12 @@ def _moved(begin: Array, offsets: Array, is_turn: bool) -> Array:
         poses[..., :3, :3] = product(rotations_from_quaternions(quaternions), poses[..., :3, :3])
     else:
         poses[..., :3, 3] += offsets
-    return poses.reshape(-1, 4, 4)
+    return poses
 
 
-def _solve(robot: arm.Arm, poses: Array, seeds: Array, limits: Array) -> tuple[Array, NDArray[np.int64]]:
-    q, residual = np.empty_like(seeds), np.empty((len(seeds), 2))
-    status = np.zeros(len(seeds), np.int64)
-    kinematics.ik_batch(robot.ik_pointer, poses, seeds, False, limits, robot.geometry_row, q, residual, status)
+def _solve(robot: arm.Arm, poses: Array, seeds: Array, limits: Array) -> tuple[Array, NDArray[np.bool_]]:
+    """Joints (N, k, n) of poses (N, k, 4, 4), and whether all k poses of a posture are reached (N,)."""
+    q, is_there = np.empty_like(seeds), np.zeros(len(seeds), np.bool_)
+    kinematics.ik_fans(robot.ik_pointer, poses, seeds, limits, robot.geometry_row, q, is_there)
     raise_pending()
-    return q, status
+    return q, is_there

@@ -11,13 +11,13 @@ import numpy as np
 from teleop_core.kernels import Array, PerJoint, inner, kernel
 from teleop_core.robots.dynamics.rigid_body import invert_positive, write_model
 from teleop_core.slave.friction import FrictionState, bend, friction
-from teleop_core.slave.joints import JointNumbers
+from teleop_core.slave.joints import LoadRecord
 from teleop_core.slave.world.contact import add_push
 
 _DAMPING = 0.02  # damping of a gear, divided by the critical damping of motor and spring; assumed
 
 
-class ElasticNumbers(JointNumbers):
+class ElasticRecord(LoadRecord):
     """Fields of a parameter record with gears that bend."""
 
     gear_stiffness: PerJoint  # [N·m/rad or N/m]; 0 for a joint that does not bend
@@ -34,7 +34,7 @@ class ElasticState(FrictionState):
 
 @inner
 def _accelerate_links(
-    acceleration: Any, dynamics: Array, p: ElasticNumbers, q: Array, dq: Array, effort: Array, ddq: Array
+    acceleration: Any, dynamics: Array, p: ElasticRecord, q: Array, dq: Array, effort: Array, ddq: Array
 ) -> None:
     """Write link accelerations (n,): the rigid model without the motors of elastic joints."""
     n = q.shape[0]
@@ -56,7 +56,7 @@ def _accelerate_links(
 def _derivative(
     acceleration: Any,
     dynamics: Array,
-    p: ElasticNumbers,
+    p: ElasticRecord,
     s: ElasticState,
     contacts: Any,
     effort: Array,
@@ -86,7 +86,7 @@ def _derivative(
 def integrate_elastic(
     acceleration: Any,
     dynamics: Array,
-    p: ElasticNumbers,
+    p: ElasticRecord,
     s: ElasticState,
     contacts: Any,
     steps: int,

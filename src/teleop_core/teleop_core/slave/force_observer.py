@@ -14,7 +14,7 @@ from teleop_core.kernels import Array, Fields, PerJoint, inner, kernel
 from teleop_core.kernels.room import room
 from teleop_core.robots.dynamics.rigid_body import invert_positive, write_model
 from teleop_core.slave.arm import SimulatedArm
-from teleop_core.slave.friction import FrictionNumbers
+from teleop_core.slave.friction import FrictionRecord
 
 _DAMPING = 1e-4
 """Damping of the map from efforts to force, divided by its mean square gain.
@@ -23,7 +23,7 @@ In a direction whose sensitivity is a hundredth of that of the other directions,
 """
 
 
-class ObserverNumbers(FrictionNumbers):
+class ObserverRecord(FrictionRecord):
     """Fields of a parameter record with the observer's model of the arm."""
 
     effort_limit: PerJoint
@@ -59,7 +59,7 @@ def _lag(s: ObserverState, effort: Array, model: Array, share: float) -> None:
 
 
 @inner
-def _known_effort(p: ObserverNumbers, s: ObserverState, i: int) -> float:
+def _known_effort(p: ObserverRecord, s: ObserverState, i: int) -> float:
     """Effort of joint ``i`` that is explained by drives, the arm itself and friction [N·m or N]."""
     speed, scale = s.speed[i], p.friction_speed[i]
     dry = p.coulomb[i] * (speed / math.sqrt(speed * speed + scale * scale))
@@ -67,7 +67,7 @@ def _known_effort(p: ObserverNumbers, s: ObserverState, i: int) -> float:
 
 
 @inner
-def _observe(p: ObserverNumbers, s: ObserverState, model: Array, dt: float) -> None:
+def _observe(p: ObserverRecord, s: ObserverState, model: Array, dt: float) -> None:
     """Update the residual (n,) [N·m or N] to the present tick, and store the values that the next tick needs.
 
     Args:
@@ -139,7 +139,7 @@ def forget(s: ObserverState, wrench: Array) -> None:
 
 
 @inner
-def estimate(p: ObserverNumbers, s: ObserverState, arm: SimulatedArm, lag: float, dt: float, wrench: Array) -> None:
+def estimate(p: ObserverRecord, s: ObserverState, arm: SimulatedArm, lag: float, dt: float, wrench: Array) -> None:
     """Write the estimated force on the tip in axes of the slave's base, with a torque of zero.
 
     The estimate uses encoder positions, amplifier efforts, the control law's model and the plant's mean friction. The

@@ -19,7 +19,7 @@ STANDARD_GRAVITY = 9.80665
 _STREAM = 3  # number of the random stream, used with the seed; the human operator uses streams 1 and 2
 
 
-class SensorNumbers(Fields):
+class SensorRecord(Fields):
     """Fields of a parameter record with the properties of the sensor."""
 
     is_ideal: int
@@ -89,7 +89,7 @@ class ForceSensorParameters:
         source="assumed: above the frequencies of a hand, and below those that encoder steps disturb",
     )
 
-    def write(self, p: SensorNumbers, dt: float) -> None:
+    def write(self, p: SensorRecord, dt: float) -> None:
         """Write these values into the record of a simulated arm whose tick is ``dt`` [s]."""
         p["sensor_share"] = -math.expm1(-2.0 * math.pi * self.force_bandwidth * dt)
         p["sensor_noise"] = [self.force_noise] * 3 + [self.torque_noise] * 3
@@ -115,7 +115,7 @@ class SensorNoise(Noise):
 
 
 @inner
-def sense(p: SensorNumbers, s: SensorState, arm: SimulatedArm, row: Row) -> None:
+def sense(p: SensorRecord, s: SensorState, arm: SimulatedArm, row: Row) -> None:
     """Write ``slave_measured_cf``: the sensor's measurement of ``slave_true_cf``.
 
     The low-pass is exact for a force that is constant during a tick.

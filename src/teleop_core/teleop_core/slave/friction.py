@@ -19,7 +19,7 @@ _MODULUS = 2147483647
 _DAMPING = 1.0  # damping of a stuck joint on its bristle, divided by critical damping
 
 
-class FrictionNumbers(Fields):
+class FrictionRecord(Fields):
     """Fields of a parameter record with the friction of each joint."""
 
     viscous: PerJoint  # [N·m·s/rad or N·s/m]
@@ -42,7 +42,7 @@ class FrictionState(Fields):
 
 
 @inner
-def friction(p: FrictionNumbers, s: FrictionState, i: int, moved: float, speed: float) -> float:
+def friction(p: FrictionRecord, s: FrictionState, i: int, moved: float, speed: float) -> float:
     """Friction of joint ``i`` [N·m or N], against its speed.
 
     Args:
@@ -61,7 +61,7 @@ def friction(p: FrictionNumbers, s: FrictionState, i: int, moved: float, speed: 
 
 
 @inner
-def bend(p: FrictionNumbers, s: FrictionState, i: int, moved: float) -> None:
+def bend(p: FrictionRecord, s: FrictionState, i: int, moved: float) -> None:
     """Bend the bristle of joint ``i`` by a whole step, up to the bend at which it carries the dry friction.
 
     The rest of the motion is slip, and is added to ``s.slipped``.
@@ -76,7 +76,7 @@ def bend(p: FrictionNumbers, s: FrictionState, i: int, moved: float) -> None:
 
 
 @inner
-def wander(p: FrictionNumbers, s: FrictionState) -> None:
+def wander(p: FrictionRecord, s: FrictionState) -> None:
     """Vary the dry friction of joints that slipped: first-order noise of mean 1 over the slipped distance.
 
     As a joint moves, its teeth and balls touch other parts of their tracks, so the friction changes. At rest the

@@ -5,11 +5,11 @@ from typing import Any
 import numpy as np
 
 from teleop_core.kernels import Array, inner, kernel
-from teleop_core.slave.friction import FrictionNumbers, FrictionState, bend, friction
-from teleop_core.slave.world.contact import WorldNumbers, add_push
+from teleop_core.slave.friction import FrictionRecord, FrictionState, bend, friction
+from teleop_core.slave.world.contact import WorldRecord, add_push
 
 
-class JointNumbers(FrictionNumbers, WorldNumbers):
+class LoadRecord(FrictionRecord, WorldRecord):
     """Fields of a parameter record with the efforts and friction that act on moving joints."""
 
 
@@ -17,7 +17,7 @@ class JointNumbers(FrictionNumbers, WorldNumbers):
 def _derivative(
     acceleration: Any,
     dynamics: Array,
-    p: JointNumbers,
+    p: LoadRecord,
     s: FrictionState,
     contacts: Any,
     effort: Array,
@@ -38,7 +38,7 @@ def _derivative(
 def integrate(
     acceleration: Any,
     dynamics: Array,
-    p: JointNumbers,
+    p: LoadRecord,
     s: FrictionState,
     contacts: Any,
     steps: int,

@@ -19,7 +19,7 @@ from teleop_core.slave.force_sensor import ForceSensorParameters, SensorNoise
 from teleop_core.slave.friction import bristle_damping
 from teleop_core.slave.plants import PER_JOINT, PLANTS, Mover, Physics
 from teleop_core.slave.world import WORLD_OBJECTS, contact, puncture
-from teleop_core.slave.world.button import ButtonNumbers
+from teleop_core.slave.world.button import ButtonRecord
 from teleop_core.slave.world.contents import WorldParameters
 
 
@@ -85,7 +85,7 @@ class SlaveSim(RunningStage):
             raise ParameterError("slave_sim.robot", parameters.robot, "a robot with drives")
         n, model = self.robot.n, self.robot.dynamics
         super().__init__(SLAVE_SIM, n, dt)
-        self.parameters = record(simulation.SimulationNumbers, n)
+        self.parameters = record(simulation.SimulationRecord, n)
         self.state = record(simulation.SimulationState, n)
         self._law = CONTROLLERS.find(parameters.controller.kind.kind)
         self._seed, physics = parameters.seed, self._physics(parameters)
@@ -178,9 +178,7 @@ class SlaveSim(RunningStage):
         return max(-float(tip["gap"]), 0.0) if tip["is_open"] else 0.0
 
     def prepare(self, ticks: int) -> None:
-        """Draw the noise of the force sensor for the next ticks; an error if another simulator cannot go on."""
-        if self._mover is not None:
-            self._mover.check()
+        """Draw the noise of the force sensor for the next ticks."""
         if self.parameters["has_noise"]:
             self._noise.prepare(self.state, ticks)
 
@@ -268,9 +266,9 @@ class SlaveSim(RunningStage):
         p["tool_length"], p["tool_radius"] = world.tool_length, world.tool_radius
         p["world_stiffness"], p["world_damping"] = made_of.stiffness, made_of.damping
         p["world_friction"] = made_of.friction
-        for name, *_ in fields_of(puncture.PunctureNumbers):
+        for name, *_ in fields_of(puncture.PunctureRecord):
             p[name] = getattr(world, name)
-        for name, *_ in fields_of(ButtonNumbers):
+        for name, *_ in fields_of(ButtonRecord):
             p[name] = getattr(world.kind.parameters, name, 0.0)
         self.arm.shape[:] = world.shape
 

@@ -18,7 +18,7 @@ from teleop_core.robots.robot import Robot
 from teleop_core.slave.arm import SimulatedArm
 from teleop_core.slave.controllers import CONTROLLERS, Controller
 from teleop_core.slave.plants import PER_JOINT
-from teleop_core.slave.simulation import SimulationNumbers, SimulationState, simulation_step
+from teleop_core.slave.simulation import SimulationRecord, SimulationState, simulation_step
 
 _TICKS = 400  # duration of a trial [ticks]
 _LAST = 100  # number of ticks at the end of a trial in which the error is measured
@@ -45,7 +45,7 @@ _ARM = ("gains", "dynamics", "model", "coupling")
 _passed: set[tuple[object, ...]] = set()
 
 
-def check_friction(p: SimulationNumbers, inertia: Array, dt: float) -> None:
+def check_friction(p: SimulationRecord, inertia: Array, dt: float) -> None:
     """Refuse friction that the drives cannot overcome, or that the integration steps cannot follow.
 
     Args:
@@ -79,7 +79,7 @@ def check_friction(p: SimulationNumbers, inertia: Array, dt: float) -> None:
 class ClosedLoop(NamedTuple):
     """A simulated arm with its control law: the arguments of one tick."""
 
-    p: SimulationNumbers
+    p: SimulationRecord
     s: SimulationState
     arm: SimulatedArm
     row: Row
@@ -114,7 +114,7 @@ class ClosedLoop(NamedTuple):
         return made
 
 
-def loop_key(p: SimulationNumbers, arm: SimulatedArm) -> tuple[bytes, ...]:
+def loop_key(p: SimulationRecord, arm: SimulatedArm) -> tuple[bytes, ...]:
     """Numbers that define the control loop of an arm, independent of its position.
 
     Args:

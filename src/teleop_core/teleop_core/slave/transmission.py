@@ -9,7 +9,7 @@ LONGEST_DELAY = 30
 """Largest delay of efforts [ticks]."""
 
 
-class DriveNumbers(Fields):
+class TransmissionRecord(Fields):
     """Fields of a parameter record with drives and transmission."""
 
     play: PerJoint  # half width, between encoder and joint [rad or m]
@@ -20,7 +20,7 @@ class DriveNumbers(Fields):
     delay_ticks: int
 
 
-class DriveState(Fields):
+class TransmissionState(Fields):
     """Fields of a state record with drives and transmission."""
 
     carried: PerJoint  # joints behind the play, as the motors last moved them [rad or m]
@@ -29,7 +29,7 @@ class DriveState(Fields):
 
 
 @inner
-def follow_encoders(p: DriveNumbers, s: DriveState, q: Array, coupling: Array, tip: Array) -> None:
+def follow_encoders(p: TransmissionRecord, s: TransmissionState, q: Array, coupling: Array, tip: Array) -> None:
     """Write the true joint positions (n,) of motors at ``q`` (n,) [rad or m].
 
     A joint stays at its position until its motor has crossed the play; then the motor drags the joint. The lag of a
@@ -52,7 +52,7 @@ def follow_encoders(p: DriveNumbers, s: DriveState, q: Array, coupling: Array, t
 
 
 @inner
-def drive(p: DriveNumbers, s: DriveState, arm: SimulatedArm) -> None:
+def drive(p: TransmissionRecord, s: TransmissionState, arm: SimulatedArm) -> None:
     """Turn the commanded effort into the effort that the motors give.
 
     Args:

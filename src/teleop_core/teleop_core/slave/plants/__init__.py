@@ -105,13 +105,6 @@ class Mover(Protocol):
     def close(self) -> None:
         """End a trial, which no other stage of the session joins."""
 
-    def check(self) -> None:
-        """Raise an error if the simulation cannot go on; called outside of ticks.
-
-        Raises:
-            TeleopError: The simulation has diverged.
-        """
-
     def concerns(self) -> list[str]:
         """Sentences for users about present problems."""
 

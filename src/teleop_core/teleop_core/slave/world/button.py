@@ -19,7 +19,7 @@ _STIFFER = 10.0  # stiffness of the friction's spring, divided by the steepest s
 _LARGEST = 100.0  # largest click force [N]
 
 
-class ButtonNumbers(Fields):
+class ButtonRecord(Fields):
     """Fields of a parameter record with the spring of a button; a click force of 0 means no button."""
 
     click_force: float  # [N]
@@ -77,7 +77,7 @@ class ButtonParameters(CylinderParameters):
 
 
 @inner
-def _spring(p: ButtonNumbers, depth: float) -> float:
+def _spring(p: ButtonRecord, depth: float) -> float:
     """Force of the spring during a press [N], at a depth [m]."""
     if depth <= p.click_travel:
         return p.click_force * max(depth, 0.0) / p.click_travel
@@ -86,7 +86,7 @@ def _spring(p: ButtonNumbers, depth: float) -> float:
 
 
 @inner
-def _stiffness(p: ButtonNumbers) -> float:
+def _stiffness(p: ButtonRecord) -> float:
     """Stiffness of the friction's spring [N/m].
 
     The stiffness is larger than the slope of the friction's bound over the travel. Otherwise the bound, which changes
@@ -96,7 +96,7 @@ def _stiffness(p: ButtonNumbers) -> float:
 
 
 @inner
-def follow_button(p: ButtonNumbers, s: ButtonState, before: float) -> None:
+def follow_button(p: ButtonRecord, s: ButtonState, before: float) -> None:
     """Update the friction by the motion of a tick, and count a press.
 
     The button counts as pressed from the moment it reaches the stop until it is back at the click.
@@ -117,7 +117,7 @@ def follow_button(p: ButtonNumbers, s: ButtonState, before: float) -> None:
 
 
 @inner
-def push_of_button(p: ButtonNumbers, s: ButtonState, depth: float) -> float:
+def push_of_button(p: ButtonRecord, s: ButtonState, depth: float) -> float:
     """Push of spring and friction [N] at a depth [m]; the push of the stop is added elsewhere.
 
     Within a tick the push is a function of the position alone.

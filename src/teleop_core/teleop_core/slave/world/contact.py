@@ -17,11 +17,11 @@ from teleop_core.kernels import Array, PerJoint, Vector3, inner
 from teleop_core.kernels.room import room
 from teleop_core.shapes.basis.directions import NEAR, make_unit
 from teleop_core.slave.arm import SimulatedArm
-from teleop_core.slave.world.button import ButtonNumbers, ButtonState, follow_button, push_of_button
-from teleop_core.slave.world.puncture import PunctureNumbers, PunctureState, follow_channel, puncture, push_in_channel
+from teleop_core.slave.world.button import ButtonRecord, ButtonState, follow_button, push_of_button
+from teleop_core.slave.world.puncture import PunctureRecord, PunctureState, follow_channel, puncture, push_in_channel
 
 
-class WorldNumbers(PunctureNumbers, ButtonNumbers):
+class WorldRecord(PunctureRecord, ButtonRecord):
     """Fields of a parameter record with the object's material and position, and with the tool."""
 
     has_world: int
@@ -42,7 +42,7 @@ class ContactState(PunctureState, ButtonState):
 
 
 @inner
-def _bend(p: WorldNumbers, s: ContactState, moved: Array, out: float, force: Array) -> float:
+def _bend(p: WorldRecord, s: ContactState, moved: Array, out: float, force: Array) -> float:
     """Write the force (3,) [N] that the bristle would carry, across the normal; return its square."""
     square = 0.0
     for k in range(3):
@@ -52,7 +52,7 @@ def _bend(p: WorldNumbers, s: ContactState, moved: Array, out: float, force: Arr
 
 
 @inner
-def _push(p: WorldNumbers, s: ContactState, moved: Array, speed: Array, force: Array) -> float:
+def _push(p: WorldRecord, s: ContactState, moved: Array, speed: Array, force: Array) -> float:
     """Write the force (3,) [N] on a tip that moved (3,) [m] since the tick began, at a speed (3,).
 
     Along the normal acts a spring with the damper of Hunt and Crossley. The spring never pulls, and its push is at most
@@ -95,7 +95,7 @@ def _push(p: WorldNumbers, s: ContactState, moved: Array, speed: Array, force: A
 
 
 @inner
-def _add_push(p: WorldNumbers, s: ContactState, q: Array, dq: Array, effort: Array) -> None:
+def _add_push(p: WorldRecord, s: ContactState, q: Array, dq: Array, effort: Array) -> None:
     """Add the joint efforts of the push on one point; see :func:`add_push`."""
     moved, speed, force = np.zeros(3), np.zeros(3), room(3)
     for i in range(q.shape[0]):
@@ -109,7 +109,7 @@ def _add_push(p: WorldNumbers, s: ContactState, q: Array, dq: Array, effort: Arr
 
 
 @inner
-def add_push(p: WorldNumbers, contacts: Any, q: Array, dq: Array, effort: Array) -> None:
+def add_push(p: WorldRecord, contacts: Any, q: Array, dq: Array, effort: Array) -> None:
     """Add the joint efforts caused by the object: the transposed Jacobian of each point times its push.
 
     Args:
@@ -159,7 +159,7 @@ def _begin_at(s: ContactState, arm: SimulatedArm, lever: Array, q: Array, dq: Ar
 
 
 @inner
-def _keep_bend(p: WorldNumbers, s: ContactState, force: Array) -> None:
+def _keep_bend(p: WorldRecord, s: ContactState, force: Array) -> None:
     """Limit the bend of the bristle to the dry friction for a push (3,) [N]; the rest of the motion is slip.
 
     Without contact the push is zero, and so the bend becomes zero.
@@ -173,7 +173,7 @@ def _keep_bend(p: WorldNumbers, s: ContactState, force: Array) -> None:
 
 @inner
 def _touch_at(
-    p: WorldNumbers,
+    p: WorldRecord,
     s: ContactState,
     arm: SimulatedArm,
     has_jacobian: bool,
@@ -226,7 +226,7 @@ def _touch_at(
 
 
 @inner
-def touch(p: WorldNumbers, contacts: Any, arm: SimulatedArm, q: Array, dq: Array, felt: Array) -> None:
+def touch(p: WorldRecord, contacts: Any, arm: SimulatedArm, q: Array, dq: Array, felt: Array) -> None:
     """Find the position of the tool relative to the object, and write the wrench on its tip (6,) [N, N·m].
 
     The points are balls of the tool's radius. They lie evenly along its axis, which is z of the

@@ -14,7 +14,7 @@ Source:
 from teleop_core.kernels import Array, Fields, Vector3, inner
 
 
-class PunctureNumbers(Fields):
+class PunctureRecord(Fields):
     """Fields of a parameter record with the forces on a needle."""
 
     puncture_force: float  # [N]; 0 if the surface never opens
@@ -38,7 +38,7 @@ class PunctureState(Fields):
 
 
 @inner
-def puncture(p: PunctureNumbers, s: PunctureState, stiffness: float, push: float, offset: Array) -> None:
+def puncture(p: PunctureRecord, s: PunctureState, stiffness: float, push: float, offset: Array) -> None:
     """Open the surface under the tip, if the push on it reaches the puncture force.
 
     Immediately after the puncture the force equals the cutting force, if the surface was bent far enough for it.
@@ -62,7 +62,7 @@ def puncture(p: PunctureNumbers, s: PunctureState, stiffness: float, push: float
 
 
 @inner
-def _is_open(p: PunctureNumbers, s: PunctureState, before: float, along: float, beside: float) -> bool:
+def _is_open(p: PunctureRecord, s: PunctureState, before: float, along: float, beside: float) -> bool:
     """Whether a tip stays in the channel, or is at a position from which it can enter the channel.
 
     Args:
@@ -83,7 +83,7 @@ def _is_open(p: PunctureNumbers, s: PunctureState, before: float, along: float, 
 
 @inner
 def follow_channel(
-    p: PunctureNumbers, s: PunctureState, stiffness: float, before: float, offset: Array, normal: Array
+    p: PunctureRecord, s: PunctureState, stiffness: float, before: float, offset: Array, normal: Array
 ) -> None:
     """Measure the gap of a tip at the last hole along the channel, and update the yielding springs by the tip's motion.
 
@@ -121,7 +121,7 @@ def follow_channel(
 
 
 @inner
-def push_in_channel(p: PunctureNumbers, s: PunctureState, stiffness: float, out: float) -> float:
+def push_in_channel(p: PunctureRecord, s: PunctureState, stiffness: float, out: float) -> float:
     """Push along the channel [N], out of the object, on a tip that moved ``out`` [m] in this tick.
 
     The push is a function of the position alone, so that no motion within a tick gains energy.
