@@ -373,3 +373,10 @@ def test_a_bridge_is_drilled_with_a_model_of_its_controller_and_one_that_coasts_
     assert "\u2713 stop_topic: FAULT: stop" in sound
     assert "\u2713 freeze_slave_sim: FAULT: feedback" in sound
     assert "\u2717 freeze_slave_sim: the tip moved" in coasting
+
+
+def test_a_policy_succeeds_where_its_demonstrator_does_and_both_fail_when_they_see_late(tmp_path: Path) -> None:
+    shares = numbers(r"(?:demonstrator|policy) +([\d.]+) %", run("policy", tmp_path))
+    assert len(shares) == 14
+    assert min(shares[:2]) > 80.0
+    assert max(shares[-2:]) < 10.0
