@@ -54,11 +54,10 @@ def line(name: str, geometry: list[str], seconds: float) -> str:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            settings: dict[str, str | list[str]] = {"robot": name, "geometry": geometry}
             arm = tc.load_robot(name, **dict(text.split("=") for text in geometry))
-            tc.run("coarse_box", duration=0.1, settings=settings)  # compiles
+            tc.run("coarse_box", duration=0.1, robot=name, settings={"geometry": geometry})  # compiles
             begin = process_time()
-            made = tc.run("coarse_box", duration=seconds, settings=settings)
+            made = tc.run("coarse_box", duration=seconds, robot=name, settings={"geometry": geometry})
             took = process_time() - begin
             score = made.score()
     except TeleopError as error:

@@ -28,6 +28,8 @@ from teleop_core.graph.topics import (
     OPERATOR_SERVO_CP,
     PASSIVITY_TOPICS,
     PORTS_BETWEEN_ARMS,
+    POSES,
+    SCENE_TOPICS,
     TASK_TOPICS,
     Kind,
     Topic,
@@ -53,6 +55,7 @@ VALUES = {
     Kind.BUTTONS: "clutch, fixture, mode; 1 pressed",
     Kind.JOINTS: "position of each joint [rad or m]",
     Kind.STATE: "position, velocity, effort of all joints",
+    Kind.POSES: f"{POSES} poses, each x, y, z [m], quaternion w, x, y, z",
     Kind.JAW: "position [rad], velocity [rad/s], effort [N·m] of `jaw`",
 }
 
@@ -130,6 +133,7 @@ def topics_page(graph: Graph) -> str:
     with_jaw = build_graph(stages=["network", "jaw_command", "jaw", "jaw_sim"])
     writers = {t: member.name for member in with_jaw.members for t in member.writes}
     rows += [topic_row(t, f"{writers[t]}, with a [jaw](gripper.md)", with_jaw) for t in JAW_TOPICS]
+    rows += [topic_row(t, "scene, with a [scene](scenes.md)", with_jaw) for t in SCENE_TOPICS]
     return page([
         "# Topics",
         "CRTK names, standard messages, SI units. Streams are offered reliable with a queue of "

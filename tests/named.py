@@ -24,6 +24,7 @@ _LIVE = "needs a session that runs, or is one: tests/ros starts and stops it"
 _DEVICE = "needs a device"
 NOT_RUN = {
     r"live|console|play|stop|operate|topic|param|service|conformance|drill(?! --list)|--parts mine\.py drill": _LIVE,
+    r"camera": _LIVE,
     r"people": "needs a person at the page, or what people did: tests/ros/test_people.py",
     r"devices": _DEVICE,
     r"compile": "the kernels are compiled before tests: tests/scenario/test_compile_command.py",

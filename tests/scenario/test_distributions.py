@@ -81,6 +81,11 @@ def test_robot_of_a_missing_distribution_says_what_to_install() -> None:
     assert "stewart" not in alone("robot").stdout
 
 
+def test_scene_without_its_distribution_says_what_to_install() -> None:
+    text = "reader of scenes 'scene' must be installed; it is in the distribution teleop_scene"
+    assert alone("robot", "cubes.xml", code=2).stderr == f"teleop robot: {text}\n"
+
+
 def test_robots_of_the_machines_are_those_that_the_core_knows_to_be_there() -> None:
     found = {entry.name for entry in entry_points(group=ROBOTS.group)}
     assert found == set(ROBOTS.elsewhere)

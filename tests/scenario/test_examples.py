@@ -47,6 +47,13 @@ def test_own_object_is_touched_as_the_built_in_ones_are(tmp_path: Path) -> None:
     assert all(0.9 < peak < 1.2 for peak in numbers(r"at most ([\d.]+) N", text))
 
 
+def test_a_mujoco_scene_is_moved_and_its_weight_is_felt(tmp_path: Path) -> None:
+    text = run("mujoco_scene", tmp_path)
+    weight, known = numbers(r"([\d.]+) N", text)
+    assert weight == pytest.approx(known, rel=0.03)
+    assert 5.0 < numbers(r"rolled (\d+) mm", text)[0] < 60.0
+
+
 def test_own_architecture_feels_force_as_position_force_does_and_less_drag(tmp_path: Path) -> None:
     text = run("own_architecture", tmp_path)
     drag, felt = numbers(r"([\d.]+) N in free", text), numbers(r"to ([\d.]+) N", text)
@@ -366,3 +373,10 @@ def test_a_bridge_is_drilled_with_a_model_of_its_controller_and_one_that_coasts_
     assert "\u2713 stop_topic: FAULT: stop" in sound
     assert "\u2713 freeze_slave_sim: FAULT: feedback" in sound
     assert "\u2717 freeze_slave_sim: the tip moved" in coasting
+
+
+def test_a_policy_succeeds_where_its_demonstrator_does_and_both_fail_when_they_see_late(tmp_path: Path) -> None:
+    shares = numbers(r"(?:demonstrator|policy) +([\d.]+) %", run("policy", tmp_path))
+    assert len(shares) == 14
+    assert min(shares[:2]) > 80.0
+    assert max(shares[-2:]) < 10.0

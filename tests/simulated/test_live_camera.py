@@ -1,7 +1,6 @@
 """Cameras beside a live session: pictures of the poses of their stamps, on time, late or lost as their way says."""
 
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pytest
@@ -18,9 +17,6 @@ from teleop_scene import models  # noqa: E402
 from teleop_scene.camera import Camera, View, read_marker  # noqa: E402
 from teleop_scene.film import Way, topics_of  # noqa: E402
 from teleop_scene.live_camera import run  # noqa: E402
-
-if TYPE_CHECKING:
-    from simulated.conftest import SimulatedPeer
 
 SCENE = models.OWN / "cubes.xml"
 VIEW = View("front", 160, 120, is_marked=True)
@@ -39,9 +35,7 @@ pytestmark = pytest.mark.skipif(not _can_draw(), reason="no OpenGL without a scr
 
 
 @pytest.mark.parametrize(("way", "kept"), [(Way(), 1), (Way(delay=0.05), 1), (Way(loss=1.0), 0)])
-def test_pictures_of_a_live_session_carry_the_stamp_of_their_poses(
-    way: Way, kept: int, peer: "SimulatedPeer", tmp_path: Path
-) -> None:
+def test_pictures_of_a_live_session_carry_the_stamp_of_their_poses(way: Way, kept: int, peer: Any) -> None:
     types, interrupt, counts = get_typestore(Stores.ROS2_JAZZY), Interrupt(), list[Any]()
     image, _ = topics_of(VIEW)
 

@@ -222,3 +222,38 @@ def test_lerobot_makes_both_by_their_type_and_a_loop_runs() -> None:
             teleop.send_feedback(robot.get_observation())
     assert not robot.is_connected
     assert not teleop.is_connected
+
+
+def test_pictures_of_a_scene_are_features_before_the_session_and_observations_in_it() -> None:
+    pytest.importorskip("mujoco", reason="teleop_scene is not installed")
+    from teleop_scene import models
+    from teleop_scene.camera import Camera, View
+
+    scene = str(models.OWN / "cubes.xml")
+    slave = sides.SlaveSide(scene, "free_motion", fps=20, cameras=["front:96x64"])
+    assert slave.pictures == {"front": (64, 96, 3)}
+    try:
+        Camera(models.OWN / "cubes.xml", View("front", 64, 64)).close()
+    except tc.TeleopError:
+        pytest.skip("no OpenGL without a screen (EGL) on this machine")
+    slave.begin()
+    first = slave.observe()
+    assert set(first) == {*slave.observed_keys, "front"}
+    assert (first["front"].shape, first["front"].dtype) == ((64, 96, 3), np.uint8)
+    assert np.array_equal(first["front"], slave.observe()["front"])
+    goal = {key: first[key] for key in slave.joint_keys}
+    for _ in range(20):
+        goal[slave.joint_keys[0]] += 0.02
+        slave.send(goal)
+    assert np.mean(slave.observe()["front"] != first["front"]) > 0.02
+    slave.end()
+
+
+def test_cameras_without_a_scene_are_refused() -> None:
+    pytest.importorskip("mujoco", reason="teleop_scene is not installed")
+    with pytest.raises(tc.ParameterError, match=r"SCENE\.xml"):
+        sides.SlaveSide(scenario="free_motion", cameras=["front"])
+    from teleop_scene import models
+
+    with pytest.raises(tc.ParameterError, match="16 to 4096"):
+        sides.SlaveSide(str(models.OWN / "cubes.xml"), cameras=["front:1x1"])

@@ -144,3 +144,11 @@ def test_a_scene_without_its_package_says_what_to_install(monkeypatch: pytest.Mo
     monkeypatch.setattr(SCENES, "_installed", {})
     with pytest.raises(TeleopError, match="in the distribution teleop_scene"):
         tc.load_robot("cubes.xml")
+
+
+def test_an_arm_that_begins_inside_another_body_is_told() -> None:
+    assert not odd()[1].notes
+    more = '<keyframe><key qpos="0.5 0.1 -0.3 1.2 0.5 0 0.3 1 0 0 0"/></keyframe>'
+    (note,) = odd(more)[1].notes
+    assert "mm inside" in note
+    assert "ball" in note

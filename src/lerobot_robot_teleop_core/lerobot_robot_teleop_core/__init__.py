@@ -3,7 +3,7 @@
 LeRobot imports this package by its name; the teleoperator of the same distribution comes with it.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from lerobot.robots import Robot, RobotConfig
@@ -19,6 +19,8 @@ __all__ = ["TeleopCoreRobot", "TeleopCoreRobotConfig"]
 class TeleopCoreRobotConfig(SessionFields, RobotConfig):
     """What runs; the fields are arguments of :class:`teleop_core_lerobot.SlaveSide`."""
 
+    views: list[str] = field(default_factory=list)
+
 
 class TeleopCoreRobot(Connection, Robot):
     """The simulated slave; a call of ``send_action`` lets ``1 / fps`` of virtual time pass."""
@@ -30,13 +32,13 @@ class TeleopCoreRobot(Connection, Robot):
     def __init__(self, config: TeleopCoreRobotConfig) -> None:
         super().__init__(config)
         self.config = config
-        self.cameras: dict[str, Any] = {}  # LeRobot asks each robot for its cameras
-        self._side = SlaveSide(*config.arguments())
+        self._side = SlaveSide(*config.arguments(), config.views)
+        self.cameras: dict[str, Any] = dict.fromkeys(self._side.pictures)  # LeRobot counts them
 
     @property
-    def observation_features(self) -> dict[str, type]:
-        """Joints [rad or m] and force on the tip [N], all float."""
-        return dict.fromkeys(self._side.observed_keys, float)
+    def observation_features(self) -> dict[str, type | tuple[int, int, int]]:
+        """Joints [rad or m] and force on the tip [N], all float; pictures by height, width and 3."""
+        return {**dict.fromkeys(self._side.observed_keys, float), **self._side.pictures}
 
     def get_observation(self) -> dict[str, Any]:
         """See :meth:`teleop_core_lerobot.SlaveSide.observe`."""

@@ -126,7 +126,9 @@ class Past(ABC):
             self.columns[below(arm, ERROR)] = Column(below(arm, topic), 0, "m")
 
     def _add_known(self, arm: str, topic: str, kind: topics.Kind, joints: tuple[str, ...], robot: Robot | None) -> None:
-        """Add the columns of a topic of a known kind."""
+        """Add the columns of a topic of a known kind; nobody plots the poses of all bodies of a scene."""
+        if kind is topics.Kind.POSES:
+            return
         known = topics.BY_NAME.get(topic)
         names = known.columns if known is not None and known.columns else kind.columns(joints)
         units = _UNITS.get(kind) or [_UNIT_OF.get(name, "") for name in names]

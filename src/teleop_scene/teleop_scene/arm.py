@@ -125,6 +125,7 @@ def arm_of(
         home=start,
         start=start,
         dynamics=chain_dynamics(row),
+        notes=chain.touching(model, own, begin),
         file=file,
         chain=own,
         drive=drive,

@@ -19,6 +19,7 @@ from teleop_core.robots.files.urdf_tree import ASSUMED, turn_of_z
 HINGE, SLIDE = int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE)
 _NAMES = {int(mujoco.mjtJoint.mjJNT_FREE): "free", int(mujoco.mjtJoint.mjJNT_BALL): "ball"}
 _TIES = (int(mujoco.mjtEq.mjEQ_CONNECT), int(mujoco.mjtEq.mjEQ_WELD))
+_INSIDE = 1e-3  # depth of a contact that is no touch [m]
 _EYE = np.eye(4)
 
 
@@ -205,6 +206,21 @@ def gravity(model: mujoco.MjModel, chain: Chain, base: Array) -> Array:
     mass = model.body_mass[carried]
     share = float((mass * model.body_gravcomp[carried]).sum() / max(float(mass.sum()), 1e-12))
     return product(np.ascontiguousarray(base[:3, :3].T), model.opt.gravity * (1.0 - share))
+
+
+def touching(model: mujoco.MjModel, chain: Chain, begin: Array) -> tuple[str, ...]:
+    """Note on a body of the arm that is inside another body at the start, so that the arm cannot move freely."""
+    data = _placed(model, begin)
+    mujoco.mj_fwdPosition(model, data)
+    for contact in data.contact:
+        bodies = [int(model.geom_bodyid[g]) for g in contact.geom if g >= 0]
+        is_arm = any(x in chain.bodies for b in bodies for x in ancestors(model, b))
+        if is_arm and contact.dist < -_INSIDE:
+            first, second = (model.body(b).name or "the world" for b in bodies)
+            return (
+                f"at the start {first} is {-1e3 * contact.dist:.1f} mm inside {second}; start=[...] moves the arm away",
+            )
+    return ()
 
 
 def refuse_unusable(model: mujoco.MjModel, chain: Chain) -> None:

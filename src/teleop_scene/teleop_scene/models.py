@@ -50,17 +50,33 @@ def model_of(file: Path) -> mujoco.MjModel:
         ParameterError: The file is no model, or a file that it names is missing; the message is the compiler's.
     """
     try:
-        stat = file.stat()
+        own = _state(file.resolve())
     except OSError as error:
         raise RecordingError(file, f"cannot be read: {error.strerror}") from error
-    return _compiled(file.resolve(), stat.st_mtime_ns, stat.st_size)
+    return _compiled(file.resolve(), (own, *(_state(path) for path in _others(*own) if path.is_file())))
+
+
+def _state(file: Path) -> tuple[Path, int, int]:
+    """A file as it is now: another state means that it may have changed."""
+    stat = file.stat()
+    return file, stat.st_mtime_ns, stat.st_size
+
+
+@lru_cache(maxsize=32)
+def _others(file: Path, _changed_ns: int, _size: int) -> tuple[Path, ...]:
+    """Other files that a model names, included files of included files too; none if the file is no XML."""
+    try:
+        found = {Path(name).resolve() for name in mujoco.mju_getXMLDependencies(str(file))}
+    except (ValueError, mujoco.FatalError):
+        return ()
+    return tuple(sorted(found - {file}))
 
 
 @lru_cache(maxsize=8)
-def _compiled(file: Path, _changed_ns: int, _size: int) -> mujoco.MjModel:
+def _compiled(file: Path, _states: tuple[tuple[Path, int, int], ...]) -> mujoco.MjModel:
     try:
         return mujoco.MjModel.from_xml_path(str(file))
-    except ValueError as error:
+    except (ValueError, mujoco.FatalError) as error:
         words = re.sub(r"\s+", " ", str(error)).split(" ")
         text = " ".join(words[:_MOST_WORDS])
         raise ParameterError("scene", str(file), f"a MuJoCo model; {text}") from error
@@ -74,8 +90,7 @@ def files_of(file: Path) -> dict[str, Path]:
     """
     model_of(file)
     own = file.resolve()
-    others = {Path(name).resolve() for name in mujoco.mju_getXMLDependencies(str(own))} - {own}
-    paths = [own, *sorted(path for path in others if path.is_file())]
+    paths = [own, *(path for path in _others(*_state(own)) if path.is_file())]
     root = os.path.commonpath([path.parent for path in paths])
     return {str(path.relative_to(root)): path for path in paths}
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from teleop_core.base import ParameterError, Within, fixed
+from teleop_core.base import Within, fixed
 from teleop_core.graph import DT, Row, RunningStage, Stage, assign, topics
 from teleop_core.kernels import Array, Fields, kernel, record
 from teleop_core.kernels.fields import Integers
@@ -102,22 +102,27 @@ def world_step(
     own.ticks += 1
 
 
+@kernel
+def rest(row: WorldRow, dt: float) -> None:
+    """One tick of a stage without a scene: nothing moves."""
+
+
 class World(RunningStage):
-    """Stage of the bodies of a scene.
+    """Stage of the bodies of a scene; with a robot that is no arm of a scene it does nothing.
 
     Raises:
-        ParameterError: A joint of the jaw is unknown, has no position actuator, or the robot is no arm of a scene.
+        ParameterError: A joint of the jaw is unknown, or has no position actuator.
     """
 
     def __init__(self, parameters: SceneParameters, dt: float = DT) -> None:
         robot = load_robot_set(parameters.robot, parameters.geometry)
         super().__init__(SCENE_STAGE, robot.n, dt)
+        self._row, self.state, self.robot = self.signals.copy(), record(WorldState), robot
         if not isinstance(robot, SceneRobot):
-            raise ParameterError("scene.robot", parameters.robot, "SCENE.xml, the arm of a scene")
+            self.scene, self.kernel = None, rest
+            return
         scene = shared(robot.file, dt, f"{robot.chain.tip} world")
-        self.scene, self.robot, model, data = scene, robot, scene.model, scene.data
-        self._row = self.signals.copy()
-        self.state = own = record(WorldState)
+        self.scene, model, data, own = scene, scene.model, scene.data, self.state
         own["every_ns"] = round(1e9 / parameters.rate)
         own["is_first"], own["place"] = scene.claim("poses"), address_of("mj_kinematics")
         own["upper"] = parameters.jaw_upper
@@ -137,6 +142,8 @@ class World(RunningStage):
 
     def concerns(self) -> list[str]:
         """Report a stage whose arm is in another process, so that nothing moves here."""
+        if self.scene is None or not isinstance(self.robot, SceneRobot):
+            return [f"robot {self.robot.name} is no arm of a scene"]
         if self.scene.has(self.robot.chain.tip):
             return []
         return ["the scene stands still: it must be in the process of slave_sim, as by side or with --composed"]

@@ -86,6 +86,7 @@ def _parts() -> Iterator[tuple[str, ...]]:
     from teleop_core.coupling.passivity import PASSIVITIES
     from teleop_core.hand.tasks import TASKS
     from teleop_core.robots import ROBOTS
+    from teleop_core.robots.parts import SCENES
     from teleop_core.shapes import SHAPES
     from teleop_core.slave.controllers import CONTROLLERS
     from teleop_core.slave.plants import PLANTS
@@ -93,7 +94,8 @@ def _parts() -> Iterator[tuple[str, ...]]:
     named = [name for name in SHAPES if find_spec("trimesh") or not _reads_a_file(name)]
     shapes = {SHAPES.find(name).distance: name for name in named}.values()  # one shape per kernel
     kinds: dict[str, Iterable[str]]
-    kinds = {"robot": ROBOTS, "controller": CONTROLLERS, "plant": PLANTS, "fixture": shapes}
+    plants = [name for name in PLANTS if name not in PLANTS.elsewhere]
+    kinds = {"robot": ROBOTS, "controller": CONTROLLERS, "plant": plants, "fixture": shapes}
     for key, parts in kinds.items():
         yield from ((f"{key}={name}",) for name in parts)
     stages: tuple[tuple[str, str, Iterable[str]], ...] = (
@@ -106,6 +108,8 @@ def _parts() -> Iterator[tuple[str, ...]]:
     for used, key, names in stages:
         yield from ((f"teleop.stages=[{used}]", f"{key}={name}") for name in names)
     yield ("teleop.stages=[remote_centre]",)
+    if SCENES.names():
+        yield ("robot=cubes.xml", "teleop.stages=[jaw_command,jaw]")
 
 
 def _reads_a_file(shape: str) -> bool:

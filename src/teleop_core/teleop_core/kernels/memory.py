@@ -75,7 +75,7 @@ def octets(address: int, count: int) -> Octets:
 def call(function: int, a: int, b: int, c: int, d: int) -> int:
     """Call a C function of up to four integer or pointer arguments at an address; returns its int32."""
     of = ctypes.CFUNCTYPE(ctypes.c_int32, *[ctypes.c_size_t] * 4)
-    return of(function)(a, b, c, d)
+    return of(int(function))(int(a), int(b), int(c), int(d))
 
 
 if IS_COMPILED:

@@ -5,7 +5,7 @@ from teleop_core.graph import BUILT_IN, DT, topics
 from teleop_core.hand.master.device import DeviceParameters
 from teleop_core.hand.master.haptic_master import HapticMasterParameters
 from teleop_core.robots import load_robot_set
-from teleop_core.robots.parts import is_urdf
+from teleop_core.robots.parts import is_scene, is_urdf
 from teleop_core.robots.robot_notes import assumed_note, notes_on_robot
 from teleop_core.session.configuration import Configuration
 from teleop_core.slave.parameters import SlaveParameters
@@ -35,6 +35,8 @@ def notes_of(configuration: Configuration, transport: float = 0.0) -> list[str]:
             own = notes_on_robot(robot, slave.robot, has_task)
             own += filter(None, [assumed_note(robot, slave.robot)])
             found += [note for note in own if note not in found]
+        elif isinstance(slave, SlaveParameters) and is_scene(slave.robot):  # models never state limits of speeds
+            found += [f"{slave.robot}: {note}" for note in load_robot_set(slave.robot, slave.geometry).notes]
     return found
 
 

@@ -1,7 +1,7 @@
 """Write a MuJoCo scene of twenty lines, follow the hand with its arm, and carry a ball on a tray."""
 
-import argparse
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import teleop_core as tc
 
@@ -28,15 +28,11 @@ SCENE = """<mujoco model="tray">
 
 def main() -> None:
     """Run a session with the scene, and print what the arm and the ball did."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--out", type=Path, default=Path("out/own_scene"), help="folder of the scene and its recording")
-    parser.add_argument("--duration", type=float, default=8.0, help="of the session [s]")
-    given = parser.parse_args()
-    given.out.mkdir(parents=True, exist_ok=True)
-    file = given.out / "tray.xml"
-    file.write_text(SCENE, encoding="utf-8")
-    recording = tc.run("coarse_box", duration=given.duration, robot=str(file), out=given.out / "bag")
-    print(recording.score())
+    with TemporaryDirectory() as folder:
+        file = Path(folder) / "tray.xml"
+        file.write_text(SCENE, encoding="utf-8")
+        recording = tc.run("coarse_box", duration=8.0, robot=str(file))
+        print(recording.score())
     weight = -float(recording["slave/measured_cf"]["fz"].mean())
     carriage, ball = recording["scene/poses"]["x0"], recording["scene/poses"]["x1"]
     print(f"mean weight on the tray: {weight:.2f} N; the ball weighs {0.2 * 9.81:.2f} N")
