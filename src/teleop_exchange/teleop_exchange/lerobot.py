@@ -1,9 +1,8 @@
 """LeRobot data set: recordings as episodes for learning, in version 3.0 of the format.
 
 A data set is a folder with ``meta/info.json`` (features, rate, counts), ``meta/stats.json``, ``meta/tasks.parquet`` and
-``meta/episodes`` (a row for each episode). ``data`` contains a row for each frame, a group of rows for each episode, and
-``videos`` the pictures of each camera. The ``lerobot`` package, version 0.6, reads the folder offline:
-``LeRobotDataset("name", root=FOLDER)``.
+``meta/episodes`` (a row for each episode). ``data`` contains a row for each frame, and ``videos`` the pictures of each
+camera. The ``lerobot`` package, version 0.6, reads the folder offline: ``LeRobotDataset("name", root=FOLDER)``.
 """
 
 import json
