@@ -37,7 +37,7 @@ wheel: setup
 
 # The wheel in an environment of its own: arms of 7 and 12 joints run, and no kernel of ours is compiled.
 test-wheel: wheel
-	$(BIN)/python tests/wheel.py $(OUT)/wheels
+	$(BIN)/python tests/support/wheel.py $(OUT)/wheels
 
 # CRTK's messages, which PyPI does not have, and what builds them; it needs a compiler.
 crtk_msgs: setup
@@ -101,7 +101,7 @@ test-slow: $(VENV)/.tested
 # that README, site and --help name, after a list of those that are not run; half an hour.
 soak: $(VENV)/.tested
 	$(TRY_CRTK_MSGS)
-	$(BIN)/python tests/named.py
+	$(BIN)/python tests/support/named.py
 	$(BIN)/pytest -n 1 -m soak tests
 
 # Broken files, texts and messages, other ones each time; an hour. The tests have a short form of it.
@@ -115,7 +115,7 @@ fuzz: $(VENV)/.tested
 
 # Of kernels, run as plain Python: compiled code leaves no trace.
 coverage: $(VENV)/.tested
-	$(BIN)/python tests/kernel_coverage.py
+	$(BIN)/python tests/support/kernel_coverage.py
 
 # The site of the documents, in build/docs; a warning fails it. Pages that changed are built anew and
 # tutorials run with them; after make clean all of them do.
@@ -150,17 +150,17 @@ endurance: $(VENV)/.tested
 # Copies of teleop_core with one line broken each: quick tests must find every one; a quarter of an
 # hour. MUTANTS names some of them.
 mutants: $(VENV)/.tested
-	$(BIN)/python tests/code_mutants.py $(MUTANTS)
+	$(BIN)/python tests/support/code_mutants.py $(MUTANTS)
 
 # Copies of teleop_core with one safety broken each: the drill must find every one, in both forms,
 # and nothing in a sound copy; about an hour on a busy machine. MUTANTS names some of them.
 drill-mutants: setup
-	$(BIN)/python tests/mutants.py $(MUTANTS)
+	$(BIN)/python tests/support/mutants.py $(MUTANTS)
 
 # Live tests twenty times beside busy processes, and how often each failed; about three hours.
 # FLAKY names tests, how often and how much else there is to do: FLAKY="--count 5 tests/ros/test_ends.py".
 flaky: $(VENV)/.tested
-	$(BIN)/python tests/flaky.py $(FLAKY)
+	$(BIN)/python tests/support/flaky.py $(FLAKY)
 
 clean:
 	rm -rf $(OUT) build ros_ws/build ros_ws/install ros_ws/log

@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 import psutil
 
-sys.path.append(str(Path(__file__).parents[1] / "tests"))  # the page is used as tests use it
+sys.path.append(str(Path(__file__).parents[1] / "tests" / "support"))  # the page is used as tests use it
 from browser import VIEWER, Tab
 from console_process import ConsoleProcess
 from teleop_core.bags.reader import Bag

@@ -28,7 +28,7 @@ from scipy.spatial.transform import Rotation  # noqa: E402
 
 from teleop_core.robots import IkStatus, Robot, load_robot  # noqa: E402
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "support"))
 from real_arms import ARMS, urdf_of  # noqa: E402
 
 DT, TICKS, STAND = 0.004, 250, 250

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 ROOT = Path(__file__).parents[1]
-sys.path.insert(0, str(ROOT / "tests"))
+sys.path.insert(0, str(ROOT / "tests" / "support"))
 from property.test_contact_laws import HALF, energies, session, slow  # noqa: E402
 from teleop_core.evaluation.metrics.contact import TOUCH_J  # noqa: E402
 from teleop_core.kernels.geometry import Array  # noqa: E402

@@ -20,7 +20,7 @@ from PIL import Image
 import teleop_core as tc
 
 ROOT = Path(__file__).resolve().parents[1]
-sys.path.insert(0, str(ROOT / "tests"))
+sys.path.insert(0, str(ROOT / "tests" / "support"))
 
 from browser import VIEWER, Tab  # noqa: E402
 from console_process import ConsoleProcess  # noqa: E402

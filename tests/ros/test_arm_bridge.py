@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from ros.conftest import Peer
 
 pytestmark = [pytest.mark.ros, pytest.mark.slow]
-CONTROLLER = Path(__file__).resolve().parents[1] / "plain_controller.py"
+CONTROLLER = Path(__file__).resolve().parents[1] / "support" / "plain_controller.py"
 JOINTS = ("base", "shoulder", "slide", "roll", "pitch", "yaw")
 
 

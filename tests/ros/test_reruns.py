@@ -44,7 +44,7 @@ def run(tmp_path: Path) -> Callable[..., Any]:
         done = subprocess.run(
             command,
             cwd=tmp_path,
-            env=dict(os.environ) | {"PYTHONPATH": str(TESTS)},
+            env=dict(os.environ) | {"PYTHONPATH": str(TESTS / "support")},
             capture_output=True,
             text=True,
             timeout=120,

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from ros.conftest import Peer
 
 pytestmark = pytest.mark.ros
-READER = Path(__file__).resolve().parents[1] / "stop_reader.py"
+READER = Path(__file__).resolve().parents[1] / "support" / "stop_reader.py"
 
 
 @pytest.fixture

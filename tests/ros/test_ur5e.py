@@ -28,7 +28,7 @@ from teleop_core.session import api
 
 pytestmark = [pytest.mark.ros, pytest.mark.slow]
 
-CONTROLLER = [sys.executable, str(ROOT / "tests/plain_controller.py"), "forward_command", "ur5e"]
+CONTROLLER = [sys.executable, str(ROOT / "tests/support/plain_controller.py"), "forward_command", "ur5e"]
 URDF = ROOT / "examples/ur5e.urdf"
 START = (0.0, -1.57, 1.57, -1.57, -1.57, 0.0)
 ARM = [f"robot={URDF}", "geometry=[tip=tool0]", f"start={list(START)}"]
@@ -133,7 +133,7 @@ def test_a_session_leads_it_home_and_after_the_hand_without_a_jump(tmp_path: Pat
 @pytest.mark.soak
 def test_a_gamepad_leads_it_home_and_after_its_stick_without_a_jump(tmp_path: Path, bridge: list[Any]) -> None:
     pytest.importorskip("pygame")
-    pad = [sys.executable, str(ROOT / "tests/padded_operator.py"), "operator"]
+    pad = [sys.executable, str(ROOT / "tests/support/padded_operator.py"), "operator"]
     operator = [*pad, "--ros-args", "-p", "kind:=gamepad"]
     recording, first, largest = led(tmp_path, bridge, 1, "operator=gamepad", operator=operator)
     goes_home_and_follows(recording, first, largest)

@@ -1,7 +1,7 @@
 """Whatever README, site and ``--help`` name runs to its end.
 
 Sessions of commands are short here, and whole in ``make soak``. What is not run is listed, with the
-reason, by ``python tests/named.py``. The tutorials run where the site is built.
+reason, by ``python tests/support/named.py``. The tutorials run where the site is built.
 """
 
 import re

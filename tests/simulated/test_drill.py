@@ -84,6 +84,6 @@ def test_a_drill_whose_environment_another_drill_has_left_breaks_its_stage(
 @pytest.mark.parametrize("name", MUTANTS)
 def test_a_broken_safety_is_found(name: str) -> None:
     """The others, and both forms of each: make drill-mutants."""
-    command = [sys.executable, str(ROOT / "tests/mutants.py"), name, "--processes"]
+    command = [sys.executable, str(ROOT / "tests/support/mutants.py"), name, "--processes"]
     done = subprocess.run(command, check=False, capture_output=True, text=True, timeout=400)
     assert done.returncode == 0, done.stdout + done.stderr

@@ -16,7 +16,7 @@ from typing import Any
 
 import coverage
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 PACKAGES = [ROOT / "src" / name / name for name in ("teleop_core", "teleop_machines")]
 
 # Those of tests/unit that call kernels.

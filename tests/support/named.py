@@ -1,6 +1,6 @@
 """What README, site and ``--help`` name: commands, scenarios, experiments, examples, tutorials.
 
-    python tests/named.py        print what of it no test runs, and why
+    python tests/support/named.py        print what of it no test runs, and why
 
 ``tests/scenario/test_named.py`` runs all the rest.
 """
@@ -17,7 +17,7 @@ import numpy as np
 import teleop_core as tc
 from teleop_core.commands.cli import application, main, overview
 
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 HELP = "--help"
 PAGES = sorted({*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md"), *ROOT.glob("bags/*.md")})
 _LIVE = "needs a session that runs, or is one: tests/ros starts and stops it"

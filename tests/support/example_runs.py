@@ -14,7 +14,7 @@ from tempfile import TemporaryFile
 from teleop_core.nodes.starter import Starter
 from teleop_core.session.configuration import configure
 
-EXAMPLES = Path(__file__).resolve().parents[1] / "examples"
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 NAMES = sorted(path.stem for path in EXAMPLES.glob("*.py"))
 
 

@@ -1,7 +1,7 @@
 """Flaky tests: run tests again and again beside busy processes, and say which failed how often.
 
-    python tests/flaky.py                                   # live tests, twenty times
-    python tests/flaky.py --count 5 tests/ros/test_drill.py -m slow
+    python tests/support/flaky.py                                   # live tests, twenty times
+    python tests/support/flaky.py --count 5 tests/ros/test_drill.py -m slow
 
 What CI runs must pass twenty times in a row while others keep both processors busy: a test that
 does not is mended before anything else. Ctrl-C ends it and says what was found until then.
@@ -17,7 +17,7 @@ from collections import Counter
 from pathlib import Path
 from xml.etree import ElementTree
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 LIVE = "ros and not soak"
 
 

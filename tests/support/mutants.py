@@ -1,7 +1,7 @@
 """Mutants: copies of the package with one safety broken, each of which the drill must find.
 
-    python tests/mutants.py --list
-    python tests/mutants.py stop_late braking_weak --composed
+    python tests/support/mutants.py --list
+    python tests/support/mutants.py stop_late braking_weak --composed
 
 A mutant is a copy of the package in a directory of its own with a few words of its source replaced, and comes first in
 the path of the drill and of what it starts. The machine is a simulated one, so that what is found is found every time;
@@ -19,7 +19,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 PACKAGE = ROOT / "src/teleop_core/teleop_core"
 PLACE = Path(os.environ.get("TELEOP_MUTANTS", ROOT / "out/mutants"))
 """Where the copies are."""

@@ -1,7 +1,7 @@
 """Code mutants: copies of the package with one line broken, each of which a quick test must find.
 
-    python tests/code_mutants.py --list
-    python tests/code_mutants.py sticking touch_drop
+    python tests/support/code_mutants.py --list
+    python tests/support/code_mutants.py sticking touch_drop
 
 Safeties that only a running session has are broken in :mod:`mutants`, and found by the drill. Here
 are the rest: what a tick computes, what a score says, what the console lets through. A mutant is

@@ -17,7 +17,7 @@ from typing import Any
 
 from random_arms import row
 
-ARMS = json.loads((Path(__file__).parent / "data" / "arms.json").read_text(encoding="utf-8"))
+ARMS = json.loads((Path(__file__).parents[1] / "data" / "arms.json").read_text(encoding="utf-8"))
 
 
 def urdf_of(name: str, effort: float | None = None) -> str:

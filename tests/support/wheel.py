@@ -1,7 +1,7 @@
 """Wheel with kernels, in an environment of its own: arms of 7 and of 12 joints run, and nothing of ours is compiled.
 
-Run with ``python tests/wheel.py out/wheels`` after ``make wheel``. It also runs a kernel that the wheel does not have,
-which must be refused: otherwise it would prove nothing.
+Run as ``python tests/support/wheel.py FOLDER``; the wheels come from ``make wheel``. A kernel that the wheel does not
+have must be refused: otherwise the test would prove nothing.
 """
 
 import argparse
@@ -14,7 +14,7 @@ from pathlib import Path
 
 from jointed import urdf
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 FORBID = """
 import sys
 from numba.core import event
