@@ -21,7 +21,7 @@ BOTH = {
     "calibrate", "configure", "disconnect",
 }  # fmt: skip
 ROBOT = BOTH | {"observation_features", "get_observation", "send_action"}
-TELEOPERATOR = BOTH | {"feedback_features", "get_action", "send_feedback"}
+TELEOPERATOR = BOTH | {"feedback_features", "get_action", "send_feedback", "enable_torque", "disable_torque"}
 
 
 @pytest.fixture
@@ -162,6 +162,51 @@ def test_hand_feels_the_force_that_is_given_as_it_feels_one_that_is_measured() -
     assert felt[2.0] == pytest.approx(2.0 * felt[1.0], rel=1e-6)
 
 
+def test_hand_takes_over_where_a_program_has_led_the_slave_without_a_jump() -> None:
+    robot = tc.load_robot("rcrt1")
+    master = sides.MasterSide(scenario="free_motion")
+    master.begin()
+    for _ in range(15):
+        master.next_action()
+    master.hold()
+    held = np.array([joints_of(master, master.next_action()) for _ in range(20)])
+    assert np.ptp(held[1:], axis=0).max() == 0.0  # the hand still moves, and moves nothing
+    there = held[-1] + 0.05 * INWARD  # as LeRobot's smooth_move_to: no action is asked for on the way
+    for share in np.linspace(0.0, 1.0, 61):
+        joints = held[-1] + share * (there - held[-1])
+        master.feel(dict(zip(master.joint_keys, joints, strict=True)))
+    master.release()
+    led = np.array([joints_of(master, master.next_action()) for _ in range(60)])
+    tips = np.array([robot.fk(joints)[:3, 3] for joints in (there, *led)])
+    steps = np.linalg.norm(np.diff(tips, axis=0), axis=1)
+    assert steps[0] < 1e-3
+    assert steps.max() < 3e-3  # the hand's own motion in a period
+    assert np.linalg.norm(tips[-1] - tips[0]) > 5e-3  # it leads again
+
+
+def test_joints_given_to_a_free_master_move_nothing() -> None:
+    actions = []
+    for given in ({}, {"joints": 1.0}):
+        master = sides.MasterSide(scenario="free_motion")
+        master.begin()
+        if given:
+            master.feel(dict.fromkeys(master.joint_keys, 1.0))
+        actions.append([joints_of(master, master.next_action()) for _ in range(10)])
+    assert np.array_equal(*actions)
+
+
+def test_joints_beyond_a_limit_lead_to_the_limit() -> None:
+    robot = tc.load_robot("rcrt1")
+    master = sides.MasterSide(scenario="free_motion")
+    master.begin()
+    master.hold()
+    wanted = joints_of(master, master.next_action()) + np.array([9.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+    master.feel(dict(zip(master.joint_keys, wanted, strict=True)))
+    for _ in range(300):
+        reached = joints_of(master, master.next_action())
+    assert reached[0] == pytest.approx(robot.upper[0], abs=1e-5)
+
+
 def test_both_sides_refuse_what_they_cannot_use(slave: SlaveSide) -> None:
     with pytest.raises(tc.ParameterError, match=r"theta1\.pos") as caught:
         slave.send({"theta1.pos": 0.0})
@@ -184,6 +229,8 @@ def test_both_sides_refuse_what_they_cannot_use(slave: SlaveSide) -> None:
     master.begin()
     with pytest.raises(tc.ParameterError, match=r"force\.z"):
         master.feel({"force.x": 0.0, "force.y": 0.0})
+    with pytest.raises(tc.ParameterError, match=r"theta1\.pos"):
+        master.feel(dict.fromkeys(master.joint_keys, np.nan))
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,116 @@
+"""Side of a session for a loop of another program: what the slave's and the master's side share."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+import teleop_core as tc
+from teleop_core.commands.progress import shown_progress
+from teleop_core.graph import TICK_NS
+from teleop_core.session.runner import record_blocks
+from teleop_core.slave.parameters import SlaveParameters
+
+SECOND_NS = 1_000_000_000
+FORCE = ("force.x", "force.y", "force.z")
+"""Keys of the force on the slave's tip along its base [N]."""
+
+
+class Side:
+    """One side of a session, which a loop advances period by period.
+
+    Args:
+        stages: Stages by which the loop gives.
+        robot: Name of a robot, its URDF or table; empty for the one of the scenario.
+        scenario: One of ``teleop scenarios``; empty for the defaults.
+        settings: Parameters as ``key=value``, as ``teleop sim --set`` takes them.
+        fps: Calls of the loop in a second, 1 to 1000.
+        bag: Directory of a recording that :meth:`end` makes; empty for none.
+
+    Attributes:
+        joint_names: Names of the robot's joints.
+
+    Raises:
+        TeleopError: A value is wrong; the text names it.
+    """
+
+    def __init__(
+        self, stages: Sequence[tc.Stage], robot: str, scenario: str, settings: Sequence[str], fps: int, bag: str = ""
+    ) -> None:
+        if not 1 <= fps <= 1000:
+            raise tc.ParameterError("fps", fps, "1 to 1000 calls in a second")
+        self._configuration = tc.configuration(scenario or None, robot=robot or None, stages=stages, texts=settings)
+        arms, known = self._configuration.graph.arms, self._configuration.graph.stages
+        if any(stage not in known for stage in stages) or len(arms) > 1:
+            needed = f"one arm, with {', '.join(stage.name for stage in stages)} among teleop.stages"
+            raise tc.ParameterError("settings", tuple(settings), needed)
+        self._fps, self._bag = fps, bag
+        self.joint_names: tuple[str, ...] = self._configuration.of(SlaveParameters).joint_names
+        self._session: tc.VirtualTime | None = None
+
+    @property
+    def joint_keys(self) -> tuple[str, ...]:
+        """Keys of the joints in actions and observations, [rad or m]."""
+        return tuple(f"{name}.pos" for name in self.joint_names)
+
+    @property
+    def is_running(self) -> bool:
+        """Whether it has begun and not ended."""
+        return self._session is not None
+
+    def begin(self) -> None:
+        """Begin a session, and wait until the slave is where it starts.
+
+        Raises:
+            SessionError: It runs already.
+        """
+        if self._session is not None:
+            raise tc.SessionError("the session runs already; end it first")
+        with shown_progress("starting"):  # the first start on a machine compiles kernels, for half a minute or more
+            self._session, self._periods = tc.VirtualTime(self._configuration), 0
+            self._blocks: list[NDArray[np.void]] = []
+            self._advance(max(1, self._session.lead))
+        self._begin_ns = self._session.now_ns
+
+    def end(self) -> None:
+        """End the session, and make its recording if one is wanted.
+
+        Raises:
+            SessionError: It does not run.
+            RecordingError: The directory exists, or cannot be written.
+        """
+        session, self._session = self._running, None
+        if self._bag:
+            ticks = session.now_ns // TICK_NS
+            record_blocks(session, self._configuration, Path(self._bag), self._blocks, ticks)
+
+    @property
+    def _running(self) -> tc.VirtualTime:
+        if self._session is None:
+            raise tc.SessionError("no session runs; begin one first")
+        return self._session
+
+    def _given(self, stage: tc.Stage) -> Any:
+        """State record of a stage by which the loop gives."""
+        return self._running.stages[stage.name].arguments[1]
+
+    @property
+    def _slave(self) -> Any:
+        return self._running.stages["slave"]
+
+    def _advance(self, ticks: int) -> None:
+        block = self._running.run(ticks)
+        self._row = block[-1].copy()
+        if self._bag:
+            self._blocks.append(block)
+
+    def _advance_period(self) -> None:
+        """Go on to the next call of the loop; periods are whole ticks and drift from none."""
+        self._periods += 1
+        until_ns = self._begin_ns + self._periods * SECOND_NS // self._fps
+        self._advance((until_ns - self._running.now_ns) // TICK_NS)
+
+    def _named(self, joints: NDArray[np.float64]) -> dict[str, float]:
+        return dict(zip(self.joint_keys, joints.tolist(), strict=True))
