@@ -22,6 +22,7 @@ BOTH = {
 }  # fmt: skip
 ROBOT = BOTH | {"observation_features", "get_observation", "send_action"}
 TELEOPERATOR = BOTH | {"feedback_features", "get_action", "send_feedback", "enable_torque", "disable_torque"}
+CAMERA = {"is_connected", "find_cameras", "connect", "read", "async_read", "read_latest", "disconnect"}
 
 
 @pytest.fixture
@@ -221,8 +222,8 @@ def test_both_sides_refuse_what_they_cannot_use(slave: SlaveSide) -> None:
             call()
     with pytest.raises(tc.ParameterError, match="fps"):
         sides.SlaveSide(fps=0)
-    with pytest.raises(tc.ParameterError, match="given_joints"):
-        sides.SlaveSide(settings=("teleop.stages=[network]",))
+    with pytest.raises(tc.ParameterError, match="one arm, with given_joints"):
+        sides.SlaveSide(settings=("teleop.arms=[left,right]",))
     with pytest.raises(tc.UnknownNameError):
         sides.MasterSide(robot="no_such_robot")
     master = sides.MasterSide(scenario="free_motion")
@@ -235,15 +236,21 @@ def test_both_sides_refuse_what_they_cannot_use(slave: SlaveSide) -> None:
 
 @pytest.mark.parametrize(
     ("package", "base", "names"),
-    [("lerobot_robot_teleop_core", "Robot", ROBOT), ("lerobot_teleoperator_teleop_core", "Teleoperator", TELEOPERATOR)],
+    [
+        ("lerobot_robot_teleop_core", "Robot", ROBOT),
+        ("lerobot_teleoperator_teleop_core", "Teleoperator", TELEOPERATOR),
+        ("lerobot_camera_teleop_core", "Camera", CAMERA),
+    ],
 )
 def test_class_for_lerobot_has_what_its_documents_ask_for(package: str, base: str, names: set[str]) -> None:
     tree = ast.parse((PACKAGE / package / "__init__.py").read_text())
     classes = {node.name: node for node in tree.body if isinstance(node, ast.ClassDef)}
-    bases = ["Connection", base]  # in this order: what is shared stands in for LeRobot's abstract
+    # In this order: what robot and teleoperator share stands in for LeRobot's abstract.
+    bases = [base] if base == "Camera" else ["Connection", base]
     device = next(c for c in classes.values() if [ast.unparse(b) for b in c.bases] == bases)
     defined = {node.name for node in device.body if isinstance(node, ast.FunctionDef)}
-    defined |= set(vars(sides.Connection))
+    if base != "Camera":
+        defined |= set(vars(sides.Connection))
     defined |= {ast.unparse(n.targets[0]) for n in device.body if isinstance(n, ast.Assign)}
     assert defined >= names
     assert f"{device.name}Config" in classes  # LeRobot finds the class by this name
@@ -304,3 +311,16 @@ def test_cameras_without_a_scene_are_refused() -> None:
 
     with pytest.raises(tc.ParameterError, match="16 to 4096"):
         sides.SlaveSide(str(models.OWN / "cubes.xml"), cameras=["front:1x1"])
+
+
+def test_gymnasium_finds_no_fault_with_the_environment_of_lerobot() -> None:
+    pytest.importorskip("lerobot", reason="lerobot is not installed: it brings torch")
+    from gymnasium.utils.env_checker import check_env
+    from lerobot.envs.configs import EnvConfig
+    from lerobot.utils.import_utils import register_third_party_plugins
+
+    register_third_party_plugins()
+    config = EnvConfig.get_choice_class("teleop_core")(
+        scenario="free_motion", settings=["teleop.stages=[display,task]", "task.kind=reach"]
+    )
+    check_env(next(iter(config.create_envs(1).values()))[0].envs[0].unwrapped, skip_render_check=True)

@@ -5,8 +5,10 @@ Each side is a session in virtual time, which a call of the loop advances by one
 """
 
 from teleop_core_lerobot.device import Connection, SessionFields
+from teleop_core_lerobot.episodes import Episodes
+from teleop_core_lerobot.live_camera import LiveCamera
 from teleop_core_lerobot.master_side import MasterSide
 from teleop_core_lerobot.side import Side
 from teleop_core_lerobot.slave_side import SlaveSide
 
-__all__ = ["Connection", "MasterSide", "SessionFields", "Side", "SlaveSide"]
+__all__ = ["Connection", "Episodes", "LiveCamera", "MasterSide", "SessionFields", "Side", "SlaveSide"]

@@ -10,7 +10,9 @@ from numpy.typing import NDArray
 import teleop_core as tc
 from teleop_core.graph import TICK_NS, topics
 from teleop_core.kernels.fields import PerJoint
+from teleop_core.robots import load_robot_set
 from teleop_core.robots.parts import file_of, is_scene
+from teleop_core.slave.parameters import SlaveParameters
 from teleop_core_lerobot.side import FORCE, Side
 
 GIVEN_JP = tc.Topic("given/servo_jp", tc.Kind.JOINTS, topics.in_force("slave/servo_jp"), "slave_base")
@@ -144,12 +146,26 @@ class SlaveSide(Side):
         """Keys of the numbers of an observation: joints [rad or m], then force on the tip along slave_base [N]."""
         return (*self.joint_keys, *FORCE)
 
+    @property
+    def limits(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Lower and upper limits (n,) of the joints [rad or m]."""
+        chosen = self._configuration.of(SlaveParameters)
+        robot = load_robot_set(chosen.robot, chosen.geometry)
+        return robot.lower, robot.upper
+
+    @property
+    def tip(self) -> NDArray[np.float64]:
+        """Measured pose of the tip in slave_base: position [m], quaternion w, x, y, z."""
+        return self.values(topics.SLAVE_MEASURED_CP)
+
+    def observe_joints(self) -> dict[str, float]:
+        """Measured joints of the last tick [rad or m]; no time passes."""
+        return self._named(self.values(topics.SLAVE_MEASURED_JS)[: len(self.joint_names)])
+
     def observe(self) -> dict[str, Any]:
         """Measured joints, force on the tip and pictures (height, width, 3), of the last tick; no time passes."""
-        self._running  # noqa: B018 raises without a session
-        joints = self._row["slave_measured_js"][: len(self.joint_names)]
-        force = self._row["slave_measured_cf"][:3]
-        found: dict[str, Any] = self._named(joints) | dict(zip(FORCE, force.tolist(), strict=True))
+        force = self.values(topics.SLAVE_MEASURED_CF)[:3]
+        found: dict[str, Any] = self.observe_joints() | dict(zip(FORCE, force.tolist(), strict=True))
         for lens in self._lenses:
             poses = np.reshape(self._row["scene_poses"], (-1, 7))[: lens.bodies]
             found[lens.view.name] = lens.take(poses)
