@@ -56,9 +56,11 @@ class _Loaded:
             for one in (self._policy, self._before, self._after):
                 one.reset()
         self._last = seen.time
-        if _GOAL in self._inputs and seen.goal is None:
-            return seen.place
-        numbers = {_STATE: seen.measured_cp, _GOAL: seen.goal}
+        numbers = {_STATE: seen.measured_cp}
+        if _GOAL in self._inputs:
+            if seen.goal is None:
+                return seen.place
+            numbers[_GOAL] = seen.goal
         batch = {name: self._torch.from_numpy(numbers[name].astype(np.float32)) for name in self._inputs}
         with self._torch.inference_mode():
             found = self._after(self._policy.select_action(self._before(batch)))
