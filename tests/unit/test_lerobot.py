@@ -21,7 +21,8 @@ BOTH = {
     "calibrate", "configure", "disconnect",
 }  # fmt: skip
 ROBOT = BOTH | {"observation_features", "get_observation", "send_action"}
-TELEOPERATOR = BOTH | {"feedback_features", "get_action", "send_feedback"}
+TELEOPERATOR = BOTH | {"feedback_features", "get_action", "send_feedback", "enable_torque", "disable_torque"}
+CAMERA = {"is_connected", "find_cameras", "connect", "read", "async_read", "read_latest", "disconnect"}
 
 
 @pytest.fixture
@@ -162,6 +163,51 @@ def test_hand_feels_the_force_that_is_given_as_it_feels_one_that_is_measured() -
     assert felt[2.0] == pytest.approx(2.0 * felt[1.0], rel=1e-6)
 
 
+def test_hand_takes_over_where_a_program_has_led_the_slave_without_a_jump() -> None:
+    robot = tc.load_robot("rcrt1")
+    master = sides.MasterSide(scenario="free_motion")
+    master.begin()
+    for _ in range(15):
+        master.next_action()
+    master.hold()
+    held = np.array([joints_of(master, master.next_action()) for _ in range(20)])
+    assert np.ptp(held[1:], axis=0).max() == 0.0  # the hand still moves, and moves nothing
+    there = held[-1] + 0.05 * INWARD  # as LeRobot's smooth_move_to: no action is asked for on the way
+    for share in np.linspace(0.0, 1.0, 61):
+        joints = held[-1] + share * (there - held[-1])
+        master.feel(dict(zip(master.joint_keys, joints, strict=True)))
+    master.release()
+    led = np.array([joints_of(master, master.next_action()) for _ in range(60)])
+    tips = np.array([robot.fk(joints)[:3, 3] for joints in (there, *led)])
+    steps = np.linalg.norm(np.diff(tips, axis=0), axis=1)
+    assert steps[0] < 1e-3
+    assert steps.max() < 3e-3  # the hand's own motion in a period
+    assert np.linalg.norm(tips[-1] - tips[0]) > 5e-3  # it leads again
+
+
+def test_joints_given_to_a_free_master_move_nothing() -> None:
+    actions = []
+    for given in ({}, {"joints": 1.0}):
+        master = sides.MasterSide(scenario="free_motion")
+        master.begin()
+        if given:
+            master.feel(dict.fromkeys(master.joint_keys, 1.0))
+        actions.append([joints_of(master, master.next_action()) for _ in range(10)])
+    assert np.array_equal(*actions)
+
+
+def test_joints_beyond_a_limit_lead_to_the_limit() -> None:
+    robot = tc.load_robot("rcrt1")
+    master = sides.MasterSide(scenario="free_motion")
+    master.begin()
+    master.hold()
+    wanted = joints_of(master, master.next_action()) + np.array([9.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+    master.feel(dict(zip(master.joint_keys, wanted, strict=True)))
+    for _ in range(300):
+        reached = joints_of(master, master.next_action())
+    assert reached[0] == pytest.approx(robot.upper[0], abs=1e-5)
+
+
 def test_both_sides_refuse_what_they_cannot_use(slave: SlaveSide) -> None:
     with pytest.raises(tc.ParameterError, match=r"theta1\.pos") as caught:
         slave.send({"theta1.pos": 0.0})
@@ -176,27 +222,35 @@ def test_both_sides_refuse_what_they_cannot_use(slave: SlaveSide) -> None:
             call()
     with pytest.raises(tc.ParameterError, match="fps"):
         sides.SlaveSide(fps=0)
-    with pytest.raises(tc.ParameterError, match="given_joints"):
-        sides.SlaveSide(settings=("teleop.stages=[network]",))
+    with pytest.raises(tc.ParameterError, match="one arm, with given_joints"):
+        sides.SlaveSide(settings=("teleop.arms=[left,right]",))
     with pytest.raises(tc.UnknownNameError):
         sides.MasterSide(robot="no_such_robot")
     master = sides.MasterSide(scenario="free_motion")
     master.begin()
     with pytest.raises(tc.ParameterError, match=r"force\.z"):
         master.feel({"force.x": 0.0, "force.y": 0.0})
+    with pytest.raises(tc.ParameterError, match=r"theta1\.pos"):
+        master.feel(dict.fromkeys(master.joint_keys, np.nan))
 
 
 @pytest.mark.parametrize(
     ("package", "base", "names"),
-    [("lerobot_robot_teleop_core", "Robot", ROBOT), ("lerobot_teleoperator_teleop_core", "Teleoperator", TELEOPERATOR)],
+    [
+        ("lerobot_robot_teleop_core", "Robot", ROBOT),
+        ("lerobot_teleoperator_teleop_core", "Teleoperator", TELEOPERATOR),
+        ("lerobot_camera_teleop_core", "Camera", CAMERA),
+    ],
 )
 def test_class_for_lerobot_has_what_its_documents_ask_for(package: str, base: str, names: set[str]) -> None:
     tree = ast.parse((PACKAGE / package / "__init__.py").read_text())
     classes = {node.name: node for node in tree.body if isinstance(node, ast.ClassDef)}
-    bases = ["Connection", base]  # in this order: what is shared stands in for LeRobot's abstract
+    # In this order: what robot and teleoperator share stands in for LeRobot's abstract.
+    bases = [base] if base == "Camera" else ["Connection", base]
     device = next(c for c in classes.values() if [ast.unparse(b) for b in c.bases] == bases)
     defined = {node.name for node in device.body if isinstance(node, ast.FunctionDef)}
-    defined |= set(vars(sides.Connection))
+    if base != "Camera":
+        defined |= set(vars(sides.Connection))
     defined |= {ast.unparse(n.targets[0]) for n in device.body if isinstance(n, ast.Assign)}
     assert defined >= names
     assert f"{device.name}Config" in classes  # LeRobot finds the class by this name
@@ -257,3 +311,16 @@ def test_cameras_without_a_scene_are_refused() -> None:
 
     with pytest.raises(tc.ParameterError, match="16 to 4096"):
         sides.SlaveSide(str(models.OWN / "cubes.xml"), cameras=["front:1x1"])
+
+
+def test_gymnasium_finds_no_fault_with_the_environment_of_lerobot() -> None:
+    pytest.importorskip("lerobot", reason="lerobot is not installed: it brings torch")
+    from gymnasium.utils.env_checker import check_env
+    from lerobot.envs.configs import EnvConfig
+    from lerobot.utils.import_utils import register_third_party_plugins
+
+    register_third_party_plugins()
+    config = EnvConfig.get_choice_class("teleop_core")(
+        scenario="free_motion", settings=["teleop.stages=[display,task]", "task.kind=reach"]
+    )
+    check_env(next(iter(config.create_envs(1).values()))[0].envs[0].unwrapped, skip_render_check=True)

@@ -1,6 +1,6 @@
 """Slave of teleop_core as LeRobot's robot, ``--robot.type=teleop_core``.
 
-LeRobot imports this package by its name; the teleoperator of the same distribution comes with it.
+LeRobot imports this package by its name; teleoperator, camera and environment of the same distribution come with it.
 """
 
 from dataclasses import dataclass, field
@@ -8,6 +8,8 @@ from typing import Any
 
 from lerobot.robots import Robot, RobotConfig
 
+import lerobot_camera_teleop_core  # noqa: F401 registers the camera
+import lerobot_env_teleop_core  # noqa: F401 registers the environment
 import lerobot_teleoperator_teleop_core  # noqa: F401 registers the teleoperator
 from teleop_core_lerobot import Connection, SessionFields, SlaveSide
 

@@ -30,12 +30,20 @@ class TeleopCoreTeleop(Connection, Teleoperator):
 
     @property
     def feedback_features(self) -> dict[str, type]:
-        """Force on the slave's tip along its base [N]."""
+        """Joints to move to while torque is enabled [rad or m], and force on the slave's tip along its base [N]."""
         return dict.fromkeys(self._side.feedback_keys, float)
 
     def get_action(self) -> dict[str, Any]:
         """See :meth:`teleop_core_lerobot.MasterSide.next_action`."""
         return self._side.next_action()
+
+    def enable_torque(self) -> None:
+        """Take the master from the hand; see :meth:`teleop_core_lerobot.MasterSide.hold`."""
+        self._side.hold()
+
+    def disable_torque(self) -> None:
+        """Give the master back to the hand; see :meth:`teleop_core_lerobot.MasterSide.release`."""
+        self._side.release()
 
     def send_feedback(self, feedback: dict[str, Any]) -> None:
         """See :meth:`teleop_core_lerobot.MasterSide.feel`."""
