@@ -1,6 +1,7 @@
 """A policy as operator: it moves the hand by a share of the way to the goal that it sees, fifty times a second.
 
-teleop sim --parts examples/policy_by_sight.py --scenario point --set operator=policy policy.name=by_sight task=reach
+Run this file, or: ``teleop sim --parts examples/policy_by_sight.py --scenario point --set operator=policy
+policy.name=by_sight task=reach --out bags/policy``.
 """
 
 import numpy as np

@@ -9,6 +9,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from example_runs import EXAMPLES, NAMES, numbers
@@ -373,6 +374,15 @@ def test_a_bridge_is_drilled_with_a_model_of_its_controller_and_one_that_coasts_
     assert "\u2713 stop_topic: FAULT: stop" in sound
     assert "\u2713 freeze_slave_sim: FAULT: feedback" in sound
     assert "\u2717 freeze_slave_sim: the tip moved" in coasting
+
+
+def test_a_policy_reaches_the_fewer_goals_the_later_it_sees(tmp_path: Path) -> None:
+    text = run("policy_by_sight", tmp_path)
+    done, ages = numbers(r"(\d+) goals", text), numbers(r"seen +(\d+) ms", text)
+    assert done == sorted(done, reverse=True)
+    assert done[0] > 30
+    assert done[-1] < 3
+    assert np.allclose(np.diff(ages), 100.0, atol=1.0)
 
 
 def test_a_policy_succeeds_where_its_demonstrator_does_and_both_fail_when_they_see_late(tmp_path: Path) -> None:
