@@ -140,6 +140,7 @@ bench: bench-setup
 	$(BIN)/python benchmarks/first_session.py --cold
 	$(BIN)/python benchmarks/kinematics.py
 	$(BIN)/python benchmarks/urdf_arms.py
+	$(BIN)/python benchmarks/glass.py
 	$(BIN)/python benchmarks/live.py --seconds $(SECONDS_LIVE) --runs $(RUNS_LIVE)
 
 # Starts and ends of live sessions under load, COUNT of each kind; about a quarter of an hour.

@@ -37,6 +37,7 @@ _GRIPPER = "slave/bridges/jaw_bridge.py"
 _SHARING = "slave/jaw/sharing.py"
 _YIELD = "coupling/architectures/impedance.py"
 _PID, _WAY = "slave/controllers/pid.py", "slave/interpolation.py"
+_POLICY = "hand/operators/policy.py"
 _HAND, _OBSERVER = "hand/master/hand_mechanics.py", "slave/force_observer.py"
 _SWIVEL, _SWIVEL_ARCS = (f"kinematics/closed_form/{name}.py" for name in ("swivel", "swivel_arcs"))
 _SPHERICAL_WRIST = "kinematics/closed_form/spherical_wrist.py"
@@ -263,9 +264,15 @@ CODE_MUTANTS = (
             "if not named:", "import_bags"),
     _mutant("bodies_mixed", "the position of one body goes with the orientation of another",
             "teleop_exchange/guessing.py", "if turn.group.body == body]", "]", "import_guesses"),
-    _mutant("policy_jumps", "a policy that takes over begins at its own place", "teleop_lab/policies.py",
-            "self._shift, self._is_new = self.place - wanted, False",
-            "self._shift, self._is_new = 0.0 * wanted, False", "policies"),
+    _mutant("policy_jumps", "a policy that takes over begins at its own place", _POLICY,
+            "self._shift, self._is_new = hand - wanted, False",
+            "self._shift, self._is_new = 0.0 * wanted, False", "policies", "policy_operator"),
+    _mutant("policy_age", "a policy is told that what it sees is new", "hand/master/operator.py",
+            'return 1e-9 * (int(self.signals["now_ns"]) - stamp_ns)', "return 0.0", "policy_operator"),
+    _mutant("policy_nan", "a policy that returns no number is not named", _POLICY,
+            "if not np.isfinite(place).all():", "if False:", "policy_operator"),
+    _mutant("policy_leaves", "a policy moves the hand out of its space", _POLICY,
+            "np.clip(place, *self._corners)", "place", "policy_operator"),
     _mutant("picture_of_last_tick", "a picture carries the stamp of other poses", "teleop_scene/film.py",
             "picture = camera.take(poses.values[index]", "picture = camera.take(poses.values[index - 1]",
             "scene_camera"),

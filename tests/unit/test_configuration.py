@@ -46,7 +46,8 @@ def test_setting_with_its_stage_sets_that_parameter_alone() -> None:
 def test_bare_key_sets_every_stage_that_has_it() -> None:
     layer = layers.parse_setting("robot=mma")
     layer.pop("given_joints", None)  # of teleop_core_lerobot, where a test has loaded it
-    assert layer == {name: {"robot": "mma"} for name in ("inverse_kinematics", "slave", "slave_sim", "arm_bridge")}
+    stages = ("inverse_kinematics", "slave", "slave_sim", "arm_bridge", "scene")
+    assert layer == {name: {"robot": "mma"} for name in stages}
     assert layers.parse_setting("seed=5") == {
         name: {"seed": 5} for name in ("operator", "haptic_master", "network", "slave_sim")
     }

@@ -232,7 +232,7 @@ def test_the_path_of_a_table_is_a_robot(tmp_path: Path) -> None:
 def test_unknown_names_list_the_alternatives() -> None:
     with pytest.raises(errors.UnknownNameError) as caught:
         load_robot("r2d2")
-    files = ("FILE.urdf", "FILE.xacro", "FILE.yaml")
+    files = ("FILE.urdf", "FILE.xacro", "FILE.yaml", "SCENE.xml")
     assert caught.value.alternatives == (*list_robots(), *files)
 
 

@@ -35,6 +35,7 @@ from .hand.operators import (
     following as following,
     register_operator as register_operator,
 )
+from .hand.operators.policy import View as View, register_policy as register_policy
 from .hand.operators.remote import RemoteHand as RemoteHand, remote_operator as remote_operator
 from .hand.tasks import Task as Task, register_task as register_task
 from .base.parameters import NoParameters as NoParameters, Within as Within, parameter as parameter

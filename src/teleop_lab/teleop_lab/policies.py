@@ -10,7 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from teleop_core.base import ParameterError, ShapeError
+from teleop_core.base import ParameterError
+from teleop_core.hand.operators.policy import GIVE_WAY, HandOver, checked_place
 from teleop_core.kernels import Array
 from teleop_core.session.stepped import Observation, Session
 
@@ -46,9 +47,9 @@ class Way:
 class Pilot:
     """Moves the hand of a session by one policy at a time, and changes policies without a jump of the hand.
 
-    When a policy takes over, its places are shifted so that the first one is where the hand is. The shift then shrinks
-    at a bounded speed, so that the hand comes to the places of the new policy by itself. A person is a policy too,
-    whose places come from a device. Places beyond the space of the hand are moved to its border.
+    When a policy takes over, its places are shifted as :class:`~teleop_core.hand.operators.policy.HandOver` says. A
+    person is a policy too, whose places come from a device. Places beyond the space of the hand are moved to its
+    border.
 
     Args:
         session: Session whose hand is moved.
@@ -60,12 +61,9 @@ class Pilot:
         place: Place of the hand that was commanded last (3,) [m].
     """
 
-    def __init__(self, session: Session, policy: Policy, way: Way | None = None, give_way: float = 0.01) -> None:
-        if not 0.0 < give_way <= 1.0:
-            raise ParameterError("give_way", give_way, "above 0, up to 1 m/s")
-        self._session, self._way, self._speed = session, way or Way(), give_way
-        self._policy, self._is_new = policy, True
-        self.place, self._shift = np.zeros(3), np.zeros(3)
+    def __init__(self, session: Session, policy: Policy, way: Way | None = None, give_way: float = GIVE_WAY) -> None:
+        self._session, self._way, self._hand_over = session, way or Way(), HandOver(give_way)
+        self._policy, self.place = policy, np.zeros(3)
         self._rng = np.random.default_rng(self._way.seed)
         self._seen: deque[Observation] = deque(maxlen=self._way.seen_late + 1)
         self._told: deque[Array] = deque(maxlen=self._way.told_late + 1)
@@ -73,7 +71,9 @@ class Pilot:
 
     def hand_over(self, policy: Policy) -> None:
         """Let another policy move the hand from the next step on."""
-        self._policy, self._is_new = policy, True
+        self._policy = policy
+        self._hand_over.begin()
+        self._told.clear()
 
     def step(self, found: Observation) -> Observation:
         """Give an observation to the policy, command the hand, and let one step pass.
@@ -83,18 +83,10 @@ class Pilot:
             ParameterError: The place is not finite.
         """
         self._seen.append(found)
-        wanted = np.asarray(self._policy(self._seen[0]), np.float64)
-        if wanted.shape != (3,):
-            raise ShapeError("place of the policy", (3,), wanted.shape)
+        wanted = checked_place(self._policy(self._seen[0]), ((3,),))
         passed = max(0.0, found.time - self._time) if self._time >= 0.0 else 0.0
         self._time = found.time
-        if self._is_new:
-            self._shift, self._is_new = self.place - wanted, False
-            self._told.clear()
-        else:
-            length = float(np.linalg.norm(self._shift))
-            self._shift = self._shift * max(0.0, 1.0 - self._speed * passed / max(length, 1e-12))
-        self._told.append(wanted + self._shift)
+        self._told.append(self._hand_over.place(wanted, self.place, passed))
         if self._rng.random() >= self._way.loss:
             space = self._session.command_space
             self.place = np.clip(self._told[0], space.low[:3], space.high[:3])

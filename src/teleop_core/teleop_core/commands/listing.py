@@ -26,6 +26,7 @@ def parts() -> None:
     from teleop_core.evaluation import METRICS
     from teleop_core.graph.stage import STAGES
     from teleop_core.hand.operators import OPERATORS
+    from teleop_core.hand.operators.policy import POLICIES
     from teleop_core.hand.tasks import TASKS
     from teleop_core.robots import ROBOTS
     from teleop_core.shapes import SHAPES
@@ -35,8 +36,8 @@ def parts() -> None:
     from teleop_core.slave.world import WORLD_OBJECTS
 
     registries = (
-        OPERATORS, SHAPES, ROBOTS, CONTROLLERS, PLANTS, WORLD_OBJECTS, ARCHITECTURES, NETWORKS,
-        PASSIVITIES, TREMOR_FILTERS, TASKS, BRIDGES, STAGES, METRICS,
+        OPERATORS, POLICIES, SHAPES, ROBOTS, CONTROLLERS, PLANTS, WORLD_OBJECTS, ARCHITECTURES,
+        NETWORKS, PASSIVITIES, TREMOR_FILTERS, TASKS, BRIDGES, STAGES, METRICS,
     )  # fmt: skip
     for registry in registries:
         print(f"{registry.kinds:16}{', '.join(registry)}")

@@ -136,7 +136,7 @@ class RunningOperator(RunningStage):
         phases = rng.uniform(0.0, 2.0 * math.pi, PHASES)
         self._operator = OPERATORS.find(fixed.kind.kind)
         self.ahead = min(self._operator.ahead, BLOCK)
-        seen = Seen(*(row[topic.field] for topic in OPERATOR.reads))
+        seen = Seen._make((*(row[topic.field] for topic in OPERATOR.reads), self._age))
         setting = Setting(fixed, phases, fixed.seed, seen)
         self._motion = self._asked(self._operator.make, fixed.kind.parameters, setting)
         buttons = fixed.buttons
@@ -183,6 +183,11 @@ class RunningOperator(RunningStage):
         self._end = max(ticks, min(left - 1 + self._operator.ahead, BLOCK)) + 1
         self.state["next"] = 0
         self._draw(self._wanted[left : self._end])
+
+    def _age(self) -> float:
+        """Time since the slave's pose was measured that the operator sees [s]; infinite before the first pose."""
+        stamp_ns = int(self.signals[f"{topics.SLAVE_MEASURED_CP.field}_ns"])
+        return 1e-9 * (int(self.signals["now_ns"]) - stamp_ns) if stamp_ns > 0 else math.inf
 
     def _draw(self, drawn: Any) -> None:
         count = len(drawn)

@@ -41,6 +41,7 @@ class Seen(NamedTuple):
         state: Numbers of ``teleop/state``, as :data:`~teleop_core.graph.topics.TELEOP_STATE` names them.
         task: Numbers of ``task/state``, as :data:`~teleop_core.graph.topics.TASK_STATE` names them;
             zero without a task, and before it begins.
+        age: Function that returns the time since ``slave`` was measured [s]; infinite before the first value arrives.
     """
 
     slave: Array
@@ -48,6 +49,7 @@ class Seen(NamedTuple):
     force: Array
     state: Array
     task: Array
+    age: Callable[[], float] = float
 
 
 class Setting(NamedTuple):
@@ -165,6 +167,7 @@ OPERATORS: Registry[Operator] = Registry(
         "tour": "teleop_core.hand.operators.tour:TOUR",
         "human": "teleop_core.hand.operators.human:HUMAN",
         "observer": "teleop_core.hand.operators.observer:OBSERVER",
+        "policy": "teleop_core.hand.operators.policy:POLICY",
         "remote": "teleop_core.hand.operators.remote:REMOTE",
         "gamepad": "teleop_core.hand.devices.gamepad:GAMEPAD",
         "spacemouse": "teleop_core.hand.devices.spacemouse:SPACEMOUSE",
