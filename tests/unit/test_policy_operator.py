@@ -147,7 +147,7 @@ def words(_: tc.View) -> Any:
 def test_a_fixture_holds_a_policy_as_it_holds_a_person() -> None:
     def reach(size: float) -> float:
         """Farthest place of the tip from where it began [m]."""
-        box = {"fixture": "box", "fixture__box__size": [size] * 3, "operator__buttons__fixture": [0.1]}
+        box: dict[str, Any] = {"fixture": "box", "fixture__box__size": [size] * 3, "operator__buttons__fixture": [0.1]}
         way = places(run(lambda _: np.array([0.0, 0.02, 0.0]), 3.0, **box), "slave/measured_cp")
         return float(np.abs(way - way[0]).max())
 
