@@ -390,3 +390,9 @@ def test_a_policy_succeeds_where_its_demonstrator_does_and_both_fail_when_they_s
     assert len(shares) == 14
     assert min(shares[:2]) > 80.0
     assert max(shares[-2:]) < 10.0
+
+
+def test_the_hand_takes_over_from_a_policy_where_the_arm_is(tmp_path: Path) -> None:
+    jump, moved, led = numbers(r"([\d.]+) mm", run("policy_hand_over", tmp_path))
+    assert moved < 1.0
+    assert min(jump, led) > 10.0

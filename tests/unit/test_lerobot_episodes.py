@@ -65,9 +65,12 @@ def test_state_is_that_of_a_data_set_that_was_recorded() -> None:
     made = Episodes(scenario="free_motion", settings=("slave.starts_at_home=true",))
     seen = made.begin()
     assert list(seen) == ["agent_pos"]
-    assert np.array_equal(seen["agent_pos"], np.float32(list(made.side.observe().values())))
+    assert np.array_equal(seen["agent_pos"], np.array(list(made.side.observe().values()), np.float32))
     assert made.step(seen["agent_pos"][:6])[1:] == (0.0, False)
     made.end()
+    only = Episodes(scenario="free_motion", state="joints", settings=("slave.starts_at_home=true",))
+    assert np.array_equal(only.begin()["agent_pos"], seen["agent_pos"][:6])
+    assert only.state_width == 6
 
 
 def test_joints_of_the_hand_are_followed_as_those_of_a_policy_are() -> None:

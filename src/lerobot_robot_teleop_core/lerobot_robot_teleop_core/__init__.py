@@ -19,9 +19,10 @@ __all__ = ["TeleopCoreRobot", "TeleopCoreRobotConfig"]
 @RobotConfig.register_subclass("teleop_core")
 @dataclass(kw_only=True)
 class TeleopCoreRobotConfig(SessionFields, RobotConfig):
-    """What runs; the fields are arguments of :class:`teleop_core_lerobot.SlaveSide`."""
+    """What runs; the fields are arguments of :class:`teleop_core_lerobot.SlaveSide`, and whether force is observed."""
 
     views: list[str] = field(default_factory=list)
+    force: bool = True
 
 
 class TeleopCoreRobot(Connection, Robot):
@@ -40,11 +41,13 @@ class TeleopCoreRobot(Connection, Robot):
     @property
     def observation_features(self) -> dict[str, type | tuple[int, int, int]]:
         """Joints [rad or m] and force on the tip [N], all float; pictures by height, width and 3."""
-        return {**dict.fromkeys(self._side.observed_keys, float), **self._side.pictures}
+        keys = self._side.observed_keys if self.config.force else self._side.joint_keys
+        return {**dict.fromkeys(keys, float), **self._side.pictures}
 
     def get_observation(self) -> dict[str, Any]:
         """See :meth:`teleop_core_lerobot.SlaveSide.observe`."""
-        return self._side.observe()
+        found = self._side.observe()
+        return {key: found[key] for key in self.observation_features}
 
     def send_action(self, action: dict[str, Any]) -> dict[str, Any]:
         """See :meth:`teleop_core_lerobot.SlaveSide.send`."""

@@ -16,9 +16,9 @@ from teleop_core.hand.tasks.task import TaskParameters
 from teleop_core_lerobot.side import FORCE
 from teleop_core_lerobot.slave_side import SlaveSide
 
-STATES = ("record", "export")
-"""What the state of an observation has beside the joints: the force on the tip, as ``lerobot-record`` stores it, or the
-pose of the tip, as ``teleop export`` does."""
+STATES = {"record": 3, "export": 7, "joints": 0}
+"""What the state of an observation has beside the joints, and how many numbers: the force on the tip, as
+``lerobot-record`` stores it; the pose of the tip, as ``teleop export`` does; or nothing."""
 _NUMBER, _ATTEMPTS, _SUCCESSES = (TASK_STATE.columns.index(name) for name in ("number", "attempts", "successes"))
 _GOAL = [TASK_STATE.columns.index(f"goal_{name}") for name in ("x", "y", "z", "qw", "qx", "qy", "qz")]
 _GOAL.append(TASK_STATE.columns.index("width"))
@@ -56,7 +56,7 @@ class Episodes:
         state: str = "record",
     ) -> None:
         if state not in STATES:
-            raise tc.UnknownNameError("state", state, STATES)
+            raise tc.UnknownNameError("state", state, tuple(STATES))
         self.side, self._state = SlaveSide(robot, scenario, settings, fps, cameras=cameras), state
         self._topics = {topic.name for topic in self.side.topics}
 
@@ -68,7 +68,7 @@ class Episodes:
     @property
     def state_width(self) -> int:
         """Count of numbers in the state."""
-        return len(self.side.joint_names) + (len(FORCE) if self._state == "record" else 7)
+        return len(self.side.joint_names) + STATES[self._state]
 
     @property
     def surroundings_width(self) -> int:
@@ -132,7 +132,7 @@ class Episodes:
         """Observation of the last tick; no time passes."""
         found, side = self.side.observe(), self.side
         joints = [found[key] for key in side.joint_keys]
-        more = [found[key] for key in FORCE] if self._state == "record" else side.tip.tolist()
+        more = {"record": [found[key] for key in FORCE], "export": side.tip.tolist(), "joints": []}[self._state]
         seen: Seen = {"agent_pos": np.array(joints + more, np.float32)}
         if self.surroundings_width:
             around = self._task[_GOAL]
