@@ -10,7 +10,7 @@ from example_runs import EXAMPLES, NAMES
 from present import present
 
 PUBLIC = {
-    "teleop_lab", "teleop_lab.calibration", "teleop_lab.policies", "teleop_core.graph.operation",
+    "teleop_lab", "teleop_lab.calibration", "teleop_lab.policies", "teleop_core_lerobot", "teleop_core.graph.operation",
     "teleop_console.app", "teleop_console.controls", "teleop_console.link",
     "teleop_console.recorded", "teleop_console.server",
     "teleop_core", "teleop_core.evaluation", "teleop_core.evaluation.metric", "teleop_core.hand.operators",
