@@ -270,7 +270,7 @@ _KILLED = """
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
-sys.path[:0] = [{folder!r}, {folder!r} + "/.."]
+sys.path[:0] = [{folder!r}, {folder!r} + "/../support"]
 from test_studies import study
 if __name__ == "__main__":
     study().run(Path(sys.argv[1]), jobs=2)
