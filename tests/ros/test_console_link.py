@@ -14,7 +14,7 @@ from teleop_console.link import box_of
 from teleop_core.bags.reader import Bag
 from teleop_core.base.errors import ParameterError, SessionError
 from teleop_core.graph import topics
-from teleop_core.graph.topics import JAW_TOPICS, PASSIVITY_TOPICS, TASK_TOPICS
+from teleop_core.graph.topics import JAW_TOPICS, PASSIVITY_TOPICS, SCENE_TOPICS, TASK_TOPICS
 from teleop_core.nodes.children import free_domain
 from teleop_core.nodes.display import SEEN
 from teleop_core.session import api
@@ -37,7 +37,8 @@ def live(tmp_path_factory: pytest.TempPathFactory) -> Any:
             wait_until(lambda: any("operator is ready" in line for line in said), "nodes")
             view = link.view()
             wait_until(lambda: link.view().arms[""].state and view.recording, "reports")
-            count = len(set(SEEN) - {*JAW_TOPICS, *PASSIVITY_TOPICS, *TASK_TOPICS})  # this arm has none of them
+            without = {*JAW_TOPICS, *PASSIVITY_TOPICS, *SCENE_TOPICS, *TASK_TOPICS}  # this arm has none of them
+            count = len(set(SEEN) - without)
             wait_until(lambda: len(link.view().arms[""].streams) == count, "streams")
             yield session, link, out
 
