@@ -1,21 +1,25 @@
 """A camera of LeRobot reads pictures of a live session from their topic, each with its true age."""
 
-from typing import Any
+from importlib.util import find_spec
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
 
 simplejpeg = pytest.importorskip("simplejpeg", reason="teleop_scene is not installed")
-pytest.importorskip("teleop_core_lerobot", reason="lerobot_robot_teleop_core is missing")
 pytest.importorskip("mujoco", reason="teleop_scene is not installed")
 
 import teleop_core as tc  # noqa: E402
 from teleop_core.nodes.quality import profile  # noqa: E402
 from teleop_core.nodes.streams import message_type  # noqa: E402
-from teleop_core_lerobot import LiveCamera  # noqa: E402
 from teleop_scene.camera import View  # noqa: E402
 from teleop_scene.film import encoded, topics_of  # noqa: E402
 
+if TYPE_CHECKING:
+    from teleop_core_lerobot import LiveCamera
+
+# Imported by the tests that use it: it registers stages, and other files list all stages when they are collected.
+pytestmark = pytest.mark.skipif(find_spec("teleop_core_lerobot") is None, reason="no lerobot_robot_teleop_core")
 IMAGE, _ = topics_of(View("front"))
 
 
@@ -37,12 +41,14 @@ def send(peer: Any) -> Any:
 
 @pytest.fixture
 def camera(peer: Any) -> Any:
+    from teleop_core_lerobot import LiveCamera
+
     with LiveCamera("front", world=peer.world) as made:
         peer.sleep(0.2)
         yield made
 
 
-def test_picture_comes_with_the_time_since_its_capture(camera: LiveCamera, send: Any) -> None:
+def test_picture_comes_with_the_time_since_its_capture(camera: "LiveCamera", send: Any) -> None:
     assert camera.age == float("inf")
     send(200, 0.3)
     assert camera.age == pytest.approx(0.31, abs=0.005)
@@ -51,13 +57,13 @@ def test_picture_comes_with_the_time_since_its_capture(camera: LiveCamera, send:
         camera.newest(0.1)
 
 
-def test_picture_that_was_overtaken_is_left_out(camera: LiveCamera, send: Any) -> None:
+def test_picture_that_was_overtaken_is_left_out(camera: "LiveCamera", send: Any) -> None:
     send(100, 0.02)
     send(200, 0.5)
     assert np.abs(camera.newest().astype(int) - 100).max() <= 2
 
 
-def test_each_picture_is_new_once_and_the_next_is_waited_for(camera: LiveCamera, send: Any) -> None:
+def test_each_picture_is_new_once_and_the_next_is_waited_for(camera: "LiveCamera", send: Any) -> None:
     send(100, 0.0)
     assert camera.next(0.5).shape == (32, 48, 3)
     with pytest.raises(TimeoutError, match=r"no new picture came on camera/front/image_raw/compressed in 0.2 s"):
@@ -67,6 +73,8 @@ def test_each_picture_is_new_once_and_the_next_is_waited_for(camera: LiveCamera,
 
 
 def test_camera_that_does_not_listen_says_so(peer: Any) -> None:
+    from teleop_core_lerobot import LiveCamera
+
     camera = LiveCamera("/any/topic", world=peer.world)
     assert camera.topic == "any/topic"
     with pytest.raises(tc.SessionError, match="begin first"):
