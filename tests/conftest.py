@@ -60,6 +60,16 @@ def pytest_runtest_makereport(item: Any) -> Iterator[None]:
     return report
 
 
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_teardown(item: pytest.Item) -> Iterator[None]:
+    """Let a test fail that leaves a priority in its process, which all later tests and what they start would have."""
+    yield
+    if os.sched_getscheduler(0) in {os.SCHED_FIFO, os.SCHED_RR}:
+        left = os.sched_getparam(0).sched_priority
+        os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
+        pytest.fail(f"{item.nodeid} leaves a real-time priority of {left}")
+
+
 Run = Callable[..., "subprocess.CompletedProcess[str]"]
 
 

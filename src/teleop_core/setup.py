@@ -62,6 +62,7 @@ setup(
             "optuna",
             "pytest",
             "pytest-rerunfailures",
+            "pytest-timeout",
             "pytest-xdist",
             "hypothesis",
             "import-linter",

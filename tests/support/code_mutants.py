@@ -278,6 +278,8 @@ CODE_MUTANTS = (
             "scene_camera"),
     _mutant("marker_of_last_tick", "a picture carries the number of another tick", "teleop_scene/film.py",
             "stamp // TICK_NS)", "stamp // TICK_NS - 1)", "scene_camera"),
+    _mutant("encoder_first", "an export comes before every loop of the machine", "teleop_exchange/videos.py",
+            "os.sched_setscheduler(thread, policy, given)", "pass", "data_set_with_pictures"),
     _mutant("picture_by_log", "a frame shows the picture that was recorded last", "teleop_exchange/pictures.py",
             'order = usable[np.argsort(self.stamp_ns[usable], kind="stable")]', "order = usable",
             "data_set_with_pictures"),

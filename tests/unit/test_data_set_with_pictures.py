@@ -2,6 +2,7 @@
 
 import io
 import json
+import os
 from collections.abc import Callable, Sequence
 from fractions import Fraction
 from pathlib import Path
@@ -20,6 +21,7 @@ import teleop_core as tc
 import teleop_exchange
 from teleop_core.commands.cli import main
 from teleop_core.kernels.geometry import Array
+from teleop_exchange.videos import Video
 
 TYPES, TYPES1 = get_typestore(Stores.ROS2_JAZZY), get_typestore(Stores.ROS1_NOETIC)
 SIZE = 96, 128  # height, width
@@ -160,6 +162,17 @@ def test_each_frame_shows_the_newest_picture_taken_before_it_and_tells_its_age(c
     repeated = len(expected) - len(set(expected.tolist()))
     assert f"{repeated} frames without a new picture" in report.notes[0]
     assert info_of(out)["features"][FRONT]["info"]["video.codec"] == codec
+
+
+@pytest.mark.parametrize("codec", ["av1", "h264"])
+def test_an_export_never_comes_before_a_loop_of_the_machine(codec: str, tmp_path: Path) -> None:
+    """The AV1 encoder takes SCHED_FIFO 99 for its process where it may."""
+    video = Video(tmp_path, FRONT, 30, codec)
+    video.begin()
+    video.add(av.VideoFrame.from_ndarray(flat(0)), 0, 1)
+    policies = {os.sched_getscheduler(int(thread)) for thread in os.listdir("/proc/self/task")}
+    video.close()
+    assert policies == {os.sched_getscheduler(0)} == {os.SCHED_OTHER}
 
 
 def uyvy(pixels: Any) -> Any:

@@ -1,6 +1,8 @@
 """Videos: writes pictures of a camera, of all episodes one after the other, to the files of a data set."""
 
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from fractions import Fraction
 from pathlib import Path
@@ -114,6 +116,8 @@ class Video:
         self._stream = self._container.add_stream(encoder, self.fps, options=dict(options))
         self._stream.width, self._stream.height, self._stream.pix_fmt = self.width, self.height, "yuv420p"
         self._stream.codec_context.color_range = LIMITED
+        with _as_scheduled_before():
+            self._container.start_encoding()
 
     def end(self) -> tuple[dict[str, object], dict[str, Any]]:
         """End an episode; tell where it ends, and the statistics of its colours."""
@@ -139,6 +143,22 @@ class Video:
         info = {f"video.{name}": value for name, value in told.items()} | {"has_audio": False, "is_depth_map": False}
         shape, names = [self.height, self.width, 3], ["height", "width", "channels"]
         return {"dtype": "video", "shape": shape, "names": names, "info": info}
+
+
+@contextmanager
+def _as_scheduled_before() -> Iterator[None]:
+    """Give the calling thread, and threads that are started meanwhile, the scheduling that the caller had.
+
+    The AV1 encoder gives all of them SCHED_FIFO 99 if the process may have it, and never takes it back: an export
+    would come before every loop of the machine, and what the process starts later would inherit it.
+    """
+    known, policy, given = set(os.listdir("/proc/self/task")), os.sched_getscheduler(0), os.sched_getparam(0)
+    try:
+        yield
+    finally:
+        for thread in [0, *map(int, set(os.listdir("/proc/self/task")) - known)]:
+            with suppress(ProcessLookupError):
+                os.sched_setscheduler(thread, policy, given)
 
 
 def _statistics(counts: NDArray[np.int64], frames: int) -> dict[str, Any]:
