@@ -42,6 +42,8 @@ class ForeignArm:
         if "no state" not in faults:
             self.states = node.create_publisher(crtk.OperatingState, "PSM/operating_state", Qos())
         self.measured = node.create_publisher(JointState, "PSM/measured_js", Qos(is_reliable="qos" not in faults))
+        if "owners" in faults:
+            node.create_publisher(JointState, "PSM/measured_js", Qos())
         self.setpoint = node.create_publisher(JointState, "PSM/setpoint_js", Qos())
         self.pose = node.create_publisher(JointState if "type" in faults else PoseStamped, "PSM/measured_cp", Qos())
         self.wanted = node.create_publisher(PoseStamped, "PSM/setpoint_cp", Qos())
@@ -57,18 +59,24 @@ class ForeignArm:
         return 0
 
     def command(self, message: Any) -> None:
+        if "ignores" in self.faults:
+            return
+        if "jumps" in self.faults and message.string == "resume":
+            self.q = list(self.goal)
         word = {"pause": "PAUSED", "resume": "ENABLED"}.get(message.string)
         if "any word" in self.faults:
             word = word or "DISABLED"
         self.state = word or self.state
 
     def move(self, message: Any) -> None:
-        if self.state == "ENABLED" or "moves paused" in self.faults:
+        if "jumps" in self.faults and self.state == "PAUSED":
+            self.goal = list(message.position)
+        if "ignores" not in self.faults and (self.state == "ENABLED" or "moves paused" in self.faults):
             self.goal = list(message.position)
             self.busy_until_ns = self.world.monotonic_ns() + 150_000_000
 
     def servo(self, message: Any) -> None:
-        if self.state == "ENABLED":
+        if self.state == "ENABLED" and "ignores" not in self.faults:
             self.goal = list(message.position)
 
     def lying(self, dt: float) -> tuple[list[float], list[float]]:
@@ -103,7 +111,7 @@ class ForeignArm:
         # Ten milliseconds, more on a busy machine: speeds are those of the time that passed.
         dt = max(1e-9 * (now_ns - self.last_ns), 1e-3)
         self.last_ns = now_ns
-        for i in range(3):
+        for i in range(0 if "jumps" in self.faults and self.state == "PAUSED" else 3):
             step = min(max(self.goal[i] - self.q[i], -SPEED * dt), SPEED * dt)
             self.q[i] += step
             is_busy = is_busy or abs(step) > 0.0
@@ -123,7 +131,7 @@ class ForeignArm:
         if self.faults & {"speeds", "honest"}:
             joints.velocity = speed
         if "stamp" not in self.faults:
-            stamp(joints, now_ns)
+            stamp(joints, now_ns + 300_000_000 * ("future" in self.faults))
         if "nan" in self.faults:
             joints.position[1] = math.nan
         if "length" in self.faults:
@@ -131,4 +139,6 @@ class ForeignArm:
         self.measured.publish(joints)
         self.wanted.publish(self.tip(now_ns))
         if "type" not in self.faults:
-            self.pose.publish(self.tip(now_ns, 30.0 if "turning" in self.faults else 0.0))
+            pose = self.tip(now_ns, 30.0 if "turning" in self.faults else 0.0)
+            pose.pose.position.x *= "frozen tip" not in self.faults
+            self.pose.publish(pose)

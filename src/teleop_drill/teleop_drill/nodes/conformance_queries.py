@@ -13,6 +13,7 @@ from teleop_drill.nodes.conformance_arm import ArmClient, numbers_of, stamp_of
 _LOOK = 0.5  # time in which messages are counted [s]
 _FIRST = 2.5  # time within which the first message must arrive [s]
 _OLD = 1.0  # largest age of a measurement [s]
+_AHEAD = 0.05  # largest time by which the clock of the sender may be ahead [s]; clocks of a network differ by less
 _UNIT = 1e-3
 
 
@@ -50,7 +51,7 @@ def _listen(arm: ArmClient, row: CrtkTopic, ends: list[Endpoint]) -> Finding:
     if faults:
         return Finding(row, RowResult.FAILED, found, faults[0])
     if len(ends) > 1:
-        return Finding(row, RowResult.NOTED, found, f"{len(ends)} publishers: who speaks for the arm?")
+        return Finding(row, RowResult.FAILED, found, f"{len(ends)} publishers: the arm must have one owner")
     if not any(end.is_reliable for end in ends):
         note = "offered best effort: ordinary clients, which are reliable, receive nothing"
         return Finding(row, RowResult.FAILED, found, note)
@@ -66,10 +67,16 @@ def _stamps(row: CrtkTopic, messages: list[Any], now_ns: int) -> list[str]:
         return ["its stamp is 0, which means invalid"]
     if any(late < early for early, late in pairwise(stamps)):
         return ["its stamps go back"]
-    age = 1e-9 * (now_ns - stamps[-1])
-    if row.name.startswith("measured") and not -_OLD < age < _OLD + _LOOK:
+    return _age(stamps, 1e-9 * (now_ns - stamps[-1])) if row.name.startswith("measured") else []
+
+
+def _age(stamps: list[int], age: float) -> list[str]:
+    """Text about faults of the age [s] of the newest measurement, and of stamps that stand still."""
+    if age < -_AHEAD:
+        return [f"its stamp is {-age:.3g} s in the future: the sender uses another clock"]
+    if age > _OLD + _LOOK:
         return [f"its stamp is {age:.3g} s old: the sender uses another clock or none"]
-    if row.name.startswith("measured") and len(stamps) > 2 and stamps[0] == stamps[-1]:
+    if len(stamps) > 2 and stamps[0] == stamps[-1]:
         return ["its stamp does not move"]
     return []
 

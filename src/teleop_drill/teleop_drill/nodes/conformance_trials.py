@@ -95,7 +95,7 @@ class Trials:
     # -- commands --------------------------------------------------------------------------------
 
     def state_command(self) -> Outcome:
-        """Pause, refuse to move, resume; unknown commands must change nothing."""
+        """Pause, refuse to move, resume without a motion; unknown commands must change nothing."""
         arm = self.arm
         self._say("no such command")
         arm.pause(0.3)
@@ -114,6 +114,10 @@ class Trials:
             return RowResult.FAILED, f"resume: {self._state()} in place of ENABLED"
         if moved > _STILL:
             return RowResult.FAILED, f"moved by {moved:.3g} while PAUSED"
+        arm.pause(0.3)
+        moved = float(np.abs(self.joints() - before).max())
+        if moved > _STILL:
+            return RowResult.FAILED, f"moved by {moved:.3g} on resume, without a command"
         return _OK
 
     def _say(self, word: str) -> None:
