@@ -2,6 +2,7 @@
 
 python docs/pictures.py            all of them, some minutes; look at them before they are committed
 python docs/pictures.py --moving   the moving one alone
+python docs/pictures.py --scene    that of a scene alone
 python docs/pictures.py --states   twenty states at a desk, on a phone and on a wall, to look at, in out/states
 """
 
@@ -30,7 +31,7 @@ SCENARIO = "coarse_box"
 AT_A_WALL = f"{VIEWER}.nodeRefFromName['/arm/master/force'].visible"
 NOTICE = "document.querySelector('.mantine-Notification-closeButton')?.click()"  # of the renderer
 SETTLE = 4.0  # the page fades and slides [s]
-SHARP = "?fixedDpr=2"  # smooth edges, which software does not draw for people
+SHARP = "&fixedDpr=2"  # smooth edges, which software does not draw for people
 TAKEN = IMAGES / "taken.json"
 FROM, TO, FRAME_TIME = 5.0, 14.0, 0.1  # of the moving picture [s]
 LARGE = {"robot": "puma560", "motion_scaling.coarse_gain": 3.0}
@@ -137,6 +138,17 @@ def seek(tab: Tab, moment: float) -> None:
     """Go to a time of the recording [s]."""
     tab.value(f"fetch('time?seek={moment}', {{headers: {{'Teleop-Page': window.teleopPage}}}})")
     tab.shows(f"{moment:.2f} s of")
+
+
+def scene(folder: Path) -> None:
+    """Take the page of a recording of a scene, whose bodies it draws."""
+    recorded = folder / "cubes"
+    tc.run(SCENARIO, duration=6.0, out=recorded, settings={"robot": "cubes.xml"})
+    with served(folder, recorded) as console, Tab(folder / "scene", 1100, 700) as tab:
+        tab.visit(console.url + SHARP)
+        tab.shows("Play", 120)
+        seek(tab, 4.0)
+        keep(tab, "console_scene.png")
 
 
 def moving(folder: Path) -> None:
@@ -256,8 +268,12 @@ if __name__ == "__main__":
         if "--states" in sys.argv:
             states(Path(place))
             sys.exit()
+        if "--scene" in sys.argv:
+            scene(Path(place))
+            sys.exit()
         moving(Path(place))
         if "--moving" not in sys.argv:
             start(Path(place))
             live(Path(place))
             replay(Path(place))
+            scene(Path(place))

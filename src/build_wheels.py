@@ -41,7 +41,7 @@ from teleop_core.session.virtual import VirtualTime
 sums = hashlib.sha256()
 parts = [*({"robot": name} for name in ROBOTS), *({"controller": name} for name in CONTROLLERS)]
 for part in parts:
-    sums.update(VirtualTime(api.configuration("coarse_box", **part)).run(400).tobytes())
+    sums.update(VirtualTime(api.configuration("coarse_box", **part)).run(150).tobytes())
 print(compiled_count(), sums.hexdigest())
 """
 
