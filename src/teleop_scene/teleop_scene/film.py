@@ -1,12 +1,12 @@
 """Film: adds pictures to the recording of a session with a scene, from the poses that it recorded.
 
 The pictures are those that a camera beside the session would have taken, to the bit: they depend on the poses alone.
-The session itself never waits for a picture. A way delays, loses and reorders the pictures as a network would.
+The session itself never waits for a picture. The network of the session delays, loses and reorders the pictures.
 """
 
 import struct
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -15,48 +15,28 @@ from numpy.typing import NDArray
 
 from teleop_core.bags.kept_files import recorded_files
 from teleop_core.bags.ros_types import serialise, typestore
+from teleop_core.bags.series import Series
 from teleop_core.bags.writer import BagWriter
 from teleop_core.base import ParameterError, RecordingError
+from teleop_core.coupling.network.link import LONGEST
+from teleop_core.coupling.network.network import NETWORK
+from teleop_core.coupling.network.pictures import PictureWay
+from teleop_core.coupling.network.presets import NetworkParameters
 from teleop_core.graph import TICK_NS, topics
+from teleop_core.graph.layers import parse_setting
 from teleop_core.graph.topics import Kind, Quality, Topic
-from teleop_core.kernels import Array
 from teleop_core.robots.parts import file_of
+from teleop_core.session.configuration import Configuration
 from teleop_core.session.recording import Recording, open_recording
+from teleop_core.session.runner import recorded_configuration
 from teleop_scene.camera import Camera, Pixels, View
+from teleop_scene.world import SceneParameters
 
 SECOND_NS = 1_000_000_000
 QUALITY = 90
 """Quality of JPEG, of 100."""
+_Message = tuple[Topic, int, bytes]
 IMAGE, INFO = "sensor_msgs/msg/CompressedImage", "sensor_msgs/msg/CameraInfo"
-
-
-@dataclass(frozen=True)
-class Way:
-    """Way of pictures from a camera to whoever sees them.
-
-    Attributes:
-        delay: Delay [s].
-        jitter: Standard deviation of a further delay, which is never negative [s].
-        loss: Share of lost pictures, 0 to 1.
-        seed: Seed of the random numbers.
-    """
-
-    delay: float = 0.0
-    jitter: float = 0.0
-    loss: float = 0.0
-    seed: int = 0
-
-    def __post_init__(self) -> None:
-        for name, value, most in (("delay", self.delay, 60.0), ("jitter", self.jitter, 60.0), ("loss", self.loss, 1.0)):
-            if not 0.0 <= value <= most:
-                raise ParameterError(f"--{name}", value, f"0 to {most:g}")
-
-    def arrivals(self, count: int) -> Array:
-        """Delay of each picture [s]; infinite for a lost one."""
-        rng = np.random.default_rng(self.seed)
-        late = self.delay + self.jitter * np.abs(rng.standard_normal(count))
-        late[rng.random(count) < self.loss] = np.inf
-        return late
 
 
 def encoded(pixels: Pixels, stamp_ns: int, frame: str) -> bytes:
@@ -133,13 +113,19 @@ def scene_file(recording: Recording) -> Path:
     return found[0]
 
 
+def network_of(configuration: Configuration) -> NetworkParameters | None:
+    """Network of the first arm, over which the pictures of a session go; None without one."""
+    found = configuration.groups.get(NETWORK.name)
+    return found if isinstance(found, NetworkParameters) else None
+
+
 def film(
     recording: Recording | Path | str,
     out: Path | str,
-    cameras: Sequence[str | View],
+    cameras: Sequence[str | View] = (),
     *,
-    rate: float = 30.0,
-    way: Way | None = None,
+    rate: float | None = None,
+    texts: Sequence[str] = (),
     is_marked: bool = False,
 ) -> FilmReport:
     """Write a copy of a recording that has the pictures of cameras too.
@@ -147,9 +133,10 @@ def film(
     Args:
         recording: Recording of a session with a scene.
         out: Directory of the new recording.
-        cameras: Cameras, as :meth:`View.parse` reads them.
-        rate: Pictures per second [Hz] of each camera; not above the rate of ``scene/poses``.
-        way: Way of the pictures to the recorder.
+        cameras: Cameras, as :meth:`View.parse` reads them; empty: ``scene.cameras`` of the session.
+        rate: Pictures per second [Hz] of each camera, not above the rate of ``scene/poses``; None:
+            ``scene.camera_rate`` of the session.
+        texts: Parameters ``key=value`` that replace those of the session, such as ``network.back.loss=0.1``.
         is_marked: Whether pictures carry the number of their tick, for tests.
 
     Raises:
@@ -159,35 +146,51 @@ def film(
         TeleopError: This machine cannot draw.
     """
     source = recording if isinstance(recording, Recording) else open_recording(recording)
+    file, poses = scene_file(source), source.bag.read(topics.SCENE_POSES)
+    layer, scenario = recorded_configuration(source.bag)
+    configuration = Configuration.from_layers([layer, *map(parse_setting, texts)], scenario)
+    scene = configuration.of(SceneParameters)
+    rate = scene.camera_rate if rate is None else rate
     if not 0.0 < rate <= 1000.0:
         raise ParameterError("--rate", rate, "above 0 Hz, up to 1000 Hz")
-    if not cameras:
+    if not (given := tuple(cameras) or scene.cameras):
         raise ParameterError("--cameras", (), "at least one camera of the scene")
-    views = [View.parse(one, is_marked=is_marked) if isinstance(one, str) else one for one in cameras]
-    file, poses = scene_file(source), source.bag.read(topics.SCENE_POSES)
-    taken_way = way or Way()
-    made, counts = list[tuple[Topic, int, bytes]](), np.zeros(2, int)
+    views = [View.parse(one, is_marked=is_marked) if isinstance(one, str) else one for one in given]
     at = captures(poses.stamp_ns, rate)
     slots = np.floor(poses.stamp_ns[at] * (rate / SECOND_NS) + 1e-6)
     missed = int(slots[-1] - slots[0]) + 1 - len(at)
+    made, network = list[_Message](), network_of(configuration)
     for number, view in enumerate(views):
-        camera = Camera(file, view)
-        image, info = topics_of(view)
-        late = replace(taken_way, seed=taken_way.seed + number).arrivals(len(at))
-        calibrated = calibration(camera)
-        for k, index in enumerate(at):
-            counts += (1, not np.isfinite(late[k]))
-            if np.isfinite(late[k]):
-                stamp = int(poses.stamp_ns[index])
-                picture = camera.take(poses.values[index].reshape(-1, 7)[: camera.bodies], stamp // TICK_NS)
-                came_ns = int(poses.log_ns[index] + late[k] * SECOND_NS)
-                made += [(image, came_ns, encoded(picture, stamp, view.name)), (info, came_ns, calibrated(stamp))]
-        camera.close()
+        made += _pictures(Camera(file, view), poses, at, PictureWay(network, number))
     _copy(source, Path(out), sorted(made, key=lambda m: m[1]), [t for view in views for t in topics_of(view)])
-    return FilmReport(Path(out), int(counts[0]), int(counts[1]), missed * len(views))
+    taken = len(at) * len(views)
+    return FilmReport(Path(out), taken, taken - len(made) // 2, missed * len(views))
 
 
-def _copy(source: Recording, out: Path, made: list[tuple[Topic, int, bytes]], further: list[Topic]) -> None:
+def _pictures(camera: Camera, poses: Series, at: NDArray[np.int64], way: PictureWay) -> list[_Message]:
+    """Pictures of a camera and their calibrations, as they arrive over the network."""
+    (image, info), calibrated, packed, found = (
+        topics_of(camera.view),
+        calibration(camera),
+        list[bytes](),
+        list[_Message](),
+    )
+    ticks = (poses.log_ns[at] - poses.log_ns[at[0]]) // TICK_NS
+    pauses = [*np.diff(ticks).tolist(), LONGEST]
+    for index, pause in zip(at, pauses, strict=True):
+        stamp = int(poses.stamp_ns[index])
+        picture = camera.take(poses.values[index].reshape(-1, 7)[: camera.bodies], stamp // TICK_NS)
+        packed.append(encoded(picture, stamp, camera.view.name))
+        for k, tick in way.pass_time(pause, len(packed[-1])):
+            if tick >= 0:
+                sent_ns, stamp_ns = int(poses.log_ns[at[k]]), int(poses.stamp_ns[at[k]])
+                came_ns = sent_ns + (tick - int(ticks[k])) * TICK_NS
+                found += [(image, came_ns, packed[k]), (info, came_ns, calibrated(stamp_ns))]
+    camera.close()
+    return found
+
+
+def _copy(source: Recording, out: Path, made: list[_Message], further: list[Topic]) -> None:
     bag = source.bag
     known = [Topic(name, Kind.REPORT, message=info.type) for name, info in bag.topics.items()]
     by_name = {topic.name: topic for topic in known}

@@ -7,7 +7,7 @@ picture are counted, and the next picture shows the newest poses.
 import heapq
 import os
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from time import perf_counter
 
@@ -17,6 +17,8 @@ from teleop_core.bags.layouts import layout
 from teleop_core.bags.messages import read_any
 from teleop_core.bags.reports import report
 from teleop_core.base import ParameterError
+from teleop_core.coupling.network.pictures import PictureWay
+from teleop_core.coupling.network.presets import NetworkParameters
 from teleop_core.graph import TICK_NS
 from teleop_core.graph.topics import DIAGNOSTICS, SCENE_POSES, Topic
 from teleop_core.kernels import Array
@@ -25,10 +27,11 @@ from teleop_core.middleware.world import Publisher, World
 from teleop_core.nodes.discovery import choose_transport
 from teleop_core.nodes.guest import Guest
 from teleop_core.nodes.interrupt import Interrupt
+from teleop_core.nodes.parent import Parent
 from teleop_core.nodes.quality import profile
 from teleop_core.nodes.streams import Subscription, message_type
 from teleop_scene.camera import Camera, View
-from teleop_scene.film import SECOND_NS, Way, calibration, encoded, topics_of
+from teleop_scene.film import SECOND_NS, calibration, encoded, topics_of
 
 NAME = "camera"
 _NICE = 5
@@ -56,37 +59,48 @@ class Counts:
 
 
 class _Sender:
-    """Publishes pictures after the time that they are on their way."""
+    """Publishes pictures when they arrive over the network."""
 
-    def __init__(self, guest: Guest, views: Sequence[View], way: Way, counts: Counts) -> None:
-        self._guest, self._counts, self._number = guest, counts, 0
-        self._ways = [replace(way, seed=way.seed + k) for k in range(len(views))]
-        self._late: list[Array] = [np.empty(0)] * len(views)
+    def __init__(self, guest: Guest, views: Sequence[View], network: NetworkParameters | None, counts: Counts) -> None:
+        self._guest, self._counts, self._begin_ns = guest, counts, guest.world.monotonic_ns()
+        self._ways = [PictureWay(network, k) for k in range(len(views))]
+        self._ticks, self._sent = [0] * len(views), [0] * len(views)
         self._made = [[self._publisher(topic) for topic in topics_of(view)] for view in views]
         self._reports = self._publisher(DIAGNOSTICS)
-        self._waiting: list[tuple[int, int, int, tuple[bytes, bytes]]] = []
+        self._waiting = dict[tuple[int, int], tuple[bytes, bytes]]()  # by camera and number
+        self._due: list[tuple[int, int, int]] = []
 
     def _publisher(self, topic: Topic) -> Publisher:
         return self._guest.ros.create_publisher(message_type(topic.ros_type), f"/{topic.name}", profile(topic))
 
+    def _now(self) -> int:
+        return (self._guest.world.monotonic_ns() - self._begin_ns) // TICK_NS
+
+    def _pass(self, k: int, size: int = 0) -> None:
+        """Send a picture of camera ``k`` if it has a size, and let the time until now pass before it."""
+        now = self._now()
+        decided = self._ways[k].pass_time(now - self._ticks[k])
+        self._ticks[k] = now
+        for number, tick in decided + (self._ways[k].pass_time(0, size) if size else []):
+            if tick >= 0:
+                heapq.heappush(self._due, (tick, k, number))
+            else:
+                self._counts.lost += 1
+                del self._waiting[k, number]
+
     def send(self, k: int, picture: bytes, calibrated: bytes) -> None:
         """Send a picture of camera ``k`` and its calibration on their way."""
-        if not len(self._late[k]):
-            self._late[k] = self._ways[k].arrivals(_BLOCK)
-            self._ways[k] = replace(self._ways[k], seed=self._ways[k].seed + 1000)
-        late, self._late[k] = float(self._late[k][0]), self._late[k][1:]
-        if not np.isfinite(late):
-            self._counts.lost += 1
-            return
-        self._number += 1
-        due = self._guest.world.monotonic_ns() + round(late * SECOND_NS)
-        heapq.heappush(self._waiting, (due, self._number, k, (picture, calibrated)))
+        self._waiting[k, self._sent[k]] = (picture, calibrated)
+        self._sent[k] += 1
+        self._pass(k, len(picture))
 
     def deliver(self) -> None:
         """Publish the pictures that are due."""
-        while self._waiting and self._waiting[0][0] <= self._guest.world.monotonic_ns():
-            _, _, k, messages = heapq.heappop(self._waiting)
-            for publisher, data in zip(self._made[k], messages, strict=True):
+        for k in range(len(self._ways)):
+            self._pass(k)
+        while self._due and self._due[0][0] <= self._now():
+            _, k, number = heapq.heappop(self._due)
+            for publisher, data in zip(self._made[k], self._waiting.pop((k, number)), strict=True):
                 publisher.send(data)
 
     def tell(self) -> None:
@@ -97,11 +111,13 @@ class _Sender:
 class _Cameras:
     """Draws a picture of each camera at the first poses of each period."""
 
-    def __init__(self, guest: Guest, cameras: Sequence[Camera], rate: float, way: Way, counts: Counts) -> None:
+    def __init__(
+        self, guest: Guest, cameras: Sequence[Camera], rate: float, network: NetworkParameters | None, counts: Counts
+    ) -> None:
         self._cameras, self._rate, self._counts, self._world = cameras, rate, counts, guest.world
         self._form, self._slot, self._told = layout(SCENE_POSES, ()), -1, 0
         self._poses = Subscription(guest, SCENE_POSES, f"/{SCENE_POSES.name}")
-        self._sender = _Sender(guest, [camera.view for camera in cameras], way, counts)
+        self._sender = _Sender(guest, [camera.view for camera in cameras], network, counts)
         self._calibrated = [calibration(camera) for camera in cameras]
 
     def turn(self) -> None:
@@ -141,18 +157,18 @@ def run(
     views: Sequence[View],
     *,
     rate: float = 30.0,
-    way: Way | None = None,
+    network: NetworkParameters | None = None,
     world: World = ROS,
     interrupt: Interrupt | None = None,
     say: Callable[[str], object] = print,
 ) -> Counts:
-    """Draw and publish pictures of a running session until an ending signal.
+    """Draw and publish pictures of a running session until an ending signal, or until its process ends.
 
     Args:
         file: File of the scene.
         views: Cameras.
         rate: Pictures per second [Hz] of each camera; not above the rate of ``scene/poses``.
-        way: Way of the pictures.
+        network: Network on the way of the pictures; None: they arrive at once.
         world: World of the session.
         interrupt: Object that ends the cameras, in addition to signals of this process.
         say: Called with each line for the user.
@@ -167,16 +183,21 @@ def run(
     if not views or not 0.0 < rate <= 1000.0:
         raise ParameterError("--rate", rate, "above 0 Hz, up to 1000 Hz, for at least one camera")
     interrupt, counts = interrupt or Interrupt(), Counts()
+    parent = Parent.of_environment()
     cameras = [Camera(file, view) for view in views]
     if world is ROS:
         choose_transport()
         os.nice(_NICE)
     with interrupt.caught(), Guest(NAME, world=world) as guest:
-        work = _Cameras(guest, cameras, rate, way or Way(), counts)
+        work = _Cameras(guest, cameras, rate, network, counts)
         say(f"{len(cameras)} cameras of {file.name} at {rate:g} Hz: {', '.join(view.topic for view in views)}")
         try:
             while True:
                 interrupt.check()
+                if parent is not None:
+                    parent.tell("at work")
+                    if parent.has_gone():  # its session was killed
+                        break
                 work.turn()
         except KeyboardInterrupt:
             say(str(counts))

@@ -10,13 +10,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from teleop_core.base import Within, fixed
-from teleop_core.graph import DT, Row, RunningStage, Stage, assign, topics
+from teleop_core.graph import DT, Beside, Row, RunningStage, Stage, assign, topics
 from teleop_core.kernels import Array, Fields, kernel, record
 from teleop_core.kernels.fields import Integers
 from teleop_core.kernels.memory import call
 from teleop_core.robots import load_robot_set
 from teleop_core.robots.selection import RobotParameters
 from teleop_scene.arm import SceneRobot
+from teleop_scene.camera import View
 from teleop_scene.jaw import Jaw, jaw_of
 from teleop_scene.models import moving_bodies
 from teleop_scene.scene import SceneState, address_of, shared
@@ -35,6 +36,17 @@ class SceneParameters(RobotParameters):
         (), Within(None, None, "rad or m"), "position of each of these joints when the jaw is open; empty: found"
     )
     jaw_upper: float = fixed(0.8, Within(0.05, 3.0, "rad"), "angle of the jaw at which the gripper is open")
+    cameras: tuple[str, ...] = fixed(
+        (),
+        doc="cameras that a live session starts and records, and that a film takes: NAME, NAME:WIDTHxHEIGHT, or with "
+        "its own place",
+    )
+    camera_rate: int = fixed(30, Within(1, 1000, "Hz"), "pictures per second of each camera, not above scene.rate")
+
+    def __post_init__(self) -> None:
+        """Refuse a camera that cannot be read."""
+        for camera in self.cameras:
+            View.parse(camera)
 
 
 class WorldState(Fields):
@@ -156,6 +168,15 @@ class World(RunningStage):
         self.signals["slave_jaw_setpoint_js_ns"] = topics.NO_COMMAND_NS
 
 
+def cameras_beside(p: SceneParameters) -> Beside | None:
+    """Process that films a live session; None without cameras."""
+    if not p.cameras:
+        return None
+    views = [View.parse(camera) for camera in p.cameras]
+    words = ("camera", p.robot, *p.cameras, "--rate", str(p.camera_rate))
+    return Beside(words, tuple(name for view in views for name in (view.topic, view.info_topic)))
+
+
 SCENE_STAGE = Stage(
     "scene",
     SceneParameters,
@@ -163,5 +184,6 @@ SCENE_STAGE = Stage(
     writes=(topics.SCENE_POSES, topics.SCENE_ENERGY, topics.SLAVE_JAW_MEASURED_JS),
     optional=(topics.SLAVE_JAW_SETPOINT_JS,),
     on_demand=(topics.SLAVE_JAW_MEASURED_JS,),
+    beside=cameras_beside,
     make=World,
 )

@@ -20,6 +20,6 @@ else:  # loaded with their first use
         "noise": ("Noise",),
         "row": ("Row",),
         "signals": ("DT", "STATE", "STATE_FIELDS", "TICK_NS", "assign", "copy", "make_signals"),
-        "stage": ("STAGES", "Runner", "RunningStage", "Stage", "register_stage"),
+        "stage": ("STAGES", "Beside", "Runner", "RunningStage", "Stage", "register_stage"),
     }  # fmt: skip
     __getattr__, __dir__, __all__ = lazy_loader.attach(__name__, {"topics"}, _NAMES)

@@ -19,7 +19,7 @@ from teleop_core.graph.topics import Topic
 from teleop_core.kernels import Fields, fields_of, held, raise_pending, records
 from teleop_core.kernels.groups import Field, group_fields
 
-__all__ = ["STAGES", "Runner", "RunningStage", "Stage", "joints_of", "register_stage"]
+__all__ = ["STAGES", "Beside", "Runner", "RunningStage", "Stage", "joints_of", "register_stage"]
 
 
 class Runner(Protocol):
@@ -72,6 +72,19 @@ class Runner(Protocol):
         """Names and texts that the report of the stage contains in addition to its numbers."""
 
 
+@dataclass(frozen=True)
+class Beside:
+    """Process beside a live session; the session goes on without it if it ends.
+
+    Attributes:
+        words: Words of its command after ``teleop``; ``--config`` with the session's parameters follows them.
+        records: Topics of the process that the recorder records, as ``recorder.also`` takes them.
+    """
+
+    words: tuple[str, ...]
+    records: tuple[str, ...]
+
+
 @dataclass(frozen=True, repr=False)
 class Stage:
     """One stage of the graph.
@@ -102,6 +115,7 @@ class Stage:
         notes: Further fields of the stage's record, which no stage reads.
         node: ``module:class`` of the stage's node, if a generic node is not enough.
         needs: Topics without which the node answers no message.
+        beside: Function of the parameters: the process that a live session starts beside its nodes, or None.
 
     Raises:
         PartError: The stage contradicts itself; the message states the contradiction.
@@ -124,6 +138,7 @@ class Stage:
     notes: tuple[Field, ...] = ()
     node: str = ""
     needs: tuple[Topic, ...] = ()
+    beside: Callable[[Any], "Beside | None"] | None = None
 
     def __post_init__(self) -> None:
         """Refuse a stage that could never run."""

@@ -95,6 +95,7 @@ class Child:
         env: Environment variables of the process.
         starter: Starter that starts the process.
         command: Command of the process; by default, the process runs the node ``name``.
+        main: ``module:function`` that runs the command in a copy of the starter; empty: a program runs it.
         nodes: Nodes in the process. If there are several, or one with another name, the process is one side of a
             session.
 
@@ -112,6 +113,7 @@ class Child:
         starter: Starter,
         command: Sequence[str] = (),
         nodes: Sequence[str] = (),
+        main: str = "",
     ) -> None:
         arm, _, stage = name.rpartition("/")
         self.name, self.doing = name, "starting"
@@ -130,7 +132,7 @@ class Child:
         with theirs:
             variables = env | {parent.VARIABLE: "<line>"}
             self._process = starter.start(
-                command or ["teleop_core.nodes", *ours], variables, files, main="" if command else NODE
+                command or ["teleop_core.nodes", *ours], variables, files, main=main if command else NODE
             )
         self._chances, self._silent = Chances(self._process.pid), 0.0
 

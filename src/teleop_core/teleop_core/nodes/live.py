@@ -17,6 +17,7 @@ from teleop_core.graph.graph import HAND, RECORDER_NAME
 from teleop_core.graph.layers import SESSION
 from teleop_core.graph.topics import SLAVE_SETPOINT_JS
 from teleop_core.middleware.real_time import is_priority_granted
+from teleop_core.nodes.beside import BesideSession, processes_beside
 from teleop_core.nodes.children import Child, end_all, environment
 from teleop_core.nodes.crews import Crew, Processes, crews
 from teleop_core.nodes.interrupt import Interrupt
@@ -150,6 +151,7 @@ class _Session:
         self._parameters, self._env, self._interrupt = parameters, env, interrupt
         self._starter = starter
         self._children: dict[str, Child] = {}
+        self._beside = BesideSession(configuration, env, starter, self.say)
         self._ready = 0.0
         self.crews = crews(self._graph)
 
@@ -178,6 +180,7 @@ class _Session:
             self._await_starter()
             for crew in self.crews:
                 self._start(crew)
+            self._beside.start()
             if self._keys.is_there:
                 self.say("press space to stop all arms, and e to let them continue")
             self._await_operator()
@@ -280,6 +283,7 @@ class _Session:
         """Check that no signal came, all processes run and all nodes report."""
         self._interrupt.check()
         self._obey()
+        self._beside.check()
         if time.monotonic() - self._ready < _ALONE:
             self._insist_on_one_owner(1)
         for crew in self.crews:
@@ -307,6 +311,8 @@ class _Session:
             if is_arm and member.name in statuses:
                 parts += self._slave_line(member.arm, statuses[member.name])
         parts.append(f"refused {refused:.0f}")
+        if self._beside.ended:
+            parts.append(f"ended beside {self._beside.ended}")
         warnings = [f"{n}: {s.message}" for n, s in statuses.items() if s.level >= WARNING]
         return ", ".join(parts) + "".join(f"; {warning}" for warning in warnings)
 
@@ -329,6 +335,7 @@ class _Session:
         """End all nodes in order, whatever signals come; returns texts about problems."""
         recorder = self._children.pop(RECORDER_NAME, None)
         failures = end_all(self._children.values())
+        self._beside.close()
         return failures + end_all([recorder] if recorder else [])
 
 
@@ -393,6 +400,8 @@ def session_parameters(
     recorder = content[RECORDER_NAME]["ros__parameters"]
     recorder["out"], recorder["configuration"] = out, configuration.text()
     recorder["scenario"], recorder["real_time.priority"] = configuration.scenario, 0
+    records = [topic for one in processes_beside(configuration).values() for topic in one.records]
+    recorder["also"] = list(dict.fromkeys([*recorder["also"], *records]))
     if not starts_recorder:
         recorder["autostart"] = False
     place = f"/{namespace}" if namespace else ""

@@ -129,7 +129,14 @@ def _packet_bytes(way: Way) -> float:
 
 @inner
 def send_packet(p: LinkRecord, s: LinkState, way: Way, k: int, dt: float) -> None:
-    """Send ``way.packet`` with the motion in ``way.moved[0]``.
+    """Send ``way.packet`` with the motion in ``way.moved[0]``; arguments as in :func:`serve_line`."""
+    queue_packet(p, s, way, k)
+    serve_line(p, s, way, k, dt)
+
+
+@inner
+def queue_packet(p: LinkRecord, s: LinkState, way: Way, k: int) -> None:
+    """Put ``way.packet`` into the queue of the line.
 
     If the queue is full, its oldest packet is lost. If the order of packets is kept, the new packet is lost instead.
 
@@ -138,7 +145,6 @@ def send_packet(p: LinkRecord, s: LinkState, way: Way, k: int, dt: float) -> Non
         s: State; written.
         way: The direction; written.
         k: Index of the direction.
-        dt: Tick [s].
     """
     s.sent[k] += 1
     s.sent_tick[k] = s.tick
@@ -161,7 +167,6 @@ def send_packet(p: LinkRecord, s: LinkState, way: Way, k: int, dt: float) -> Non
         way.waiting_ns[at, i] = way.packet_ns[i]
     way.waiting_ns[at, topics] = s.sent[k]
     s.waits[k] += 1
-    serve_line(p, s, way, k, dt)
 
 
 @inner
@@ -183,13 +188,23 @@ def serve_line(p: LinkRecord, s: LinkState, way: Way, k: int, dt: float) -> None
     """
     while s.waits[k] > 0 and s.free[k] <= s.tick:
         at = s.head[k]
-        s.free[k] += way.waiting[at, way.packet.shape[0] + 3] * p.byte_ticks[k]
-        due = _due(p, s, way, k, dt)
-        if due == 0:
-            s.lost[k] += 1
-        else:
+        due = transmit(p, s, way, k, dt)
+        if due != 0:
             _put_in_calendar(way, at, due)
-        _leave_queue(s, k)
+
+
+@inner
+def transmit(p: LinkRecord, s: LinkState, way: Way, k: int, dt: float) -> int:
+    """Transmit the packet that has waited longest; returns the tick of its arrival, or 0 if it is lost.
+
+    Arguments as in :func:`serve_line`.
+    """
+    s.free[k] += way.waiting[s.head[k], way.packet.shape[0] + 3] * p.byte_ticks[k]
+    due = _due(p, s, way, k, dt)
+    if due == 0:
+        s.lost[k] += 1
+    _leave_queue(s, k)
+    return due
 
 
 @inner
