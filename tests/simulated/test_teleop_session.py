@@ -148,8 +148,6 @@ def test_real_time_options_are_taken_or_refused_in_one_line() -> None:
         os.sched_setaffinity(0, allowed)
 
 
-@pytest.mark.slow
-@pytest.mark.soak  # a helper thread once had the priority of another program, on a machine with a load of nine
 def test_with_a_priority_all_threads_come_before_other_processes_but_not_what_they_start() -> None:
     if not is_priority_granted(10):
         pytest.skip("the system grants no priority")
