@@ -13,7 +13,7 @@ import pytest
 from teleop_core.graph.operation import State
 from teleop_core.nodes.crews import Processes
 from teleop_core.nodes.operation import StopInput
-from teleop_drill.simulation import seeds
+from teleop_drill.simulation import seeds, sometimes
 from teleop_drill.simulation.schedules import KINDS, Fault, draw
 from teleop_drill.simulation.seeds import PROCESSES, run_seed, shrink
 
@@ -32,6 +32,26 @@ def test_all_laws_hold_under_a_random_schedule(seed: Any) -> None:
     assert found.broken == ()
     assert found.seconds > 9.0
     assert {"speed", "motion", "told", "ends", "queues", "recovery"} <= set(found.looks)
+    assert set(found.sometimes) <= set(sometimes.catalogue(KINDS))
+
+
+def test_what_a_schedule_meets_is_counted_by_the_names_of_the_catalogue() -> None:
+    faults = [
+        Fault(1.0, "kill", "slave_side", 0.2, 0.0),
+        Fault(1.05, "press", "", 3.0, 0.25),  # the button 0, before the slave is back
+        Fault(2.0, "full disk", "", 1.0, 0.5),
+        Fault(3.0, "press", "", 0.2, 0.000001),  # the button 1
+    ]
+    seen, every = run_seed(1, faults).sometimes, sometimes.catalogue(KINDS)
+    assert len(set(every)) == len(every) >= 150
+    assert set(seen) <= set(every)
+    expected = {
+        "kill in ENABLED", "press during another fault", "recovery after full disk", "FAULT becomes DISABLED",
+        "enable asked in DISABLED", "fault stop", "a command is FRESH",
+        sometimes.UNKNOWN_STOP, sometimes.BOTH_STOPS, sometimes.DISK_ENDS,
+    }  # fmt: skip
+    assert {name for name in expected if not seen[name]} == set()
+    assert set(sometimes.never(seen, KINDS)) == {name for name in every if not seen[name]}
 
 
 def test_schedules_are_drawn_from_their_seed_and_all_kinds_come() -> None:
@@ -74,12 +94,13 @@ def test_one_schedule_is_run_again_by_its_seed_and_faults_on_processors_that_rou
 
 def test_many_schedules_are_told_as_a_table_of_faults_and_states(tmp_path: Path) -> None:
     file = tmp_path / "seeds.json"
-    words = ["drill", "--seeds", "2", "--seed", "10", "--json", str(file)]
+    words = ["drill", "--seeds", "2", "--seed", "10", "--sometimes", "--json", str(file)]
     done = subprocess.run(
         [sys.executable, "-m", "teleop_core.commands.cli", *words], check=False, capture_output=True, text=True
     )
-    assert done.returncode == 0, done.stdout + done.stderr
+    assert done.returncode == 1, done.stdout + done.stderr  # two schedules do not meet everything
     found = json.loads(file.read_text(encoding="utf-8"))
+    assert f"{sum(map(bool, found['sometimes'].values()))} of {len(found['sometimes'])} events were met" in done.stdout
     assert found["sessions"] == 2
     assert found["broken"] == {}
     drawn = [fault.kind for seed in (10, 13) for fault in draw(seed, SIDES)]  # nothing is known yet

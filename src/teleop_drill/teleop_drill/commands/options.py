@@ -32,6 +32,8 @@ class Options:
     """Seed of the simulated machine."""
     seeds: int | None = None
     """Run this number of random schedules of faults on the simulated machine; their seeds begin at --seed."""
+    sometimes: bool = False
+    """With --seeds: fail if an event that must happen sometimes never did."""
     breaks: float = 0.0
     """In schedules, share of clock readings after which another thread runs; try 0.0005."""
     faults: Annotated[str | None, Parameter(metavar="I,K", allow_leading_hyphen=True)] = None

@@ -2,6 +2,7 @@
 
 import json
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from teleop_core.bags.finding import check_new
 from teleop_core.base.errors import ParameterError
@@ -9,9 +10,12 @@ from teleop_core.commands.options import ros_module
 from teleop_core.nodes.crews import Processes
 from teleop_drill.commands.options import Options
 
+if TYPE_CHECKING:
+    from teleop_drill.simulation.report import Coverage
+
 
 def run_schedules(names: tuple[str, ...], options: Options) -> int:
-    """Run the schedules; returns 1 if a law was broken.
+    """Run the schedules; returns 1 if a law was broken, or an event that must happen sometimes never did.
 
     Raises:
         ParameterError: Arguments contradict each other.
@@ -29,7 +33,8 @@ def run_schedules(names: tuple[str, ...], options: Options) -> int:
     processes = Processes.ONE if options.composed else Processes.SIDES
     if count == 1:
         return _run_one(first, options.faults, out, processes, options.breaks)
-    return _run_many(first, count, options.json, processes, options.breaks)
+    coverage = _run_many(first, count, options.json, processes, options.breaks)
+    return 1 if coverage.broken or (options.sometimes and coverage.never()) else 0
 
 
 def _run_one(seed: int, chosen: str | None, out: Path | None, processes: Processes, breaks: float) -> int:
@@ -54,7 +59,7 @@ def _run_one(seed: int, chosen: str | None, out: Path | None, processes: Process
     return 1 if found.broken else 0
 
 
-def _run_many(first: int, count: int, json_file: Path | None, processes: Processes, breaks: float) -> int:
+def _run_many(first: int, count: int, json_file: Path | None, processes: Processes, breaks: float) -> "Coverage":
     from rich.console import Console
     from rich.progress import track
     from rich.table import Column, Table
@@ -83,7 +88,7 @@ def _run_many(first: int, count: int, json_file: Path | None, processes: Process
         console.print(table)
     for line in coverage.lines():
         print(line)
-    return 1 if coverage.broken else 0
+    return coverage
 
 
 def _short(count: str) -> str:

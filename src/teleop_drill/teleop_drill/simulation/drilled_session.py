@@ -1,5 +1,6 @@
 """Stage: a session on a simulated machine, and the faults and commands that a schedule applies to it."""
 
+from collections import Counter
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
@@ -23,15 +24,15 @@ from teleop_core.nodes.operation import STOP_TOPIC
 from teleop_core.nodes.streams import message_type
 from teleop_core.robots import Robot
 from teleop_core.session.configuration import Configuration
+from teleop_core.slave.operation.faults import Fault as SlaveFault
 from teleop_core.slave.operation.states import COMMANDS
 from teleop_drill.drill.exercise import Master
+from teleop_drill.simulation import sometimes
 from teleop_drill.simulation.bus import Bus
 from teleop_drill.simulation.machine import Process
 from teleop_drill.simulation.session import SimulatedSession
 from teleop_drill.simulation.world import SimulatedWorld
 
-NO_STATE = "none"
-_RELEASE = "release"
 _FRESH_NS = 200_000_000
 
 
@@ -80,9 +81,12 @@ class DrilledSession:
         """Buttons that are pressed."""
         self._buttons = [self._node.create_publisher(Bool, STOP_TOPIC, Qos(depth=100)) for _ in range(2)]
         self._speeds = self._node.create_publisher(JointState, "/slave/servo_jv", Qos())
-        self._clients = {name: self._node.create_client(Trigger, f"/slave/{name}") for name in (*COMMANDS, _RELEASE)}
+        names = (*COMMANDS, sometimes.RELEASE)
+        self._clients = {name: self._node.create_client(Trigger, f"/slave/{name}") for name in names}
         self._hand = self._node.create_client(ChangeState, "/inverse_kinematics/change_state")
         self._publishers: dict[str, Any] = {}
+        self.sometimes: Counter[str] = Counter()
+        """How often each event of :mod:`sometimes` was met."""
         self.operation: dict[str, float] = {}
         """Newest report of the slave, by the names of its numbers."""
         self.is_following = False
@@ -101,7 +105,12 @@ class DrilledSession:
     def _note_operation(self, taken: Taken) -> None:
         found = read_numbers(taken.data, OPERATION)
         if isinstance(found, tuple):
-            self.operation = dict(zip(OPERATION, found[1].tolist(), strict=True))
+            before = self.operation.get("state")
+            self.operation = told = dict(zip(OPERATION, found[1].tolist(), strict=True))
+            if before is not None and before != told["state"]:
+                self.sometimes[sometimes.change(State(int(before)), State(int(told["state"])))] += 1
+            if fault := int(told["fault"]):
+                self.sometimes[f"fault {SlaveFault(fault).word}"] += 1
 
     def _note_state(self, taken: Taken) -> None:
         found = read_numbers(taken.data, TELEOP_STATE.columns)
@@ -128,6 +137,7 @@ class DrilledSession:
     def kill(self, name: str) -> None:
         """Kill a process."""
         process = self.process(name)
+        self.sometimes[sometimes.AGAIN] += any(one.name == process.name for one in self.killed)
         self.killed.add(process)
         self.kills += name != RECORDER_NAME
         process.end(-9, is_orderly=False)
@@ -140,11 +150,22 @@ class DrilledSession:
     def press(self, button: int, *, is_pressed: bool) -> None:
         """Send a message of a stop button, which reaches only discovered readers."""
         if is_pressed:
+            self._note_press(button)
             self.presses.append(button)
             self.held.add(button)
         else:
             self.held.discard(button)
         self._buttons[button].publish(Bool(data=is_pressed))
+
+    def _note_press(self, button: int) -> None:
+        """Count in which moment a stop is pressed."""
+        told, slave = self.operation, self.session.process_of("slave")
+        found = None if slave is None else self.found(button, slave)
+        is_homed, is_busy = told.get("is_homed", 0.0), told.get("is_busy", 0.0)
+        self.sometimes[sometimes.WHILE_HOMING] += bool(is_busy and not is_homed)
+        self.sometimes[sometimes.WHILE_BRAKING] += bool(is_busy and told.get("state") != State.ENABLED)
+        self.sometimes[sometimes.BOTH_STOPS] += bool(self.held - {button})
+        self.sometimes[sometimes.UNKNOWN_STOP] += found is None or found[1] > self.machine.scheduler.now_ns
 
     def found(self, button: int, slave: Process) -> tuple[int, int] | None:
         """Time at which a button and a slave have discovered each other [ns]; None before the slave listens."""
@@ -154,6 +175,7 @@ class DrilledSession:
 
     def command(self, name: str) -> None:
         """Send a request to the slave without waiting for the answer."""
+        self.sometimes[sometimes.asked(name, self.state)] += 1
         self._clients[name].call_async(Trigger.Request())
 
     def lead(self, *, by_hand: bool) -> None:
@@ -202,9 +224,9 @@ class DrilledSession:
 
     @property
     def state(self) -> str:
-        """Name of the last reported state of the arm; ``none`` before the first report."""
+        """Name of the last reported state of the arm; :data:`~sometimes.NO_STATE` before the first report."""
         state = self.operation.get("state")
-        return NO_STATE if state is None else State(int(state)).name
+        return sometimes.NO_STATE if state is None else State(int(state)).name
 
     def follows(self) -> bool:
         """Whether the arm reports that it follows the hand."""

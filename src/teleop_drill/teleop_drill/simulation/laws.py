@@ -19,6 +19,7 @@ from teleop_core.kernels.geometry import Array
 from teleop_core.middleware.world import Taken
 from teleop_core.slave.commands import CommandStatus
 from teleop_drill.drill.numbers import Numbers
+from teleop_drill.simulation import sometimes
 from teleop_drill.simulation.drilled_session import DrilledSession
 from teleop_drill.simulation.machine import Process
 from teleop_drill.simulation.owner import Owner
@@ -93,6 +94,7 @@ class Laws:
         looks: Number of checks of each law.
         in_force: Kinds of the present faults.
         under: Number of checks of each law by present fault and state of the arm.
+        lost_recorders: Recorders that ended because their disk failed.
     """
 
     def __init__(self, stage: DrilledSession, numbers: Numbers) -> None:
@@ -104,6 +106,7 @@ class Laws:
         self.looks: Counter[str] = Counter()
         self.in_force: list[str] = []
         self.under: Counter[tuple[str, str, str]] = Counter()
+        self.lost_recorders: set[Process] = set()
         self.begin_ns = self._scheduler.now_ns
         self._last: tuple[Array, Array, Process | None] | None = None
         """Newest setpoint: joints, position of the tip, and process of the slave."""
@@ -223,6 +226,7 @@ class Laws:
 
     def _judge_state(self, slave: Any) -> None:
         """Check that an arm that must not move is at rest, and that its state is reported in time."""
+        self._stage.sometimes[f"a command is {CommandStatus(int(slave.row['command_status'])).name}"] += 1
         state = int(slave.stage.operation["state"])
         if state != self._seen_state:
             self._seen_state, self._since = state, self._worked
@@ -283,6 +287,8 @@ class Laws:
                 self._stage.killed.add(process)
                 said = [one.text for one in self._stage.machine.log if one.level in _BAD]
                 if process in self._stage.lost_disk and _NO_DISK in "".join(said[-1:]):
+                    self.lost_recorders.add(process)
+                    self._stage.sometimes[sometimes.DISK_ENDS] += 1
                     continue  # the saved messages are checked at the end of the session
                 self._break("ends", f"{process.name} has ended: {' '.join(said[-1:])[-300:]}")
 
@@ -294,7 +300,9 @@ class Laws:
             if slow_ns < _GIVEN_WAY_NS:
                 continue
             self._count("way")
-            if any(strand.has_priority for strand in self._scheduler.strands(process)):
+            keeps = any(strand.has_priority for strand in self._scheduler.strands(process))
+            self._stage.sometimes[sometimes.GAVE_WAY] += not keeps
+            if keeps:
                 self._break("way", f"{process.name} keeps its priority, although its turns take several ticks")
 
     def _judge_queues(self) -> None:

@@ -3,9 +3,8 @@
 from collections import Counter
 from dataclasses import dataclass, field
 
-from teleop_core.graph.operation import State
 from teleop_core.nodes.crews import Processes
-from teleop_drill.simulation.drilled_session import NO_STATE
+from teleop_drill.simulation import sometimes
 from teleop_drill.simulation.laws import LAWS
 from teleop_drill.simulation.schedules import KINDS
 from teleop_drill.simulation.seeds import Found
@@ -21,6 +20,7 @@ class Coverage:
         met: Number of times that each fault happened in each state of the arm.
         looks: Number of checks of each law.
         under: Number of checks of each law by present fault and state of the arm.
+        sometimes: Number of times that each event of :mod:`sometimes` was met.
         broken: Number of schedules that broke each law.
     """
 
@@ -29,6 +29,7 @@ class Coverage:
     met: Counter[tuple[str, str]] = field(default_factory=Counter)
     looks: Counter[str] = field(default_factory=Counter)
     under: Counter[tuple[str, str, str]] = field(default_factory=Counter)
+    sometimes: Counter[str] = field(default_factory=Counter)
     broken: Counter[str] = field(default_factory=Counter)
 
     def add(self, found: Found) -> None:
@@ -38,14 +39,14 @@ class Coverage:
         self.met.update(found.met)
         self.looks.update(found.looks)
         self.under.update(found.under)
+        self.sometimes.update(found.sometimes)
         self.broken.update(one.law for one in found.broken)
 
     def table(self) -> list[list[str]]:
         """Table of faults by states of the arm, with the counts of each combination; the first row is the head."""
-        states = [state.name for state in State] + [NO_STATE]
         return [
-            ["fault", *states],
-            *([kind, *(str(self.met[kind, state]) for state in states)] for kind in sorted(KINDS)),
+            ["fault", *sometimes.STATES],
+            *([kind, *(str(self.met[kind, state]) for state in sometimes.STATES)] for kind in sorted(KINDS)),
         ]
 
     def laws(self) -> list[list[str]]:
@@ -62,6 +63,7 @@ class Coverage:
             "seconds": self.seconds,
             "looks": dict(self.looks),
             "broken": dict(self.broken),
+            "sometimes": {name: self.sometimes[name] for name in sometimes.catalogue(KINDS)},
             "met": {" / ".join(key): count for key, count in sorted(self.met.items())},
             "under": {" / ".join(key): count for key, count in sorted(self.under.items())},
         }
@@ -69,7 +71,15 @@ class Coverage:
     def lines(self) -> list[str]:
         """Lines that summarize the result."""
         laws = [f"{law}: {self.looks[law]} looks, {self.broken[law]} broken" for law in self.looks]
-        return [f"{self.sessions} sessions of {self.seconds:.0f} s in all", *sorted(laws)]
+        return [f"{self.sessions} sessions of {self.seconds:.0f} s in all", *sorted(laws), *self._sometimes()]
+
+    def never(self) -> list[str]:
+        """Events that were never met."""
+        return sometimes.never(self.sometimes, KINDS)
+
+    def _sometimes(self) -> list[str]:
+        left, total = self.never(), len(sometimes.catalogue(KINDS))
+        return [f"{total - len(left)} of {total} events were met; never: {', '.join(left) or 'none'}"]
 
 
 def told(found: Found, shortest: Found, law: str) -> list[str]:

@@ -12,6 +12,7 @@ from teleop_core.graph.topics import MASTER_BUTTONS, SLAVE_SERVO_JP
 from teleop_core.slave.operation.states import COMMANDS
 from teleop_drill.simulation.bus import Line
 from teleop_drill.simulation.drilled_session import DrilledSession
+from teleop_drill.simulation.sometimes import RELEASE
 
 BEGIN = 1.0
 """Earliest time in a session at which a fault begins [s]."""
@@ -20,7 +21,7 @@ END = 9.0
 _LONGEST = 3.0  # longest duration of a fault [s]
 _LONGER = {"slow turns": 4.5}
 """Time by which faults of a kind last longer, so that a loop has time to give way [s]."""
-_NAMES = sorted((*COMMANDS, "release"))
+_NAMES = sorted((*COMMANDS, RELEASE))
 _LEADS = {"": 8, "disable": 2, "kill": 3, "pause": 4, "press": 2}
 """Commands before a fault, with their weights. Commands to states that faults rarely met have larger weights."""
 _CLOCK_NS = (200_000_000, 3_600_000_000_000)

@@ -17,6 +17,7 @@ from teleop_core.nodes.start import SESSION
 from teleop_core.session import api
 from teleop_drill.drill import hand
 from teleop_drill.drill.numbers import Numbers
+from teleop_drill.simulation import sometimes
 from teleop_drill.simulation.bus import Bus
 from teleop_drill.simulation.drilled_session import DrilledSession
 from teleop_drill.simulation.laws import Broken, Laws
@@ -54,6 +55,7 @@ class Found:
         met: Number of times that each fault happened in each state of the arm.
         looks: Number of checks of each law.
         under: Number of checks of each law by present fault and state of the arm.
+        sometimes: Number of times that each event of :mod:`sometimes` was met.
         seconds: Simulated time [s].
     """
 
@@ -65,6 +67,7 @@ class Found:
     met: Counter[tuple[str, str]] = field(default_factory=Counter)
     looks: Counter[str] = field(default_factory=Counter)
     under: Counter[tuple[str, str, str]] = field(default_factory=Counter)
+    sometimes: Counter[str] = field(default_factory=Counter)
     seconds: float = 0.0
 
 
@@ -104,6 +107,7 @@ class _Run:
 
     def __init__(self, bus: Bus, owner: Process, found: Found, folder: Path) -> None:
         bus.watch(owner)
+        self._bus = bus
         made = api.configuration("free_motion", texts=(*_CIRCLE, "real_time.priority=20"))
         numbers = Numbers.of(made)
         self._found, self._scheduler = found, owner.machine.scheduler
@@ -124,23 +128,35 @@ class _Run:
         self._wait(last + 0.5)
         for end in self._ends:
             end()
-        self._stage.command("release")
-        self._laws.judge_recovery(self._await(_CURED), _CURED)
+        self._stage.command(sometimes.RELEASE)
+        recovery = self._await(_CURED)
+        self._laws.judge_recovery(recovery, _CURED)
+        if recovery is not None:
+            self._stage.sometimes.update({sometimes.recovered(fault.kind) for fault in self._found.faults})
         self._found.seconds = 1e-9 * (self._scheduler.now_ns - begin_ns)
         for process in self._stage.session.running.values():
             self._stage.killed.add(process)  # from now on the processes are ordered to end
         (first, *more), was_killed = self._stage.session.recordings, self._was("kill", "recorder")
         recorder = None if more else self._stage.session.node(RECORDER_NAME)
+        self._stage.sometimes[sometimes.SEVERAL_BAGS] += bool(more)
+        readers = (reader for several in self._bus.readers.values() for reader in several)
+        self._stage.sometimes[sometimes.LOST] += any(reader.lost for reader in readers)
+        outlives = self._stage.lost_disk - self._laws.lost_recorders
+        self._stage.sometimes[sometimes.DISK_STAYS] += any(not one.is_dead for one in outlives)
         self._stage.session.close()
         if not (was_killed or self._was("clock step") or self._was("clock drift")):
             self._laws.judge_recording(first, {} if recorder is None else recorder.values())
         self._found.broken = tuple(self._laws.broken.values())
         self._found.looks.update(self._laws.looks)
         self._found.under.update(self._laws.under)
+        self._found.sometimes.update(self._stage.sometimes)
         return self._found
 
     def _begin(self, fault: Fault) -> None:
-        self._found.met[fault.kind, self._stage.state] += 1
+        state, seen = self._stage.state, self._stage.sometimes
+        self._found.met[fault.kind, state] += 1
+        seen[sometimes.met(fault.kind, state)] += 1
+        seen[sometimes.together(fault.kind)] += bool(self._laws.in_force)
         process = self._stage.session.running.get(fault.where)
         if process is not None and process.is_dead:
             return
