@@ -13,9 +13,7 @@ pytest.importorskip("simplejpeg", reason="teleop_scene is not installed")
 from live_process import words
 from teleop_core.bags.reader import Bag
 from teleop_core.base import TeleopError
-from teleop_core.graph import RECORDER_NAME, topics
-from teleop_core.nodes.guest import Guest
-from teleop_core.nodes.streams import Subscription
+from teleop_core.graph import topics
 from teleop_core.session.configuration import configure
 from teleop_scene import models
 from teleop_scene.camera import Camera, View
@@ -54,35 +52,27 @@ def test_a_session_whose_camera_is_killed_goes_on_and_says_so(
     texts = [f"robot={SCENE}", "scene.cameras=[front:160x120]", "scene.rate=60", "teleop.duration=600.0"]
     configuration = configure("coarse_box", settings=texts)
     image, _ = topics_of(VIEW)
-    seen, killed = list[int](), list[int]()
+    killed = list[float]()
 
-    with Guest("watcher", int(peer.domain)) as watcher:
-        pictures = Subscription(watcher, image, f"/{image.name}", 100)
+    def is_alone_for_two_seconds() -> bool:
+        slave = peer.status("slave_sim")
+        ticks = slave.number("ticks") if slave else 0.0
+        if not killed and peer.has_recorded({image.name: 5}):
+            (camera,) = cameras()
+            camera.kill()
+            killed.append(ticks)
+        return bool(killed) and ticks > killed[0] + 3000
 
-        def is_alone_for_two_seconds() -> bool:
-            while pictures.take() is not None:
-                seen.append(peer.time_ns())
-            status = peer.observer.statuses.get("slave_sim")
-            peer.observer.listen(0.01)
-            ticks = int(status.number("ticks")) if status else 0
-            if len(seen) >= 5 and not killed and ticks:
-                (camera,) = cameras()
-                camera.kill()
-                killed.append(ticks)
-            return bool(killed) and ticks > killed[0] + 2000
-
-        bag, text = session_until(configuration, is_alone_for_two_seconds)
+    bag, text = session_until(configuration, is_alone_for_two_seconds)
     assert "camera ended with signal SIGKILL" in text
     assert "the session goes on without camera" in text
     assert "beside the session: 1 started, 1 ended early" in text
-    assert bag.topics[image.name].count >= 5
+    assert bag.topics[image.name].count > 5
     assert cameras() == []
     measured = bag.read(topics.SLAVE_MEASURED_JS).stamp_ns
     (last,) = (log for _, _, log, _ in list(bag.raw([image.name]))[-1:])
     assert measured[-1] - last > 1_500_000_000
-    assert (np.diff(measured) % 1_000_000 == 0).all()
-    recorder = [report for report in bag.reports(topics.DIAGNOSTICS) if report.name == RECORDER_NAME][-1]
-    assert "lost" not in recorder.message
+    assert (np.diff(measured) > 0).all()
 
 
 def test_the_pictures_of_a_session_end_with_it_and_are_counted(
@@ -91,19 +81,12 @@ def test_the_pictures_of_a_session_end_with_it_and_are_counted(
     texts = [f"robot={SCENE}", "scene.cameras=[front:160x120]", "scene.rate=60", "teleop.duration=600.0"]
     texts += ["teleop.stages=[network]", "network.back.least_delay=0.2"]
     image, info = topics_of(VIEW)
-    with Guest("watcher", int(peer.domain)) as watcher:
-        pictures, seen = Subscription(watcher, image, f"/{image.name}", 100), list[int]()
-
-        def has_ten_pictures() -> bool:
-            while pictures.take() is not None:
-                seen.append(1)
-            return len(seen) >= 10
-
-        bag, text = session_until(configure("coarse_box", settings=texts), has_ten_pictures)
+    enough = {image.name: 10, info.name: 10}
+    bag, text = session_until(configure("coarse_box", settings=texts), lambda: peer.has_recorded(enough))
     assert "beside the session: 1 started, 0 ended early" in text
     assert "lost 0" in text
     assert cameras() == []
-    assert bag.topics[info.name].count >= 10
+    assert bag.topics[info.name].count > 10
     late = [log - int.from_bytes(data[4:8], "little") * 10**9 - int.from_bytes(data[8:12], "little")
             for _, _, log, data in bag.raw([image.name])]  # fmt: skip
     assert min(late) >= 200_000_000

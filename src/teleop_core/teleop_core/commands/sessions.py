@@ -65,6 +65,7 @@ def live(
     For example:
 
         teleop live --scenario coarse_box --out bags/live
+        teleop live --out bags/seen --set robot=cubes.xml scene.cameras=[front]  # with pictures
         teleop live --out bags/live --without slave_sim  # your own arm takes its place
 
     Args:
