@@ -106,7 +106,7 @@ def plot(file: str, shares: list[tuple[float, float]]) -> None:
 def main() -> None:
     """Print the shares of success; arguments: numbers of demonstrations and of sessions per delay, file of a plot."""
     given = sys.argv[1:]
-    count, sessions = (int(word) for word in [*given, "40", "4"][:2]) if len(given) != 1 else (int(given[0]), 4)
+    count, sessions = (int(word) for word in [*given[:2], *("40", "4")[len(given) :]])
     seen, done = zip(*map(demonstration, range(1000, 1000 + count)), strict=True)
     network = trained(np.concatenate(seen), np.concatenate(done), hidden=16, seed=1)
     print(f"trained on {sum(map(len, seen))} moments of {count} demonstrations")
@@ -115,9 +115,9 @@ def main() -> None:
         if view.goal is None or not view.is_following:
             return view.place
         way = view.goal - view.measured_cp[:3]
-        distance = np.linalg.norm(way, keepdims=True)
-        speed, jaw = network(inputs(distance, view.task[STEP : STEP + 1]))[0]
-        return np.append(view.place + view.to_hand(way * speed / max(float(distance[0]), 1e-9)), jaw > 0.5)
+        distance = float(np.linalg.norm(way))
+        speed, jaw = network(inputs(np.array([distance]), view.task[STEP : STEP + 1]))[0]
+        return np.append(view.place + view.to_hand(way * speed / max(distance, 1e-9)), jaw > 0.5)
 
     tc.register_policy("picks", picks)
     shares = list[tuple[float, float]]()
