@@ -91,15 +91,15 @@ def plot(file: str, shares: list[tuple[float, float]]) -> None:
     text = [f'<text x="{a:g}" y="250">{1e3 * late:.0f}</text>' for a, late in zip(x, DELAYS, strict=True)]
     text += [f'<text x="35" y="{225 - 2 * y}">{y}</text><path d="M60 {220 - 2 * y}h400"/>' for y in (0, 50, 100)]
     text += ['<text x="260" y="275">delay of the network on the way back, ms</text>']
-    text += ['<text x="60" y="12" text-anchor="start">success, %</text>']
+    text += ['<text x="60" y="0">success, %</text>']
     for column, (name, colour) in enumerate((("demonstrator", "#0072b2"), ("policy", "#d55e00"))):
         corners = " ".join(f"{a:g},{220 - 2 * both[column]:g}" for a, both in zip(x, shares, strict=True))
         dash = "6 4" if column else "none"
         text.append(f'<polyline points="{corners}" stroke="{colour}" stroke-width="3" stroke-dasharray="{dash}"/>')
-        text.append(f'<text x="{230 + 130 * column}" y="12" style="fill:{colour}">{name}</text>')
+        text.append(f'<text x="{230 + 130 * column}" y="0" style="fill:{colour}">{name}</text>')
     style = "text{font:14px sans-serif;text-anchor:middle}path{stroke:#ccc}polyline{fill:none}"
-    head = '<svg xmlns="http://www.w3.org/2000/svg" width="480" height="290" viewBox="0 0 480 290">'
-    body = "\n".join(['<rect width="480" height="290" fill="#fff"/>', *text])
+    head = '<svg xmlns="http://www.w3.org/2000/svg" width="480" height="310" viewBox="0 -20 480 310">'
+    body = "\n".join(['<rect y="-20" width="480" height="310" fill="#fff"/>', *text])
     Path(file).write_text(f"{head}<style>{style}</style>\n{body}\n</svg>\n", encoding="utf-8")
 
 
