@@ -392,6 +392,13 @@ def test_a_policy_succeeds_where_its_demonstrator_does_and_both_fail_when_they_s
     assert max(shares[-2:]) < 10.0
 
 
+def test_a_trained_policy_carries_new_blocks_to_their_pegs_unless_it_sees_late(tmp_path: Path) -> None:
+    shares = numbers(r"policy +([\d.]+) %", run("policy_picks", tmp_path))
+    assert len(shares) == 6
+    assert shares[0] >= 80.0
+    assert shares[-1] <= 0.5 * shares[0]
+
+
 def test_the_hand_takes_over_from_a_policy_where_the_arm_is(tmp_path: Path) -> None:
     jump, moved, led = numbers(r"([\d.]+) mm", run("policy_hand_over", tmp_path))
     assert moved < 1.0

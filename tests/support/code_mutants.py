@@ -273,6 +273,8 @@ CODE_MUTANTS = (
             "if not np.isfinite(place).all():", "if False:", "policy_operator"),
     _mutant("policy_leaves", "a policy moves the hand out of its space", _POLICY,
             "np.clip(place, *self._corners)", "place", "policy_operator"),
+    _mutant("policy_open", "a policy that closes the jaw leaves it open", _POLICY,
+            "self._jaw = min(max(float(wanted[3]), 0.0), 1.0)", "self._jaw = 0.0", "policy_operator"),
     _mutant("picture_of_last_tick", "a picture carries the stamp of other poses", "teleop_scene/film.py",
             "picture = camera.take(poses.values[index]", "picture = camera.take(poses.values[index - 1]",
             "scene_camera"),
