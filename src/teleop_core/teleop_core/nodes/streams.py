@@ -282,9 +282,9 @@ class Input:
 
         For buttons, the first message that presses or releases a button is written, so that no press is missed.
         """
-        before = self._pressed()
+        before = self._pressed() if self._is_buttons else b""
         if self._needs_python[0]:
-            return self._newest_after(self.take(), before)
+            return self.take() and self._newest_after(True, before)
         self._newest()
         answer = self._cells["answer"]
         return self._newest_after_foreign() if answer == wire.FOREIGN else bool(answer == wire.NEW)
