@@ -15,7 +15,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from teleop_core.kernels import records
-from teleop_core.kernels.fields import fields_of
+from teleop_core.kernels.fields import Cells, fields_of
 from teleop_core.middleware.world import Line, Listener, World
 from teleop_core.nodes.wire import Block
 
@@ -87,21 +87,22 @@ class Feed:
         self.waiting = bytearray()
         self.block: Any = records(fields_of(Block))[0]
         self._bytes = np.zeros(_BLOCK, np.uint8)
-        self._view, self._fill = self._bytes.data, np.asarray(self.block)["fill"]
+        cells = Cells(self.block)
+        self._view, self._fill, self._is_open = self._bytes.data, cells.number("fill"), cells.number("is_open")
         self.block["at"], self.block["room"] = self._bytes.ctypes.data, _BLOCK
         self.channels = {name: Channel(self, index) for index, name in enumerate(self._names)}
 
     @property
     def is_open(self) -> bool:
         """Whether a recorder listens."""
-        return bool(self.block["is_open"])
+        return bool(self._is_open[0])
 
     def spill(self) -> None:
         """Move the messages of the block to the queue."""
-        fill = int(self._fill)
+        fill = self._fill[0]
         if fill and len(self.waiting) < MOST:
             self.waiting += self._view[:fill]
-        self._fill[...] = 0
+        self._fill[0] = 0
 
     def put(self, index: int, word: int, data: bytes = b"", number: int = 0, time_ns: int = 0) -> None:
         """Append a frame to the queue."""
@@ -116,7 +117,7 @@ class Feed:
             if now_ns - self._looked_ns > _AGAIN_NS:
                 self._looked_ns = now_ns
                 self._connect()
-        fill = int(self._fill)
+        fill = self._fill[0]
         if self._line is None or not (fill or self.waiting):
             return
         is_straight = not self.waiting  # nothing has to be copied if the socket accepts everything
@@ -130,7 +131,7 @@ class Feed:
             self.close()
             return
         if is_straight and written == fill:
-            self._fill[...] = 0
+            self._fill[0] = 0
         else:
             self.spill()
             del self.waiting[:written]

@@ -6,6 +6,7 @@ time. A missing number means a lost message. The rules are kernels of :mod:`tele
 """
 
 from enum import Enum
+from functools import lru_cache
 from typing import Any
 
 from teleop_core.bags.messages import Refusal
@@ -27,6 +28,12 @@ class StampFault(Enum):
 
 
 _FAULTS = {wire.ZERO: StampFault.ZERO, wire.FROZEN: StampFault.FROZEN, wire.BACKWARDS: StampFault.BACKWARDS}
+
+
+@lru_cache(maxsize=1024)
+def halves(sender: bytes) -> tuple[int, int]:
+    """First and last eight bytes of a publisher's identifier, as integers."""
+    return int.from_bytes(sender[:8], "little", signed=True), int.from_bytes(sender[8:16], "little", signed=True)
 
 
 class Sender:
@@ -105,8 +112,7 @@ class Sender:
             number: Number of the message in the publisher's sequence; 0 if the middleware has no numbers.
             now_ns: Monotonic time [ns].
         """
-        low, high = (int.from_bytes(part, "little", signed=True) for part in (sender[:8], sender[8:16]))
-        reason = wire.admit(self.own, low, high, number, now_ns)
+        reason = wire.admit(self.own, *halves(sender), number, now_ns)
         return wire.REASONS[reason - 1] if reason else None
 
     def release(self) -> None:

@@ -7,7 +7,7 @@ deserialised and read by name. Both give the same values.
 
 from collections import Counter, deque
 from collections.abc import Callable, Sequence
-from functools import cache
+from functools import cache, cached_property
 from importlib import import_module
 from typing import Any, Protocol, runtime_checkable
 
@@ -17,7 +17,7 @@ from teleop_core.bags import messages
 from teleop_core.base.errors import MessageTypeError
 from teleop_core.graph.topics import Kind, Topic
 from teleop_core.kernels import held, record_dtype, records
-from teleop_core.kernels.fields import Cells, fields_of
+from teleop_core.kernels.fields import Cells, Integers, fields_of
 from teleop_core.kernels.geometry import Array
 from teleop_core.kernels.memory import integers, octets
 from teleop_core.middleware.world import Owner, Publisher, Taken, Taker, World
@@ -25,7 +25,7 @@ from teleop_core.nodes import wire
 from teleop_core.nodes.feed import Channel
 from teleop_core.nodes.quality import NO_OVERRIDES, QualityOverrides
 from teleop_core.nodes.quality import profile as profile  # noqa: PLC0414  for importers of both
-from teleop_core.nodes.sender import Sender
+from teleop_core.nodes.sender import Sender, halves
 
 _WAITING = 20
 """Smallest queue length for a late reader [messages]. A longer queue is used if a late sender may catch up more ticks
@@ -98,7 +98,7 @@ def describe(cells: Cells, form: messages.Layout) -> None:
 def load() -> None:
     """Load the kernels that Python calls one by one, which takes ms at their first call."""
     reading, writing = (records(kind)[0] for kind in (READING, WRITING))
-    sender, row, count = Sender(into=reading), np.zeros(1), np.zeros(1, np.int64)
+    sender, row = Sender(into=reading), np.zeros(1)
     for cells in map(Cells, (reading, writing)):
         for name in ("template_at", "mask_at", "places_at"):
             cells[name] = row.ctypes.data
@@ -106,10 +106,7 @@ def load() -> None:
         reading[name] = row.ctypes.data
     for name in ("source_at", "kept_at", "readers_at"):
         writing[name] = row.ctypes.data
-    sender.admit(b"", 0, 0)
     sender.note_old(0, 0)
-    wire.read(reading, count.ctypes.data, 8)
-    wire.accept(reading, 0, 0, 0)
     wire.is_due(writing, 0)
     buffer = np.zeros(16, np.uint8)
     writing["buffer_at"], writing["size"] = buffer.ctypes.data, len(buffer)
@@ -216,6 +213,11 @@ class Input:
         calls = Calls(self._world)
         kernels = wire.answer_take, wire.answer_newest
         self._take, self._newest = (held(kernel, own, calls.own) for kernel in kernels)
+        given = np.zeros(6, np.int64)
+        self._given = given.data  # faster to set than the array
+        self._look, self._judge = (held(kernel, own, given) for kernel in (wire.look, wire.answer_accept))
+        self._needs_python, self._answer = self._cells.number("needs_python"), self._cells.number("answer")
+        self._has_stamp, self._stamp_ns = self._cells.number("has_stamp"), self._cells.number("stamp_ns")
         self.is_trigger = False
         """Whether each message of the topic is a step of the stage."""
         self.subscription: Subscription | None = None
@@ -227,7 +229,7 @@ class Input:
             describe(cells, self._layout)
         cells["width"], cells["is_pose"] = len(self._row), topic.kind is Kind.POSE
         cells["target_at"], cells["row_at"] = self._target.ctypes.data, self._row.ctypes.data
-        cells["is_buttons"] = topic.kind is Kind.BUTTONS
+        cells["is_buttons"] = self._is_buttons = topic.kind is Kind.BUTTONS
         cells["may_repeat"] = topic.stamp.is_in_force or self._layout is None
 
     def _listen(self) -> None:
@@ -241,7 +243,7 @@ class Input:
     @property
     def stamp_ns(self) -> int | None:
         """Stamp of the newest valid message; None before the first."""
-        return int(self._cells["stamp_ns"]) if self._cells["has_stamp"] else None
+        return int(self._stamp_ns[0]) if self._has_stamp[0] else None
 
     @property
     def received(self) -> int:
@@ -266,10 +268,10 @@ class Input:
 
     def take(self) -> bool:
         """Write the next valid message in the queue into the signals; return whether there was one."""
-        if self._cells["needs_python"]:
+        if self._needs_python[0]:
             return self._take_held() if self._delay_ns else self._take_in_python()
         self._take()
-        while (answer := self._cells["answer"]) == wire.FOREIGN:
+        while (answer := self._answer[0]) == wire.FOREIGN:
             if self._take_foreign():
                 return True
             self._take()
@@ -280,21 +282,27 @@ class Input:
 
         For buttons, the first message that presses or releases a button is written, so that no press is missed.
         """
-        before = self._pressed()
-        if self._cells["needs_python"]:
-            return self._newest_after(self.take(), before)
+        before = self._pressed() if self._is_buttons else b""
+        if self._needs_python[0]:
+            return self.take() and self._newest_after(True, before)
         self._newest()
         answer = self._cells["answer"]
         return self._newest_after_foreign() if answer == wire.FOREIGN else bool(answer == wire.NEW)
 
     def finish(self) -> None:
         """Read the newest message for :func:`~teleop_core.nodes.wire.read_all`, which needs Python for it."""
-        if self._cells["needs_python"]:
+        if self._needs_python[0]:
             self.newest()
         else:
             self._newest_after_foreign()
-        if self._cells["stamp_at"] and self._cells["has_stamp"]:
-            integers(self._cells["stamp_at"], 1)[0] = self._cells["stamp_ns"]
+        if self._has_stamp[0] and len(self._stamp):
+            self._stamp[0] = self._stamp_ns[0]
+
+    @cached_property
+    def _stamp(self) -> Integers:
+        """Stamp in the signals of a stage; empty if they have none."""
+        at = self._cells["stamp_at"]
+        return integers(at, 1) if at else np.zeros(0, np.int64)
 
     def _newest_after_foreign(self) -> bool:
         """As :meth:`newest`, after a kernel has found a message of another form."""
@@ -310,27 +318,16 @@ class Input:
 
     def _pressed(self) -> bytes:
         """State of the buttons; empty for an input without buttons."""
-        return self._target.tobytes() if self.topic.kind is Kind.BUTTONS else b""
+        return self._target.tobytes() if self._is_buttons else b""
 
     # -- in Python: what is rare, and everything in a world whose middleware kernels cannot reach -----
 
     def _take_in_python(self) -> bool:
         assert self.subscription is not None
         while (taken := self.subscription.take()) is not None:
-            if self._admit(taken) and self._accept_bytes(taken.data):
+            if (found := self._admitted(taken)) is not None and self._accept(*found):
                 return True
         return False
-
-    def _admit(self, taken: Taken) -> bool:
-        self._cells["received"] += 1
-        reason = self.sender.admit(taken.sender, taken.number, self._world.monotonic_ns())
-        if reason is not None:
-            self._refuse(reason)
-        return reason is None
-
-    def _accept_bytes(self, data: bytes) -> bool:
-        found = self._values(data)
-        return found is not None and self._accept(*found)
 
     def _take_foreign(self) -> bool:
         """Accept the message of another form that a kernel has taken."""
@@ -341,13 +338,19 @@ class Input:
             return False
         return self._accept(*found)
 
-    def _values(self, data: bytes) -> tuple[int, messages.Values] | None:
+    def _admitted(self, taken: Taken) -> tuple[int, messages.Values] | None:
         """Stamp and values of a message; None if it was refused."""
-        if len(data) <= len(self._bytes):
-            self._bytes[: len(data)] = data
-            stamp_ns = wire.read(self.own, self._bytes_at, len(data))
-            if stamp_ns >= 0:
-                return stamp_ns, self._row
+        data, sender, number, _, _ = taken
+        given, size = self._given, len(data)
+        if size > len(self._bytes):
+            size = 0  # another form
+        self._bytes[:size] = data[:size]
+        given[0], given[1] = halves(sender)
+        given[2], given[3], given[4], given[5] = number, self._world.monotonic_ns(), self._bytes_at, size
+        self._look()
+        answer = self._answer[0]
+        if answer != wire.FOREIGN:
+            return (given[0], self._row) if answer == wire.NEW else None
         found = self._read(data)
         if isinstance(found, messages.Refusal):
             self._refuse(found)
@@ -357,7 +360,7 @@ class Input:
     def _take_held(self) -> bool:
         """Write the next valid delayed message that is due into the signals; return whether there was one."""
         while self.subscription is not None and (taken := self.subscription.take()) is not None:
-            if self._admit(taken) and (found := self._values(taken.data)) is not None:
+            if (found := self._admitted(taken)) is not None:
                 self._held.append((self._world.monotonic_ns() + self._delay_ns, found[0], found[1].copy()))
         now_ns = self._world.monotonic_ns()
         while self._held and self._held[0][0] <= now_ns:
@@ -367,8 +370,12 @@ class Input:
         return False
 
     def _accept(self, stamp_ns: int, values: messages.Values) -> bool:
-        self._row[:] = values
-        return bool(wire.accept(self.own, stamp_ns, self._world.monotonic_ns(), self._world.time_ns()))
+        if values is not self._row:
+            self._row[:] = values
+        given, world = self._given, self._world
+        given[0], given[1], given[2] = stamp_ns, world.monotonic_ns(), world.time_ns()
+        self._judge()
+        return bool(self._answer[0])
 
     def _refuse(self, reason: messages.Refusal) -> None:
         self._cells["refused"][wire.REASONS.index(reason)] += 1
@@ -381,7 +388,7 @@ class Input:
 
     def age(self) -> float:
         """Time since the last valid message was read [s]; infinite before the first."""
-        if not self._cells["has_stamp"]:
+        if not self._has_stamp[0]:
             return float("inf")
         return float((self._world.monotonic_ns() - self._cells["arrival_ns"]) * 1e-9)
 
@@ -464,6 +471,8 @@ class Output:
         self._cells["source_at"], self._cells["buffer_at"] = source.ctypes.data, self._buffer.ctypes.data
         self._cells["kept_at"], self._cells["message_at"] = self._kept.ctypes.data, self._message.ctypes.data
         self._cells["readers_at"] = self._readers.ctypes.data
+        self._pending, self._pending_ns = self._cells.number("is_pending"), self._cells.number("pending_ns")
+        self._sent, self._writer = self._cells.number("sent"), self._cells.number("writer")
         self._tap: Tap | None = None
         self._is_kept = isinstance(publisher, Kept)
         if isinstance(publisher, Kept):
@@ -478,12 +487,12 @@ class Output:
     @property
     def is_pending(self) -> bool:
         """Whether a written message is still to be sent."""
-        return bool(self._cells["is_pending"])
+        return bool(self._pending[0])
 
     @property
     def is_direct(self) -> bool:
         """Whether kernels send the messages."""
-        return bool(self._cells["writer"])
+        return bool(self._writer[0])
 
     @property
     def is_silent(self) -> bool:
@@ -532,17 +541,17 @@ class Output:
 
     def publish(self) -> None:
         """Send the message in the buffer in Python, if it is still to be sent."""
-        if not self._cells["is_pending"]:
+        if not self._pending[0]:
             return
-        stamp = self._buffer[4:12].view(np.uint32).tolist()
         for entry in self._held:
+            stamp = self._buffer[4:12].view(np.uint32).tolist()
             entry.hold(stamp[0] * wire.SECOND_NS + stamp[1], self._source)
-        data, sent_ns = self._buffer.tobytes(), self._cells["pending_ns"]
+        data, sent_ns = self._buffer.tobytes(), self._pending_ns[0]
         self._publisher.send(data)
         if self._tap is not None:
             self._tap.give(data, sent_ns)
-        self._cells["is_pending"] = 0
-        self._cells["sent"] += 1
+        self._pending[0] = 0
+        self._sent[0] += 1
 
 
 @runtime_checkable

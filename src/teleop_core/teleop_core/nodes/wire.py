@@ -304,6 +304,31 @@ def accept(r: Reading, stamp_ns: int, now_ns: int, time_ns: int) -> int:
 
 
 @kernel
+def look(r: Reading, given: Integers) -> None:
+    """Admit and read a message that Python has taken; ``r.answer`` is :data:`NOTHING` if it was refused.
+
+    Args:
+        r: The input.
+        given: The two halves of the publisher's identifier, the number of the message, the monotonic time [ns], and the
+            address and length of the message. The first is set to the stamp [ns].
+    """
+    r.received += 1
+    reason = admit(r, given[0], given[1], given[2], given[3])
+    if reason:
+        r.refused[reason - 1] += 1
+        r.answer = NOTHING
+        return
+    given[0] = read(r, given[4], given[5])
+    r.answer = NEW if given[0] >= 0 else FOREIGN
+
+
+@kernel
+def answer_accept(r: Reading, given: Integers) -> None:
+    """:func:`accept` of a stamp and two times, with its answer in the record."""
+    r.answer = accept(r, given[0], given[1], given[2])
+
+
+@kernel
 def take(r: Reading, calls: Calls) -> int:
     """Take messages from the middleware until one is valid, and write it to the signals.
 
