@@ -172,7 +172,8 @@ def test_an_export_never_comes_before_a_loop_of_the_machine(codec: str, tmp_path
     video.add(av.VideoFrame.from_ndarray(flat(0)), 0, 1)
     policies = {os.sched_getscheduler(int(thread)) for thread in os.listdir("/proc/self/task")}
     video.close()
-    assert policies == {os.sched_getscheduler(0)} == {os.SCHED_OTHER}
+    assert os.sched_getscheduler(0) == os.SCHED_OTHER
+    assert policies.isdisjoint({os.SCHED_FIFO, os.SCHED_RR})
 
 
 def uyvy(pixels: Any) -> Any:

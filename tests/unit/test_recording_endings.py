@@ -1,6 +1,7 @@
 """Ends of recordings when their directory is moved, removed or in the way, and on a full disk."""
 
 import os
+import queue
 import resource
 import shutil
 import signal
@@ -10,13 +11,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from mcap.reader import make_reader
 from rosbags.highlevel import AnyReader
 
-from patience import wait_until
 from teleop_core.bags.mcap_source import McapSource
 from teleop_core.bags.reader import Bag, recover
 from teleop_core.bags.writer import BagWriter
+from teleop_core.base.background import System
 from teleop_core.base.errors import RecordingError
 from teleop_core.graph import topics
 
@@ -52,16 +52,27 @@ def assert_holds(path: Path, count: int = SECONDS * 1000) -> None:
         assert sum(1 for _ in reader.messages()) == count
 
 
-def whole_chunks(path: Path, compression: str) -> int:
-    """Bytes of a recording of the same seconds up to its last chunk, which is written at the end only."""
-    with BagWriter(path, [TOPIC], JOINTS, compression=compression) as writer:
-        for number in range(SECONDS):
-            writer.write_block(second(number))
-    (file,) = path.glob("*.mcap")
-    with file.open("rb") as stream:
-        summary = make_reader(stream).get_summary()
-    assert summary is not None
-    return int(summary.chunk_indexes[-1].chunk_start_offset)
+class Jobs(queue.Queue[Any]):
+    """Queue of a writer that knows when a job is done: the writer then asks for the next."""
+
+    has_given = False
+
+    def get(self, *arguments: Any, **options: Any) -> Any:
+        if self.has_given:
+            self.task_done()
+        self.has_given = True
+        return super().get(*arguments, **options)
+
+
+class Waiting(System):
+    """Threads and files of the system; :meth:`wait` returns when all that was given has been written."""
+
+    def queue(self, size: int) -> Jobs:
+        self.jobs = Jobs(size)
+        return self.jobs
+
+    def wait(self) -> None:
+        self.jobs.join()
 
 
 @pytest.mark.parametrize("size", [0, 100, 300_000, 600_000])
@@ -69,13 +80,12 @@ def whole_chunks(path: Path, compression: str) -> int:
 def test_a_file_that_is_truncated_while_it_is_recorded_goes_on_and_its_loss_is_told(
     size: int, compression: str, tmp_path: Path
 ) -> None:
-    path, written = tmp_path / "bag", SECONDS * 1000
-    writer = BagWriter(path, [TOPIC], JOINTS, compression=compression)
+    path, written, background = tmp_path / "bag", SECONDS * 1000, Waiting()
+    writer = BagWriter(path, [TOPIC], JOINTS, compression=compression, background=background)
     for number in range(SECONDS):
         writer.write_block(second(number))
     (file,) = path.glob("*.mcap")
-    whole = whole_chunks(tmp_path / "sound", compression)  # a chunk that is being written would fill the file again
-    wait_until(lambda: file.stat().st_size >= whole, "all whole chunks on the disk", 60)
+    background.wait()  # a chunk that is being written would fill the file again
     os.truncate(file, size)
     writer.write_block(second(SECONDS))
     with pytest.raises(RecordingError, match="was truncated by another program during the recording") as told:
@@ -90,11 +100,12 @@ def test_a_file_that_is_truncated_while_it_is_recorded_goes_on_and_its_loss_is_t
 
 
 def test_a_file_that_is_truncated_just_before_its_end_is_no_whole_recording(tmp_path: Path) -> None:
-    writer = BagWriter(tmp_path / "bag", [TOPIC], JOINTS, compression="none")
+    background = Waiting()
+    writer = BagWriter(tmp_path / "bag", [TOPIC], JOINTS, compression="none", background=background)
     writer.write_block(second(0))
     writer.write_block(second(1))
     (file,) = (tmp_path / "bag").glob("*.mcap")
-    wait_until(lambda: writer._jobs.empty() and file.stat().st_size > 400_000, "two blocks on the disk", 60)
+    background.wait()
     os.truncate(file, 0)
     with pytest.raises(RecordingError, match="2000 messages are lost; 0 messages are safe"):
         writer.close()
