@@ -152,3 +152,23 @@ def test_an_arm_that_begins_inside_another_body_is_told() -> None:
     (note,) = odd(more)[1].notes
     assert "mm inside" in note
     assert "ball" in note
+
+
+BESIDE = """<mujoco><asset><model name="arm" file="{urdf}"/></asset><worldbody>
+  <body name="block" pos="1.5 0 0.02"><freejoint/><geom type="box" size="0.02 0.02 0.02"/></body>
+  <frame pos="0 0 0.1"><attach model="arm" body="base_link" prefix="arm_"/></frame>
+  <geom type="plane" size="2 2 0.1"/></worldbody></mujoco>"""
+
+
+def test_an_arm_from_a_urdf_in_a_scene_has_the_kinematics_of_the_urdf_and_follows(
+    rng: np.random.Generator, tmp_path: Path
+) -> None:
+    urdf = Path(__file__).resolve().parents[2] / "examples" / "ur5e.urdf"
+    (file := tmp_path / "beside.xml").write_text(BESIDE.format(urdf=urdf), encoding="utf-8")
+    alone, robot = tc.load_robot(str(urdf), tip="tool0"), tc.load_robot(str(file), tip="arm_tool0")
+    assert robot.joint_names == tuple(f"arm_{name}" for name in alone.joint_names)
+    for q in rng.uniform(alone.lower, alone.upper, (20, alone.n)):
+        np.testing.assert_allclose(robot.fk(q), alone.fk(q), atol=1e-9)
+    assert {path.name for path in models.files_of(file).values()} == {"beside.xml", "ur5e.urdf"}
+    score = tc.run("free_motion", duration=3.0, robot=robot).score()
+    assert score.position_error_mm.rms < 0.1
