@@ -289,11 +289,12 @@ HAND_NUMBERS = np.array([3e-4, 6e-3, 10.0])
 @pytest.mark.parametrize(("left", "after"), [(5e-3, 0.0), (-1e-3, -1e-3)])
 def test_a_touch_that_is_over_leaves_nothing_to_give_but_what_is_owed(left: float, after: float) -> None:
     memory, port, push, still = np.zeros(12), np.zeros(len(ENERGY)), np.zeros(3), np.zeros(3)
+    heard = port.copy()
     port[MARGIN] = left
-    tdpa_hand(HAND_NUMBERS, memory, still, still, still, still, still, port, push, 1.0, 1e-3)
+    tdpa_hand(HAND_NUMBERS, memory, still, still, still, still, heard, port, push, 1.0, 1e-3)
     assert port[MARGIN] == after
     push[0] = 1.0
-    tdpa_hand(HAND_NUMBERS, memory, still, still, still, still, still, port, push, 1.0, 1e-3)
+    tdpa_hand(HAND_NUMBERS, memory, still, still, still, still, heard, port, push, 1.0, 1e-3)
     assert push[0] <= 0.005
 
 
