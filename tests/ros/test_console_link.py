@@ -23,9 +23,6 @@ if TYPE_CHECKING:
     from ros.conftest import Peer
 
 pytestmark = [pytest.mark.ros, pytest.mark.slow]
-shares_a_session = (
-    pytest.mark.soak
-)  # whose process ended with SIGSEGV in rclpy's send_response in about half of the runs
 
 
 @pytest.fixture(scope="module")
@@ -51,7 +48,6 @@ def state(link: LiveLink) -> Any:
     return link.view().arms[""].operation_text.split(",")[0].split(":")[0]
 
 
-@shares_a_session
 def test_the_view_has_fresh_streams_of_the_arm_and_says_where_it_is_recorded(live: Any) -> None:
     _, link, out = live
     first = dict(link.view().arms[""].stamp_ns)
@@ -72,7 +68,6 @@ def test_the_view_has_fresh_streams_of_the_arm_and_says_where_it_is_recorded(liv
     np.testing.assert_allclose(link.arms[0].robot.fk(q)[:3, 3], tip, atol=1e-3)
 
 
-@shares_a_session
 def test_commands_are_obeyed_and_answered(live: Any) -> None:
     _, link, _ = live
     wait_until(lambda: state(link) == "ENABLED", "enabled")
@@ -85,7 +80,6 @@ def test_commands_are_obeyed_and_answered(live: Any) -> None:
     wait_until(lambda: state(link) == "ENABLED", "enabled again")
 
 
-@shares_a_session
 def test_the_emergency_stop_is_latched_until_it_is_released_reset_and_enabled(live: Any) -> None:
     _, link, _ = live
     link.press(is_pressed=True)
@@ -96,7 +90,6 @@ def test_the_emergency_stop_is_latched_until_it_is_released_reset_and_enabled(li
     wait_until(lambda: link.command("enable")[0], "enabled")
 
 
-@shares_a_session
 def test_mode_that_the_button_of_the_stylus_changes_is_told_as_a_changed_parameter(live: Any) -> None:
     _, link, _ = live
     wait_until(lambda: state(link) == "ENABLED", "enabled")
@@ -106,7 +99,6 @@ def test_mode_that_the_button_of_the_stylus_changes_is_told_as_a_changed_paramet
         wait_until(lambda: link.changes().get(("motion_scaling", "mode")) == mode, mode)
 
 
-@shares_a_session
 def test_parameters_come_with_bounds_and_meaning_and_a_refusal_with_its_reason(live: Any) -> None:
     _, link, _ = live
     known = link.parameters()
@@ -121,7 +113,6 @@ def test_parameters_come_with_bounds_and_meaning_and_a_refusal_with_its_reason(l
     assert link.change("nobody", "fine_gain", 0.3)
 
 
-@shares_a_session
 def test_the_buttons_of_the_stylus_switch_mode_and_box(live: Any) -> None:
     _, link, _ = live
     before = link.view().arms[""].state["is_fine"]
@@ -134,7 +125,6 @@ def test_the_buttons_of_the_stylus_switch_mode_and_box(live: Any) -> None:
     assert (found[1] > 0.0).all()
 
 
-@shares_a_session
 def test_a_saved_recording_is_there_under_its_name_and_the_next_one_goes_on(live: Any) -> None:
     session, link, out = live
     for name in ("", "a/b", "..", "a b"):

@@ -19,7 +19,7 @@ from teleop_core.kernels.fields import Cells
 from teleop_core.kernels.memory import integers
 from teleop_core.middleware.world import Taken
 from teleop_core.nodes import wire
-from teleop_core.nodes.streams import READING, Calls, Input, Output, describe
+from teleop_core.nodes.streams import READING, WRITING, Input, Output, calls_of, describe
 
 JOINTS = ("a", "shoulder", "b2")
 STREAMS = (
@@ -144,11 +144,11 @@ def test_what_kernels_publish_is_what_another_reader_deserialises(topic: Any) ->
     queue, random = Queue(True), np.random.default_rng(3)
     source = values_of(topic, random)
     output = Output(queue, Publisher(queue), layout(topic, JOINTS), source, topic.name)  # type: ignore[arg-type]
-    place, calls = np.zeros(2, np.int64), Calls(queue)  # type: ignore[arg-type]
+    place, calls = np.zeros(2, np.int64), calls_of(queue)  # type: ignore[arg-type]
     outputs = np.asarray(output.own).reshape(1).view(output.own.dtype)
     block = records([("is_open", "i8"), ("at", "i8"), ("room", "i8"), ("fill", "i8")])[0]
     output.write(NOW_NS, 0, 0)
-    wire.send_all(outputs, calls.own, block, place)
+    wire.send_all(outputs, calls, block, place)
     assert (place[0], output.sent, len(queue.published)) == (1, 1, 1)
     found = read_values(topic.kind, deserialise(queue.published[0], topic.ros_type), topic.names(JOINTS))
     assert not isinstance(found, Refusal)
@@ -158,8 +158,20 @@ def test_what_kernels_publish_is_what_another_reader_deserialises(topic: Any) ->
     queue.readers = 0
     output.write(NOW_NS + 1, 0, 0)
     place[0] = 0
-    wire.send_all(outputs, calls.own, block, place)
+    wire.send_all(outputs, calls, block, place)
     assert (output.sent, len(queue.published)) == (2, 1), "nobody reads it, so it is not published"
+
+
+def test_what_the_middleware_answers_is_written_into_the_record_that_the_kernel_holds() -> None:
+    queue = Queue(True)
+    calls: Any = calls_of(queue)  # type: ignore[arg-type]
+    queue.now_ns = 7 * wire.SECOND_NS + 5
+    place, times = np.zeros(2, np.int64), np.zeros(2, np.int64)
+    wire.write_all(records(WRITING, 0), calls, place, times)
+    assert times.tolist() == [queue.monotonic_ns(), queue.time_ns()]
+    whole = np.asarray(calls)
+    assert calls["time"].tolist() == list(divmod(queue.time_ns(), wire.SECOND_NS))
+    assert whole.ctypes.data <= calls["time"].ctypes.data < whole.ctypes.data + whole.nbytes
 
 
 class Publisher:

@@ -19,7 +19,7 @@ from teleop_core.kernels.geometry import Array
 from teleop_core.middleware.world import Publisher, World
 from teleop_core.nodes import wire
 from teleop_core.nodes.feed import NO_BLOCK, Feed
-from teleop_core.nodes.streams import READING, WRITING, Calls, Input, Output, Tap
+from teleop_core.nodes.streams import READING, WRITING, Input, Output, Tap, calls_of
 
 Feeds = Callable[[str], list[tuple[str, float]]]
 """Function from a port to the topics that feed it, each with its delay [s]."""
@@ -68,14 +68,14 @@ class Ports:
         self._base = np.asarray(signals).ctypes.data, signals.dtype.fields
         self._make_inputs(owner, signals, feeds, joint_names, buttons)
         self._make_outputs(owner, signals, publisher, joint_names)
-        self._calls = Calls(self._world) if self._world is not None else None
+        self._calls = calls_of(self._world) if self._world is not None else None
         self._feed: Feed | None = None
         # First input to read, and the port to leave out; first output to write, and the stamp of samples [ns].
         self._reading, self._writing = np.array((0, -1)), np.zeros(2, np.int64)
         self._times = np.zeros(2, np.int64)
-        self._has_clock = self._calls is not None and bool(self._calls.own["clock"])
+        self._has_clock = self._calls is not None and bool(self._calls["clock"])
         if self._calls is not None:
-            self._bind(self._calls.own)
+            self._bind(self._calls)
 
     def _make_inputs(
         self, owner: Any, signals: Any, feeds: Feeds, joint_names: tuple[str, ...], buttons: tuple[int, ...]
@@ -229,7 +229,7 @@ class Ports:
         for topic, output in self.outputs.items():
             output.connect(taps.get(topic.name))
         if self._calls is not None:
-            self._bind(self._calls.own)
+            self._bind(self._calls)
 
     def mute(self) -> None:
         """Send nothing from now on, because another node publishes these topics."""
@@ -238,7 +238,7 @@ class Ports:
         self.outputs, self._sent = {}, []
         self._write_records = self._write_records[:0]
         if self._calls is not None:
-            self._bind(self._calls.own)
+            self._bind(self._calls)
 
     def concerns(self) -> list[str]:
         """Texts about problems of the stage's outputs."""

@@ -17,7 +17,7 @@ from teleop_core.bags import messages
 from teleop_core.base.errors import MessageTypeError
 from teleop_core.graph.topics import Kind, Topic
 from teleop_core.kernels import held, record_dtype, records
-from teleop_core.kernels.fields import Cells, Integers, fields_of
+from teleop_core.kernels.fields import Cells, Integers, fields_of, record
 from teleop_core.kernels.geometry import Array
 from teleop_core.kernels.memory import integers, octets
 from teleop_core.middleware.world import Owner, Publisher, Taken, Taker, World
@@ -113,22 +113,12 @@ def load() -> None:
     wire.write_one(writing, 0, 0, 0)
 
 
-class Calls:
-    """C functions of a world for the kernels of its nodes.
-
-    Args:
-        world: World of the nodes.
-
-    Attributes:
-        own: Record of :class:`~teleop_core.nodes.wire.Calls`.
-    """
-
-    def __init__(self, world: World) -> None:
-        self.own: Any = records(fields_of(wire.Calls))[0]
-        self._time, self._count = np.zeros(2, np.int64), np.zeros(1, np.int64)
-        for name, address in world.functions().items():
-            self.own[name] = address
-        self.own["time_at"], self.own["count_at"] = self._time.ctypes.data, self._count.ctypes.data
+def calls_of(world: World) -> wire.Calls:
+    """C functions of a world for the kernels of its nodes."""
+    own = record(wire.Calls)
+    for name, address in world.functions().items():
+        own[name] = address
+    return own
 
 
 class RareTakers:
@@ -144,7 +134,7 @@ class RareTakers:
         found = [getattr(taker, "places", None) for taker in own]
         self._look: Callable[[], None] | None = None
         if all(places is not None for places in found):
-            self._look = held(wire.take_raw, np.array(found, np.int64), Calls(world).own, self._count)
+            self._look = held(wire.take_raw, np.array(found, np.int64), calls_of(world), self._count)
 
     def next(self, count: int) -> tuple[int, Taken] | None:
         """Index of one of the first ``count`` subscriptions, and its oldest message; None if none has a message."""
@@ -210,9 +200,9 @@ class Input:
         self._describe()
         self._bytes = bytearray(self._cells["size"] + _SPARE)
         self._bytes_at = np.frombuffer(self._bytes, np.uint8).ctypes.data
-        calls = Calls(self._world)
+        calls = calls_of(self._world)
         kernels = wire.answer_take, wire.answer_newest
-        self._take, self._newest = (held(kernel, own, calls.own) for kernel in kernels)
+        self._take, self._newest = (held(kernel, own, calls) for kernel in kernels)
         given = np.zeros(6, np.int64)
         self._given = given.data  # faster to set than the array
         self._look, self._judge = (held(kernel, own, given) for kernel in (wire.look, wire.answer_accept))

@@ -43,7 +43,8 @@ _FRAME = 20  # bytes of a feed's frame before its message
 class Calls(Fields):
     """Addresses of the C functions of the middleware and of the clock; all 0 in a world that has none.
 
-    The clock writes seconds and nanoseconds to ``time_at``.
+    What they answer is written into the record itself: seconds and nanoseconds of the clock, and a number of
+    subscriptions. Memory beside it could be freed while a kernel that holds the record still has its address.
     """
 
     take: int
@@ -51,8 +52,8 @@ class Calls(Fields):
     publish: int
     matched: int
     clock: int
-    time_at: int
-    count_at: int
+    time: Annotated[Integers, 2]
+    count: Annotated[Integers, 1]
 
 
 class Form(Fields):
@@ -163,9 +164,8 @@ class Block(Fields):
 @inner
 def read_clock(calls: Calls, kind: int) -> int:
     """Time of a clock of the system [ns]; ``kind`` is 0 for the time of day, 1 for the monotonic clock."""
-    call(calls.clock, kind, calls.time_at, 0, 0)
-    time = integers(calls.time_at, 2)
-    return time[0] * SECOND_NS + time[1]
+    call(calls.clock, kind, calls.time.ctypes.data, 0, 0)
+    return calls.time[0] * SECOND_NS + calls.time[1]
 
 
 # -- inputs ----------------------------------------------------------------------------------------
@@ -573,11 +573,10 @@ def send_all(outputs: Array, calls: Calls, block: Block, place: Integers) -> Non
         if not w.writer or (w.is_fed and block.is_open and not _feed(w, block)):
             place[0] = i
             return
-        count = integers(calls.count_at, 1)
-        count[0] = 1
+        calls.count[0] = 1
         if not w.is_latched:
-            call(calls.matched, w.writer, calls.count_at, 0, 0)
-        if count[0]:
+            call(calls.matched, w.writer, calls.count.ctypes.data, 0, 0)
+        if calls.count[0]:
             call(calls.publish, w.writer, w.message_at, 0, 0)
         if w.is_fed:
             w.fed += 1
