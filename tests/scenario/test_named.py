@@ -29,11 +29,11 @@ AGREEING = {
     "repeatability": 6, "responses": 5, "accuracy": 30, "master_slave": 7, "controllers": 2,
     "gravity": 6, "robustness": 0, "shares": 0, "points24": 1, "stability": 15, "zwidth": 29,
     "transparency": 112, "drift": 42, "puncture": 27, "fitts": 14, "delay": 5,
-    "scaling_under_delay": 3, "uva": 74, "mma_frames": 39, "mma_balance": 15, "hybrid": 18,
+    "move_and_wait": 14, "scaling_under_delay": 3, "uva": 74, "mma_frames": 39, "mma_balance": 15, "hybrid": 18,
     "parallel_robots": 6, "operator_models": 0, "blind": 124,
 }  # fmt: skip
 """Published figures, laws and goals that each experiment agrees with."""
-LONG_EXPERIMENTS = ("stability", "transparency", "operator_models")
+LONG_EXPERIMENTS = ("stability", "transparency", "operator_models", "move_and_wait")
 """Half a minute and more each; tests/unit has their laws with fewer cases."""
 TRACKED_MM = {"coarse_box": 0.289, "fine_box": 0.260, "human": 0.114, "point": 0.153, "uva_board": 0.105}
 """Root mean square of each scenario's position error, where it is above a tenth."""

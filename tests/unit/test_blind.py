@@ -11,6 +11,7 @@ from teleop_core.graph.topics import TASK_STATE
 from teleop_core.hand.tasks import MEMORY, SCENE, Act, Task
 from teleop_core.hand.tasks.catch import CATCH, CatchParameters
 from teleop_core.hand.tasks.point import POINT, PointParameters
+from teleop_core.hand.tasks.trace import TRACE, TraceParameters
 from teleop_lab.experiments import blind
 from teleop_lab.studies.study import read_study
 
@@ -99,13 +100,28 @@ def test_a_target_that_stays_is_set_anew_only_by_a_hit_and_its_time_runs_on() ->
     assert np.linalg.norm(task.goal - first) > 0.02
 
 
-def test_a_ring_by_entering_counts_the_tip_inside_without_a_press() -> None:
-    task = Judged(POINT, PointParameters(by_entering=True))
+@pytest.mark.parametrize("stays", [False, True])
+def test_a_ring_by_entering_counts_the_tip_inside_once_without_a_press(stays: bool) -> None:
+    task = Judged(POINT, PointParameters(by_entering=True, stays=stays))
     assert task.value("act") == Act.PASS
     for count in range(1, 4):
         task.scene[1:4] = task.goal
         task.judge(0.5)
         assert (task.value("attempts"), task.value("successes")) == (count, count)
+
+
+def test_a_point_that_waits_goes_on_by_a_step_each_time_the_tip_is_near() -> None:
+    parameters = TraceParameters(waits=True, diameter=0.04, step=0.5, period=4.0)
+    task = Judged(TRACE, parameters)
+    begin = task.goal.copy()
+    for count in range(1, 5):
+        task.scene[1:4] = begin + [0.1, 0.0, 0.0]
+        task.judge(3.0)
+        assert task.value("attempts") == count - 1, "it waits, whatever the time"
+        task.scene[1:4] = task.goal
+        task.judge(0.002)
+        assert task.value("successes") == count
+    assert task.goal - begin == pytest.approx([0.0, 0.0, 0.04], abs=1e-12)  # half of the ring in four of eight steps
 
 
 def test_a_target_to_catch_accelerates_from_rest_and_one_press_ends_the_turn() -> None:

@@ -252,6 +252,24 @@ class Bench:
         self.rows.append(row)
         self.tips.append(self.tip.copy())
 
+    def be_late(self, late: float) -> None:
+        """Show the tip with another delay [s] from now on."""
+        self._shown = deque([self._shown[-1]] * (1 + round(late / TICK)), maxlen=1 + round(late / TICK))
+
+    def times(self, goals: int) -> list[float]:
+        """Times [s] to press in targets, to and fro."""
+        found = list[float]()
+        for i in range(goals):
+            self.ask(np.array([0.0, 0.02 * (-1) ** i, 0.0]), Act.PRESS)
+            begin, closed = len(self.rows), False
+            while not closed:
+                assert len(self.rows) - begin < 60_000, "it never presses"
+                self.go_on(0.016)
+                closed = self.rows[-1][12] > 0.0
+            found.append((len(self.rows) - begin) * TICK)
+            self.go_on(0.08)  # the press ends
+        return found
+
     @property
     def presses(self) -> int:
         """How often the clutch was pressed."""
@@ -329,6 +347,16 @@ def test_where_the_arm_ends_the_hand_is_brought_back_and_tries_again() -> None:
     bench.go_on(12.0)
     assert bench.presses >= 2
     assert np.abs(np.array(bench.rows)[:, :3]).max() < 0.06  # it does not push on and on
+
+
+@pytest.mark.parametrize(("first", "then"), [(0.05, 1.0), (0.05, 2.5), (2.0, 0.05)])
+def test_a_person_finds_out_that_the_screen_has_become_later_or_sooner(first: float, then: float) -> None:
+    constants = ObserverParameters(noise=0.0, **PLAIN | {"longest_wait": 6.0})
+    bench, used_to_it = Bench(constants, late=first), Bench(constants, late=then)
+    bench.times(4)
+    bench.be_late(then)
+    bench.times(6)
+    assert bench.times(4) == pytest.approx(used_to_it.times(8)[4:], abs=0.05)
 
 
 @pytest.mark.parametrize("gap", [0.006, 0.012])

@@ -80,6 +80,7 @@ EXPERIMENTS: Registry[Experiment] = Registry(
         "blind": f"{_PLACE}.blind:BLIND",
         "delay": f"{_PLACE}.delay:DELAY",
         "scaling_under_delay": f"{_PLACE}.delay:SCALING_UNDER_DELAY",
+        "move_and_wait": f"{_PLACE}.move_and_wait:MOVE_AND_WAIT",
         "uva": f"{_PLACE}.uva:UVA",
         "mma_frames": f"{_PLACE}.mma_frames:MMA_FRAMES",
         "mma_balance": f"{_PLACE}.mma_spring:MMA_BALANCE",

@@ -314,7 +314,7 @@ NETWORK = Stage(
     optional=(MASTER_ENERGY, SLAVE_ENERGY, SLAVE_JAW_SERVO_JP, SLAVE_SERVO_CF),
     replaces=_TAKEN,
     spares=(
-        "slave/measured_cf@passivity", "slave/measured_cp@passivity",
+        "slave/servo_cp@display", "slave/measured_cf@passivity", "slave/measured_cp@passivity",
         "slave/measured_cf@impedance", "slave/setpoint_cp@impedance",
     ),
     on_demand=(

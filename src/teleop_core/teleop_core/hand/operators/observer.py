@@ -67,6 +67,8 @@ class Observer:
         self._number = 0.0
         self._next = 0.0  # time before which the operator does not move [s]
         self._half_seen = math.inf  # time at which half of the last motion was seen [s]
+        self._sooner = math.inf  # time at which half of a motion was seen, too soon for the believed lag [s]
+        self._before: Glance | None = None  # what was seen before the last motion could be seen, if the lag is long
         self._is_still = self._was_felt = False  # whether the end of the last motion was seen; whether it was only felt
         self._close = -math.inf  # time at which the hand closes for a moment [s]
         self._holds, self._since = False, -math.inf  # whether the hand stays closed, and since which time [s]
@@ -196,8 +198,7 @@ class Observer:
         if math.isinf(self._half_seen) and not is_pressed:
             self._half_seen = self._half_way(move, until)
         if math.isinf(self._half_seen):
-            late = end + self._patience()
-            return late if late <= until else math.inf
+            return self._given_up(move, until)
         when = self._half_seen + 0.5 * move.duration
         if when > until or self._is_still:
             return when
@@ -206,6 +207,23 @@ class Observer:
             self._half_seen += until - when + 1e-3
             return math.inf
         return when
+
+    def _given_up(self, move: Move, until: float) -> float:
+        """Time at which the operator goes on without having seen a motion [s]; infinite if it is after ``until``.
+
+        The screen is then believed to be as late as that at least, unless the arm is at its end.
+        """
+        late = move.begin + move.duration + self._patience()
+        if late > until:
+            return math.inf
+        if not self._has_stopped:
+            self._lag = max(self._lag, late - self._p.eye - move.begin - 0.5 * move.duration)
+        return late
+
+    @property
+    def _has_stopped(self) -> bool:
+        """Whether the arm is seen at the end of its range."""
+        return bool(self._seen.state[STATE["limit"]] in _ENDS)
 
     def _has_ended(self, move: Move, when: float) -> bool:
         """Whether a motion is seen at rest at a time [s]: for longer, if it is not where the hand felt it end.
@@ -245,18 +263,33 @@ class Observer:
         return np.concatenate((b.tip[:3] - a.tip[:3], lever * turn))
 
     def _half_way(self, move: Move, until: float) -> float:
-        """Time at which the tip was seen at half of the path [s]; infinite if this was not before ``until``."""
-        unseen, whole = move.unseen, float(dot(move.unseen, move.unseen))
-        half = 1.0 - 0.5 * float(length(move.way.both)) / math.sqrt(whole)
-        gone = [
-            (glance.time, float(dot(self._gone(move.seen, glance), unseen)) / whole)
-            for glance in self._glances.since(move.begin, until)
-        ]
-        at = crossing(gone, half)
+        """Time at which the tip was seen at half of the path [s]; infinite if this was not before ``until``.
+
+        What is seen before half of a long lag is the rest of an earlier motion, unless nothing is seen later.
+        """
+        at, soonest = self._passes_half(move, move.seen, move.begin, until), move.begin + 0.5 * self._lag
+        if soonest > move.begin + self._p.eye and np.array_equal(move.unseen, move.way.both):
+            self._sooner = min(self._sooner, at)
+            if until < soonest + self._p.eye:
+                return math.inf
+            self._before = self._before or self._glances.at(soonest + self._p.eye)
+            at = self._passes_half(move, self._before, soonest, until)
+            if math.isinf(at) and until >= move.begin + move.duration + self._patience():
+                at = max(self._sooner, soonest + 0.5 * move.duration)  # so the believed lag becomes half
         if math.isinf(at):
             return at
         self._lag = max(at - move.begin - 0.5 * move.duration, 0.0)
         return at + self._p.eye
+
+    def _passes_half(self, move: Move, before: Glance, begin: float, until: float) -> float:
+        """Time on the screen, from ``begin`` [s] on, at which the tip has passed half of a path since ``before``."""
+        unseen, whole = move.unseen, float(dot(move.unseen, move.unseen))
+        half = 1.0 - 0.5 * float(length(move.way.both)) / math.sqrt(whole)
+        gone = [
+            (glance.time, float(dot(self._gone(before, glance), unseen)) / whole)
+            for glance in self._glances.since(begin, until)
+        ]
+        return crossing(gone, half)
 
     def _patience(self) -> float:
         """Time for which the operator waits, after the end of a motion, until the motion becomes visible [s]."""
@@ -265,6 +298,11 @@ class Observer:
             return p.longest_wait
         return min(p.longest_wait, 2.0 * p.eye + 1.5 * self._lag + p.least_time)
 
+    def _is_unseen(self, move: Move, seen: Glance) -> bool:
+        """Whether the operator gave up waiting for a motion of which nothing was seen: it may still be seen later."""
+        is_given_up = math.isinf(self._half_seen) and not (move.is_clutched or self._has_stopped)
+        return is_given_up and bool(length(self._gone(move.seen, seen)) <= _STILL * length(move.unseen))
+
     def _begin(self, now: float, seen: Glance, way: Way) -> None:
         """Begin a submovement; bring the hand back instead if the hand or the arm is at the end of its range."""
         p = self._p
@@ -272,7 +310,7 @@ class Observer:
         step = product(self._hand_of_slave, way.step) / gain
         turn = self._turns_of_hand.of_hand(way.turn, self._hand[3:]) if way.turn.any() else way.turn
         was_back, fits = self._move is not None and self._move.is_clutched, self._room.share(self._hand, step, turn)
-        has_stopped = self._seen.state[STATE["limit"]] in _ENDS and self._move is not None
+        has_stopped = self._has_stopped and self._move is not None
         if ((has_stopped and math.isinf(self._half_seen)) or fits < 1.0) and not was_back:
             self._bring_back(now, seen, *(fits < 1.0) * np.stack((step, turn)))
             return
@@ -292,7 +330,7 @@ class Observer:
         fits = max(self._room.share(self._hand, step, turn), _LEAST_SHARE)  # noise may lead beyond the room
         ended = Way(fits * ended.step, fits * ended.turn, way.lever)
         unseen = ended.both
-        if self._move is not None and self._was_felt:
+        if self._move is not None and (self._was_felt or self._is_unseen(self._move, seen)):
             seen, unseen = seen._replace(tip=self._move.seen.tip), unseen + self._move.unseen
         self._go(Move(now, duration, self._hand, fits * step, fits * turn, seen, ended, unseen))
         self._has_tried = True
@@ -315,6 +353,7 @@ class Observer:
         self._move, self._turns = move, bool(move.turn.any() or move.start[4:].any())
         self._hand = np.concatenate((move.start[:3] + move.step, turned(move.start[3:], move.turn)[0]))
         self._next, self._half_seen = move.begin + move.duration, math.inf
+        self._sooner, self._before = math.inf, None
         self._is_still = self._was_felt = False
 
     def _press(self, when: float, act: int) -> None:

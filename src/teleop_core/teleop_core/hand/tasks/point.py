@@ -46,6 +46,7 @@ def point_judge(numbers: Array, memory: Array, scene: Array, state: Array) -> No
         if not attempts.is_at_goal(scene, state):
             return
         attempts.tell_attempt(memory, scene, state)
+        memory[3] += 1.0
     elif not attempts.was_pressed(memory, scene[8]):
         return
     else:
