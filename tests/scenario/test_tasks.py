@@ -93,7 +93,7 @@ def test_a_display_is_dark_until_the_slave_says_where_it_is() -> None:
 
 
 def frames_of(ticks: int = 20_000, **given: Any) -> np.ndarray:
-    """Times at which each shown frame was taken and came [s], shape (N, 2); frames that no tick ended with are left out."""
+    """Times at which each frame was taken and came [s], shape (N, 2), without frames that stood for no tick."""
     running = STAGES.find("display").run(DisplayParameters(**given))
     row, found = running.signals, []
     for tick in range(1, ticks):
@@ -134,6 +134,17 @@ def test_a_seed_loses_and_delays_the_same_frames_each_time() -> None:
     first, again, other = (frames_of(4000, seed=seed, **given) for seed in (1, 1, 2))
     assert np.array_equal(first, again)
     assert not np.array_equal(first[:50], other[:50])
+
+
+def test_who_sees_a_frame_stand_does_not_take_the_tip_for_being_at_rest() -> None:
+    """Five frames a second cost little more than a steady picture of the same age, which is 0.5 s."""
+    rare, steady = (
+        tc.run("mouse", duration=40.0, display__rate=rate, display__latency=latency).score()
+        for rate, latency in ((5.0, 0.4), (60.0, 0.492))
+    )
+    ages = [one.value("display.age_mean_ms") for one in (rare, steady)]
+    assert ages[0] == pytest.approx(ages[1], abs=2.0)
+    assert (rare.value("task.time_s") or 0.0) < 1.3 * (steady.value("task.time_s") or 0.0)
 
 
 def test_more_frames_than_a_display_keeps_are_refused() -> None:

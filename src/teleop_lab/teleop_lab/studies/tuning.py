@@ -90,8 +90,8 @@ class Tuned:
             return f"All other values tried are worse: {metric} differs by more than {self.least:.2g} (95 %)."
         spans = ", ".join(f"{name} {_span([one.values[name] for one in self.alike])}" for name in self.best.values)
         return (
-            f"Cannot be told apart from the best: {len(self.alike) - 1} of {count - 1} other trials, whose {metric} differs "
-            f"by less than {self.least:.2g} (95 %). Interval of the best: {spans}."
+            f"Cannot be told apart from the best: {len(self.alike) - 1} of {count - 1} other trials, whose {metric} "
+            f"differs by less than {self.least:.2g} (95 %). Interval of the best: {spans}."
         )
 
 

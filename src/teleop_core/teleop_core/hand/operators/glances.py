@@ -49,7 +49,8 @@ class Glances:
         if seen.slave[:3].any():  # otherwise no pose has been shown yet
             tip = seen.slave.copy()
             self._notice_frame(now - seen.age())
-            kept.append(Glance(now, tip, goal.copy(), seen.force[:3].copy(), tip if self._before is None else self._before))
+            before = tip if self._before is None else self._before
+            kept.append(Glance(now, tip, goal.copy(), seen.force[:3].copy(), before))
         while len(kept) > 2 and kept[1].time <= now - self._eye - SETTLED_TIME:
             kept.popleft()
 
