@@ -129,7 +129,7 @@ CODE_MUTANTS = (
     _mutant("late_other_code", "a worker that comes later with other code is not noticed",
             "teleop_lab/studies/workers.py", "if code_digest() != code:", "if False:", "studies"),
     _mutant("worst_is_best", "a search takes the worst values for the best", "teleop_lab/studies/tuning.py",
-            "sign = -1.0 if self.is_largest else 1.0", "sign = 1.0", "tuning"),
+            "max(means) if is_largest else min(means)", "max(means)", "tuning"),
     _mutant("goal_chased", "a goal that jumps is run after as one that moves", "hand/operators/glances.py",
             "glance.goal)) > width:", "glance.goal)) > 1e9:", "observer"),
     _mutant("early_display", "a display shows frames at once", "hand/master/display.py",
