@@ -69,6 +69,7 @@ class DisplayState(Fields):
 @inner
 def _mixed(word: int) -> int:
     """Another word of 32 bits: a bijection whose bits look random (``lowbias32`` of Wellons 2018)."""
+    word = int(word)  # without a compiler a NumPy integer would tell of its overflow
     word = ((word ^ (word >> 16)) * 0x7FEB352D) & _WORD
     word = ((word ^ (word >> 15)) * 0x846CA68B) & _WORD
     return word ^ (word >> 16)
