@@ -1,5 +1,6 @@
 """Tasks in sessions: what is recorded of them agrees with where the tip was, and with the hand."""
 
+import math
 from typing import Any
 
 import numpy as np
@@ -89,6 +90,68 @@ def test_a_display_is_dark_until_the_slave_says_where_it_is() -> None:
         row["slave_measured_cp_ns"] = 0 if tick < 50 else tick * 1_000_000
         running.step()
         assert (row["display_measured_cp_ns"] > 0) == (tick >= 50)
+
+
+def frames_of(ticks: int = 20_000, **given: Any) -> np.ndarray:
+    """Times at which each frame was taken and came [s], shape (N, 2), without frames that stood for no tick."""
+    running = STAGES.find("display").run(DisplayParameters(**given))
+    row, found = running.signals, []
+    for tick in range(1, ticks):
+        row["now_ns"] = row["slave_measured_cp_ns"] = tick * 1_000_000
+        before = int(row["display_measured_cp_ns"])
+        running.step()
+        if row["display_measured_cp_ns"] != before:
+            found.append((1e-9 * row["display_measured_cp_ns"], 1e-3 * tick))
+    return np.array(found)
+
+
+@pytest.mark.parametrize("loss", [0.0, 0.3, 0.9, 1.0])
+def test_the_given_share_of_frames_never_comes(loss: float) -> None:
+    shown = frames_of(rate=100.0, latency=0.0, loss=loss)
+    assert len(shown) == pytest.approx(2000 * (1.0 - loss), abs=4.0 * math.sqrt(2000 * loss * (1.0 - loss)) + 1.0)
+
+
+def test_lost_frames_come_in_no_pattern() -> None:
+    gone = np.round(100.0 * np.diff(frames_of(rate=100.0, latency=0.0, loss=0.5)[:, 0])) - 1.0
+    # As with a coin: the next frame is lost with the same chance, however many were lost before it.
+    assert [np.mean(gone[gone >= n] > n) for n in range(3)] == pytest.approx([0.5] * 3, abs=0.1)
+
+
+@pytest.mark.parametrize("jitter", [0.05, 0.2])
+def test_a_frame_is_late_by_up_to_the_jitter_more_and_never_comes_before_an_earlier_one(jitter: float) -> None:
+    taken, came = frames_of(rate=10.0, latency=0.1, jitter=jitter).T
+    late = came - taken - 0.1
+    assert (np.diff(taken) > 0.0).all()
+    assert late.min() >= -1e-9
+    assert 0.9 * jitter < late.max() <= jitter + 1e-3
+    if jitter < 0.1:  # a frame cannot reach the next one
+        assert late.mean() == pytest.approx(0.5 * jitter, rel=0.15)
+        assert late.std() == pytest.approx(jitter / math.sqrt(12.0), rel=0.15)
+
+
+def test_a_seed_loses_and_delays_the_same_frames_each_time() -> None:
+    given = {"latency": 0.05, "loss": 0.4, "jitter": 0.1}
+    first, again, other = (frames_of(4000, seed=seed, **given) for seed in (1, 1, 2))
+    assert np.array_equal(first, again)
+    assert not np.array_equal(first[:50], other[:50])
+
+
+def test_who_sees_a_frame_stand_does_not_take_the_tip_for_being_at_rest() -> None:
+    """Five frames a second cost little more than a steady picture of the same age, which is 0.5 s."""
+    rare, steady = (
+        tc.run("mouse", duration=40.0, display__rate=rate, display__latency=latency).score()
+        for rate, latency in ((5.0, 0.4), (60.0, 0.492))
+    )
+    ages = [one.value("display.age_mean_ms") for one in (rare, steady)]
+    assert ages[0] == pytest.approx(ages[1], abs=2.0)
+    assert (rare.value("task.time_s") or 0.0) < 1.3 * (steady.value("task.time_s") or 0.0)
+
+
+def test_more_frames_than_a_display_keeps_are_refused() -> None:
+    with pytest.raises(tc.ParameterError, match=r"display\.jitter.*510 frames"):
+        DisplayParameters(rate=240.0, latency=0.5, jitter=2.0)
+    with pytest.raises(tc.ParameterError, match=r"loss.*1\.5"):
+        tc.configuration("point", settings={"display.loss": 1.5})
 
 
 def test_only_the_operator_reads_the_display_wherever_it_stands() -> None:

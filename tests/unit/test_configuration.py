@@ -49,7 +49,7 @@ def test_bare_key_sets_every_stage_that_has_it() -> None:
     stages = ("inverse_kinematics", "slave", "slave_sim", "arm_bridge", "scene")
     assert layer == {name: {"robot": "mma"} for name in stages}
     assert layers.parse_setting("seed=5") == {
-        name: {"seed": 5} for name in ("operator", "haptic_master", "network", "slave_sim")
+        name: {"seed": 5} for name in ("operator", "haptic_master", "display", "network", "slave_sim")
     }
 
 

@@ -351,6 +351,12 @@ def test_dask_workers_give_the_same_bits_with_parts_of_ones_own_and_whoever_come
         assert np.array_equal(mixed[metric].values[:, :2], data[metric].values, equal_nan=True)
 
 
-@pytest.mark.parametrize(("name", "sessions"), [("uva", 1080 // 6), ("ten_thousand", 10_000)])
+@pytest.mark.parametrize(
+    ("name", "sessions"),
+    [
+        ("uva", 1080 // 6), ("ten_thousand", 10_000), ("picture", 96), ("picture_gaps", 96), ("force", 48),
+        ("force_scale", 32),
+    ],
+)  # fmt: skip
 def test_sessions_and_scores_of_a_long_study_can_be(name: str, sessions: int) -> None:
     assert read_study(config_folder() / "studies" / f"{name}.yaml").explain().sessions == sessions

@@ -148,6 +148,8 @@ def test_a_person_who_sees_leads_a_peg_into_its_hole_and_hard_walls_are_felt() -
     assert depth[easy["slave/true_cp"].stamp_ns > easy.bag.start_ns + 6_000_000_000].max() > 0.008
     assert easy.score().value("task.successes") == easy.score().value("task.attempts") != 0
     assert (hard.score().value("task.forced") or 0) > 0
+    assert hard.score().value("task.forced_share") == hard.score().value("task.error_share")
+    assert easy.score().value("task.forced_share") == 0.0
     assert hard.score().value("task.forced") == round(
         (hard.score().value("task.error_share") or 0.0) * (hard.score().value("task.attempts") or 0)
     )

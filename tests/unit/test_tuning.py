@@ -4,13 +4,17 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 import teleop_core as tc
 from teleop_lab import Tuning, read_tuning
-from teleop_lab.studies import Range
+from teleop_lab.studies import Range, Trial, Tuned
+from teleop_lab.studies.summary import least_difference
 
 METRIC = "position_error_mm.rms"
+WITHOUT_EYES = {"teleop.duration": 0.5, "teleop.stages": ("display",)}
+"""A display that the hand of a box does not look at."""
 
 
 def tuning(**changes: Any) -> Tuning:
@@ -59,6 +63,52 @@ def test_a_search_that_was_broken_off_goes_on_to_the_same_values(tmp_path: Path)
 def test_a_score_that_no_session_has_is_told_and_not_taken_for_a_bad_one() -> None:
     with pytest.raises(tc.SessionError, match=r"no trial has touch\.peak_n"):
         tuning(metric="touch.peak_n").run(trials=1, jobs=1)
+
+
+def tried(scores: Any) -> Tuned:
+    """Result of trials with scores (N, M) by trial and seed, at gains 1, 2 and so on."""
+    rows = [tuple(map(float, row)) for row in scores]
+    trials = [Trial({"gain": n}, sum(row) / len(row), "", row) for n, row in enumerate(rows, 1)]
+    return Tuned.of(trials, is_largest=True)
+
+
+def test_the_truly_best_value_is_among_those_that_are_not_told_from_the_best_nineteen_times_in_twenty() -> None:
+    rng, held = np.random.default_rng(1), 0
+    means = np.array([1.0, 0.9, 0.5, 0.5, 0.0])[:, None]
+    for _ in range(400):
+        by_seed = 3.0 * rng.normal(size=4)  # a seed that is easy is easy at every value
+        held += any(one.values["gain"] == 1 for one in tried(means + by_seed + rng.normal(size=(5, 4))).alike)
+    assert held >= 0.95 * 400
+
+
+def test_values_are_told_apart_where_they_differ_by_more_than_the_seeds_do() -> None:
+    noise = np.random.default_rng(2).normal(size=(4, 5))
+    apart, near = tried(np.arange(4.0)[:, None] + 0.01 * noise), tried(np.arange(4.0)[:, None] + 10.0 * noise)
+    assert apart.alike == (apart.best,)
+    assert "All other values tried are worse" in apart.told("score")
+    assert len(near.alike) == 4
+    assert "Cannot be told apart from the best: 3 of 3" in near.told("score")
+    assert near.told("score").endswith("Interval of the best: gain 1 … 4.")
+
+
+def test_one_seed_tells_no_values_apart_and_says_so() -> None:
+    alone = tried([[1.0], [5.0]])
+    assert len(alone.alike) == 2
+    assert "2 seeds or more" in alone.told("score")
+
+
+def test_a_parameter_that_does_nothing_has_the_whole_range_for_its_best_value() -> None:
+    tuned = tuning(searched={"display.latency": Range(0.0, 0.5)}, seeds=(1, 2), settings=WITHOUT_EYES).run(
+        trials=3, jobs=1
+    )
+    assert len(tuned.alike) == 3
+
+
+@pytest.mark.parametrize("seeds", [2, 3, 8])
+def test_what_a_seed_adds_to_all_scores_does_not_count(seeds: int) -> None:
+    scores = np.random.default_rng(3).normal(size=(4, seeds))
+    assert least_difference(scores + 100.0 * np.arange(seeds)) == pytest.approx(least_difference(scores))
+    assert least_difference(scores[:1]) == 0.0
 
 
 def test_choices_and_whole_numbers_are_kept_as_they_are() -> None:
@@ -121,6 +171,8 @@ def test_the_command_prints_the_best_values_and_writes_page_and_numbers(
     page, numbers = tmp_path / "page.html", tmp_path / "numbers.csv"
     given = ["--trials", "2", "--jobs", "1", "--html", str(page), "--csv", str(numbers)]
     assert main(["tune", str(file_of(tmp_path, text)), *given]) == 0
-    assert "best: --set coarse_gain=" in capsys.readouterr().out
+    said = capsys.readouterr().out
+    assert "best: --set coarse_gain=" in said
+    assert "One seed tells no values apart" in said
     assert "coarse_gain" in page.read_text("utf-8")
     assert len(numbers.read_text("utf-8").splitlines()) == 3

@@ -26,7 +26,7 @@ def tune(
     A search is a YAML file:
 
         scenario: point
-        seeds: 3                                        the score is the mean over them
+        seeds: 3                                        the score is the mean over them; 2 or more tell values apart
         set: {display.latency: 0.3}                     the same in all sessions
         tune:                                           a range, or a list of choices
           coarse_gain: {low: 0.1, high: 1.0, log: true}
@@ -57,6 +57,7 @@ def tune(
     if failed:
         print(f"{len(failed)} of {len(tuned.trials)} trials failed; first: {failed[0]}")
     print("best: --set " + " ".join(f"{n}={_text(v)}" for n, v in tuned.best.values.items()))
+    print(tuned.told(tuning.metric))
     outputs.write(lambda: _csv(tuning, tuned), lambda: tuning_page(tuning, tuned, file.stem))
 
 
@@ -65,13 +66,16 @@ def _text(value: object) -> str:
 
 
 def _table(tuning: "Tuning", tuned: "Tuned") -> str:
-    from teleop_lab.studies.summary import table_text
+    import numpy as np
+
+    from teleop_lab.studies.summary import mean_of, table_text
 
     scored = [(n, trial) for n, trial in enumerate(tuned.trials, 1) if trial.score is not None]
     sign = -1.0 if tuning.is_largest else 1.0
     scored.sort(key=lambda pair: sign * (pair[1].score or 0.0))
     rows = [
-        [str(n), *(_text(value) for value in trial.values.values()), _text(trial.score)] for n, trial in scored[:_SHOWN]
+        [str(n), *(_text(value) for value in trial.values.values()), str(mean_of(np.array(trial.scores)))]
+        for n, trial in scored[:_SHOWN]
     ]
     return table_text(["trial", *tuning.searched, tuning.metric], rows)
 

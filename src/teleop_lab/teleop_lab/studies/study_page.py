@@ -72,7 +72,7 @@ def tuning_page(tuning: "Tuning", tuned: "Tuned", title: str) -> str:
         f"{name}={value:.4g}" if isinstance(value, float) else f"{name}={value}"
         for name, value in tuned.best.values.items()
     )
-    told = f"Best: {best}, with {tuning.metric} {tuned.best.score:.4g}."
+    told = f"Best: {best}, with {tuning.metric} {tuned.best.score:.4g}. {tuned.told(tuning.metric)}"
     return page(title, [Text(told)], [Section(parts=figures)])
 
 

@@ -82,6 +82,34 @@ def _drawn(known: Array, statistic: Statistic, seed: int) -> Array:
     return np.asarray(statistic(known[draws], axis=1))
 
 
+def least_difference(scores: Array) -> float:
+    """Least difference of two means that tells the best condition from another one, with a certainty of 95 % for all.
+
+    The seeds are blocks: what a seed adds to all scores does not count. The spread that is left is assumed to be the
+    same in all conditions.
+
+    Args:
+        scores: Scores by condition and seed, shape (N, M).
+
+    Returns:
+        The difference, in the unit of the scores; 0 for one condition, infinite for one seed.
+
+    Source:
+        Hsu 1981, comparisons with the best, by Bonferroni's inequality for the N - 1 other conditions.
+    """
+    from scipy.stats import t as student
+
+    count, seeds = scores.shape
+    if count < 2:
+        return 0.0
+    if seeds < 2:
+        return float("inf")
+    free = (count - 1) * (seeds - 1)
+    left = scores - scores.mean(axis=1, keepdims=True) - scores.mean(axis=0) + scores.mean()
+    spread = np.sqrt((left * left).sum() / free)
+    return float(student.ppf(1.0 - 0.05 / (count - 1), free) * spread * np.sqrt(2.0 / seeds))
+
+
 def conditions(study: "Study", found: "xarray.Dataset") -> "Iterator[tuple[dict[str, Any], Any]]":
     """Yield each combination of the swept values with its part of the data set.
 

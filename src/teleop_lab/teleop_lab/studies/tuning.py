@@ -6,17 +6,22 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from teleop_core.base.errors import ParameterError, SessionError, TeleopError
 from teleop_core.session import api, runner
 from teleop_lab.studies.point import Result
 from teleop_lab.studies.store import Store
-from teleop_lab.studies.study import Study, common, named, read_entries
+from teleop_lab.studies.study import Study, common, is_number, named, read_entries
+from teleop_lab.studies.summary import least_difference
 from teleop_lab.studies.workers import in_processes
 
 _KEYS = ("scenario", "seeds", "set", "tune", "minimize", "maximize", "parts", "duration")
 _TOGETHER = 5
 """Number of trials whose values are chosen together, before any of them runs, so that several processes can run them.
 It is not an option, because the result must not depend on the machine."""
+_ROUNDING = 1e-12
+"""Relative difference of two means that is no difference."""
 
 
 class Range(NamedTuple):
@@ -40,11 +45,13 @@ class Trial(NamedTuple):
         values: Values by parameter.
         score: Mean over the seeds; None if a session failed or has no such score.
         error: Reason why the score is missing.
+        scores: Score of each seed; empty if the score is missing.
     """
 
     values: Mapping[str, api.Setting]
     score: float | None
     error: str
+    scores: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -54,10 +61,46 @@ class Tuned:
     Attributes:
         trials: All trials, in their order.
         best: The best trial.
+        least: Least difference from the best score that is told from chance; infinite with one seed.
+        alike: Trials that cannot be told from the best, with the best itself.
     """
 
     trials: tuple[Trial, ...]
     best: Trial
+    least: float
+    alike: tuple[Trial, ...]
+
+    @staticmethod
+    def of(trials: Sequence[Trial], *, is_largest: bool) -> "Tuned":
+        """Result of trials of which at least one has a score."""
+        scored = [trial for trial in trials if trial.score is not None]
+        means = [trial.score or 0.0 for trial in scored]
+        top = max(means) if is_largest else min(means)
+        least = least_difference(np.array([trial.scores for trial in scored]))
+        near = least + _ROUNDING * abs(top)
+        alike = tuple(trial for trial, mean in zip(scored, means, strict=True) if abs(mean - top) <= near)
+        return Tuned(tuple(trials), scored[means.index(top)], least, alike)
+
+    def told(self, metric: str) -> str:
+        """Sentence that says from which other values the best values cannot be told, and how well they are known."""
+        count = len([trial for trial in self.trials if trial.score is not None])
+        if math.isinf(self.least):
+            return f"One seed tells no values apart; the interval of the best values needs 2 seeds or more ({metric})."
+        if len(self.alike) == 1:
+            return f"All other values tried are worse: {metric} differs by more than {self.least:.2g} (95 %)."
+        spans = ", ".join(f"{name} {_span([one.values[name] for one in self.alike])}" for name in self.best.values)
+        return (
+            f"Cannot be told apart from the best: {len(self.alike) - 1} of {count - 1} other trials, whose {metric} "
+            f"differs by less than {self.least:.2g} (95 %). Interval of the best: {spans}."
+        )
+
+
+def _span(values: Sequence[api.Setting]) -> str:
+    """Range of values that are numbers, or the list of other values."""
+    numbers = [float(value) for value in values if is_number(value)]  # type: ignore[arg-type]
+    if len(numbers) == len(values):
+        return f"{min(numbers):.3g} … {max(numbers):.3g}"
+    return " or ".join(dict.fromkeys(map(str, values)))
 
 
 @dataclass(frozen=True)
@@ -146,11 +189,9 @@ class Tuning:
                 search.tell(trial, found.score, state=fail)
                 done.append(found)
         progress(trials, trials)
-        scored = [trial for trial in done if trial.score is not None]
-        if not scored:
+        if all(trial.score is None for trial in done):
             raise SessionError(f"no trial has {self.metric}; first: {done[0].error}")
-        sign = -1.0 if self.is_largest else 1.0
-        return Tuned(tuple(done), min(scored, key=lambda trial: sign * (trial.score or 0.0)))
+        return Tuned.of(done, is_largest=self.is_largest)
 
     def _values(self, trial: Any) -> dict[str, api.Setting]:
         found: dict[str, api.Setting] = {}
@@ -184,11 +225,12 @@ class Tuning:
         return found
 
     def _trial(self, values: dict[str, api.Setting], results: list[Result], error: str) -> Trial:
-        scores = [one.scores.get(self.metric) for one in results]
+        found = [one.scores.get(self.metric) for one in results]
         error = error or next((one.error for one in results if one.error), "")
-        if error or None in scores:
+        scores = tuple(score for score in found if score is not None)
+        if error or len(scores) < len(found):
             return Trial(values, None, error or f"a recording without {self.metric}")
-        return Trial(values, sum(map(float, scores)) / len(scores), "")  # type: ignore[arg-type]
+        return Trial(values, sum(scores) / len(scores), "", scores)
 
 
 def _optuna() -> Any:

@@ -2,6 +2,7 @@
 
 from teleop_core.evaluation.attempts import Attempts, AttemptsMetric
 from teleop_core.evaluation.metric import figure
+from teleop_core.hand.tasks import Miss
 
 
 class TaskMetric(AttemptsMetric):
@@ -17,9 +18,11 @@ class TaskMetric(AttemptsMetric):
         "count, because it includes the approach",
         "time of an attempt, mean",
     )
+    forced_share = figure("1", "share of the attempts that ended because the tip pressed too hard: share of damage")
 
     def judge(self, tried: Attempts) -> None:
-        """Set the counts and the mean time."""
+        """Set counts, shares and the mean time."""
         self.attempts, self.successes = tried.count, tried.successes
         if tried.count:
             self.error_share, self.time_s = 1.0 - self.successes / tried.count, float(tried.settled("time").mean())
+            self.forced_share = float((tried.column("miss") == Miss.FORCE).mean())

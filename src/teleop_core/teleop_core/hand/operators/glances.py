@@ -11,15 +11,20 @@ STILL_TIME = 0.02
 """A motion is at rest if it changes little in this time [s]."""
 SETTLED_TIME = 0.1
 """A motion that did not end where the hand felt it end is at rest if it changes little in this time [s]."""
+_FRAME = 0.01  # frames are told apart if the tip was measured so much later [s]; clocks of live sessions jitter by less
 
 
 class Glance(NamedTuple):
-    """Data seen and felt at a time [s]: tip (7,) and goal (3,) [m] on the screen, force on the hand (3,) [N]."""
+    """Data seen and felt at a time [s]: tip (7,) and goal (3,) [m] on the screen, force on the hand (3,) [N].
+
+    ``before`` is the tip (7,) on the frame before, if it stood for more than :data:`SETTLED_TIME`; otherwise ``tip``.
+    """
 
     time: float
     tip: Array
     goal: Array
     force: Array
+    before: Array
 
 
 class Glances:
@@ -32,6 +37,8 @@ class Glances:
     def __init__(self, eye: float) -> None:
         self._eye = eye
         self._kept: deque[Glance] = deque()
+        self._measured = -math.inf  # time at which the tip on the screen was measured [s]
+        self._before: Array | None = None  # tip on the frame before, if that frame stood long
 
     def __bool__(self) -> bool:
         return bool(self._kept)
@@ -40,9 +47,19 @@ class Glances:
         """Store the data seen and felt at a time [s], and drop glances that are no longer needed."""
         kept = self._kept
         if seen.slave[:3].any():  # otherwise no pose has been shown yet
-            kept.append(Glance(now, seen.slave.copy(), goal.copy(), seen.force[:3].copy()))
+            tip = seen.slave.copy()
+            self._notice_frame(now - seen.age())
+            before = tip if self._before is None else self._before
+            kept.append(Glance(now, tip, goal.copy(), seen.force[:3].copy(), before))
         while len(kept) > 2 and kept[1].time <= now - self._eye - SETTLED_TIME:
             kept.popleft()
+
+    def _notice_frame(self, measured: float) -> None:
+        """Store the frame before if a new one came, whose tip was measured at a time [s]."""
+        if measured > self._measured + _FRAME:
+            is_rare = len(self._kept) > 0 and measured - self._measured > SETTLED_TIME
+            self._before = self._kept[-1].tip if is_rare else None
+            self._measured = measured
 
     def covers(self, when: float) -> bool:
         """Whether the glance that can be used at a time [s] was taken."""
@@ -56,8 +73,7 @@ class Glances:
             return kept[min(later, len(kept) - 1)]
         a, b = kept[later - 1], kept[later]
         share = (at - a.time) / (b.time - a.time)
-        tip, goal, force = (x + share * (y - x) for x, y in zip(a[1:], b[1:], strict=True))
-        return Glance(at, tip, goal, force)
+        return Glance(at, *(x + share * (y - x) for x, y in zip(a[1:], b[1:], strict=True)))
 
     def since(self, begin: float, until: float) -> list[Glance]:
         """Glances from the time ``begin`` [s] on that can be used at the time ``until`` [s]."""

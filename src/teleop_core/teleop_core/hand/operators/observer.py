@@ -228,7 +228,7 @@ class Observer:
     def _has_ended(self, move: Move, when: float) -> bool:
         """Whether a motion is seen at rest at a time [s]: for longer, if it is not where the hand felt it end.
 
-        An arm that overshoots stands still for a moment at its farthest point.
+        An arm that overshoots stands still for a moment at its farthest point, and a frame that stands shows no motion.
         """
         path, width = float(length(move.way.both)), float(self._seen.task[_WIDTH])
         now, most = self._glances.at(when), _STILL * path
@@ -237,6 +237,8 @@ class Observer:
         beyond = float(dot(self._gone(move.seen, now) - move.unseen, move.unseen)) / float(length(move.unseen))
         if abs(beyond) <= max(0.25 * width, _SAME * path):
             return True
+        if length(self._gone(now._replace(tip=now.before), now)) > most:
+            return False
         return bool(length(self._gone(self._glances.at(when - SETTLED_TIME), now)) <= most)
 
     def _is_at_rest(self, until: float) -> bool:
