@@ -10,7 +10,7 @@ a process loads the kernels and is not counted.
 import argparse
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -41,8 +41,9 @@ def searched(store: Store, seed: int) -> Iterator[Schedule]:
         yield search.choose()
 
 
-def compare(minutes: float, seed: int) -> None:
-    for name, make in (("dice", dice), ("search", searched)):
+def compare(ways: Sequence[str], minutes: float, seed: int) -> None:
+    for name in ways:
+        make = dice if name == "dice" else searched
         with tempfile.TemporaryDirectory() as folder:
             store, used, marks = Store(Path(folder)), 0.0, 0
             for schedule in make(store, seed):
@@ -79,6 +80,7 @@ def cost(count: int, seed: int) -> None:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description="Search beside dice.")
+    parser.add_argument("ways", nargs="*", help="of dice and search; without one, both", default=["dice", "search"])
     parser.add_argument("--minutes", type=float, default=5.0, help="processor time of each")
     parser.add_argument("--seed", type=int, default=0, help="first seed")
     parser.add_argument("--cost", type=int, default=0, help="schedules with and without marks, in place of the search")
@@ -87,7 +89,7 @@ def main() -> None:
     if given.cost:
         cost(given.cost, given.seed)
     else:
-        compare(given.minutes, given.seed)
+        compare(given.ways, given.minutes, given.seed)
 
 
 if __name__ == "__main__":

@@ -271,7 +271,7 @@ def test_every_chosen_schedule_can_be_given_as_a_text(tmp_path: Path) -> None:
         names = PROCESSES[schedule.processes]
         assert all(one.where in names if one.kind in OF_PROCESS else not one.where for one in schedule.faults)
         assert [one.at for one in schedule.faults] == sorted(one.at for one in schedule.faults)
-        assert 1 <= len(schedule.faults) <= 16
+        assert 1 <= len(schedule.faults) <= 30
         assert max(one.at for one in schedule.faults) <= END + 1.0
 
 

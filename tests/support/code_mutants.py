@@ -715,7 +715,7 @@ CODE_MUTANTS = (
             "evaluation/origin.py", "return sum(link.delay for link in links if",
             "return max(link.delay for link in links if", "evaluation_graph"),
     _mutant("all_published", "topics that nobody reads are published too", "nodes/wire.py",
-            "        if count[0]:\n", "        if True:\n", "wire"),
+            "        if calls.count[0]:\n", "        if True:\n", "wire"),
     _mutant("new_untold", "a new message before one of another form is not told", "nodes/streams.py",
             "self.take(), before) or has_found", "self.take(), before)", "wire"),
     _mutant("skips_too_soon", "a loop gives way after one standstill", "nodes/strain.py",

@@ -19,7 +19,7 @@ from teleop_drill.simulation.schedules import BEGIN, END, KINDS, OF_PROCESS, Fau
 from teleop_drill.simulation.seeds import PROCESSES, Found
 from teleop_drill.simulation.store import Store
 
-_MOST = 16
+_MOST = 30
 """Largest number of faults of a schedule."""
 _FRESH = 0.4
 """Share of schedules that are drawn anew; the others are bred from kept ones."""
@@ -27,8 +27,12 @@ _AHEAD = 4
 """A schedule is chosen when all but this many before it are known, so that the number of cores changes nothing."""
 _ROUND = 40  # schedules that share processes: killed simulated processes stay in memory
 _BREAKS = 0.0005
-_LEADS = {State.PAUSED.name: "pause", State.DISABLED.name: "disable"}
-"""Commands that bring an enabled arm into a state."""
+_LEADS = {
+    State.DISABLED.name: ("reset", "disable"),
+    State.ENABLED.name: ("reset", "enable", "resume"),
+    State.PAUSED.name: ("reset", "enable", "pause"),
+}
+"""Commands that bring an arm into a state from any other; the arm refuses those that it does not need."""
 
 
 class Search:
@@ -168,13 +172,14 @@ def switched_on(random: Random) -> list[str]:
 
 
 def _lead(random: Random, state: str, at: float, slave: str) -> list[Fault]:
-    """What brings a following arm into a state shortly before a time [s]."""
+    """What brings an arm into a state shortly before a time [s], from whichever state."""
     if state == State.FAULT.name:
-        return [Fault(at - random.uniform(0.05, 0.6), "press", "", random.uniform(0.1, 1.5), random.random())]
+        return [Fault(at - random.uniform(0.05, 0.4), "press", "", random.uniform(0.1, 0.8), random.random())]
     if state == sometimes.NO_STATE:  # from the start of a new process of the slave until its first report
         dead = random.uniform(0.1, 0.5)
         return [Fault(at - dead - random.uniform(0.0, 0.4), "kill", slave, dead, 0.5)]
-    return [commanded(at - random.uniform(0.1, 0.6), _LEADS[state])] if state in _LEADS else []
+    begin, names = random.uniform(0.2, 0.7), _LEADS[state]
+    return [commanded(at - begin * (1.0 - k / len(names)), name) for k, name in enumerate(names)]
 
 
 def _tidy(random: Random, faults: Sequence[Fault]) -> tuple[Fault, ...]:
