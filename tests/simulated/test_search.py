@@ -119,38 +119,6 @@ def test_branches_that_ran_are_named_by_line_and_side_and_marks_change_no_result
     assert f"part.py:{at}" not in ran
 
 
-_MEASURED = """
-import os, sys
-from pathlib import Path
-from teleop_drill.simulation.branches import Branches
-from teleop_drill.simulation.planned import Schedule
-branches = Branches()
-for name in ("plain", "marked"):
-    Path(name).mkdir()
-    os.chdir(name)
-    if name == "marked":
-        branches.begin()
-    found = Schedule.of(sys.argv[1]).run(Path("bags"))
-    os.chdir("..")
-print(len(branches.ran()))
-"""
-
-
-@pytest.mark.slow
-def test_a_schedule_whose_branches_are_marked_has_the_same_bytes(tmp_path: Path) -> None:
-    text = json.dumps(Schedule(4, draw(4, SIDES)[:2]).plain())
-    done = subprocess.run(
-        [sys.executable, "-c", _MEASURED, text], check=False, capture_output=True, text=True, cwd=tmp_path
-    )
-    assert done.returncode == 0, done.stderr
-    assert int(done.stdout) > 400
-    plain, marked = (
-        [file.read_bytes() for file in sorted((tmp_path / name).rglob("*.mcap"))] for name in ("plain", "marked")
-    )
-    assert plain
-    assert plain == marked
-
-
 # -- a schedule as a text ------------------------------------------------------------------------
 
 
@@ -300,6 +268,38 @@ def test_others_are_bred_from_kept_schedules(tmp_path: Path) -> None:
     search = Search(store, 1)
     shared = [sum((one.kind, one.amount) in short for one in search.choose().faults) for _ in range(60)]
     assert sum(map(bool, shared)) > 20
+
+
+_MEASURED = """
+import os, sys
+from pathlib import Path
+from teleop_drill.simulation.branches import Branches
+from teleop_drill.simulation.planned import Schedule
+branches = Branches()
+for name in ("plain", "marked"):
+    Path(name).mkdir()
+    os.chdir(name)
+    if name == "marked":
+        branches.begin()
+    found = Schedule.of(sys.argv[1]).run(Path("bags"))
+    os.chdir("..")
+print(len(branches.ran()))
+"""
+
+
+@pytest.mark.slow
+def test_a_schedule_whose_branches_are_marked_has_the_same_bytes(tmp_path: Path) -> None:
+    text = json.dumps(Schedule(4, draw(4, SIDES)[:2]).plain())
+    done = subprocess.run(
+        [sys.executable, "-c", _MEASURED, text], check=False, capture_output=True, text=True, cwd=tmp_path
+    )
+    assert done.returncode == 0, done.stderr
+    assert int(done.stdout) > 400
+    plain, marked = (
+        [file.read_bytes() for file in sorted((tmp_path / name).rglob("*.mcap"))] for name in ("plain", "marked")
+    )
+    assert plain
+    assert plain == marked
 
 
 @pytest.mark.slow
