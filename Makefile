@@ -11,7 +11,7 @@ export AMENT_PREFIX_PATH := $(CURDIR)/$(VENV):$(AMENT_PREFIX_PATH)
 # Compiled modules are kept: without them each start of a command or a node takes a second longer.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: setup wheel test-wheel crtk_msgs demo test test-slow soak coverage lint format docs docs-links bench bench-setup endurance fuzz mutants drill-mutants flaky clean
+.PHONY: setup wheel test-wheel crtk_msgs demo test test-slow soak coverage lint format docs docs-links bench bench-setup endurance search fuzz mutants drill-mutants flaky clean
 
 # Python compiles a module when it is first imported: most of them never are.
 INSTALL := $(BIN)/python -m pip install --quiet --no-compile --use-pep517 --disable-pip-version-check \
@@ -96,6 +96,13 @@ test-slow: $(VENV)/.tested
 	$(CORE) -m "slow and not ros and not soak" || code=1; \
 	$(BIN)/pytest -n 1 tests/ros -m "ros and slow and not soak" || code=1; \
 	exit $$code
+
+# Random schedules of faults that go where earlier ones have met least, other ones each time. A broken
+# law is printed with the command that breaks it again. MINUTES says how long.
+MINUTES ?= 3
+search: setup
+	rm -rf $(OUT)/search
+	$(BIN)/teleop drill --search $(OUT)/search --minutes $(MINUTES) --seed $$(date +%s)
 
 # Long tests whose law a shorter one tests in CI with another case, and whole sessions of all commands
 # that README, site and --help name, after a list of those that are not run; half an hour.

@@ -14,6 +14,7 @@ from teleop_core.graph.operation import State
 from teleop_core.nodes.crews import Processes
 from teleop_core.nodes.operation import StopInput
 from teleop_drill.simulation import seeds, sometimes
+from teleop_drill.simulation.planned import Schedule
 from teleop_drill.simulation.schedules import KINDS, Fault, draw
 from teleop_drill.simulation.seeds import PROCESSES, run_seed, shrink
 
@@ -75,12 +76,12 @@ def test_a_schedule_that_breaks_a_law_is_cut_down_to_what_does_it(monkeypatch: p
     assert [fault.kind for fault in shrink(found, "stop").faults] == ["press"]
 
 
-def test_one_schedule_is_run_again_by_its_seed_and_faults_on_processors_that_round_otherwise(tmp_path: Path) -> None:
+def test_one_schedule_is_run_again_by_its_text_on_processors_that_round_otherwise(tmp_path: Path) -> None:
     """Its recording has the same bytes wherever NumPy and OpenBLAS compute in other orders."""
-    recordings = set()
+    recordings, text = set(), json.dumps(Schedule(3, draw(3, SIDES)[:1]).plain())
     for k, processor in enumerate(PROCESSORS):
         (folder := tmp_path / str(k)).mkdir()
-        words = ["drill", "--seeds", "1", "--seed", "3", "--faults", "0", "--out", "bags"]  # which is recorded
+        words = ["drill", "--schedule", text, "--out", "bags"]  # which is recorded
         done = subprocess.run(
             [sys.executable, "-m", "teleop_core.commands.cli", *words],
             check=False, capture_output=True, text=True, env=os.environ | processor, cwd=folder,
@@ -123,8 +124,11 @@ def test_of_three_seeds_the_one_is_run_whose_faults_have_met_least(monkeypatch: 
 @pytest.mark.parametrize(
     ("words", "needed"),
     [
-        (["--seeds", "2", "--faults", "0"], "1 with --faults"),
-        (["--seeds", "1", "--faults", "9"], "of 0, 1"),
+        (["--seeds", "2", "--out", "bags"], "--schedule or --seeds 1"),
+        (["--seeds", "2", "--search", "store"], "without names, --short, --drives and --schedule or --search"),
+        (["--search", "store", "--composed"], "without --composed"),
+        (["--search", "store", "--minutes", "nan"], "above 0"),
+        (["--search", "store", "--seed", "today"], "seed"),
         (["--seeds", "2", "stop_topic"], "without names"),
         (["--seed", "3", "stop_topic"], "with --simulated"),
     ],

@@ -723,7 +723,7 @@ CODE_MUTANTS = (
             "evaluation/origin.py", "return sum(link.delay for link in links if",
             "return max(link.delay for link in links if", "evaluation_graph"),
     _mutant("all_published", "topics that nobody reads are published too", "nodes/wire.py",
-            "        if count[0]:\n", "        if True:\n", "wire"),
+            "        if calls.count[0]:\n", "        if True:\n", "wire"),
     _mutant("new_untold", "a new message before one of another form is not told", "nodes/streams.py",
             "self.take(), before) or has_found", "self.take(), before)", "wire"),
     _mutant("skips_too_soon", "a loop gives way after one standstill", "nodes/strain.py",
@@ -893,6 +893,17 @@ CODE_MUTANTS = (
             "                move(frame, poses[place])\n", "                pass\n", "console_surroundings"),
     _mutant("given_twice", "the work of drives is counted with the other sign", "teleop_scene/scene.py",
             "            s.work += (force", "            s.work -= (force", "scene_session"),
+    _mutant("aimless", "a search does not aim at what was rarely met", "teleop_drill/simulation/search.py",
+            "1.0 / ((1.0 + met[aim[0]]) *", "1.0 / (1.0 *", "tests/simulated/test_search.py"),
+    _mutant("all_kinds", "all kinds of faults are on in each schedule of a search", "teleop_drill/simulation/search.py",
+            "for kind in sorted(KINDS) if random.random() < 0.5]", "for kind in sorted(KINDS)]",
+            "tests/simulated/test_search.py"),
+    _mutant("childless", "a search breeds nothing from what it keeps", "teleop_drill/simulation/search.py",
+            "or random.random() < _FRESH", "or True", "tests/simulated/test_search.py"),
+    _mutant("any_store", "a store of other code goes on", "teleop_drill/simulation/store.py",
+            'if plain.get("code") != code_digest():', "if False:", "tests/simulated/test_search.py"),
+    _mutant("breach_lost", "a schedule that broke a law is not kept", "teleop_drill/simulation/store.py",
+            "        if new or found.broken:", "        if new:", "tests/simulated/test_search.py"),
 )  # fmt: skip
 """All of them."""
 

@@ -32,6 +32,7 @@ def drill(
         teleop drill --simulated                                  # all on a simulated machine: the same bits every time
         teleop drill --simulated --seed 7 flood                   # with other delays, costs and discoveries
         teleop drill --seeds 100                                  # random faults at random times, and their laws
+        teleop drill --search out/search --minutes 30             # faults where earlier ones have met least
         teleop drill --composed --json drill.json
         teleop drill --drives "python examples/foreign_slave.py"  # drives of your own
         teleop drill --drives "arm_bridge --ros-args --params-file arm.yaml" --arm "./controller"
@@ -50,7 +51,7 @@ def drill(
 
     if options.seeds is not None and options.seeds < 1:  # none would mean the drill in real processes
         raise ParameterError("--seeds", options.seeds, "at least 1")
-    if options.seeds is not None or options.faults is not None:
+    if any(one is not None for one in (options.seeds, options.search, options.schedule)):
         from teleop_drill.commands.seeds import run_schedules
 
         return run_schedules(names, options)

@@ -33,11 +33,15 @@ class Options:
     seeds: int | None = None
     """Run this number of random schedules of faults on the simulated machine; their seeds begin at --seed."""
     sometimes: bool = False
-    """With --seeds: fail if an event that must happen sometimes never did."""
+    """With --seeds or --search: fail if an event that must happen sometimes never did."""
+    search: Annotated[Path | None, Parameter(metavar="STORE")] = None
+    """Search with random schedules for what none has met, and keep those that met it in this directory."""
+    minutes: float = 3.0
+    """Duration of --search [min]."""
     breaks: float = 0.0
     """In schedules, share of clock readings after which another thread runs; try 0.0005."""
-    faults: Annotated[str | None, Parameter(metavar="I,K", allow_leading_hyphen=True)] = None
-    """Run only these faults of one schedule; -: none."""
+    schedule: Annotated[str | None, Parameter(metavar="FILE|TEXT")] = None
+    """Run one given schedule of faults: a file of a store, or its text."""
     list_: Annotated[bool, Parameter(name="--list")] = False
     """List the faults."""
     json: Path | None = None

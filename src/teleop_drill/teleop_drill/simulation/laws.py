@@ -255,14 +255,14 @@ class Laws:
             times = stage.found(button, process)
             is_sent = times is not None and times[0] <= now_ns - _LOOK_NS
             self._press, self._was_idle = (button, is_sent), False
-            self._obey_by = self._worked + _OBEY if is_sent else math.inf
+            self._obey_by = math.inf  # until the slave's reader has discovered the button, which delays the message
         if self._press is None:
             return
         self._count("stop")
         button, is_sent = self._press
         self._was_idle |= operation["state"] == State.DISABLED
         if math.isinf(self._obey_by) and (times := stage.found(button, process)) and times[1] <= now_ns:
-            self._obey_by = self._worked + _DOUBT
+            self._obey_by = self._worked + (_OBEY if is_sent else _DOUBT)
         is_over = not is_sent and self._was_idle and button not in stage.held
         if is_over or operation["is_stopped"] or operation["is_pressed"]:
             self._press = None

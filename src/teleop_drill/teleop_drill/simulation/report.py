@@ -1,13 +1,17 @@
 """Report: results of random schedules, and counts of the combinations of fault and state."""
 
 from collections import Counter
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
-from teleop_core.nodes.crews import Processes
 from teleop_drill.simulation import sometimes
 from teleop_drill.simulation.laws import LAWS
+from teleop_drill.simulation.planned import Schedule
 from teleop_drill.simulation.schedules import KINDS
 from teleop_drill.simulation.seeds import Found
+
+_JOIN = " / "
 
 
 @dataclass
@@ -31,6 +35,13 @@ class Coverage:
     under: Counter[tuple[str, str, str]] = field(default_factory=Counter)
     sometimes: Counter[str] = field(default_factory=Counter)
     broken: Counter[str] = field(default_factory=Counter)
+
+    @classmethod
+    def of(cls, plain: Mapping[str, Any]) -> "Coverage":
+        """Counts from the values of :meth:`plain`."""
+        met, under = ({tuple(k.split(_JOIN)): n for k, n in plain[name].items()} for name in ("met", "under"))
+        looks, seen, broken = (Counter(dict(plain[name])) for name in ("looks", "sometimes", "broken"))
+        return cls(plain["sessions"], plain["seconds"], Counter(met), looks, Counter(under), seen, broken)
 
     def add(self, found: Found) -> None:
         """Add the result of a schedule."""
@@ -64,8 +75,8 @@ class Coverage:
             "looks": dict(self.looks),
             "broken": dict(self.broken),
             "sometimes": {name: self.sometimes[name] for name in sometimes.catalogue(KINDS)},
-            "met": {" / ".join(key): count for key, count in sorted(self.met.items())},
-            "under": {" / ".join(key): count for key, count in sorted(self.under.items())},
+            "met": {_JOIN.join(key): count for key, count in sorted(self.met.items())},
+            "under": {_JOIN.join(key): count for key, count in sorted(self.under.items())},
         }
 
     def lines(self) -> list[str]:
@@ -91,11 +102,9 @@ def told(found: Found, shortest: Found, law: str) -> list[str]:
         law: Name of the law.
     """
     (one,) = (broken for broken in shortest.broken if broken.law == law)
-    kept = ",".join(str(found.faults.index(fault)) for fault in shortest.faults)
-    way = " --composed" if found.processes is Processes.ONE else ""
-    way += f" --breaks {found.breaks:g}" if found.breaks else ""
+    planned = Schedule(found.seed, shortest.faults, found.processes, found.breaks)
     return [
         f"seed {found.seed} breaks `{law}`, {one.at:.3f} s after the arm followed: {one.text}",
         *(f"    {fault.text()}" for fault in shortest.faults),
-        f"    again: teleop drill --seeds 1 --seed {found.seed}{way} --faults {kept or '-'} --out DIR",
+        f"    again: {planned.command()} --out DIR",
     ]

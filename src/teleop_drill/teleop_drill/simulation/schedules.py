@@ -21,7 +21,8 @@ END = 9.0
 _LONGEST = 3.0  # longest duration of a fault [s]
 _LONGER = {"slow turns": 4.5}
 """Time by which faults of a kind last longer, so that a loop has time to give way [s]."""
-_NAMES = sorted((*COMMANDS, RELEASE))
+NAMES = sorted((*COMMANDS, RELEASE))
+"""Commands that a fault of the kind ``command`` sends, in the order of its amount."""
 _LEADS = {"": 8, "disable": 2, "kill": 3, "pause": 4, "press": 2}
 """Commands before a fault, with their weights. Commands to states that faults rarely met have larger weights."""
 _CLOCK_NS = (200_000_000, 3_600_000_000_000)
@@ -69,7 +70,7 @@ def draw(seed: int, processes: tuple[str, ...]) -> tuple[Fault, ...]:
     faults = []
     for _ in range(random.randint(1, 5)):
         kind = random.choice(sorted(KINDS))
-        where = random.choice(processes) if kind in _OF_PROCESS else ""
+        where = random.choice(processes) if kind in OF_PROCESS else ""
         seconds = min(_LONGEST, random.expovariate(1.0)) + _LONGER.get(kind, 0.0)
         fault = Fault(random.uniform(BEGIN, END), kind, where, seconds, random.random())
         (lead,) = random.choices(list(_LEADS), list(_LEADS.values()))
@@ -80,9 +81,14 @@ def draw(seed: int, processes: tuple[str, ...]) -> tuple[Fault, ...]:
 def _led(lead: str, at: float, processes: tuple[str, ...]) -> list[Fault]:
     """Commands that bring the arm into another state."""
     if lead in COMMANDS:
-        return [Fault(at, "command", "", 0.1, (_NAMES.index(lead) + 0.5) / len(_NAMES))]
+        return [commanded(at, lead)]
     where = processes[-2] if lead == "kill" else ""  # the slave's: the recorder's is the last
     return [Fault(at, lead, where, 1.0, 0.5)] if lead else []
+
+
+def commanded(at: float, name: str) -> Fault:
+    """Fault that sends a command at a time [s]."""
+    return Fault(at, "command", "", 0.1, (NAMES.index(name) + 0.5) / len(NAMES))
 
 
 def _stop(stage: DrilledSession, fault: Fault) -> Callable[[], None]:
@@ -161,7 +167,7 @@ def _press(stage: DrilledSession, fault: Fault) -> Callable[[], None]:
 
 
 def _command(stage: DrilledSession, fault: Fault) -> None:
-    stage.command(_NAMES[int(fault.amount * len(_NAMES)) % len(_NAMES)])
+    stage.command(NAMES[int(fault.amount * len(NAMES)) % len(NAMES)])
 
 
 def _drive(stage: DrilledSession, fault: Fault) -> Callable[[], None]:
@@ -237,4 +243,5 @@ KINDS: dict[str, Act] = {
     "buttons": _clutch,
 }
 """All kinds of faults, by their names."""
-_OF_PROCESS = ("standstill", "slow turns", "kill", "loss", "delay", "disorder", "repeats")
+OF_PROCESS = ("standstill", "slow turns", "kill", "loss", "delay", "disorder", "repeats")
+"""Kinds of faults that affect one process."""

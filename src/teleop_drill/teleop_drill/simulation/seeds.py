@@ -56,6 +56,7 @@ class Found:
         looks: Number of checks of each law.
         under: Number of checks of each law by present fault and state of the arm.
         sometimes: Number of times that each event of :mod:`sometimes` was met.
+        pairs: Number of times that a fault began during another one in a state: the other one, the fault, the state.
         seconds: Simulated time [s].
     """
 
@@ -68,6 +69,7 @@ class Found:
     looks: Counter[str] = field(default_factory=Counter)
     under: Counter[tuple[str, str, str]] = field(default_factory=Counter)
     sometimes: Counter[str] = field(default_factory=Counter)
+    pairs: Counter[tuple[str, str, str]] = field(default_factory=Counter)
     seconds: float = 0.0
 
 
@@ -157,6 +159,7 @@ class _Run:
         self._found.met[fault.kind, state] += 1
         seen[sometimes.met(fault.kind, state)] += 1
         seen[sometimes.together(fault.kind)] += bool(self._laws.in_force)
+        self._found.pairs.update((other, fault.kind, state) for other in self._laws.in_force)
         process = self._stage.session.running.get(fault.where)
         if process is not None and process.is_dead:
             return
@@ -190,16 +193,20 @@ class _Run:
 
 
 def shrink(found: Found, law: str) -> Found:
-    """Smallest set of faults of a schedule that still breaks a law."""
-    best, must_look = found, True
-    while must_look:
-        must_look = False
-        for left_out in range(len(best.faults)):
-            fewer = best.faults[:left_out] + best.faults[left_out + 1 :]
+    """Part of the faults of a schedule that still breaks a law, and needs each of its faults.
+
+    First halves are left out, then quarters, and at last single faults, until none can be left out.
+    """
+    best, size = found, len(found.faults)
+    while size > 0:
+        for begin in range(0, len(best.faults), size):
+            fewer = best.faults[:begin] + best.faults[begin + size :]
             again = run_seed(found.seed, fewer, None, found.processes, found.breaks)
             if any(one.law == law for one in again.broken):
-                best, must_look = again, True
+                best, size = again, min(size, len(again.faults))
                 break
+        else:
+            size //= 2
     return best
 
 
@@ -221,11 +228,16 @@ def run_seeds(
     met: Counter[tuple[str, str]] = Counter()
     for begin in range(0, count, _ROUND):
         threes = (range(first + 3 * k, first + 3 * k + 3) for k in range(begin, min(begin + _ROUND, count)))
-        seeds = [min(three, key=lambda s: _known(s, met, processes)) for three in threes]
+        seeds = [rarest(three, met, processes) for three in threes]
         with workers(min(cores, len(seeds))) as pool:
             for found in pool.map(partial(run_seed, processes=processes, breaks=breaks), seeds):
                 met.update(found.met)
                 yield found
+
+
+def rarest(seeds: Sequence[int], met: Counter[tuple[str, str]], processes: Processes) -> int:
+    """The seed whose faults have met their rarest states least often so far."""
+    return min(seeds, key=lambda seed: _known(seed, met, processes))
 
 
 def _known(seed: int, met: Counter[tuple[str, str]], processes: Processes) -> float:

@@ -1,0 +1,96 @@
+"""Search beside dice: what both meet in the same processor time, and what marking branches costs.
+
+    python benchmarks/search.py --minutes 5              # of processor time for each
+    python benchmarks/search.py --cost 6                 # the same schedules with and without marks
+
+Dice are schedules of successive seeds, the rarest of each three, as of ``teleop drill --seeds``. The first schedule of
+a process loads the kernels and is not counted.
+"""
+
+import argparse
+import tempfile
+import time
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from teleop_core.nodes.crews import Processes
+from teleop_drill.simulation.planned import Schedule
+from teleop_drill.simulation.schedules import draw
+from teleop_drill.simulation.search import Search, run_measured
+from teleop_drill.simulation.seeds import PROCESSES, rarest, run_seed
+from teleop_drill.simulation.store import Store, kind_of
+
+WAYS = (Processes.SIDES, Processes.SIDES, Processes.ONE)
+"""Distributions of the nodes, as often as the search draws them."""
+
+
+def dice(store: Store, seed: int) -> Iterator[Schedule]:
+    """Schedules of successive seeds."""
+    for k in range(10**9):
+        processes, first = WAYS[k % len(WAYS)], seed + 3 * k
+        chosen = rarest(range(first, first + 3), store.coverage.met, processes)
+        yield Schedule(chosen, draw(chosen, PROCESSES[processes]), processes)
+
+
+def searched(store: Store, seed: int) -> Iterator[Schedule]:
+    """Schedules of the search."""
+    search = Search(store, seed)
+    while True:
+        yield search.choose()
+
+
+def compare(ways: Sequence[str], minutes: float, seed: int) -> None:
+    for name in ways:
+        make = dice if name == "dice" else searched
+        with tempfile.TemporaryDirectory() as folder:
+            store, used, marks = Store(Path(folder)), 0.0, 0
+            for schedule in make(store, seed):
+                begin = time.process_time()
+                found, branches = run_measured(schedule)
+                used += time.process_time() - begin
+                store.add(found, branches)
+                for one in found.broken:
+                    print(f"{name} breaks `{one.law}` after {used / 60.0:.1f} min: {schedule.command()}", flush=True)
+                if used >= 60.0 * minutes * (marks + 1) / 5.0:
+                    marks += 1
+                    kinds = [kind_of(one) for one in store.times]
+                    each = ", ".join(f"{kinds.count(one)} {one}" for one in ("events", "pairs", "branches"))
+                    text = f"{store.coverage.sessions} schedules, {store.coverage.seconds:.0f} simulated s"
+                    print(f"{name} after {used / 60.0:.1f} min: {each}; {text}", flush=True)
+                if marks == 5:
+                    break
+
+
+def cost(count: int, seed: int) -> None:
+    """Processor time of the same schedules."""
+    times: dict[bool, list[float]] = {False: [], True: []}
+    for is_marked in (False, True):  # functions stay marked, so that the plain ones come first
+        for k in range(seed, seed + count):
+            begin = time.process_time()
+            if is_marked:
+                run_measured(Schedule(k, draw(k, PROCESSES[Processes.SIDES])))
+            else:
+                run_seed(k)
+            times[is_marked].append(time.process_time() - begin)
+    ratio = np.array(times[True]) / np.array(times[False])
+    print(f"marks: {100.0 * (np.median(ratio) - 1.0):.1f} % more processor time, median of {count} schedules")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description="Search beside dice.")
+    parser.add_argument("ways", nargs="*", help="of dice and search; without one, both", default=["dice", "search"])
+    parser.add_argument("--minutes", type=float, default=5.0, help="processor time of each")
+    parser.add_argument("--seed", type=int, default=0, help="first seed")
+    parser.add_argument("--cost", type=int, default=0, help="schedules with and without marks, in place of the search")
+    given = parser.parse_args()
+    run_seed(given.seed, ())
+    if given.cost:
+        cost(given.cost, given.seed)
+    else:
+        compare(given.ways, given.minutes, given.seed)
+
+
+if __name__ == "__main__":
+    main()

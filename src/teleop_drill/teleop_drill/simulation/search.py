@@ -1,0 +1,239 @@
+"""Search: draws schedules where earlier ones have met least, and breeds others from those that met something first."""
+
+import os
+import time
+from collections import Counter, deque
+from collections.abc import Iterator, Sequence
+from concurrent.futures import Future
+from dataclasses import replace
+from random import Random
+
+from teleop_core.base.workers import workers
+from teleop_core.graph.operation import State
+from teleop_core.nodes.crews import Processes
+from teleop_core.slave.operation.states import COMMANDS
+from teleop_drill.simulation import sometimes
+from teleop_drill.simulation.branches import Branches
+from teleop_drill.simulation.planned import Schedule
+from teleop_drill.simulation.schedules import BEGIN, END, KINDS, OF_PROCESS, Fault, commanded
+from teleop_drill.simulation.seeds import PROCESSES, Found
+from teleop_drill.simulation.store import Store
+
+_MOST = 30
+"""Largest number of faults of a schedule."""
+_FRESH = 0.4
+"""Share of schedules that are drawn anew; the others are bred from kept ones."""
+_AHEAD = 4
+"""A schedule is chosen when all but this many before it are known, so that the number of cores changes nothing."""
+_ROUND = 40  # schedules that share processes: killed simulated processes stay in memory
+_BREAKS = 0.0005
+_LEADS = {
+    State.DISABLED.name: ("reset", "disable"),
+    State.ENABLED.name: ("reset", "enable", "resume"),
+    State.PAUSED.name: ("reset", "enable", "pause"),
+}
+"""Commands that bring an arm into a state from any other; the arm refuses those that it does not need."""
+
+
+class Search:
+    """Chooses schedules by what earlier schedules have met.
+
+    Half of the kinds of faults are off in each schedule that is drawn anew. Some faults hide others: an arm that is
+    stopped meets no fault of its motion (Groce et al., Swarm Testing, ISSTA 2012). Kinds, states and moments are drawn
+    with a weight that decreases with the number of times that they were met.
+
+    Args:
+        store: Schedules and counts so far.
+        seed: Seed of the choice. The machine of the schedule ``k`` of a store has the seed ``seed + k``.
+    """
+
+    def __init__(self, store: Store, seed: int) -> None:
+        self._store, self._seed = store, seed
+        self._next = store.coverage.sessions
+        self._tried: Counter[str] = Counter()
+        """Number of times that an event was aimed at; an event that cannot happen is not aimed at for ever."""
+        self._moments: Counter[tuple[str, int]] = Counter()
+        """Number of faults of a kind in each second of all schedules."""
+        self._bred: Counter[Schedule] = Counter()
+        for one in store.kept:
+            self._count(one.schedule.faults)
+
+    def _count(self, faults: Sequence[Fault]) -> None:
+        self._moments.update((one.kind, int(one.at)) for one in faults)
+
+    def choose(self) -> Schedule:
+        """Next schedule."""
+        seed = self._seed + self._next
+        random = Random(f"{seed}/search")
+        self._next += 1
+        is_fresh = len(self._store.kept) < _AHEAD or random.random() < _FRESH
+        chosen = self._fresh(random, seed) if is_fresh else self._child(random, seed)
+        self._count(chosen.faults)
+        return chosen
+
+    # -- drawn anew ------------------------------------------------------------------------------
+
+    def _fresh(self, random: Random, seed: int) -> Schedule:
+        processes = random.choice((Processes.SIDES, Processes.SIDES, Processes.ONE))
+        kinds = switched_on(random)
+        faults = [one for _ in range(random.randint(2, 8)) for one in self._aimed(random, kinds, processes)]
+        breaks = _BREAKS if random.random() < 0.2 else 0.0
+        return Schedule(seed, _tidy(random, faults), processes, breaks)
+
+    def _aimed(self, random: Random, kinds: Sequence[str], processes: Processes) -> list[Fault]:
+        """A fault in a state of the arm, and what brings the arm there."""
+        aims = [(sometimes.met(kind, state), kind, state, "") for kind in kinds for state in sometimes.STATES]
+        if "command" in kinds:
+            names = (*COMMANDS, sometimes.RELEASE)
+            aims += [(sometimes.asked(name, s), "command", s, name) for name in names for s in sometimes.STATES]
+        met = self._store.times
+        weights = [1.0 / ((1.0 + met[aim[0]]) * (1.0 + self._tried[aim[0]])) for aim in aims]
+        ((event, kind, state, name),) = random.choices(aims, weights)
+        self._tried[event] += 1
+        fault = self._fault(random, kind, processes)
+        if name:
+            fault = commanded(fault.at, name)
+        return [*_lead(random, state, fault.at, PROCESSES[processes][-2]), fault]
+
+    def _fault(self, random: Random, kind: str, processes: Processes) -> Fault:
+        seconds = [*range(int(BEGIN), int(END))]
+        (second,) = random.choices(seconds, [1.0 / (1.0 + self._moments[kind, one]) for one in seconds])
+        where = random.choice(PROCESSES[processes]) if kind in OF_PROCESS else ""
+        lasts = min(3.0, random.expovariate(1.0)) + (4.5 if kind == "slow turns" else 0.0)
+        return Fault(second + random.random(), kind, where, lasts, random.random())
+
+    # -- bred ------------------------------------------------------------------------------------
+
+    def _child(self, random: Random, seed: int) -> Schedule:
+        """A kept schedule with one to three changes."""
+        parent = self._parent(random)
+        faults = list(parent.faults)
+        for _ in range(random.randint(1, 3)):
+            change = random.choice((self._add, self._move, self._swap, self._join, self._vary, self._leave_out))
+            faults = change(random, faults, parent.processes) or faults
+        seed = random.choice((seed, parent.seed))
+        return replace(parent, seed=seed, faults=_tidy(random, faults))
+
+    def _parent(self, random: Random) -> Schedule:
+        """A kept schedule; one with rare events and few children has the largest weight."""
+        times = self._store.times
+        rare = [0.1 + sum(1.0 / (1.0 + times[name]) for name in one.new) for one in self._store.kept]
+        weights = [w / (1.0 + self._bred[one.schedule]) for w, one in zip(rare, self._store.kept, strict=True)]
+        (chosen,) = random.choices(self._store.kept, weights)
+        self._bred[chosen.schedule] += 1
+        return chosen.schedule
+
+    def _add(self, random: Random, faults: list[Fault], processes: Processes) -> list[Fault]:
+        """Add a fault in a state that it rarely met."""
+        return [*faults, *self._aimed(random, sorted(KINDS), processes)]
+
+    def _move(self, random: Random, faults: list[Fault], _: Processes) -> list[Fault]:
+        """Begin a fault at another time, or shortly after another fault."""
+        if not faults:
+            return faults
+        k, other = random.randrange(len(faults)), random.choice(faults)
+        at = min(END, other.at + random.expovariate(5.0)) if random.random() < 0.5 else random.uniform(BEGIN, END)
+        return [*faults[:k], replace(faults[k], at=at), *faults[k + 1 :]]
+
+    def _swap(self, random: Random, faults: list[Fault], processes: Processes) -> list[Fault]:
+        """Replace a fault by one of another kind at the same time."""
+        if not faults:
+            return faults
+        k = random.randrange(len(faults))
+        *_, new = self._aimed(random, sorted(KINDS), processes)
+        return [*faults[:k], replace(new, at=faults[k].at), *faults[k + 1 :]]
+
+    def _join(self, random: Random, faults: list[Fault], processes: Processes) -> list[Fault]:
+        """Add the faults of another kept schedule."""
+        names = PROCESSES[processes]
+        return [
+            *faults,
+            *(
+                replace(one, where=random.choice(names)) if one.where and one.where not in names else one
+                for one in self._parent(random).faults
+            ),
+        ]
+
+    def _vary(self, random: Random, faults: list[Fault], processes: Processes) -> list[Fault]:
+        """Change place, duration and strength of a fault."""
+        if not faults:
+            return faults
+        k = random.randrange(len(faults))
+        new = self._fault(random, faults[k].kind, processes)
+        return [*faults[:k], replace(new, at=faults[k].at), *faults[k + 1 :]]
+
+    def _leave_out(self, random: Random, faults: list[Fault], _: Processes) -> list[Fault]:
+        return faults if len(faults) < 2 else random.sample(faults, len(faults) - 1)
+
+
+def switched_on(random: Random) -> list[str]:
+    """About half of the kinds of faults."""
+    return [kind for kind in sorted(KINDS) if random.random() < 0.5] or sorted(KINDS)
+
+
+def _lead(random: Random, state: str, at: float, slave: str) -> list[Fault]:
+    """What brings an arm into a state shortly before a time [s], from whichever state."""
+    if state == State.FAULT.name:
+        return [Fault(at - random.uniform(0.05, 0.4), "press", "", random.uniform(0.1, 0.8), random.random())]
+    if state == sometimes.NO_STATE:  # from the start of a new process of the slave until its first report
+        dead = random.uniform(0.1, 0.5)
+        return [Fault(at - dead - random.uniform(0.0, 0.4), "kill", slave, dead, 0.5)]
+    begin, names = random.uniform(0.2, 0.7), _LEADS[state]
+    return [commanded(at - begin * (1.0 - k / len(names)), name) for k, name in enumerate(names)]
+
+
+def _tidy(random: Random, faults: Sequence[Fault]) -> tuple[Fault, ...]:
+    """At most :data:`_MOST` faults in the order of their times, with numbers that are short in a text."""
+    some = random.sample(list(faults), min(_MOST, len(faults)))
+    short = [
+        replace(one, at=round(one.at, 3), seconds=round(one.seconds, 3), amount=round(one.amount, 6)) for one in some
+    ]
+    return tuple(sorted(short, key=lambda one: one.at))
+
+
+Result = tuple[Found, tuple[str, ...]]
+"""Result of a schedule, and what no earlier schedule had met."""
+
+
+def search(store: Store, seed: int, seconds: float, cores: int | None = None) -> Iterator[Result]:
+    """Run schedules for a time, and keep in the store those that meet something first.
+
+    The same store, seed and number of schedules give the same schedules, on any number of cores.
+
+    Args:
+        store: Schedules and counts so far.
+        seed: As of :class:`Search`.
+        seconds: Time after which no further schedule begins [s].
+        cores: Number of processes; None: one for each core.
+
+    Returns:
+        Iterator over the results, each with what no earlier schedule had met.
+    """
+    chosen, cores = Search(store, seed), cores or len(os.sched_getaffinity(0))
+    end = time.monotonic() + seconds
+    waiting: deque[Future[tuple[Found, list[str]]]] = deque()
+
+    def take() -> Result:
+        found, branches = waiting.popleft().result()
+        return found, store.add(found, branches)
+
+    while time.monotonic() < end:
+        with workers(cores) as pool:
+            for _ in range(_ROUND):
+                if time.monotonic() >= end:
+                    break
+                if len(waiting) >= _AHEAD:
+                    yield take()
+                waiting.append(pool.submit(run_measured, chosen.choose()))
+            while waiting:
+                yield take()
+
+
+_branches = Branches()
+
+
+def run_measured(schedule: Schedule) -> tuple[Found, list[str]]:
+    """Run a schedule; returns its result and the branches that it ran."""
+    _branches.begin()
+    found = schedule.run()
+    return found, _branches.ran()
