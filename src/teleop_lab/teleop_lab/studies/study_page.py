@@ -1,15 +1,17 @@
-"""Page: a study as one HTML file: lines with intervals, heat maps, and paired differences."""
+"""Page: a study as one HTML file: its design, an answer to each question, means with intervals, and tables."""
 
-from collections.abc import Callable
+from collections.abc import Iterator
+from itertools import combinations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from teleop_console.report.pages import Part, Section, Table, Text, page, plain_table
-from teleop_core.evaluation.figure import FIRST, FIXTURE, SECOND, THIRD, Figure, axis
-from teleop_core.kernels.geometry import Array
+from teleop_console.report.pages import Cell, Listed, Part, Section, Text, page, plain_table
+from teleop_core.evaluation.figure import FIRST, Figure, axis
+from teleop_lab.studies.answers import UNTOLD, effect_told, parameters_of, score_of
+from teleop_lab.studies.means import condition_figure
 from teleop_lab.studies.study import SEED, is_number
-from teleop_lab.studies.summary import Mean, conditions, differences, mean_of
+from teleop_lab.studies.summary import Mean, conditions, differences, interplay, mean_of
 from teleop_lab.studies.tuning import Range
 
 if TYPE_CHECKING:
@@ -18,34 +20,160 @@ if TYPE_CHECKING:
     from teleop_lab.studies.study import Study
     from teleop_lab.studies.tuning import Tuned, Tuning
 
-_COLORS = (FIRST, SECOND, THIRD, FIXTURE, "#7f7f7f", "#17becf", "#bcbd22", "#8c564b")
+_MOST_BOXES, _MOST_ROWS = 12, 600
+_ABOUT = (
+    "A difference is counted from the first value of its parameter, within each seed and over all values of the other "
+    "parameters; the 95 % interval is over the seeds (Student). A difference whose interval includes zero cannot be "
+    "told apart from none. Of twenty intervals, one misses the truth by chance."
+)
 
 
 def study_page(study: "Study", found: "xarray.Dataset", title: str) -> str:
     """HTML page of a study; it works offline, with plotly.js inside."""
-    facts = ", ".join(f"{name} {value}" for name, value in found.attrs.items() if value)
     errors = sorted({str(error) for error in found["error"].values.ravel() if error})
-    parts: list[Part] = [
-        Text(f"{facts}. Means over the seeds, with 95 % intervals by the bootstrap."),
-        _table(study, found),
-        *(Text(f"failed: {error}") for error in errors),
-    ]
-    return page(title, parts, [Section(metric, parts=_parts(study, found, metric)) for metric in study.metrics])
-
-
-def _parts(study: "Study", found: "xarray.Dataset", metric: str) -> list[Part]:
-    """Figures and table of one score."""
-    parts: list[Part] = []
+    facts = ", ".join(f"{name} {value}" for name, value in found.attrs.items() if value)
+    parts: list[Part] = [_design(study), *(Text(f"failed: {error}") for error in errors)]
+    sections = []
     if study.swept:
-        parts.append(condition_figure(study, found, metric, condition_lines(study, found, metric)))
-    if len(study.swept) > 1:
-        parts.append(_heat(study, found, metric))
-    rows = [
-        [name, str(value), str(mean)]
-        for name, means in differences(study, found, metric).items()
-        for value, mean in zip(study.swept[name][1:], means, strict=True)
-    ]
-    return [*parts, *[plain_table((metric, "against the first value", "difference"), rows)] * bool(rows)]
+        sections.append(Section("Answers", _ABOUT, [Listed(list(_answers(study, found)))]))
+        figures: list[Part] = []
+        for metric in study.metrics:
+            figures.append(condition_figure(study, {"": found}, metric))
+            figures += [_heat(study, found, metric, pair) for pair in _joint(study, found, metric)]
+        told = "Points are means over the seeds with 95 % intervals. A click on single sessions in a legend shows them."
+        sections.append(Section("Means", told, figures))
+    sections.append(Section("Numbers", facts, list(_tables(study, found))))
+    return page(title, parts, sections)
+
+
+def _design(study: "Study") -> Listed:
+    """The design in one picture: a row of boxes for each parameter, and one for the seeds."""
+    rows, counts = [], []
+    for quantity, values in zip(parameters_of(study).values(), study.swept.values(), strict=True):
+        rows.append(
+            (quantity.head, f"{quantity.name}: {quantity.meaning}", [Cell(quantity.text(value)) for value in values])
+        )
+        counts.append(str(len(values)))
+    seeds = [str(seed) for seed in study.seeds]
+    if len(seeds) > _MOST_BOXES:
+        seeds = [*seeds[: _MOST_BOXES - 2], "…", seeds[-1]]
+    rows.append((SEED, "repeats every combination, so comparisons are within a seed", list(map(Cell, seeds))))
+    sessions = len(study.seeds) * int(np.prod([int(count) for count in counts]))
+    told = f"{' × '.join([*counts, str(len(study.seeds))])} = {sessions} sessions of {study.scenario or 'the defaults'}"
+    rows.append(("sessions", "independent of each other, so their order has no effect", [Cell(told)]))
+    return Listed(rows, are_boxes=True)
+
+
+def _far(values: Any, means: list[Mean]) -> int:
+    """Index of the difference that answers a question: that of the last number, or the largest one of other values."""
+    if all(map(is_number, values)):
+        return len(means) - 1
+    return int(np.argmax([abs(np.nan_to_num(mean.value)) for mean in means]))
+
+
+def _answers(study: "Study", found: "xarray.Dataset") -> Iterator[tuple[str, str, list[Cell]]]:
+    """An answer for each parameter and score, and for each pair of parameters and score."""
+    changes = {metric: differences(study, found, metric) for metric in study.metrics}
+    named = parameters_of(study)
+    for name, values in study.swept.items():
+        if len(values) < 2:
+            continue
+        quantity = named[name]
+        cells = []
+        for metric in study.metrics:
+            means = changes[metric][name]
+            at = _far(values, means)
+            before = float(found[metric].isel({name: 0}).mean())
+            told = effect_told(metric, means[at], before)
+            if not all(map(is_number, values)) and len(means) > 1:
+                known = sum(mean.is_told for mean in means)
+                told = f"{known} of {len(means)} can be told apart; at {values[at + 1]}, the largest: {told}"
+            cells.append(_cell(metric, told, is_told=means[at].is_told))
+        yield f"{quantity.title} {quantity.range(values)}", quantity.meaning, cells
+    for pair in _pairs(study):
+        cells = [
+            _cell(metric, _joint_told(study, found, metric, pair), is_told=True)
+            for metric in study.metrics
+            if pair in _joint(study, found, metric)
+        ]
+        asked = " × ".join(named[name].title for name in pair)
+        told = f"{UNTOLD} from effects that add up, in all scores"
+        yield asked, "how much the effect of the first depends on the second", cells or [Cell(told, "untold")]
+    if study.printed:
+        yield (
+            study.printed.source,
+            "where the mean of the sessions is within the 95 % interval of people",
+            [_cell(metric, _people_told(study, found, metric), is_told=True) for metric in study.printed.values],
+        )
+
+
+def _joint_told(study: "Study", found: "xarray.Dataset", metric: str, pair: tuple[str, str]) -> str:
+    """Where two parameters interact most, and by how much."""
+    one, other = (parameters_of(study)[name] for name in pair)
+    (far, at), change = interplay(study, found, metric, pair)
+    before, values = study.swept[other.name][0], (study.swept[one.name][0], far)
+    told = f"the effect of {one.title} {one.range(values)} differs by"
+    return f"at {other.title} {other.text(at)} against {other.text(before)} {told} {effect_told(metric, change, 0.0)}"
+
+
+def _people_told(study: "Study", found: "xarray.Dataset", metric: str) -> str:
+    assert study.printed is not None
+    means = [mean_of(part[metric].values).value for _, part in conditions(study, found)]
+    _, low, high = study.printed.values[metric].T
+    inside = int(((low <= means) & (means <= high)).sum())
+    return f"{inside} of {len(means)} conditions"
+
+
+def _cell(metric: str, told: str, *, is_told: bool) -> Cell:
+    return Cell(told, "told" if is_told else "untold", score_of(metric, ()).title)
+
+
+def _pairs(study: "Study") -> list[tuple[str, str]]:
+    return list(combinations([name for name, values in study.swept.items() if len(values) > 1], 2))
+
+
+def _joint(study: "Study", found: "xarray.Dataset", metric: str) -> list[tuple[str, str]]:
+    """Pairs of parameters of which one changes the effect of the other on a score."""
+    return [pair for pair in _pairs(study) if interplay(study, found, metric, pair).change.is_told]
+
+
+def _heat(study: "Study", found: "xarray.Dataset", metric: str, pair: tuple[str, str]) -> Figure:
+    """Means for each value of two parameters that interact."""
+    named, (one, other) = parameters_of(study), pair
+    means = (
+        found[metric].mean([name for name in (*study.swept, SEED) if name not in {one, other}]).transpose(other, one)
+    )
+    score = score_of(metric, means.values.ravel().tolist())
+    x, y = ([named[name].text(value) for value in study.swept[name]] for name in (one, other))
+    trace = {"type": "heatmap", "z": score.factor * means.values, "x": x, "y": y, "colorscale": "Viridis",
+             "texttemplate": "%{z:.4g}", "showscale": False}  # fmt: skip
+    axes = {"xaxis": axis(named[one].head, type="category"), "yaxis": axis(named[other].head, type="category")}
+    title = f"{score.head}: {named[one].title} × {named[other].title}"
+    return Figure(title, "Means where one changes the effect of the other.", [trace], axes, 320)
+
+
+def _tables(study: "Study", found: "xarray.Dataset") -> Iterator[Part]:
+    """Folded tables: means of each condition, every difference, and every session."""
+    named = parameters_of(study)
+    scores = [score_of(metric, found[metric].values.ravel().tolist()) for metric in study.metrics]
+    heads = [one.head for one in (*named.values(), *scores)]
+    means, sessions = [], []
+    for values, part in conditions(study, found):
+        cells = [named[name].text(value) for name, value in values.items()]
+        means.append([*cells, *(score.shown(mean_of(part[score.name].values)) for score in scores)])
+        for at, seed in enumerate(study.seeds):
+            sessions.append([*cells, str(seed), *(score.text(float(part[score.name][at])) for score in scores)])
+    yield plain_table(heads, means, "Means with 95 % intervals")
+    rows = []
+    for metric in study.metrics:
+        for name, changes in differences(study, found, metric).items():
+            before = float(found[metric].isel({name: 0}).mean())
+            for value, change in zip(study.swept[name][1:], changes, strict=True):
+                rows.append([metric, named[name].head, named[name].text(value), effect_told(metric, change, before)])
+    if rows:
+        yield plain_table(("score", "parameter", "value", "difference from the first value"), rows, "Every difference")
+    if len(sessions) <= _MOST_ROWS:
+        yield plain_table([*heads[: len(named)], SEED, *heads[len(named) :]], sessions, "Every session")
 
 
 def tuning_page(tuning: "Tuning", tuned: "Tuned", title: str) -> str:
@@ -74,70 +202,3 @@ def tuning_page(tuning: "Tuning", tuned: "Tuned", title: str) -> str:
     )
     told = f"Best: {best}, with {tuning.metric} {tuned.best.score:.4g}."
     return page(title, [Text(told)], [Section(parts=figures)])
-
-
-def _label(found: "xarray.Dataset", metric: str) -> dict[str, Any]:
-    unit = found[metric].attrs.get("units", "1")
-    return axis(metric, "" if unit == "1" else unit)
-
-
-def condition_lines(
-    study: "Study", found: "xarray.Dataset", metric: str, figure: Callable[[Array], Mean] = mean_of
-) -> list[dict[str, Any]]:
-    """A line over the first swept parameter for each combination of the others, with intervals."""
-    name = next(iter(study.swept))
-    lines: dict[str, list[tuple[Any, Mean]]] = {}
-    for values, part in conditions(study, found):
-        others = ", ".join(f"{key}={value}" for key, value in values.items() if key != name)
-        lines.setdefault(others, []).append((values[name], figure(part[metric].values)))
-    traces = []
-    for number, (others, points) in enumerate(lines.items()):
-        means = [mean for _, mean in points]
-        traces.append(
-            {
-                "type": "scatter",
-                "mode": "lines+markers",
-                "name": others,
-                "x": [x if is_number(x) else str(x) for x, _ in points],
-                "y": [mean.value for mean in means],
-                "error_y": {
-                    "type": "data",
-                    "symmetric": False,
-                    "array": [mean.high - mean.value for mean in means],
-                    "arrayminus": [mean.value - mean.low for mean in means],
-                },
-                "line": {"color": _COLORS[number % len(_COLORS)]},
-            }
-        )
-    return traces
-
-
-def condition_figure(study: "Study", found: "xarray.Dataset", metric: str, traces: list[dict[str, Any]]) -> Figure:
-    """Figure of lines over the first swept parameter."""
-    name = next(iter(study.swept))
-    layout = {"xaxis": axis(name), "yaxis": _label(found, metric)}
-    return Figure("", f"{metric} over {name}", traces, layout, 340)
-
-
-def _heat(study: "Study", found: "xarray.Dataset", metric: str) -> Figure:
-    """Heat map of means for the values of the first two parameters."""
-    first, second = list(study.swept)[:2]
-    others = [name for name in (*study.swept, SEED) if name not in {first, second}]
-    means = found[metric].mean(others).transpose(second, first)
-    trace = {
-        "type": "heatmap",
-        "z": np.asarray(means.values),
-        "colorscale": "Viridis",
-        "x": [str(value) for value in study.swept[first]],
-        "y": [str(value) for value in study.swept[second]],
-        "colorbar": {"title": {"text": metric}},
-    }
-    return Figure("", f"means over {', '.join(others)}", [trace], {"xaxis": axis(first), "yaxis": axis(second)}, 340)
-
-
-def _table(study: "Study", found: "xarray.Dataset") -> Table:
-    rows = [
-        [*map(str, values.values()), *(str(mean_of(part[metric].values)) for metric in study.metrics)]
-        for values, part in conditions(study, found)
-    ]
-    return plain_table((*study.swept, *study.metrics), rows)
