@@ -8,7 +8,8 @@ import pytest
 
 import teleop_core as tc
 from teleop_lab import Tuning, read_tuning
-from teleop_lab.studies import Range
+from teleop_lab.studies import Range, Trial, Tuned
+from teleop_lab.studies.tuning_page import best_told
 
 METRIC = "position_error_mm.rms"
 
@@ -31,6 +32,19 @@ def test_the_best_trial_has_the_score_of_the_same_session_alone() -> None:
     name, value = next(iter(tuned.best.values.items()))
     alone = tc.run("coarse_box", duration=0.5, seed=1, settings={name: value}).score()
     assert tuned.best.score == alone.value(METRIC)
+
+
+def test_trials_within_the_noise_of_the_best_one_are_equal_to_it_and_others_are_not() -> None:
+    best = Trial({"coarse_gain": 1.0}, (1.0, 1.1, 0.9, 1.0), "")
+    near = Trial({"coarse_gain": 0.9}, (1.1, 1.0, 1.0, 1.0), "")
+    far = Trial({"coarse_gain": 0.1}, (2.0, 2.2, 1.8, 2.1), "")
+    failed = Trial({"coarse_gain": 0.2}, (), "tired")
+    assert Tuned((far, near, failed, best), best).equal() == [near, best]
+    name, _, (told, equal) = best_told(
+        tuning(scenario="point", metric="task.time_s"), Tuned((far, near, failed, best), best)
+    )
+    assert (name, told.text) == ("smallest task time", "coarse gain 1: 1.00 (0.87 to 1.13) s")
+    assert equal.text == "cannot be told apart from it: 1 of 3 other trials, at coarse gain 0.9 to 1"
 
 
 def test_the_largest_score_is_the_best_where_it_is_asked_for() -> None:
@@ -121,6 +135,9 @@ def test_the_command_prints_the_best_values_and_writes_page_and_numbers(
     page, numbers = tmp_path / "page.html", tmp_path / "numbers.csv"
     given = ["--trials", "2", "--jobs", "1", "--html", str(page), "--csv", str(numbers)]
     assert main(["tune", str(file_of(tmp_path, text)), *given]) == 0
-    assert "best: --set coarse_gain=" in capsys.readouterr().out
-    assert "coarse_gain" in page.read_text("utf-8")
+    printed = capsys.readouterr().out
+    assert "best: --set coarse_gain=" in printed
+    assert "cannot be told apart from it: 1 of 1 other trials" in printed
+    assert "cannot be told apart from it: 1 of 1 other trials" in page.read_text("utf-8")
+    assert "2 trials × 1 = 2 sessions" in page.read_text("utf-8")
     assert len(numbers.read_text("utf-8").splitlines()) == 3

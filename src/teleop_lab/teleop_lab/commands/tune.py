@@ -45,8 +45,8 @@ def tune(
         outputs: Files with the trials.
     """
     from teleop_core.commands.progress import shown_progress
-    from teleop_lab.studies.study_page import tuning_page
     from teleop_lab.studies.tuning import read_tuning
+    from teleop_lab.studies.tuning_page import best_told, tuning_page
 
     tuning = read_tuning(file)
     outputs.check()
@@ -57,6 +57,7 @@ def tune(
     if failed:
         print(f"{len(failed)} of {len(tuned.trials)} trials failed; first: {failed[0]}")
     print("best: --set " + " ".join(f"{n}={_text(v)}" for n, v in tuned.best.values.items()))
+    print(best_told(tuning, tuned)[2][1].text)
     outputs.write(lambda: _csv(tuning, tuned), lambda: tuning_page(tuning, tuned, file.stem))
 
 

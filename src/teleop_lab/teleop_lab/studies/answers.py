@@ -1,6 +1,5 @@
 """Answers: parameters, scores and their differences in words, and in the units in which a reader thinks."""
 
-import re
 from collections.abc import Sequence
 from math import floor, log10
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -83,8 +82,8 @@ def parameters_of(study: "Study") -> dict[str, Quantity]:
 def score_of(name: str, values: Sequence[float]) -> Quantity:
     """A score with some of its values or differences; shares become per cent."""
     key = next((key for key in keys() if key.covers(tuple(name.split(".")))), Key(name, "1", ""))
-    units = {"", *key.unit.replace("/", " ").lower().split()}
-    title = " ".join(word for word in re.split(r"[._]", name) if word not in units)
+    unit = "_" + key.unit.replace("/", "_").replace("^", "")
+    title = " ".join(part.removesuffix(unit).replace("_", " ") for part in name.split("."))
     if key.unit == "1" and "share" in name:
         return Quantity(name, title, key.meaning, 100.0, "%")
     return _scaled(Quantity(name, title, key.meaning, 1.0, key.unit), [abs(value) for value in values])

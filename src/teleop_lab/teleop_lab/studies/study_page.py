@@ -1,26 +1,24 @@
 """Page: a study as one HTML file: its design, an answer to each question, means with intervals, and tables."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from itertools import combinations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from teleop_console.report.pages import Cell, Listed, Part, Section, Text, page, plain_table
-from teleop_core.evaluation.figure import FIRST, Figure, axis
+from teleop_core.evaluation.figure import Figure, axis
 from teleop_lab.studies.answers import UNTOLD, effect_told, parameters_of, score_of
 from teleop_lab.studies.means import condition_figure
 from teleop_lab.studies.study import SEED, is_number
 from teleop_lab.studies.summary import Mean, conditions, differences, interplay, mean_of
-from teleop_lab.studies.tuning import Range
 
 if TYPE_CHECKING:
     import xarray
 
     from teleop_lab.studies.study import Study
-    from teleop_lab.studies.tuning import Tuned, Tuning
 
-_MOST_BOXES, _MOST_ROWS = 12, 600
+_MOST_ROWS = 600
 _ABOUT = (
     "A difference is counted from the first value of its parameter, within each seed and over all values of the other "
     "parameters; the 95 % interval is over the seeds (Student). A difference whose interval includes zero cannot be "
@@ -54,14 +52,17 @@ def _design(study: "Study") -> Listed:
             (quantity.head, f"{quantity.name}: {quantity.meaning}", [Cell(quantity.text(value)) for value in values])
         )
         counts.append(str(len(values)))
-    seeds = [str(seed) for seed in study.seeds]
-    if len(seeds) > _MOST_BOXES:
-        seeds = [*seeds[: _MOST_BOXES - 2], "…", seeds[-1]]
-    rows.append((SEED, "repeats every combination, so comparisons are within a seed", list(map(Cell, seeds))))
+    rows.append((SEED, "repeats every combination, so comparisons are within a seed", seed_boxes(study.seeds)))
     sessions = len(study.seeds) * int(np.prod([int(count) for count in counts]))
     told = f"{' × '.join([*counts, str(len(study.seeds))])} = {sessions} sessions of {study.scenario or 'the defaults'}"
     rows.append(("sessions", "independent of each other, so their order has no effect", [Cell(told)]))
     return Listed(rows, are_boxes=True)
+
+
+def seed_boxes(seeds: Sequence[int]) -> list[Cell]:
+    """Boxes of seeds; of many seeds only some have one."""
+    shown = list(map(str, seeds))
+    return list(map(Cell, shown if len(shown) <= 12 else [*shown[:10], "…", shown[-1]]))
 
 
 def _far(values: Any, means: list[Mean]) -> int:
@@ -174,31 +175,3 @@ def _tables(study: "Study", found: "xarray.Dataset") -> Iterator[Part]:
         yield plain_table(("score", "parameter", "value", "difference from the first value"), rows, "Every difference")
     if len(sessions) <= _MOST_ROWS:
         yield plain_table([*heads[: len(named)], SEED, *heads[len(named) :]], sessions, "Every session")
-
-
-def tuning_page(tuning: "Tuning", tuned: "Tuned", title: str) -> str:
-    """HTML page of a search. It shows the score by trial and by each parameter, and works offline."""
-    numbers = [str(n) for n in range(1, len(tuned.trials) + 1)]
-    columns: dict[str, list[Any]] = {"trial": [int(n) for n in numbers]}
-    columns |= {name: [trial.values[name] for trial in tuned.trials] for name in tuning.searched}
-    figures: list[Part] = []
-    for name, values in columns.items():
-        trace = {
-            "type": "scatter",
-            "mode": "markers",
-            "marker": {"color": FIRST},
-            "text": numbers,
-            "x": [x if is_number(x) else str(x) for x in values],
-            "y": [trial.score for trial in tuned.trials],
-            "hovertemplate": "trial %{text}: %{y:.4g}<extra></extra>",
-        }
-        where = tuning.searched.get(name)
-        kind = {"type": "log"} if isinstance(where, Range) and where.is_log else {}
-        layout = {"xaxis": axis(name, **kind), "yaxis": axis(tuning.metric)}
-        figures.append(Figure(name, "", [trace], layout, 300))
-    best = ", ".join(
-        f"{name}={value:.4g}" if isinstance(value, float) else f"{name}={value}"
-        for name, value in tuned.best.values.items()
-    )
-    told = f"Best: {best}, with {tuning.metric} {tuned.best.score:.4g}."
-    return page(title, [Text(told)], [Section(parts=figures)])

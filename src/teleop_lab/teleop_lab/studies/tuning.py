@@ -6,11 +6,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from teleop_core.base.errors import ParameterError, SessionError, TeleopError
 from teleop_core.session import api, runner
 from teleop_lab.studies.point import Result
 from teleop_lab.studies.store import Store
 from teleop_lab.studies.study import Study, common, named, read_entries
+from teleop_lab.studies.summary import change_of
 from teleop_lab.studies.workers import in_processes
 
 _KEYS = ("scenario", "seeds", "set", "tune", "minimize", "maximize", "parts", "duration")
@@ -38,13 +41,18 @@ class Trial(NamedTuple):
 
     Attributes:
         values: Values by parameter.
-        score: Mean over the seeds; None if a session failed or has no such score.
-        error: Reason why the score is missing.
+        scores: Score of each seed; empty if a session failed or has no such score.
+        error: Reason why the scores are missing.
     """
 
     values: Mapping[str, api.Setting]
-    score: float | None
+    scores: tuple[float, ...]
     error: str
+
+    @property
+    def score(self) -> float | None:
+        """Mean over the seeds; None without scores."""
+        return sum(self.scores) / len(self.scores) if self.scores else None
 
 
 @dataclass(frozen=True)
@@ -58,6 +66,12 @@ class Tuned:
 
     trials: tuple[Trial, ...]
     best: Trial
+
+    def equal(self) -> list[Trial]:
+        """Trials that cannot be told apart from the best one, which is among them."""
+        best = self.best.scores
+        scored = (trial for trial in self.trials if trial.scores)
+        return [one for one in scored if one is self.best or not change_of(np.subtract(one.scores, best)).is_told]
 
 
 @dataclass(frozen=True)
@@ -93,13 +107,13 @@ class Tuning:
                 raise ParameterError(f"tune of {name}", tuple(where[:2]), "low below high")
             if isinstance(where, Range) and where.is_log and where.low <= 0.0:
                 raise ParameterError(f"low of {name}", where.low, "above 0 with log")
-        study = self._study()
+        study = self.study()
         for name, values in study.swept.items():  # each value separately, so that an error names its parameter
             for value in values:
                 first = {other: ends[0] for other, ends in study.swept.items()}
                 study.points_at({**first, name: value})
 
-    def _study(self) -> Study:
+    def study(self) -> Study:
         """Study over the lowest and highest values of all ranges; the search uses its store."""
         ends = {name: where[:2] if isinstance(where, Range) else tuple(where) for name, where in self.searched.items()}
         return Study(self.scenario, ends, self.seeds, (self.metric,), self.settings, self.parts)
@@ -130,7 +144,7 @@ class Tuning:
         if trials < 1:
             raise ParameterError("trials", trials, "1 or more")
         optuna = _optuna()
-        study = self._study()
+        study = self.study()
         kept = study.store(store)
         # The random numbers are the same in each call, so equal results lead to equal proposals.
         search = optuna.create_study(
@@ -187,8 +201,8 @@ class Tuning:
         scores = [one.scores.get(self.metric) for one in results]
         error = error or next((one.error for one in results if one.error), "")
         if error or None in scores:
-            return Trial(values, None, error or f"a recording without {self.metric}")
-        return Trial(values, sum(map(float, scores)) / len(scores), "")  # type: ignore[arg-type]
+            return Trial(values, (), error or f"a recording without {self.metric}")
+        return Trial(values, tuple(map(float, scores)), "")  # type: ignore[arg-type]
 
 
 def _optuna() -> Any:
