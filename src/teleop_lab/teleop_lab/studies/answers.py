@@ -50,8 +50,10 @@ class Quantity(NamedTuple):
         return f"{self.title} {self.text(value)} {self.unit}".strip()
 
     def text(self, value: object) -> str:
-        """A value without its unit."""
-        return f"{value * self.factor:.6g}" if is_number(value) else str(value)  # type: ignore[operator]
+        """A value without its unit; a dash for NaN."""
+        if is_number(value):
+            return f"{value * self.factor:.6g}"  # type: ignore[operator]
+        return "–" if isinstance(value, float) else str(value)
 
     def shown(self, mean: Mean) -> str:
         """A mean with its interval, without the unit; as many digits as the interval tells."""

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from itertools import combinations
+from math import prod
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -46,15 +47,13 @@ def study_page(study: "Study", found: "xarray.Dataset", title: str) -> str:
 
 def _design(study: "Study") -> Listed:
     """The design in one picture: a row of boxes for each parameter, and one for the seeds."""
-    rows, counts = [], []
-    for quantity, values in zip(parameters_of(study).values(), study.swept.values(), strict=True):
-        rows.append(
-            (quantity.head, f"{quantity.name}: {quantity.meaning}", [Cell(quantity.text(value)) for value in values])
-        )
-        counts.append(str(len(values)))
+    rows = [
+        (one.head, f"{name}: {one.meaning}", [Cell(one.text(value)) for value in study.swept[name]])
+        for name, one in parameters_of(study).items()
+    ]
     rows.append((SEED, "repeats every combination, so comparisons are within a seed", seed_boxes(study.seeds)))
-    sessions = len(study.seeds) * int(np.prod([int(count) for count in counts]))
-    told = f"{' × '.join([*counts, str(len(study.seeds))])} = {sessions} sessions of {study.scenario or 'the defaults'}"
+    counts = [*map(len, study.swept.values()), len(study.seeds)]
+    told = f"{' × '.join(map(str, counts))} = {prod(counts)} sessions of {study.scenario or 'the defaults'}"
     rows.append(("sessions", "independent of each other, so their order has no effect", [Cell(told)]))
     return Listed(rows, are_boxes=True)
 
@@ -73,39 +72,33 @@ def _far(values: Any, means: list[Mean]) -> int:
 
 
 def _answers(study: "Study", found: "xarray.Dataset") -> Iterator[tuple[str, str, list[Cell]]]:
-    """An answer for each parameter and score, and for each pair of parameters and score."""
-    changes = {metric: differences(study, found, metric) for metric in study.metrics}
-    named = parameters_of(study)
+    """Answers for each parameter, each pair of parameters, and people; an answer for each score."""
+    named, changes = parameters_of(study), {metric: differences(study, found, metric) for metric in study.metrics}
     for name, values in study.swept.items():
-        if len(values) < 2:
-            continue
-        quantity = named[name]
-        cells = []
-        for metric in study.metrics:
-            means = changes[metric][name]
-            at = _far(values, means)
-            before = float(found[metric].isel({name: 0}).mean())
-            told = effect_told(metric, means[at], before)
-            if not all(map(is_number, values)) and len(means) > 1:
-                known = sum(mean.is_told for mean in means)
-                told = f"{known} of {len(means)} can be told apart; at {values[at + 1]}, the largest: {told}"
-            cells.append(_cell(metric, told, is_told=means[at].is_told))
-        yield f"{quantity.title} {quantity.range(values)}", quantity.meaning, cells
+        if len(values) > 1:
+            cells = [_answer(found, name, values, metric, changes[metric][name]) for metric in study.metrics]
+            yield f"{named[name].title} {named[name].range(values)}", named[name].meaning, cells
     for pair in _pairs(study):
-        cells = [
-            _cell(metric, _joint_told(study, found, metric, pair), is_told=True)
-            for metric in study.metrics
-            if pair in _joint(study, found, metric)
-        ]
-        asked = " × ".join(named[name].title for name in pair)
-        told = f"{UNTOLD} from effects that add up, in all scores"
+        joint = [metric for metric in study.metrics if pair in _joint(study, found, metric)]
+        cells = [_cell(metric, _joint_told(study, found, metric, pair), is_told=True) for metric in joint]
+        asked, told = (
+            " × ".join(named[name].title for name in pair),
+            f"{UNTOLD} from effects that add up, in all scores",
+        )
         yield asked, "how much the effect of the first depends on the second", cells or [Cell(told, "untold")]
     if study.printed:
-        yield (
-            study.printed.source,
-            "where the mean of the sessions is within the 95 % interval of people",
-            [_cell(metric, _people_told(study, found, metric), is_told=True) for metric in study.printed.values],
-        )
+        cells = [_cell(metric, _people_told(study, found, metric), is_told=True) for metric in study.printed.values]
+        yield study.printed.source, "where the mean of the sessions is within the 95 % interval of people", cells
+
+
+def _answer(found: "xarray.Dataset", name: str, values: Sequence[object], metric: str, means: list[Mean]) -> Cell:
+    """Answer for one parameter and score."""
+    at = _far(values, means)
+    told = effect_told(metric, means[at], float(found[metric].isel({name: 0}).mean()))
+    if not all(map(is_number, values)) and len(means) > 1:
+        known = sum(mean.is_told for mean in means)
+        told = f"{known} of {len(means)} can be told apart; at {values[at + 1]}, the largest: {told}"
+    return _cell(metric, told, is_told=means[at].is_told)
 
 
 def _joint_told(study: "Study", found: "xarray.Dataset", metric: str, pair: tuple[str, str]) -> str:
@@ -141,9 +134,7 @@ def _joint(study: "Study", found: "xarray.Dataset", metric: str) -> list[tuple[s
 def _heat(study: "Study", found: "xarray.Dataset", metric: str, pair: tuple[str, str]) -> Figure:
     """Means for each value of two parameters that interact."""
     named, (one, other) = parameters_of(study), pair
-    means = (
-        found[metric].mean([name for name in (*study.swept, SEED) if name not in {one, other}]).transpose(other, one)
-    )
+    means = found[metric].mean([name for name in (*study.swept, SEED) if name not in pair]).transpose(other, one)
     score = score_of(metric, means.values.ravel().tolist())
     x, y = ([named[name].text(value) for value in study.swept[name]] for name in (one, other))
     trace = {"type": "heatmap", "z": score.factor * means.values, "x": x, "y": y, "colorscale": "Viridis",
@@ -157,21 +148,31 @@ def _tables(study: "Study", found: "xarray.Dataset") -> Iterator[Part]:
     """Folded tables: means of each condition, every difference, and every session."""
     named = parameters_of(study)
     scores = [score_of(metric, found[metric].values.ravel().tolist()) for metric in study.metrics]
-    heads = [one.head for one in (*named.values(), *scores)]
+    first, last = ([one.head for one in some] for some in (named.values(), scores))
     means, sessions = [], []
     for values, part in conditions(study, found):
         cells = [named[name].text(value) for name, value in values.items()]
         means.append([*cells, *(score.shown(mean_of(part[score.name].values)) for score in scores)])
         for at, seed in enumerate(study.seeds):
             sessions.append([*cells, str(seed), *(score.text(float(part[score.name][at])) for score in scores)])
-    yield plain_table(heads, means, "Means with 95 % intervals")
-    rows = []
+    yield plain_table([*first, *last], means, "Means with 95 % intervals")
+    if rows := list(_differences(study, found)):
+        yield plain_table(("score", "parameter", "value", "difference from the first value"), rows, "Every difference")
+    if len(sessions) <= _MOST_ROWS:
+        yield plain_table([*first, SEED, *last], sessions, "Every session")
+
+
+def _differences(study: "Study", found: "xarray.Dataset") -> Iterator[list[str]]:
+    """Rows of a table: each value of each parameter against its first value, and the largest interactions."""
+    named = parameters_of(study)
     for metric in study.metrics:
+        title = score_of(metric, ()).title
         for name, changes in differences(study, found, metric).items():
             before = float(found[metric].isel({name: 0}).mean())
             for value, change in zip(study.swept[name][1:], changes, strict=True):
-                rows.append([metric, named[name].head, named[name].text(value), effect_told(metric, change, before)])
-    if rows:
-        yield plain_table(("score", "parameter", "value", "difference from the first value"), rows, "Every difference")
-    if len(sessions) <= _MOST_ROWS:
-        yield plain_table([*heads[: len(named)], SEED, *heads[len(named) :]], sessions, "Every session")
+                yield [title, named[name].head, named[name].text(value), effect_told(metric, change, before)]
+        for pair in _pairs(study):
+            values, change = interplay(study, found, metric, pair)
+            heads = " × ".join(named[name].head for name in pair)
+            texts = " × ".join(named[name].text(value) for name, value in zip(pair, values, strict=True))
+            yield [title, heads, texts, effect_told(metric, change, 0.0)]
