@@ -12,7 +12,7 @@ import pytest
 
 import teleop_core as tc
 from teleop_lab import Study, read_study
-from teleop_lab.studies.answers import UNTOLD, effect_told, parameters_of
+from teleop_lab.studies.answers import UNTOLD, effect_told, parameters_of, score_of
 from teleop_lab.studies.dataset import dataset_of, swept_coordinates
 from teleop_lab.studies.point import Key, Result
 from teleop_lab.studies.printed import Printed, read_printed
@@ -85,6 +85,7 @@ def test_the_interval_of_five_values_holds_their_mean_in_nineteen_of_twenty_samp
     assert sum(one.low <= 1.0 <= one.high for one in found) / count == pytest.approx(0.95, abs=0.015)
     assert mean_of(np.array([0.0, 0.0, 0.1])).low == 0.0
     assert mean_of(np.array([-0.1, 0.0, 0.1])).low < -0.1
+    assert score_of(SHARE, ()).shown(mean_of(np.array([0.0, 0.9, 1.0]))).endswith("to 100)")
 
 
 def test_effects_that_add_up_do_not_interact_and_others_do_with_their_sign() -> None:

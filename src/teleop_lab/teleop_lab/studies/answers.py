@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from teleop_lab.studies.study import Study
 
 UNTOLD = "cannot be told apart"
+NO_SCORE = "no session has this score"
 _SMALLER = {"s": "ms", "m": "mm"}
 _WORDS = {"ms": ("longer", "shorter"), "s": ("longer", "shorter")}
 
@@ -55,11 +56,16 @@ class Quantity(NamedTuple):
             return f"{value * self.factor:.6g}"  # type: ignore[operator]
         return "–" if isinstance(value, float) else str(value)
 
+    def ends(self, mean: Mean) -> list[float]:
+        """A mean and the ends of its interval in the unit; a share ends at 100 %."""
+        value, low, high = (self.factor * x for x in mean[:3])
+        return [value, low, min(high, max(100.0, value)) if self.unit == "%" else high]
+
     def shown(self, mean: Mean) -> str:
         """A mean with its interval, without the unit; as many digits as the interval tells."""
         if not mean.samples:
             return "–"
-        value, low, high = _rounded([self.factor * x for x in mean[:3]])
+        value, low, high = _rounded(self.ends(mean))
         return value if mean.samples == 1 else f"{value} ({low} to {high})"
 
 
@@ -110,7 +116,7 @@ def effect_told(score: str, effect: Mean, before: float) -> str:
         before: Mean of the score where the difference is counted from; 0 or NaN if unknown.
     """
     if not effect.samples:
-        return "no session has this score"
+        return NO_SCORE
     unit = score_of(score, effect[:3])
     value, low, high = _rounded([unit.factor * x for x in effect[:3]])
     name = {"%": " percentage points", "": ""}.get(unit.unit, f" {unit.unit}")

@@ -88,7 +88,7 @@ def _points(
 def _traces(row: list[_Point], shift: float, number: int, score: Quantity) -> Iterator[Trace]:
     """One line with its intervals, and its single sessions."""
     x = np.array([one.x for one in row]) + shift
-    color, means = _COLORS[number % len(_COLORS)], score.factor * np.array([one.mean[:3] for one in row])
+    color, means = _COLORS[number % len(_COLORS)], np.array([score.ends(one.mean) for one in row])
     yield figure.intervals(x, means, row[0].line, color, score.unit, number + 1)
     sessions = score.factor * np.array([one.sessions for one in row])
     if sessions.shape[1] > 1:

@@ -9,7 +9,7 @@ import numpy as np
 
 from teleop_console.report.pages import Cell, Listed, Part, Section, Text, page, plain_table
 from teleop_core.evaluation.figure import Figure, axis
-from teleop_lab.studies.answers import UNTOLD, effect_told, parameters_of, score_of
+from teleop_lab.studies.answers import NO_SCORE, UNTOLD, effect_told, parameters_of, score_of
 from teleop_lab.studies.means import condition_figure
 from teleop_lab.studies.study import SEED, is_number
 from teleop_lab.studies.summary import Mean, conditions, differences, interplay, mean_of
@@ -81,10 +81,8 @@ def _answers(study: "Study", found: "xarray.Dataset") -> Iterator[tuple[str, str
     for pair in _pairs(study):
         joint = [metric for metric in study.metrics if pair in _joint(study, found, metric)]
         cells = [_cell(metric, _joint_told(study, found, metric, pair), is_told=True) for metric in joint]
-        asked, told = (
-            " × ".join(named[name].title for name in pair),
-            f"{UNTOLD} from effects that add up, in all scores",
-        )
+        asked = " × ".join(named[name].title for name in pair)
+        told = f"{UNTOLD} from effects that add up, in all scores"
         yield asked, "how much the effect of the first depends on the second", cells or [Cell(told, "untold")]
     if study.printed:
         cells = [_cell(metric, _people_told(study, found, metric), is_told=True) for metric in study.printed.values]
@@ -95,7 +93,7 @@ def _answer(found: "xarray.Dataset", name: str, values: Sequence[object], metric
     """Answer for one parameter and score."""
     at = _far(values, means)
     told = effect_told(metric, means[at], float(found[metric].isel({name: 0}).mean()))
-    if not all(map(is_number, values)) and len(means) > 1:
+    if not all(map(is_number, values)) and len(means) > 1 and means[at].samples:
         known = sum(mean.is_told for mean in means)
         told = f"{known} of {len(means)} can be told apart; at {values[at + 1]}, the largest: {told}"
     return _cell(metric, told, is_told=means[at].is_told)
@@ -112,10 +110,10 @@ def _joint_told(study: "Study", found: "xarray.Dataset", metric: str, pair: tupl
 
 def _people_told(study: "Study", found: "xarray.Dataset", metric: str) -> str:
     assert study.printed is not None
-    means = [mean_of(part[metric].values).value for _, part in conditions(study, found)]
+    means = np.array([mean_of(part[metric].values).value for _, part in conditions(study, found)])
     _, low, high = study.printed.values[metric].T
-    inside = int(((low <= means) & (means <= high)).sum())
-    return f"{inside} of {len(means)} conditions"
+    known, inside = int(np.isfinite(means).sum()), int(((low <= means) & (means <= high)).sum())
+    return f"{inside} of {known} conditions" if known else NO_SCORE
 
 
 def _cell(metric: str, told: str, *, is_told: bool) -> Cell:
