@@ -13,6 +13,7 @@ from teleop_console.console_session import ConsoleSession
 from teleop_console.link import box_of
 from teleop_core.bags.reader import Bag
 from teleop_core.base.errors import ParameterError, SessionError
+from teleop_core.evaluation.metrics.counts import PHASES
 from teleop_core.graph import topics
 from teleop_core.graph.topics import JAW_TOPICS, PASSIVITY_TOPICS, SCENE_TOPICS, TASK_TOPICS
 from teleop_core.nodes.children import free_domain
@@ -62,6 +63,9 @@ def test_the_view_has_fresh_streams_of_the_arm_and_says_where_it_is_recorded(liv
 
     view = wait_until(fresh, "newer samples of an arm at rest")
     assert view.recording == out
+    phases = wait_until(lambda: link.view().phases, "report of the phases of a tick")
+    assert tuple(phases) == PHASES
+    assert all(0.0 < time < 0.1 for time in phases.values())
     assert view.arms[""].get(topics.SLAVE_MEASURED_JS).shape == (18,)
     q = view.arms[""].get(topics.SLAVE_MEASURED_JS)[:6]
     tip = view.arms[""].get(topics.SLAVE_MEASURED_CP)[:3]

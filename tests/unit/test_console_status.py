@@ -50,6 +50,8 @@ def test_ages_and_rate_are_told_as_far_as_they_are_known() -> None:
     assert facts(known) == "1000 Hz · command 1.3 ms · picture 33 ms old"
     known.delay = (math.nan, math.nan)
     assert facts(known) == "1000 Hz · picture 33 ms old"
+    known.phases = {"take": 0.0001, "step": 0.0002}
+    assert facts(known) == "1000 Hz · tick 0.30 ms (take 0.10, step 0.20) · picture 33 ms old"
 
 
 def test_nothing_is_red_that_is_not_wrong() -> None:

@@ -21,6 +21,7 @@ from teleop_console.picture_streams import PictureStreams
 from teleop_core.bags.messages import read_numbers, read_reports
 from teleop_core.bags.recording import MARKS
 from teleop_core.base.errors import ParameterError, SessionError
+from teleop_core.evaluation.metrics.counts import PHASES
 from teleop_core.graph.graph import RECORDER_NAME
 from teleop_core.graph.topics import OPERATION, SLAVE_OPERATION, TELEOP_STATE
 from teleop_core.kernels.geometry import Array
@@ -203,6 +204,8 @@ class LiveLink(ReportReader):
             median, worst = (slave.number(f"delay_ms.{w}") * 1e-3 for w in ("median", "p99"))
             view.delay = (math.nan, math.nan) if unknown else (median, worst)
             view.rate = slave.number("rate_hz") or math.nan
+            ticks = slave.number("phase_ticks")
+            view.phases = {name: 1e-6 * slave.number(f"phase_us.{name}") / ticks for name in PHASES if ticks}
 
     # -- commanding ------------------------------------------------------------------------------
 

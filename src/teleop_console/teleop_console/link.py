@@ -64,6 +64,7 @@ class View:
         news: Warnings of the nodes, one line for each.
         delay: Median and 99th percentile of the delay from master sample to slave command [s]; NaN if unknown.
         rate: Ticks of the slave per second; NaN if unknown.
+        phases: Mean time of each phase of a tick in the process of the slave [s], by its name; empty if unknown.
         age: Time since the newest shown sample arrived [s]; NaN if unknown.
         marks: Times [s] and texts of the marks that were set since the page opened.
         display: Frames per second and delay [s] of the operator's display; NaN without a display.
@@ -78,6 +79,7 @@ class View:
     news: tuple[str, ...] = ()
     delay: tuple[float, float] = (float("nan"), float("nan"))
     rate: float = float("nan")
+    phases: Mapping[str, float] = field(default_factory=dict)
     age: float = float("nan")
     marks: tuple[tuple[float, str], ...] = ()
     display: tuple[float, float] = (float("nan"), float("nan"))

@@ -101,9 +101,12 @@ def next_step(view: View, *, is_led_here: bool) -> str:
 
 
 def facts(view: View) -> str:
-    """Text with the rate of the slave, and the ages of command and picture; unknown values are left out."""
+    """Text with rate and ticks of the slave, and the ages of command and picture; unknown values are left out."""
+    whole = sum(view.phases.values()) if view.phases else math.nan
+    parts = ", ".join(f"{name} {1e3 * time:.2f}" for name, time in view.phases.items())
     told = (
         (view.rate, f"{view.rate:.0f} Hz"),
+        (whole, f"tick {1e3 * whole:.2f} ms ({parts})"),
         (view.delay[0], f"command {1e3 * view.delay[0]:.1f} ms"),
         (view.age, f"picture {1e3 * view.age:.0f} ms old"),
         (view.display[1], f"display {display_text(view)}"),
