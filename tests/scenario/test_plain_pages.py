@@ -40,7 +40,7 @@ def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     tc.run("coarse_box", duration=2.0, out=folder / "hand", operator="human")
     text = (Path(__file__).parents[2] / "config/studies/delay.yaml").read_text(encoding="utf-8")
     study = folder / "delay.yaml"
-    study.write_text(text.replace("duration: 20.0", "duration: 1.0").replace("seeds: 5", "seeds: 1"), encoding="utf-8")
+    study.write_text(text.replace("duration: 20.0", "duration: 1.0").replace("seeds: 5", "seeds: 2"), encoding="utf-8")
     search = folder / "scale.yaml"
     search.write_text(
         "scenario: coarse_box\nduration: 0.3\ntune: {coarse_gain: {low: 0.5, high: 1.0, log: true}}\n"
@@ -106,3 +106,17 @@ def test_plots_of_a_hand_that_is_followed_throughout_do_not_lie_on_each_other(ta
     domains = tab.value(f"{axes}.map(([, axis]) => axis.domain)")
     assert len(domains) >= 2
     assert all(high - low < 0.6 for low, high in domains)
+
+
+@pytest.mark.slow
+def test_a_click_in_the_legend_shows_the_single_sessions_of_a_study(tab: Any, pages: dict[str, Path]) -> None:
+    visit(tab, pages["study"], 1400, "light")
+    shown = "document.querySelector('.plot').data.filter((one) => one.name === 'single sessions' && one.visible !== 'legendonly')"
+    items = "[...document.querySelectorAll('.plot .legend .traces')]"
+    toggle = f"{items}.find((one) => one.textContent.includes('single')).querySelector('.legendtoggle')"
+    assert tab.value(f"{shown}.length") == 0
+    box = f"(() => {{ {toggle}.scrollIntoView({{ block: 'center' }}); return {toggle}.getBoundingClientRect(); }})()"
+    place = tab.value(f"(({{ x, y, width, height }}) => [x + width / 2, y + height / 2])({box})")
+    for kind in ("mouseMoved", "mousePressed", "mouseReleased"):
+        tab.mouse(kind, *place)
+    tab.until(f"{shown}.length === 2", 20)
