@@ -111,7 +111,8 @@ def test_plots_of_a_hand_that_is_followed_throughout_do_not_lie_on_each_other(ta
 @pytest.mark.slow
 def test_a_click_in_the_legend_shows_the_single_sessions_of_a_study(tab: Any, pages: dict[str, Path]) -> None:
     visit(tab, pages["study"], 1400, "light")
-    shown = "document.querySelector('.plot').data.filter((one) => one.name === 'single sessions' && one.visible !== 'legendonly')"
+    traces = "document.querySelector('.plot').data.filter((one) => one.name === 'single sessions')"
+    shown = f"{traces}.filter((one) => one.visible === true)"
     items = "[...document.querySelectorAll('.plot .legend .traces')]"
     toggle = f"{items}.find((one) => one.textContent.includes('single')).querySelector('.legendtoggle')"
     assert tab.value(f"{shown}.length") == 0

@@ -51,10 +51,10 @@ def grade(
     from teleop_core.base.errors import ParameterError
     from teleop_core.evaluation.command import check_places, write_whole
     from teleop_exchange import ImportOptions
+    from teleop_lab.commands.grade_page import grades_page
     from teleop_lab.grading import REASON
     from teleop_lab.grading import grade as graded
     from teleop_lab.grading import usual as usual_of
-    from teleop_lab.grading_page import grades_page
 
     if not most >= 0.0:
         raise ParameterError("--most", most, "0 or more standard deviations")
