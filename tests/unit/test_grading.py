@@ -127,5 +127,8 @@ def test_the_command_prints_and_writes_what_the_function_finds(
     assert [int(line) for line in keep.read_text().split()] == usual(found)
     assert pd.read_csv(csv)["episode"].tolist() == found.index.tolist()
     assert 'class="odd"' in page.read_text()
+    assert f"{8 - len(usual(found))} of 8" in page.read_text()
+    assert "robust standard deviations" in page.read_text()
+    assert "<th>time [s]</th>" in page.read_text()
     assert f"{len(usual(found))} of 8 episodes" in capsys.readouterr().out
     assert main(["grade", str(tmp_path / "nothing.csv")]) == 2

@@ -11,6 +11,7 @@ import teleop_core as tc
 from teleop_lab import Tuning, read_tuning
 from teleop_lab.studies import Range, Trial, Tuned
 from teleop_lab.studies.summary import least_difference
+from teleop_lab.studies.tuning_page import tuning_page
 
 METRIC = "position_error_mm.rms"
 WITHOUT_EYES = {"teleop.duration": 0.5, "teleop.stages": ("display",)}
@@ -35,6 +36,20 @@ def test_the_best_trial_has_the_score_of_the_same_session_alone() -> None:
     name, value = next(iter(tuned.best.values.items()))
     alone = tc.run("coarse_box", duration=0.5, seed=1, settings={name: value}).score()
     assert tuned.best.score == alone.value(METRIC)
+
+
+def test_trials_within_the_noise_of_the_best_one_are_equal_to_it_and_others_are_not() -> None:
+    best = Trial({"coarse_gain": 1.0}, (1.0, 1.1, 0.9, 1.0), "")
+    near = Trial({"coarse_gain": 0.9}, (1.1, 1.0, 1.0, 1.0), "")
+    far = Trial({"coarse_gain": 0.1}, (2.0, 2.2, 1.8, 2.1), "")
+    failed = Trial({"coarse_gain": 0.2}, (), "tired")
+    tuned = Tuned.of((far, near, failed, best), is_largest=False)
+    assert list(tuned.alike) == [near, best]
+    page = tuning_page(tuning(scenario="point", metric="task.time_s"), tuned, "gain")
+    assert "smallest task time" in page
+    assert "coarse gain 1: 1.00 (0.87 to 1.13) s" in page
+    assert "Cannot be told apart from the best: 1 of 2 other trials, whose task time" in page
+    assert "coarse_gain 0.9 … 1" in page
 
 
 def test_the_largest_score_is_the_best_where_it_is_asked_for() -> None:
@@ -174,5 +189,6 @@ def test_the_command_prints_the_best_values_and_writes_page_and_numbers(
     said = capsys.readouterr().out
     assert "best: --set coarse_gain=" in said
     assert "One seed tells no values apart" in said
-    assert "coarse_gain" in page.read_text("utf-8")
+    assert "One seed tells no values apart" in page.read_text("utf-8")
+    assert "2 trials × 1 = 2 sessions" in page.read_text("utf-8")
     assert len(numbers.read_text("utf-8").splitlines()) == 3

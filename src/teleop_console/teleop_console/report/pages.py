@@ -1,7 +1,7 @@
 """Pages: texts, tables and figures as one self-contained HTML file, in one look by day and by night.
 
-A page is written as values: :class:`Section`, :class:`Table`, :class:`Text`, :class:`Printed`, :class:`Sessions` and
-:class:`teleop_core.evaluation.figure.Figure`. One template shows them all. It escapes every text.
+A page is written as values: :class:`Section`, :class:`Table`, :class:`Text`, :class:`Printed`, :class:`Sessions`,
+:class:`Listed` and :class:`teleop_core.evaluation.figure.Figure`. One template shows them all. It escapes every text.
 """
 
 import json
@@ -91,9 +91,9 @@ class Table:
         return [(name, [cells for _, cells in found]) for name, found in groupby(self.rows, key=lambda row: row[0])]
 
 
-def plain_table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> Table:
-    """Table of texts without groups."""
-    return Table([[Cell(head) for head in heads]], [("", [Cell(text) for text in row]) for row in rows])
+def plain_table(heads: Sequence[str], rows: Sequence[Sequence[str]], summary: str = "") -> Table:
+    """Table of texts without groups; folded below its summary, if it has one."""
+    return Table([[Cell(head) for head in heads]], [("", [Cell(text) for text in row]) for row in rows], summary)
 
 
 @dataclass(frozen=True)
@@ -114,7 +114,22 @@ class Sessions:
     kind: ClassVar[str] = "sessions"
 
 
-Part = Text | Printed | Table | Sessions | Figure
+@dataclass(frozen=True)
+class Listed:
+    """Names, each with texts: boxes beside each other, or lines below each other.
+
+    Attributes:
+        rows: Name, a note below it, and its texts. A cell's note stands before its text; its kind is a class of the
+            style sheet: ``told`` for an answer, ``untold`` for a question that stays open.
+        are_boxes: Whether the texts are boxes beside each other.
+    """
+
+    rows: Sequence[tuple[str, str, Sequence[Cell]]]
+    are_boxes: bool = False
+    kind: ClassVar[str] = "listed"
+
+
+Part = Text | Printed | Table | Sessions | Listed | Figure
 
 
 @dataclass(frozen=True, eq=False)

@@ -160,6 +160,18 @@ def joined(x: Numbers, y: Numbers, name: str, color: str, unit: str = "mm") -> T
     return {**line(x, y, name, color, 1.5, unit), "mode": "lines+markers"}
 
 
+def intervals(x: Numbers, values: Numbers, name: str, color: str, unit: str, mark: int = 1) -> Trace:
+    """Trace of means with intervals, joined by a line; the columns of ``values`` (N, 3) are mean, low and high end."""
+    mean, low, high = np.asarray(values, np.float64).reshape(-1, 3).T
+    whiskers = {"type": "data", "symmetric": False, "array": high - mean, "arrayminus": mean - low, "color": color}
+    marker = points(x, mean, name, color, unit, mark)["marker"]
+    return {
+        **joined(x, mean, name, color, unit),
+        "marker": marker,
+        "error_y": whiskers | {"thickness": 1.5, "width": 4},
+    }
+
+
 def level(value: float, text: str, axis: str = "y") -> tuple[Layout, Layout]:
     """Horizontal line across a plot at a published number, with a text."""
     look = {"color": PUBLISHED, "width": 1.2, "dash": "dot"}

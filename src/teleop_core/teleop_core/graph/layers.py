@@ -294,13 +294,13 @@ def setting(key: str, value: object) -> Layer:
     """
     arm, slash, name = key.strip().rpartition("/")
     layer: Layer = {}
-    for stage, spec in _hits(name):
+    for stage, spec in declared_as(name):
         layer.setdefault(arm + slash + stage, {})[spec.name] = _as_declared(spec, value)
     return layer
 
 
-def _hits(key: str) -> list[tuple[str, Spec]]:
-    """Stages and parameters to which a key refers.
+def declared_as(key: str) -> list[tuple[str, Spec]]:
+    """Stages and parameters to which a key without an arm refers.
 
     Raises:
         UnknownNameError: There is no such parameter, or there are several with different names.

@@ -1,7 +1,7 @@
 """``teleop grade``: motion scores of every episode of a data set, the oddest episode first."""
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 from cyclopts import Parameter
 
@@ -51,6 +51,7 @@ def grade(
     from teleop_core.base.errors import ParameterError
     from teleop_core.evaluation.command import check_places, write_whole
     from teleop_exchange import ImportOptions
+    from teleop_lab.commands.grade_page import grades_page
     from teleop_lab.grading import REASON
     from teleop_lab.grading import grade as graded
     from teleop_lab.grading import usual as usual_of
@@ -81,21 +82,4 @@ def grade(
     if usual is not None:
         write_whole(usual, "".join(f"{number}\n" for number in kept))
         print(f"usual episodes: {usual}")
-    outputs.write(table.to_csv, lambda: _page(table, dataset.name))
-
-
-def _page(table: Any, name: str) -> str:
-    """Page with the episodes, the oddest first; odd cells are highlighted."""
-    from teleop_console.report.pages import Cell, Table, Text, page
-    from teleop_lab.grading import ODD, WORST
-
-    rows = []
-    for number, row in table.iterrows():
-        cells = [Cell(str(number))]
-        for column, value in row.items():
-            is_odd = column == row[WORST] and row[ODD] > 3.5
-            cells.append(Cell(f"{value:.4g}" if isinstance(value, float) else str(value), "odd" * is_odd))
-        rows.append(("", cells))
-    text = "Oddest first: by how many robust standard deviations the oddest figure is off the median of all episodes."
-    heads = [Cell(str(column)) for column in ("episode", *table.columns)]
-    return page(name, [Text(text), Table([heads], rows)])
+    outputs.write(table.to_csv, lambda: grades_page(table, dataset.name, most))

@@ -45,8 +45,8 @@ def tune(
         outputs: Files with the trials.
     """
     from teleop_core.commands.progress import shown_progress
-    from teleop_lab.studies.study_page import tuning_page
     from teleop_lab.studies.tuning import read_tuning
+    from teleop_lab.studies.tuning_page import tuning_page
 
     tuning = read_tuning(file)
     outputs.check()

@@ -5,11 +5,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from teleop_console.report.pages import Part, Section, Text, page, plain_table
-from teleop_core.evaluation.figure import FIRST, SECOND
 from teleop_lab.people.journal import DONE, Journal
 from teleop_lab.people.plan import Plan
 from teleop_lab.studies.dataset import swept_coordinates, units_of_scores
-from teleop_lab.studies.study_page import condition_figure, condition_lines
+from teleop_lab.studies.means import condition_figure
 from teleop_lab.studies.summary import Mean, apart, conditions, differences, median_of, table_text
 
 if TYPE_CHECKING:
@@ -19,7 +18,8 @@ PARTICIPANT = "participant"
 _HEADS = ("people", "simulated operator", "people − simulated")
 _ABOUT = (
     "Medians over participants and over seeds, a participant's value being the mean of the trials that count. "
-    "Intervals of 95 % by the bootstrap (Efron 1979). Changes are within each participant, and within each seed."
+    "Intervals of 95 % by the bootstrap (Efron 1979). Changes are means within each participant, and within each seed, "
+    "with intervals by Student."
 )
 
 
@@ -82,19 +82,14 @@ def comparison_table(plan: Plan, people: "xarray.Dataset", simulated: "xarray.Da
 
 def comparison_page(plan: Plan, people: "xarray.Dataset", simulated: "xarray.Dataset") -> str:
     """HTML page of this comparison, with plots, paired differences and answers; it works offline."""
-    both = {"people": (people, FIRST), "simulated operator": (simulated, SECOND)}
+    both = {"people": people, "simulated operator": simulated}
     sections = []
     for metric in plan.study.metrics:
         rows = [[row[0], *map(str, row[1:])] for row in compared(plan, people, simulated, metric)]
         parts: list[Part] = [plain_table((metric, *_HEADS), rows)]
         if plan.study.swept:
-            traces = [
-                trace | {"name": " ".join(filter(None, (who, trace["name"]))), "line": {"color": color}}
-                for who, (found, color) in both.items()
-                for trace in condition_lines(plan.study, found, metric, median_of)
-            ]
             heads = (f"change of {metric}", "against the first", *_HEADS[:2])
-            parts.append(condition_figure(plan.study, people, metric, traces))
+            parts.append(condition_figure(plan.study, both, metric, median_of))
             parts.append(plain_table(heads, _changes(plan, both, metric)))
         sections.append(Section(metric, parts=parts))
     asked = [question.name for question in plan.questions]
@@ -110,8 +105,8 @@ def comparison_page(plan: Plan, people: "xarray.Dataset", simulated: "xarray.Dat
     return page(plan.people.title, [Text(_ABOUT)], sections)
 
 
-def _changes(plan: Plan, both: dict[str, Any], metric: str) -> list[list[str]]:
-    found = [differences(plan.study, data, metric) for data, _ in both.values()]
+def _changes(plan: Plan, both: "dict[str, xarray.Dataset]", metric: str) -> list[list[str]]:
+    found = [differences(plan.study, data, metric) for data in both.values()]
     return [
         [name, str(value), *(str(changes[name][i]) for changes in found)]
         for name, values in plan.study.swept.items()

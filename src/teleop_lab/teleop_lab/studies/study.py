@@ -16,6 +16,7 @@ from teleop_core.graph.layers import SESSION
 from teleop_core.session import api, runner
 from teleop_lab.studies.checks import insist_on_reach, insist_on_scores
 from teleop_lab.studies.point import Point, code_digest, own_digest, point_key, recipe_of
+from teleop_lab.studies.printed import Printed, read_printed
 from teleop_lab.studies.store import Store
 
 if TYPE_CHECKING:
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
     from distributed import Client
 
 SEED = "seed"
-_KEYS = ("scenario", "seeds", "set", "sweep", "metrics", "parts", "duration", "people")
+_KEYS = ("scenario", "seeds", "set", "sweep", "metrics", "parts", "duration", "people", "printed")
 _SPEED = 25.0
 """Simulated seconds per second that one process computes, scoring included; measured on a busy machine."""
 _BEGIN = 0.1  # time to begin a session [s]
@@ -79,6 +80,7 @@ class Study:
         metrics: Keys of scores, such as ``task.time_s``; each score is a variable of the results.
         settings: Parameters that are the same in all sessions.
         parts: Files that register parts of your own.
+        printed: What people did, as a source printed it.
 
     Raises:
         TeleopError: A parameter, value, key of a score or part is wrong; no session was run.
@@ -90,6 +92,7 @@ class Study:
     metrics: Sequence[str]
     settings: Mapping[str, api.Setting] = field(default_factory=dict)
     parts: Sequence[Path] = ()
+    printed: Printed | None = None
 
     def __post_init__(self) -> None:
         load_own_parts(self.parts)
@@ -282,10 +285,10 @@ def _study(
 
 
 def read_study(path: Path | str) -> Study:
-    """Read a study from a YAML file with the entries scenario, set, sweep, seeds, metrics, parts and duration.
+    """Read a study from a YAML file with the entries scenario, set, sweep, seeds, metrics, parts, duration and printed.
 
     ``seeds`` is a list, or the number of seeds, which then begin with 1. ``parts`` are files in the folder of the YAML
-    file. Entries below ``people`` are for :mod:`teleop_lab.people`.
+    file. Entries below ``people`` are for :mod:`teleop_lab.people`; for ``printed`` see :func:`read_printed`.
 
     Raises:
         TeleopError: The file cannot be read, or does not describe a study.
@@ -295,9 +298,11 @@ def read_study(path: Path | str) -> Study:
     for name, values in swept.items():
         if not isinstance(values, list):
             raise ParameterError(f"sweep of {name}", values, "a list of values")
+    metrics = tuple(map(str, listed(content, "metrics")))
     return Study(
         swept={name: tuple(values) for name, values in swept.items()},
-        metrics=tuple(map(str, listed(content, "metrics"))),
+        metrics=metrics,
+        printed=read_printed(named(content, "printed"), metrics, math.prod(map(len, swept.values()))),
         **common(content, Path(path)),
     )
 

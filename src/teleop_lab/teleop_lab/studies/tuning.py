@@ -43,15 +43,18 @@ class Trial(NamedTuple):
 
     Attributes:
         values: Values by parameter.
-        score: Mean over the seeds; None if a session failed or has no such score.
-        error: Reason why the score is missing.
-        scores: Score of each seed; empty if the score is missing.
+        scores: Score of each seed; empty if a session failed or has no such score.
+        error: Reason why the scores are missing.
     """
 
     values: Mapping[str, api.Setting]
-    score: float | None
+    scores: tuple[float, ...]
     error: str
-    scores: tuple[float, ...] = ()
+
+    @property
+    def score(self) -> float | None:
+        """Mean over the seeds; None without scores."""
+        return sum(self.scores) / len(self.scores) if self.scores else None
 
 
 @dataclass(frozen=True)
@@ -136,13 +139,13 @@ class Tuning:
                 raise ParameterError(f"tune of {name}", tuple(where[:2]), "low below high")
             if isinstance(where, Range) and where.is_log and where.low <= 0.0:
                 raise ParameterError(f"low of {name}", where.low, "above 0 with log")
-        study = self._study()
+        study = self.study()
         for name, values in study.swept.items():  # each value separately, so that an error names its parameter
             for value in values:
                 first = {other: ends[0] for other, ends in study.swept.items()}
                 study.points_at({**first, name: value})
 
-    def _study(self) -> Study:
+    def study(self) -> Study:
         """Study over the lowest and highest values of all ranges; the search uses its store."""
         ends = {name: where[:2] if isinstance(where, Range) else tuple(where) for name, where in self.searched.items()}
         return Study(self.scenario, ends, self.seeds, (self.metric,), self.settings, self.parts)
@@ -173,7 +176,7 @@ class Tuning:
         if trials < 1:
             raise ParameterError("trials", trials, "1 or more")
         optuna = _optuna()
-        study = self._study()
+        study = self.study()
         kept = study.store(store)
         # The random numbers are the same in each call, so equal results lead to equal proposals.
         search = optuna.create_study(
@@ -227,10 +230,9 @@ class Tuning:
     def _trial(self, values: dict[str, api.Setting], results: list[Result], error: str) -> Trial:
         found = [one.scores.get(self.metric) for one in results]
         error = error or next((one.error for one in results if one.error), "")
-        scores = tuple(score for score in found if score is not None)
-        if error or len(scores) < len(found):
-            return Trial(values, None, error or f"a recording without {self.metric}")
-        return Trial(values, sum(scores) / len(scores), "", scores)
+        if error or None in found:
+            return Trial(values, (), error or f"a recording without {self.metric}")
+        return Trial(values, tuple(map(float, found)), "")  # type: ignore[arg-type]
 
 
 def _optuna() -> Any:
