@@ -115,7 +115,7 @@ def test_a_point_that_waits_goes_on_by_a_step_each_time_the_tip_is_near() -> Non
     task = Judged(TRACE, parameters)
     begin = task.goal.copy()
     for count in range(1, 5):
-        task.scene[1:4] = begin + [0.1, 0.0, 0.0]
+        task.scene[1:4] = begin + np.array([0.1, 0.0, 0.0])
         task.judge(3.0)
         assert task.value("attempts") == count - 1, "it waits, whatever the time"
         task.scene[1:4] = task.goal

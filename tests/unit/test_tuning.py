@@ -83,7 +83,7 @@ def test_a_score_that_no_session_has_is_told_and_not_taken_for_a_bad_one() -> No
 def tried(scores: Any) -> Tuned:
     """Result of trials with scores (N, M) by trial and seed, at gains 1, 2 and so on."""
     rows = [tuple(map(float, row)) for row in scores]
-    trials = [Trial({"gain": n}, sum(row) / len(row), "", row) for n, row in enumerate(rows, 1)]
+    trials = [Trial({"gain": n}, row, "") for n, row in enumerate(rows, 1)]
     return Tuned.of(trials, is_largest=True)
 
 
