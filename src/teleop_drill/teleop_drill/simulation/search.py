@@ -51,7 +51,7 @@ class Search:
         self._store, self._seed = store, seed
         self._next = store.coverage.sessions
         self._tried: Counter[str] = Counter()
-        """Number of times that an event was aimed at; an event that cannot happen is not aimed at for ever."""
+        """Number of times that an event was aimed at; an event that cannot happen is not aimed at without end."""
         self._moments: Counter[tuple[str, int]] = Counter()
         """Number of faults of a kind in each second of all schedules."""
         self._bred: Counter[Schedule] = Counter()

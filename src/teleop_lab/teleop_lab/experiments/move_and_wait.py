@@ -39,10 +39,11 @@ TRACING = Way(
     {**_FIXED, **_ONE_BY_ONE, "task.kind": "trace", "task.trace.waits": True}, 30.0, 30.0,
 )  # fmt: skip
 TRANSFER = Way(
-    "transfer a block, one arm", "uva_board",
-    {**_FIXED, "teleop.stages": ("network", "jaw_command", "jaw", "jaw_sim", "display", "task"),
-     "task.peg_transfer.arms": "one", "task.peg_transfer.longest": 600.0},
-    30.0, 60.0,
+    "transfer a block, one arm", "peg_transfer",
+    {**_FIXED, "teleop.stages": ("network", "jaw_command", "jaw", "jaw_sim", "display", "task"), "operator": "observer",
+     "operator.tremor_amplitude": 0.0, "operator.buttons.jaw": (), "task": "peg_transfer",
+     "jaw_sim.pegs.clearance": 0.003, "task.peg_transfer.clearance": 0.003, "task.peg_transfer.longest": 600.0},
+    35.0, 65.0,
 )  # fmt: skip
 
 

@@ -211,14 +211,19 @@ class Observer:
     def _given_up(self, move: Move, until: float) -> float:
         """Time at which the operator goes on without having seen a motion [s]; infinite if it is after ``until``.
 
-        The screen is then believed to be as late as that at least, unless the arm is at its end.
+        The screen is then believed to be as late as that at least, unless the arm is at its end. A short motion may as
+        well have been stopped by friction or contact.
         """
         late = move.begin + move.duration + self._patience()
         if late > until:
             return math.inf
-        if not self._has_stopped:
+        if not (self._has_stopped or self._is_short(move)):
             self._lag = max(self._lag, late - self._p.eye - move.begin - 0.5 * move.duration)
         return late
+
+    def _is_short(self, move: Move) -> bool:
+        """Whether a motion is shorter than the goal is wide, so that the rest of another motion may look like it."""
+        return bool(length(move.way.both) < self._seen.task[_WIDTH])
 
     @property
     def _has_stopped(self) -> bool:
@@ -277,6 +282,8 @@ class Observer:
             self._before = self._before or self._glances.at(soonest + self._p.eye)
             at = self._passes_half(move, self._before, soonest, until)
             if math.isinf(at) and until >= move.begin + move.duration + self._patience():
+                if self._is_short(move):
+                    return self._sooner + self._p.eye
                 at = max(self._sooner, soonest + 0.5 * move.duration)  # so the believed lag becomes half
         if math.isinf(at):
             return at
