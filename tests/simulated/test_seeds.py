@@ -125,7 +125,7 @@ def test_of_three_seeds_the_one_is_run_whose_faults_have_met_least(monkeypatch: 
     ("words", "needed"),
     [
         (["--seeds", "2", "--out", "bags"], "--schedule or --seeds 1"),
-        (["--seeds", "2", "--search", "store"], "without names, --short, --drives and --schedule or --search"),
+        (["--seeds", "2", "--search", "store"], "without names, --short, --drives and --search or --schedule"),
         (["--search", "store", "--composed"], "without --composed"),
         (["--search", "store", "--minutes", "nan"], "above 0"),
         (["--search", "store", "--seed", "today"], "seed"),

@@ -51,7 +51,9 @@ def _check(names: tuple[str, ...], options: Options) -> None:
     ways = {"--seeds": options.seeds, "--search": options.search, "--schedule": options.schedule}
     (way, value), *others = [(name, value) for name, value in ways.items() if value is not None]
     if names or options.short or options.drives or others:
-        raise ParameterError(way, value, "given without names, --short, --drives and " + " or ".join({*ways} - {way}))
+        raise ParameterError(
+            way, value, "given without names, --short, --drives and " + " or ".join(one for one in ways if one != way)
+        )
     if way != "--seeds" and (options.composed or options.breaks):
         raise ParameterError(way, value, "given without --composed and --breaks, which a schedule contains")
     if options.out is not None and way != "--schedule" and options.seeds != 1:
