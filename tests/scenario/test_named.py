@@ -28,7 +28,7 @@ AGREEING = {
     "resolution": 16, "tendons": 3, "poses": 73, "workspace": 1, "filter": 10, "precision": 5,
     "repeatability": 6, "responses": 5, "accuracy": 30, "master_slave": 7, "controllers": 2,
     "gravity": 6, "robustness": 0, "shares": 0, "points24": 1, "stability": 15, "zwidth": 29,
-    "transparency": 112, "drift": 42, "puncture": 27, "fitts": 14, "delay": 6,
+    "transparency": 112, "drift": 42, "puncture": 27, "fitts": 13, "delay": 6,
     "move_and_wait": 14, "scaling_under_delay": 2, "uva": 74, "mma_frames": 39, "mma_balance": 15, "hybrid": 18,
     "parallel_robots": 6, "operator_models": 0, "blind": 124,
 }  # fmt: skip

@@ -140,7 +140,7 @@ CODE_MUTANTS = (
     _mutant("goal_chased", "a goal that jumps is run after as one that moves", "hand/operators/glances.py",
             "glance.goal)) > width:", "glance.goal)) > 1e9:", "observer"),
     _mutant("lag_unlearned", "a person who waited in vain believes the screen to be as prompt as before",
-            "hand/operators/observer.py", "if not (self._has_stopped or self._is_short(move)):", "if False:", "observer"),
+            "hand/operators/observer.py", "not (self._has_stopped or self._is_short(move))", "False", "observer"),
     _mutant("late_prediction", "a predictive display shows the command that has passed the network",
             "coupling/network/network.py", '"slave/servo_cp@display", ', "", "tests/scenario/test_tasks.py"),
     _mutant("early_display", "a display shows frames at once", "hand/master/display.py",
