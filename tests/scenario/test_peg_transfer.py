@@ -65,6 +65,22 @@ def test_a_session_may_end_with_its_tasks_and_is_the_same_until_then(arms: str) 
     assert min(short[name].values[-1001, COLUMN["is_over"]] for name in tasks) == 0.0
 
 
+@pytest.mark.slow
+def test_the_time_of_a_transfer_is_a_straight_line_over_the_delay() -> None:
+    """Ferrell 1965: the number of waits does not depend on the delay."""
+    times = []
+    for delay in (0.0, 1.0, 2.0):
+        behind: dict[str, Any] = {
+            "teleop.stages": ["network", *SEEING["teleop.stages"]],
+            "network.there.least_delay": delay,
+            "feedback_timeout": 5.0,
+            "operator.observer.longest_wait": 6.0,
+            "task.peg_transfer.longest": 600.0,
+        }
+        times.append(transferred("one", 35.0 + 65.0 * delay, behind).score().value("task.time_s") or 999.0)
+    assert times[2] == pytest.approx(2.0 * times[1] - times[0], rel=0.1)  # as in the experiment move_and_wait
+
+
 def test_in_a_hand_over_the_first_lets_go_once_the_second_holds() -> None:
     recording = transferred("hand_over", 14.0)
     first, second = (recording[f"{arm}slave/jaw/grip"] for arm in ("", "right/"))

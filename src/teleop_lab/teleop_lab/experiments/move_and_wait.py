@@ -31,12 +31,11 @@ class Way(NamedTuple):
     seconds_per_delay: float
 
 
-_ONE_BY_ONE: Settings = {"coarse_gain": 0.5}
-POINTING = Way("press in a target", "point", {**_FIXED, **_ONE_BY_ONE, "task.point.stays": True}, 40.0, 60.0)
+POINTING = Way("press in a target", "point", {**_FIXED, "coarse_gain": 0.5, "task.point.stays": True}, 40.0, 60.0)
 ENTERING = Way("enter a target", "point", {**POINTING.settings, "task.point.by_entering": True}, 40.0, 60.0)
 TRACING = Way(
     "trace 4 mm of a ring", "point",
-    {**_FIXED, **_ONE_BY_ONE, "task.kind": "trace", "task.trace.waits": True}, 30.0, 30.0,
+    {**_FIXED, "coarse_gain": 0.5, "task.kind": "trace", "task.trace.waits": True}, 30.0, 30.0,
 )  # fmt: skip
 TRANSFER = Way(
     "transfer a block, one arm", "peg_transfer",
