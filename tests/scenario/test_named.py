@@ -33,7 +33,7 @@ AGREEING = {
     "parallel_robots": 6, "operator_models": 0, "blind": 124,
 }  # fmt: skip
 """Published figures, laws and goals that each experiment agrees with."""
-LONG_EXPERIMENTS = ("stability", "transparency", "operator_models", "move_and_wait")
+LONG_EXPERIMENTS = ("stability", "transparency", "operator_models", "move_and_wait", "controllers", "fitts")
 """Half a minute and more each; tests/unit has their laws with fewer cases."""
 TRACKED_MM = {"coarse_box": 0.289, "fine_box": 0.260, "human": 0.114, "point": 0.153, "uva_board": 0.105}
 """Root mean square of each scenario's position error, where it is above a tenth."""
