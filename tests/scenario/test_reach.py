@@ -81,8 +81,7 @@ def picked(axes: tuple[str, ...]) -> np.ndarray:
     return matrix
 
 
-@pytest.mark.parametrize("robot", ROBOTS)
-@pytest.mark.parametrize("name", PEOPLE)
+@pytest.mark.parametrize(("name", "robot"), list(zip(PEOPLE, 2 * ROBOTS, strict=True)))
 def test_a_proposal_is_followed_by_the_session_as_it_says(name: str, robot: str) -> None:
     reach = proposed(name, robot, SECONDS)
     assert reach.proposed.share >= reach.goal == 0.99
@@ -92,8 +91,7 @@ def test_a_proposal_is_followed_by_the_session_as_it_says(name: str, robot: str)
     assert abs(present(session.score().value("reach.followed_share")) - followed(session)) <= AGREE
 
 
-@pytest.mark.parametrize("robot", ROBOTS)
-@pytest.mark.parametrize("name", PEOPLE)
+@pytest.mark.parametrize(("name", "robot"), list(zip(PEOPLE, 2 * ROBOTS[::-1], strict=True)))
 def test_a_session_as_given_follows_as_little_as_it_says(name: str, robot: str) -> None:
     hand = person(name, SECONDS, seed=3)
     reach = lab.reach(hand, robot=robot, share=1e-3, settings=ALIGNED)  # nothing is to be proposed
