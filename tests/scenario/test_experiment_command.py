@@ -19,8 +19,8 @@ if TYPE_CHECKING:
     from conftest import Run
 
 
-def test_without_a_name_every_experiment_is_listed_in_a_line(teleop: "Run") -> None:
-    lines = teleop("experiment").stdout.splitlines()
+def test_without_a_name_every_experiment_is_listed_in_a_line(teleop_again: "Run") -> None:
+    lines = teleop_again("experiment").stdout.splitlines()
     assert [line.split()[0] for line in lines] == list(experiments.EXPERIMENTS.names())
     assert all(len(line.split()) > 3 for line in lines)
 

@@ -220,10 +220,10 @@ def test_a_table_of_others_is_taken_as_it_is(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_what_the_command_prints_and_writes_is_what_replay_takes(tmp_path: Path, teleop: "Run") -> None:
+def test_what_the_command_prints_and_writes_is_what_replay_takes(tmp_path: Path, teleop_again: "Run") -> None:
     bag = saved("da_vinci_30", 15.0, tmp_path)
     file, page = tmp_path / "reach.yaml", tmp_path / "reach.html"
-    shown = teleop("reach", bag, "--robot", "rcrt1", "--out", file, "--html", page).stdout
+    shown = teleop_again("reach", bag, "--robot", "rcrt1", "--out", file, "--html", page).stdout
     proposed = float(present(re.search(r"followed in a session +[\d.]+ % +([\d.]+) %", shown))[1]) / 100.0
     assert proposed >= 0.99
     line = next(line for line in shown.splitlines() if line.startswith("--set "))
