@@ -19,7 +19,6 @@ from mutants import MUTANTS, ROOT, changed
 from present import present
 from teleop_core.bags import reader, reports
 from teleop_core.bags.writer import BagWriter
-from teleop_core.base.errors import UnknownNameError
 from teleop_core.graph.operation import State
 from teleop_core.graph.topics import DIAGNOSTICS, SLAVE_SETPOINT_JS, SLAVE_TRUE_CP
 from teleop_core.kernels.geometry import Array
@@ -435,12 +434,6 @@ def test_every_code_mutant_fits_the_source_and_names_files_of_tests() -> None:
         assert changed(mutant), mutant.name
         assert mutant.rows, mutant.name
         assert all((ROOT / file).is_file() for file in mutant.rows), mutant.name
-
-
-def test_a_fault_that_there_is_not_is_refused_with_those_that_there_are() -> None:
-    with pytest.raises(UnknownNameError) as caught:
-        drill.chosen(("kill_slave_simm",), is_composed=False)
-    assert "kill_slave_sim" in str(caught.value)
 
 
 def test_the_tables_have_a_row_for_each_fault() -> None:
