@@ -128,28 +128,3 @@ def test_of_three_seeds_the_one_is_run_whose_faults_have_met_least(monkeypatch: 
     for state in State:
         met.update((one.kind, state.name) for one in draw(30, SIDES))
     assert seeds._known(30, met, Processes.SIDES) >= 1.0
-
-
-@pytest.mark.parametrize(
-    ("words", "needed"),
-    [
-        (["--seeds", "2", "--out", "bags"], "--schedule or --seeds 1"),
-        (["--seeds", "2", "--search", "store"], "without names, --short, --drives and --search or --schedule"),
-        (["--search", "store", "--composed"], "without --composed"),
-        (["--search", "store", "--minutes", "nan"], "above 0"),
-        (["--search", "store", "--seed", "today"], "seed"),
-        (["--seeds", "2", "stop_topic"], "without names"),
-        (["--seed", "3", "stop_topic"], "with --simulated"),
-    ],
-)
-def test_arguments_that_do_not_go_together_are_refused_in_one_line(words: Any, needed: Any, teleop_again: Any) -> None:
-    done = teleop_again("drill", *words, code=2)
-    assert needed in done.stderr
-    assert len(done.stderr.strip().splitlines()) == 1
-
-
-@pytest.mark.parametrize("count", ["0", "-1"])
-def test_no_schedules_are_refused_and_start_no_session(count: str, teleop_again: Any) -> None:
-    done = teleop_again("drill", "--seeds", count, code=2)
-    assert not done.stdout
-    assert f"--seeds is {count}, must be at least 1" in done.stderr
