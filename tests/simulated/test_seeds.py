@@ -118,12 +118,16 @@ def test_many_schedules_are_told_as_a_table_of_faults_and_states(tmp_path: Path)
     assert {name.split(" / ")[0] for name in found["under"]} <= set(drawn)
 
 
+@pytest.mark.soak
 def test_of_three_seeds_the_one_is_run_whose_faults_have_met_least(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(seeds, "_ROUND", 1)
     ran = [found.seed for found in seeds.run_seeds(30, 2, 1)]
     assert ran[0] == 30
-    met = Counter((one.kind, "ENABLED") for one in draw(30, SIDES))
     assert all(33 + 3 * k <= seed < 36 + 3 * k for k, seed in enumerate(ran[1:]))
+
+
+def test_a_seed_is_known_once_each_of_its_faults_has_met_every_state() -> None:
+    met = Counter((one.kind, "ENABLED") for one in draw(30, SIDES))
     assert seeds._known(30, met, Processes.SIDES) == 0.0  # in other states they met nothing
     for state in State:
         met.update((one.kind, state.name) for one in draw(30, SIDES))
