@@ -45,7 +45,7 @@ _PARALLEL_AXES = "kinematics/closed_form/parallel_axes.py"
 _CANDIDATES = "kinematics/closed_form/candidates.py"
 _SEEING = "hand/operators/observer.py"
 CODE_MUTANTS = (
-    _mutant("joints_overlap", "arrays over joints of a record begin at one place", "kernels/joint_records.py",
+    _mutant("joints_overlap", "arrays over joints of a record begin at one place", "kernels/compiler/joint_records.py",
             "        begin = builder.add(begin, _bytes(builder, sizes))\n", "        pass\n", "joint_records"),
     _mutant("start_far", "a start may be any posture with room", "robots/freedom.py",
             "good[int(_away(robot, good).argmin())]", "good[-1]", "freedom"),
@@ -267,7 +267,7 @@ CODE_MUTANTS = (
             "slave/plants/hardware.py", "np.minimum(drives.effort_limit, quick)",
             "drives.effort_limit", "real_arms"),
     _mutant("deaf_pointer", "an error in a kernel that is called through a pointer is lost",
-            "kernels/numba_private.py", "if code.signature().return_type == result:", "if False:",
+            "kernels/compiled_kernel.py", "if code.result == result:", "if False:",
             "kernel_callables"),
     _mutant("far_turn", "a turn beyond half a turn goes the long way", "kernels/geometry.py",
             "sign = -1.0 if turn[0] < 0.0 else 1.0", "sign = 1.0", "geometry"),
@@ -276,8 +276,14 @@ CODE_MUTANTS = (
     _mutant("force_turned", "a force along the tip's axes is turned the other way",
             "kernels/geometry.py", "((turn.T * force)", "((turn * force)", "geometry"),
     _mutant("version_beside", "what another version keeps meanwhile ends a program",
-            "kernels/numba_private.py", "except _BROKEN:  # written", "except EOFError:  # written",
+            "kernels/compiler/__init__.py", "except _BROKEN:  # written", "except EOFError:  # written",
             "kernel_cache"),
+    _mutant("image_damaged", "damaged code is run", "kernels/images.py",
+            "if _sum(data[_CHECK:]) != data[:_CHECK]:", "if False:", "images"),
+    _mutant("image_of_old", "code of an older source is run", "kernels/images.py",
+            'if kept["stamp"] == stamp and', "if", "shipped_kernels"),
+    _mutant("kinds_alike", "code for a table is run for its transpose", "kernels/kinds.py",
+            '"C" if flags.c_contiguous else "F" if flags.f_contiguous else "A"', '"C"', "images"),
     _mutant("kernels_kept", "kernels are thrown away while they are used", "kernels/store.py",
             "if index.stat().st_mtime < oldest:", "if index.stat().st_mtime > oldest:",
             "kernel_cache"),
