@@ -25,6 +25,7 @@ def _mutant(name: str, text: str, file: str, before: str, after: str, *tests: st
     return Mutant(name, text, ((file, before, after),), files)
 
 
+_CALLS = "tests/unit/refusals/test_calls.py"
 _BUTTON = "slave/world/button.py"
 _CONTACT, _PUNCTURE = "slave/world/contact.py", "slave/world/puncture.py"
 _SCALING, _LINK = "coupling/mapping/motion_scaling.py", "coupling/network/link.py"
@@ -197,9 +198,9 @@ CODE_MUTANTS = (
     _mutant("task_uncounted", "a task that counts nothing is taken", "hand/tasks/__init__.py",
             "if not done and act", "if False and act", "part_mistakes"),
     _mutant("scores_unwritten", "a study may ask for scores of what no session writes",
-            "teleop_lab/studies/checks.py", "if reads and not written.intersection(reads):", "if False:", "studies"),
+            "teleop_lab/studies/checks.py", "if reads and not written.intersection(reads):", "if False:", _CALLS),
     _mutant("place_unreached", "a study may have an object that the slave cannot touch",
-            "teleop_lab/studies/checks.py", ") > _NEAR:", ") > np.inf:", "studies"),
+            "teleop_lab/studies/checks.py", ") > _NEAR:", ") > np.inf:", _CALLS),
     _mutant("short_waits", "a tenth of a second at rest is a wait", "evaluation/metrics/waits.py",
             "self._still == 3", "self._still == 1", "evaluation_scores"),
     _mutant("any_bump", "every bump of a force is a peak", "evaluation/metrics/force_peaks.py",

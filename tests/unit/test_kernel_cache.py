@@ -5,10 +5,12 @@ import re
 import shutil
 import subprocess
 import sys
+from contextlib import chdir
 from pathlib import Path
 
 import pytest
 
+from copies import run_copy
 from teleop_core.kernels import IS_COMPILED, store
 from teleop_core.kernels.compiler import SUPPORTED, check_version
 
@@ -154,15 +156,14 @@ print(tick.hits)
 
 
 def run(folder: Path) -> tuple[list[float], int]:
-    """Values and cache hits of a fresh process that imports the modules."""
-    done = subprocess.run(
-        [sys.executable, "outer.py"],
-        cwd=folder,
-        capture_output=True,
-        text=True,
-        check=True,
-        env={**os.environ, "PYTHONDONTWRITEBYTECODE": "1", "NUMBA_CACHE_DIR": str(folder / "c")},
-    )
+    """Values and cache hits of a process that imports the modules for the first time."""
+    return ran(folder, {**os.environ, "PYTHONDONTWRITEBYTECODE": "1", "NUMBA_CACHE_DIR": str(folder / "c")})
+
+
+def ran(folder: Path, env: dict[str, str]) -> tuple[list[float], int]:
+    with chdir(folder):
+        done = run_copy(["outer.py"], env=env)
+    assert done.returncode == 0, done.stderr
     values, hits = done.stdout.splitlines()
     return [float(value) for value in values.split()], int(hits)
 
@@ -384,9 +385,7 @@ def in_store(folder: Path, place: Path) -> tuple[list[float], int]:
     """What the script prints where the store is at a place, and how many kernels it found there."""
     env = {**os.environ, "PYTHONDONTWRITEBYTECODE": "1", "TELEOP_KERNELS": str(place)}
     env.pop("NUMBA_CACHE_DIR", None)
-    done = subprocess.run([sys.executable, "outer.py"], cwd=folder, capture_output=True, text=True, check=True, env=env)
-    values, hits = done.stdout.splitlines()
-    return [float(value) for value in values.split()], int(hits)
+    return ran(folder, env)
 
 
 @pytest.fixture(scope="module")
