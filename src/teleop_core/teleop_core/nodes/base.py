@@ -14,6 +14,7 @@ from teleop_core.graph.topics import Kind, Topic
 from teleop_core.graph.warming import warm_up
 from teleop_core.middleware.world import Publisher, TransitionResult
 from teleop_core.nodes.diagnostics import Reporter, input_values, recent_values, tick_values
+from teleop_core.nodes.display import DisplayCopies
 from teleop_core.nodes.feed import Feed
 from teleop_core.nodes.loop import Loop
 from teleop_core.nodes.news import Commanders, introduction
@@ -63,6 +64,7 @@ class CoreNode(TunedNode):
         self._feed: Feed | None = None
         self.ports = NO_PORTS
         self._own_publishers: list[Publisher] = []
+        self._copies = DisplayCopies(self, {})
         self._report: Topic | None = None
         self._reported: tuple[bytes, Any] = (b"", None)
         self._fresh_counts()
@@ -91,6 +93,7 @@ class CoreNode(TunedNode):
             self.options.joy_buttons,
         )
         self.row = self.ports.row
+        self._copies = DisplayCopies(self, self.ports.outputs)
         self._open_report()
 
     def turn(self) -> None:
@@ -167,9 +170,7 @@ class CoreNode(TunedNode):
     def leave_topics(self) -> None:
         """Stop publishing the stage's topics until the next configuration; another node publishes them instead."""
         self.ports.mute()
-        for publisher in self._own_publishers:
-            self.ros.destroy(publisher)
-        self._own_publishers = []
+        self._close_publishers()
 
     def _open_report(self) -> None:
         """Open the stage's report topic, if it has one; reports are sent when they change."""
@@ -202,10 +203,15 @@ class CoreNode(TunedNode):
 
     def _close(self) -> None:
         self.ports.close()
+        self._close_publishers()
+        self.ports = NO_PORTS
+        self.stage = self.runner = self.row = None
+
+    def _close_publishers(self) -> None:
+        self._copies.close()
         for publisher in self._own_publishers:
             self.ros.destroy(publisher)
-        self.ports, self._own_publishers = NO_PORTS, []
-        self.stage = self.runner = self.row = None
+        self._copies, self._own_publishers = DisplayCopies(self, {}), []
 
     # -- lifecycle -------------------------------------------------------------------------------
 
@@ -378,6 +384,7 @@ class CoreNode(TunedNode):
     def _report_in_time(self) -> None:
         """Report once a second. An exception from a user's part is logged, and does not end the node."""
         try:
+            self._copies.look()
             self.report()
         except Exception:
             self.ros.get_logger().error(f"cannot report:\n{traceback.format_exc()}", throttle_duration_sec=60.0)

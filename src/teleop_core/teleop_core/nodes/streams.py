@@ -475,6 +475,11 @@ class Output:
         return int(self._cells["sent"])
 
     @property
+    def data(self) -> bytes:
+        """Bytes of the newest message, without padding."""
+        return self._buffer.tobytes()
+
+    @property
     def is_pending(self) -> bool:
         """Whether a written message is still to be sent."""
         return bool(self._pending[0])

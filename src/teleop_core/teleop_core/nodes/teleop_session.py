@@ -12,14 +12,14 @@ from typing import Any
 
 from teleop_core.base.errors import UnknownNameError
 from teleop_core.evaluation.metrics.counts import PHASES
-from teleop_core.graph.graph import RECORDER_NAME, Graph, Member
-from teleop_core.graph.stage import STAGES
+from teleop_core.graph.graph import FRAMES_NAME, RECORDER_NAME, Graph, Member
 from teleop_core.graph.topics import Kind
 from teleop_core.middleware.ros import ROS
 from teleop_core.middleware.world import World
 from teleop_core.nodes.base import CoreNode
 from teleop_core.nodes.feed import Feed
 from teleop_core.nodes.files import graph_of
+from teleop_core.nodes.frames import FramesNode
 from teleop_core.nodes.loop import Loop
 from teleop_core.nodes.making import make_node
 from teleop_core.nodes.rate import Phases, Schedule
@@ -32,14 +32,14 @@ of the hand's side, its commands arrive before this phase."""
 
 
 class TeleopSession:
-    """The nodes of a graph and the loop that runs all nodes except the recorder.
+    """The nodes of a graph, and the loop that runs all stages. The recorder and the node of frames have own loops.
 
     The loop uses the real-time options and the catch-up limit of the last stage, the slave. The group ``teleop`` of the
     parameter files defines the graph.
 
     Args:
         namespace: Namespace of the whole session, without leading slash; the arms are below it.
-        names: Nodes of this process, with the namespaces of their arms; empty: all nodes and the recorder. Nodes in
+        names: Nodes of this process, with the namespaces of their arms; empty: all nodes. Nodes in
             other processes are connected by topics.
         world: World of the session.
         graph: Graph of the session; None: the graph of the parameter files on the command line.
@@ -53,17 +53,20 @@ class TeleopSession:
     ) -> None:
         self._world = world
         graph = graph or graph_of(sys.argv)
-        known = [member.name for member in graph.members]
+        known = [*(member.name for member in graph.members), FRAMES_NAME]
         for name in names:
             if name not in known:
                 raise UnknownNameError("node of the session", name, known)
         members = [member for member in graph.members if member.name in names or not names]
-        self._recorder = () if names else (_recorder(graph, namespace, world),)
+        given: dict[str, Any] = {"graph": graph, "namespace": namespace, "world": world}
+        self._recorder = () if names else (RecorderNode(**given),)
+        self._frames = (FramesNode(**given),) if FRAMES_NAME in names or not names else ()
         self._stages = tuple(_node(graph, member, namespace, world) for member in members)
-        pairs = zip(members, self._stages, strict=True)
-        stages = {member.name: node.parameters for member, node in pairs}
-        for recorder in self._recorder:
-            recorder.stages = stages
+        pairs = [*zip(members, self._stages, strict=True)]
+        for beside in (*self._recorder, *self._frames):
+            beside.stages = {member.name: node.parameters for member, node in pairs}
+            if self._recorder:
+                beside.stages[RECORDER_NAME] = self._recorder[0].parameters
         self._feed = Feed(_fed(self._stages) if names else (), world)
         self._gate = world.lock()
         for node in self._stages:
@@ -87,12 +90,12 @@ class TeleopSession:
     @property
     def nodes(self) -> tuple[CoreNode, ...]:
         """The nodes. The recorder is the first and masters are the last, so that no message is missed."""
-        return (*self._recorder, *reversed(self._stages))
+        return (*self._recorder, *self._frames, *reversed(self._stages))
 
     def watched(self) -> list[tuple[Loop, int]]:
-        """The loop of all stages, and the loop of the recorder."""
+        """The loop of all stages, and the loops of the other nodes."""
         own = [(self._loop, self._loop.turns + self._ticks)] if self._loop.is_ready else []
-        return [*own, *(one for recorder in self._recorder for one in recorder.watched())]
+        return [*own, *(one for node in (*self._recorder, *self._frames) for one in node.watched())]
 
     def halt(self) -> None:
         """Stop the loop; if it hangs, its nodes end without waiting for it."""
@@ -183,11 +186,6 @@ def _fed(stages: Sequence[CoreNode]) -> list[str]:
         for topic in node.description.writes
         if topic.kind is not Kind.REPORT
     ]
-
-
-def _recorder(graph: Graph, namespace: str, world: World) -> RecorderNode:
-    stage = STAGES.find(RECORDER_NAME)
-    return RecorderNode(stage, graph=graph, namespace=namespace, world=world)
 
 
 def _node(graph: Graph, member: Member, namespace: str, world: World) -> CoreNode:
