@@ -5,6 +5,7 @@ contains the frames of its own samples.
 """
 
 import sys
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
@@ -148,9 +149,13 @@ class FramesNode(SessionNode):
             self._markers.append(LiveMarkers(self, "/".join(filter(None, (self.arm, name))), turn))
         self.stage = self._model
 
-    def turn(self) -> None:
-        """Publish what is due. The robots are described even without subscribers, once their joints are known."""
+    def due(self) -> Sequence[int]:
+        """Wait for the next copies."""
         self.world.sleep(PERIOD_NS * 1e-9)
+        return (self.world.monotonic_ns(),)
+
+    def step(self, tick_ns: int) -> None:
+        """Publish what is due. The robots are described even without subscribers, once their joints are known."""
         self.counts.ticks += 1
         shared = self._publishers.get(TF.name)
         is_watched = shared is not None and shared.get_subscription_count() > 0

@@ -3,6 +3,7 @@
 import sys
 import time
 from collections import deque
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -196,9 +197,13 @@ class RecorderNode(SessionNode):
         self.channels = {topic.name: _Channel(self, topic) for topic in self._recorded}
         self._feeds = FeedReader(self.channels, self.world)
 
-    def turn(self) -> None:
-        """Record the received messages."""
+    def due(self) -> Sequence[int]:
+        """Wait a moment."""
         self.world.sleep(_PAUSE)
+        return (self.world.monotonic_ns(),)
+
+    def step(self, tick_ns: int) -> None:
+        """Record the received messages."""
         with self._writing:
             self._drain()
         self.counts.ticks += 1
@@ -226,8 +231,8 @@ class RecorderNode(SessionNode):
 
     def abandon(self) -> None:
         """Close the recording when an orderly end is no longer possible. May be called in any thread."""
-        if self._loop is not None:
-            self._loop.stop()
+        if self.loop is not None:
+            self.loop.stop()
         if self.stage is not None:
             if self.is_at_work and not self._is_broken:
                 self._drain()
