@@ -1,9 +1,8 @@
 """Base of all nodes: a lifecycle node around one stage of the graph."""
 
 import traceback
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from concurrent.futures import Future
-from dataclasses import replace
 from typing import Any
 
 from teleop_core.bags.reports import read_reports
@@ -15,14 +14,12 @@ from teleop_core.graph.warming import warm_up
 from teleop_core.middleware.world import Publisher, TransitionResult
 from teleop_core.nodes.diagnostics import Reporter, input_values, recent_values, tick_values
 from teleop_core.nodes.display import DisplayCopies
-from teleop_core.nodes.loop import LiveLoop, Loop
+from teleop_core.nodes.loop import LiveLoop, Loop, LoopNode
 from teleop_core.nodes.news import Commanders, introduction
 from teleop_core.nodes.ports import NO_PORTS, Ports
 from teleop_core.nodes.quality import profile
 from teleop_core.nodes.rate import REPORT_PERIOD, Recent, Schedule, TickCounts, report_phase
-from teleop_core.nodes.strain import Strain
 from teleop_core.nodes.streams import Input, message_type
-from teleop_core.nodes.tuned import TunedNode
 from teleop_core.session.reports import report_of
 
 # longest wait for the gate [s]; even on a busy machine, a session's tick takes a hundredth of this time
@@ -30,7 +27,7 @@ _GATE_PATIENCE = 1.0
 _NEWS = {"active": "at work", "finalized": "ended"}  # other states are logged by their own names
 
 
-class CoreNode(TunedNode):
+class CoreNode(LoopNode):
     """Lifecycle node around one stage: writes received values to its signals, makes steps, publishes outputs.
 
     A subclass makes the stage in :meth:`setup` and works in :meth:`step`, which a
@@ -45,13 +42,12 @@ class CoreNode(TunedNode):
         """The running stage, the same object as :attr:`runner`; None for a node without a stage."""
         self.row: Any = None
         """The stage's signals, by the names of their fields."""
-        self.gate = self.world.lock()  # locked by the node's loop during a tick
+        self.gate = self.world.lock()
         self.ended: Future[None] = Future()
         self.exit_code = 0
         self.has_ended = False
         """Whether the node was shut down and will send nothing more."""
         self.patience = self.options.real_time.patience
-        """Time without progress after which the loop counts as hung [s]; 0: never."""
         self.loop: LiveLoop | None = None
         """Loop of the node, which a session gives to its nodes; an active node without one makes its own."""
         self.tells_strain = True
@@ -91,23 +87,6 @@ class CoreNode(TunedNode):
         self.row = self.ports.row
         self._copies = DisplayCopies(self, self.ports.outputs)
         self._open_report()
-
-    def due(self) -> Sequence[int]:
-        """Wait for work, at most a tenth of a second; returns the ticks to make [ns, monotonic].
-
-        A session has a schedule for all its nodes and does not call this method.
-        """
-        return self.schedule.due()
-
-    def take(self) -> None:
-        """Read what came from other processes; the loop calls this method of all its nodes before :meth:`step`."""
-
-    def step(self, tick_ns: int) -> None:
-        """Work for one tick [ns, monotonic]; the loop calls this method of all its nodes in turn."""
-        raise NotImplementedError
-
-    def tell(self) -> None:
-        """Report changes of the last tick, after the loop has sent all messages of the tick."""
 
     def start(self) -> None:
         """Get ready for the first turn. Messages that came while the node was inactive are already deleted."""
@@ -250,7 +229,7 @@ class CoreNode(TunedNode):
         self.start()
         self.is_at_work = self.has_worked = True
         if self.loop is None:
-            self._own = self.loop = LiveLoop(self.ros.get_name(), (self,))
+            self._own = self.loop = LiveLoop(self.ros.get_name(), (self,), self.fail)
             self._own.start()
 
     def _halt(self) -> None:
@@ -292,22 +271,6 @@ class CoreNode(TunedNode):
         self._word = word
         self.report()
         return TransitionResult.SUCCESS
-
-    def prepare(self) -> None:
-        """Apply the real-time options to the calling thread; log the options that the system refuses."""
-        options = self.options.real_time
-        refusals = self.world.take_real_time(options)
-        for refusal in refusals:
-            self.ros.get_logger().warning(refusal)
-        if options.priority > 0 and not any("priority" in refusal for refusal in refusals):
-            self.schedule.strain = self.strain()
-
-    def strain(self) -> Strain:
-        """New judge of the loop that calls this method, which has real-time priority."""
-        again = replace(self.options.real_time, cpus=(), lock_memory=False, freeze_gc=False)
-        warn = self.ros.get_logger().warning
-        # A log line takes milliseconds, too long for the loop.
-        return Strain(self.world, lambda: self.world.take_real_time(again), lambda text: self.ros.defer(warn, text))
 
     def fail(self, reason: str, is_expected: bool) -> None:
         """End the work from within the loop: the outputs fall silent, and the process ends."""

@@ -8,7 +8,8 @@ active, its readers listen to the topic instead: a real device, or a node elsewh
 import sys
 import traceback
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, Protocol
+from dataclasses import replace
+from typing import Any
 
 from teleop_core.base.errors import TeleopError
 from teleop_core.evaluation.metrics.counts import PHASES
@@ -18,7 +19,9 @@ from teleop_core.middleware.world import World
 from teleop_core.nodes.feed import Feed
 from teleop_core.nodes.ports import Ports
 from teleop_core.nodes.rate import Phases, Schedule
+from teleop_core.nodes.strain import Strain
 from teleop_core.nodes.streams import Tap
+from teleop_core.nodes.tuned import TunedNode
 
 _END_PATIENCE = 8.0  # longest wait for the last turn [s], which may compile a kernel or wait for a slow disk
 
@@ -103,51 +106,63 @@ class Loop:
             self._fail(traceback.format_exc(), False)
 
 
-class Member(Protocol):
-    """Node as its loop sees it."""
+class LoopNode(TunedNode):
+    """Node that works in a :class:`LiveLoop`."""
 
-    world: World
     description: Stage
     ports: Ports
     schedule: Schedule
     patience: float
+    """Time without progress after which the loop counts as hung [s]; 0: never."""
+    gate: Any
+    """Locked by the loop during a tick."""
     is_at_work: bool
     has_worked: bool
     has_ended: bool
-    options: Any
-    gate: Any
-
-    @property
-    def arm(self) -> str:
-        """Namespace of the node, without the slash before it."""
 
     def due(self) -> Sequence[int]:
-        """Wait for work; returns the times of the ticks to make [ns, monotonic]."""
+        """Wait for work, at most a tenth of a second; returns the ticks to make [ns, monotonic].
+
+        A session has a schedule for all its nodes and does not call this method.
+        """
+        return self.schedule.due()
 
     def take(self) -> None:
-        """Read what came from other processes."""
+        """Read what came from other processes; the loop calls this method of all its nodes before :meth:`step`."""
 
     def step(self, tick_ns: int) -> None:
-        """Work for one tick [ns, monotonic]."""
+        """Work for one tick [ns, monotonic]; the loop calls this method of all its nodes in turn."""
+        raise NotImplementedError
 
     def tell(self) -> None:
-        """Report changes of the last tick, after all its messages are sent."""
+        """Report changes of the last tick, after the loop has sent all messages of the tick."""
 
     def prepare(self) -> None:
-        """Apply the real-time options to the calling thread."""
+        """Apply the real-time options to the calling thread; log the options that the system refuses."""
+        options = self.options.real_time
+        refusals = self.world.take_real_time(options)
+        for refusal in refusals:
+            self.ros.get_logger().warning(refusal)
+        if options.priority > 0 and not any("priority" in refusal for refusal in refusals):
+            self.schedule.strain = self.strain()
 
-    def fail(self, reason: str, is_expected: bool) -> None:
-        """End the work after an error."""
+    def strain(self) -> Strain:
+        """New judge of the loop that calls this method, which has real-time priority."""
+        again = replace(self.options.real_time, cpus=(), lock_memory=False, freeze_gc=False)
+        warn = self.ros.get_logger().warning
+        # A log line takes milliseconds, too long for the loop.
+        return Strain(self.world, lambda: self.world.take_real_time(again), lambda text: self.ros.defer(warn, text))
 
 
 class LiveLoop(Loop):
     """Loop of the nodes of a process, or of one of them.
 
-    The last node's real-time options, patience and reaction to errors are those of the loop.
+    The last node's real-time options and patience are those of the loop.
 
     Args:
         name: Name of the thread.
         nodes: Nodes in the order of their steps.
+        fail: Called when a tick failed and the loop has ended, with the reason and whether it was expected.
         schedule: Schedule of all ticks; None if the single node decides when it works.
         beside: Further nodes of the process, which have their own loops.
         taps: Receivers of messages in this process, by topic; None: messages are fed to the recorder of this machine.
@@ -163,13 +178,14 @@ class LiveLoop(Loop):
     def __init__(
         self,
         name: str,
-        nodes: Sequence[Member],
+        nodes: Sequence[LoopNode],
+        fail: Callable[[str, bool], None],
         schedule: Schedule | None = None,
-        beside: Sequence[Member] = (),
+        beside: Sequence[LoopNode] = (),
         taps: Callable[[], Mapping[str, Tap]] | None = None,
     ) -> None:
         last = nodes[-1]
-        super().__init__(last.world, name, self._work, last.fail, patience=last.patience)
+        super().__init__(last.world, name, self._work, fail, patience=last.patience)
         self.nodes, self._crew, self._gate = nodes, (*beside, *nodes), last.world.lock()
         self._schedule, self._due = (last.schedule, last.due) if schedule is None else (schedule, schedule.due)
         self._taps = taps
@@ -265,7 +281,7 @@ class LiveLoop(Loop):
         self._feed.flush()  # send fed messages before the middleware publishes the first message
 
 
-def _fed(nodes: Sequence[Member]) -> list[str]:
+def _fed(nodes: Sequence[LoopNode]) -> list[str]:
     """Names of the topics that nodes feed to a recorder. Reports are sent only by the middleware."""
     written = [(topic, node.arm) for node in nodes for topic in node.description.writes]
     return [topic.of_arm(arm).name for topic, arm in written if topic.kind is not Kind.REPORT]

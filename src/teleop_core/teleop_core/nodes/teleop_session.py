@@ -63,6 +63,7 @@ class TeleopSession:
         self._loop = LiveLoop(
             "session",
             self._stages,
+            self._stages[-1].fail,
             Schedule(
                 world.monotonic_ns,
                 world.sleep,
