@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from teleop_core.base.errors import SessionError
-from teleop_core.graph.graph import RECORDER_NAME
+from teleop_core.graph.graph import FRAMES_NAME, RECORDER_NAME
 from teleop_core.graph.stage import STAGES
 from teleop_core.nodes.base import CoreNode
 from teleop_core.nodes.live import session_parameters
@@ -111,8 +111,8 @@ class SimulatedSession:
         if len(nodes) > 1:
             own = () if RECORDER_NAME in nodes else nodes
             return TeleopSession("", own, world, graph)
-        if nodes == (RECORDER_NAME,):
-            return make_node(STAGES.find(RECORDER_NAME), world=world)
+        if nodes[0] in {RECORDER_NAME, FRAMES_NAME}:
+            return make_node(STAGES.find(nodes[0]), world=world)
         (member,) = (one for one in graph.members if one.name == nodes[0])
         return make_node(member.stage, namespace=member.arm, world=world)
 
