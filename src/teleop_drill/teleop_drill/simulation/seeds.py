@@ -22,7 +22,8 @@ from teleop_drill.simulation.bus import Bus
 from teleop_drill.simulation.drilled_session import DrilledSession
 from teleop_drill.simulation.laws import Broken, Laws
 from teleop_drill.simulation.machine import Machine, Process
-from teleop_drill.simulation.scheduler import BEGIN_NS, Scheduler
+from teleop_drill.simulation.reach import BEGIN_NS
+from teleop_drill.simulation.scheduler import Scheduler
 from teleop_drill.simulation.schedules import KINDS, Fault, draw
 
 PROCESSES = {Processes.SIDES: ("hand_side", "slave_side", RECORDER_NAME), Processes.ONE: (SESSION, RECORDER_NAME)}
