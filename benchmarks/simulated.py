@@ -3,8 +3,8 @@
     python benchmarks/simulated.py --count 20            # the median of 20 random schedules, by side and composed
     python benchmarks/simulated.py --count 1 --parts     # one schedule of each, with the share of each part
 
-The first schedule of a process loads the kernels and is not counted. With ``--parts`` the profiler makes the schedules
-several times slower, and counts calls of Python functions as longer than they are.
+The first schedule of a process loads the kernels and is not counted. ``--parts`` looks at the running code once in a
+millisecond of processor time, first by kind of work, then by function.
 """
 
 import argparse
@@ -26,7 +26,15 @@ _STARTS = {"start", "launch", "close", "on_configure", "on_activate", "on_deacti
 KINDS = {
     "laws": ("simulation/laws", "simulation/owner", "simulation/drilled_session", "simulation/sometimes"),
     "scheduler and bus": ("simulation/", "middleware/"),
-    "recorder": ("nodes/recorder", "nodes/feed", "nodes/model", "nodes/markers", "nodes/display", "nodes/newest", "bags/"),
+    "recorder": (
+        "nodes/recorder",
+        "nodes/feed",
+        "nodes/model",
+        "nodes/markers",
+        "nodes/display",
+        "nodes/newest",
+        "bags/",
+    ),
     "messages of nodes": ("nodes/streams", "nodes/ports", "nodes/wire", "nodes/sender"),
     "steps of stages": ("graph/stage",),
     "reports": ("nodes/diagnostics", "nodes/observer"),

@@ -175,8 +175,8 @@ class Reader:
             self._buffer = ctypes.create_string_buffer(len(data))
         at = ctypes.addressof(self._buffer)
         ctypes.memmove(at, data, len(data))
-        self._message[:] = at, len(data)
-        self._info[:] = sent_ns, came_ns, number, 0, 0, *_halves(sender)
+        self._message[:] = [at, len(data)]
+        self._info[:] = [sent_ns, came_ns, number, 0, 0, *_halves(sender)]
         return _OK
 
     def _note(self) -> None:

@@ -144,10 +144,15 @@ class Lock:
             self._scheduler.wake(self._waiting.pop(0))
 
     def __enter__(self) -> object:
-        return self.acquire()
+        if self._is_taken:
+            return self.acquire()
+        self._is_taken = True
+        return True
 
     def __exit__(self, *_: object) -> None:
-        self.release()
+        self._is_taken = False
+        if self._waiting:
+            self.release()
 
 
 class Scheduler:
