@@ -640,7 +640,7 @@ CODE_MUTANTS = (
             "teleop_console/hooks.py", "Front(opened, answers.paths,", "Front(opened, frozenset(),",
             "tests/scenario/test_console_hostile.py"),
     _mutant("feed_loss_untold", "what a loop could not feed is not counted", "nodes/feed.py",
-            "lost = number - self._last.get(index, number - 1) - 1", "lost = 0", "feed"),
+            "lost = number - last.get(index, number - 1) - 1", "lost = 0", "feed"),
     _mutant("any_releases", "any stop button releases what another one pressed",
             "slave/operation/presses.py", "self._holders.pop(sender, None)",
             "self._holders.clear()", "presses"),
