@@ -16,6 +16,7 @@ NODES = (
     "slave_sim",
     "arm_bridge",
     "recorder",
+    "frames",
     "teleop_session",
     "stage",
 )

@@ -24,9 +24,10 @@ REST = [0.0, -0.06, -0.08, 1.0, 0.0, 0.0, 0.0]
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
-def test_a_recorder_shows_and_records_the_robot_that_it_hears(peer: "Peer", tmp_path: Path) -> None:
+def test_a_session_shows_and_records_the_robot_that_it_hears(peer: "Peer", tmp_path: Path) -> None:
     robot = load_robot("rcrt1")
     recorder = peer.start("recorder", out=str(tmp_path / "bag"))
+    peer.start("frames")
     described: list[Any]
     drawn: list[Any]
     described, drawn = [], []

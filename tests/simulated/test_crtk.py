@@ -42,7 +42,8 @@ def test_a_pose_is_moved_to_and_one_out_of_reach_is_refused_and_counted(client: 
 def test_a_composed_session_takes_streams_of_a_client_unless_its_own_stages_command(peer: "Peer", compose: Any) -> None:
     compose(operator={"approach_time": 1.0, "patience": 0.0}, slave={"operation": {"longest_outage": 0.0}})
     client = StockClient(peer)
-    client.wait(lambda: "setpoint_cp" in client.newest and client.newest["setpoint_cp"].header.stamp.sec > 0, "a hand")
+    told = {"setpoint_cp", "setpoint_js"}
+    client.wait(lambda: told <= {*client.newest} and client.newest["setpoint_cp"].header.stamp.sec > 0, "a hand")
     goal = JointState(position=(client.joints() + TURN).tolist())
     for name, message in (("servo_jp", goal), ("servo_cp", PoseStamped(pose=client.newest["setpoint_cp"].pose))):
         for _ in range(100):

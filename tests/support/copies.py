@@ -6,11 +6,10 @@ import subprocess
 import sys
 from collections.abc import Mapping, Sequence
 from functools import cache
+from importlib import import_module
 from pathlib import Path
 from runpy import run_path
 from tempfile import TemporaryFile
-
-from numba.core import config
 
 from teleop_core.nodes.starter import Starter
 from teleop_core.session.configuration import configure
@@ -45,7 +44,8 @@ def run_copy(
 
 def be_program() -> int:
     """Be the program that ``sys.argv`` names, as if the copy had begun with it."""
-    config.reload_config()
+    if "numba" in sys.modules:  # whoever compiles reads the environment anew
+        import_module("numba.core.config").reload_config()
     sys.dont_write_bytecode = "PYTHONDONTWRITEBYTECODE" in os.environ
     sys.path.insert(0, str(Path(sys.argv[0]).resolve().parent))
     run_path(sys.argv[0], run_name="__main__")

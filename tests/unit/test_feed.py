@@ -203,7 +203,7 @@ def test_sides_meet_at_the_slave_and_two_arms_share_them() -> None:
     recorder, sides = crews(graph)
     assert list(recorder.values()) == [("recorder",)]
     assert list(sides) == ["hand_side", "slave_side"]
-    assert set(sides["slave_side"]) == {"slave", "slave_sim", "left/slave", "left/slave_sim"}
+    assert set(sides["slave_side"]) == {"slave", "slave_sim", "left/slave", "left/slave_sim", "frames"}
     assert "left/network" in sides["hand_side"]
-    assert len(crews(graph, Processes.NODES)[1]) == len(graph.members)
+    assert len(crews(graph, Processes.NODES)[1]) == len(graph.members) + 1
     assert len(crews(graph, Processes.ONE, without=("slave_sim",))[1]) == 1

@@ -11,7 +11,8 @@ from pathlib import Path
 import pytest
 
 from copies import run_copy
-from teleop_core.kernels import IS_COMPILED, SUPPORTED, check_version, store
+from teleop_core.kernels import IS_COMPILED, store
+from teleop_core.kernels.compiler import SUPPORTED, check_version
 
 pytestmark = pytest.mark.skipif(not IS_COMPILED, reason="nothing is kept of what is not compiled")
 
@@ -45,7 +46,7 @@ def through(function, x: float) -> float:
     return function(x)
 
 print(scaled(3.0), through(pointer(plus_one, types.float64(types.float64)), 3.0))
-print(sum(scaled.stats.cache_hits.values()))
+print(scaled.hits)
 """,
 }
 
@@ -117,7 +118,7 @@ def from_nested(row):
 kernels = (from_names, from_dictionary, from_called, from_tuple, from_array, from_flag,
            from_choice, from_nested)
 print(*(kernel(np.array([10.0, 20.0])) for kernel in kernels))
-print(sum(sum(kernel.stats.cache_hits.values()) for kernel in kernels))
+print(sum(kernel.hits for kernel in kernels))
 """,
 }
 
@@ -149,7 +150,7 @@ tick = kernel_from_source(
     "def tick(x):\\n    return moved(x) * SCALE", "tick", {"moved": moved, "SCALE": 3.0}
 )
 print(tick(2.0))
-print(sum(tick.stats.cache_hits.values()))
+print(tick.hits)
 """,
 }
 
@@ -280,7 +281,7 @@ spec = spec_from_file_location("first", "inner.py")
 module = sys.modules["first"] = module_from_spec(spec)
 spec.loader.exec_module(module)
 print(module.factor(3.0))
-print(sum(module.factor.stats.cache_hits.values()))
+print(module.factor.hits)
 """
     folder = write_all(tmp_path, {"inner.py": CALLS["inner.py"], "outer.py": load})
     assert [run(folder), run(folder)] == [([6.0], 0), ([6.0], 1)]
@@ -304,9 +305,9 @@ import pickle
 from pathlib import Path
 import numba
 from middle import plus_one
-from teleop_core.kernels import numba_private
+from teleop_core.kernels import compiler
 
-load = numba_private._Cache.load_overload
+load = compiler._Cache.load_overload
 
 def loaded(self, *arguments):
     found = load(self, *arguments)
@@ -315,16 +316,16 @@ def loaded(self, *arguments):
     index.write_bytes(pickle.dumps(numba.__version__) + b"ca_later_module\\nItsRecord\\n.")
     return found
 
-numba_private._Cache.load_overload = loaded
+compiler._Cache.load_overload = loaded
 print(plus_one(3.0), plus_one(4))
-numba_private._Cache.load_overload = load
-print(sum(plus_one.stats.cache_hits.values()))
+compiler._Cache.load_overload = load
+print(plus_one.hits)
 """)
     assert run(folder) == ([7.0, 9.0], 0)
     (folder / "outer.py").write_text("""
 from middle import plus_one
 print(plus_one(4))
-print(sum(plus_one.stats.cache_hits.values()))
+print(plus_one.hits)
 """)
     assert run(folder) == ([9.0], 1)
 
@@ -368,7 +369,7 @@ def total(pair) -> float:
     return pair.first + pair.second
 
 print(total({0}(1.0, 2.0)))
-print(sum(total.stats.cache_hits.values()))
+print(total.hits)
 """
 
 

@@ -17,6 +17,7 @@ from teleop_core.nodes.start import taken_names
 
 LAUNCH = Path(__file__).resolve().parents[2] / "src" / "teleop_core" / "launch"
 STAGES = {"operator", "haptic_master", "motion_scaling", "inverse_kinematics", "slave", "slave_sim"}
+NODES = STAGES | {"frames"}
 
 
 def given(own: dict[str, tuple[str, str]] = ONE_ARM, **values: str) -> dict[str, str]:
@@ -32,15 +33,15 @@ def test_a_session_has_a_process_for_each_side_with_the_recorder_first() -> None
     recorder, slave, hand = processes(given())
     assert recorder.name == "recorder"
     assert {slave.executable, hand.executable} == {"teleop_session"}
-    assert set(slave.arguments) == {"slave", "slave_sim"}
-    assert {*slave.arguments, *hand.arguments} == STAGES
+    assert set(slave.arguments) == {"slave", "slave_sim", "frames"}
+    assert {*slave.arguments, *hand.arguments} == NODES
     assert (hand.respawns, slave.respawns) == (True, False)
 
 
 def test_a_session_may_have_a_process_for_each_node_with_the_recorder_first() -> None:
     found = processes(given(processes="nodes"))
     assert found[0].name == "recorder"
-    assert {process.name for process in found} == STAGES | {"recorder"}
+    assert {process.name for process in found} == NODES | {"recorder"}
     assert {process.namespace for process in found} == {"/"}
 
 
@@ -58,9 +59,9 @@ def test_every_node_finds_its_parameters_where_it_is(outer: str, own: str, where
 def test_one_process_may_hold_all_nodes_but_the_recorder() -> None:
     _, process = processes(given(processes="one", namespace="lab"))
     assert (process.executable, process.name) == ("teleop_session", "")
-    assert set(process.arguments) == STAGES
+    assert set(process.arguments) == NODES
     assert process.namespace == "/lab"
-    assert {f"/lab/{name}" for name in STAGES | {"recorder"}} <= set(parameters(process))
+    assert {f"/lab/{name}" for name in NODES | {"recorder"}} <= set(parameters(process))
 
 
 def test_nothing_records_where_it_is_not_wanted() -> None:
@@ -85,7 +86,7 @@ def test_an_argument_of_no_meaning_is_refused(name: str, value: str) -> None:
         processes(given(**dict[str, Any]({name: value})))
 
 
-@pytest.mark.parametrize(("file", "own", "count"), [("teleop", ONE_ARM, 7), ("two_arms", TWO_ARMS, 13)])
+@pytest.mark.parametrize(("file", "own", "count"), [("teleop", ONE_ARM, 8), ("two_arms", TWO_ARMS, 14)])
 def test_a_launch_file_declares_its_arguments_and_starts_its_nodes(
     monkeypatch: pytest.MonkeyPatch, file: str, own: dict[str, tuple[str, str]], count: int
 ) -> None:

@@ -1,7 +1,7 @@
 """Console link: access of the page to a live session through topics and services.
 
-The link reads the slow copies of streams that the recorder publishes (:mod:`teleop_core.nodes.display`). Without a
-recorder it subscribes to the streams themselves, best effort and with a queue of one. In a session with a display the
+The link reads the slow copies of streams that their nodes send for displays (:mod:`teleop_core.nodes.display`). Without
+copies it subscribes to the streams themselves, best effort and with a queue of one. In a session with a display the
 page shows the slave with the delay of this display, as a simulated operator sees it.
 """
 

@@ -12,8 +12,8 @@ from teleop_core.bags.messages import Layout, layout, read_any
 from teleop_core.graph.topics import DISPLAY_MEASURED_CP, OPERATOR_BUTTONS, OPERATOR_JAW, OPERATOR_SERVO_CP, Topic
 from teleop_core.kernels.geometry import Array
 from teleop_core.middleware.world import Owner, Qos
-from teleop_core.nodes.display import displayed
-from teleop_core.nodes.streams import Subscription, message_type
+from teleop_core.nodes.display import DisplayedStream
+from teleop_core.nodes.streams import message_type
 
 SILENCE = 1.0
 """Time without a message after which a stream is no longer fresh [s]. Then the page searches another source of the
@@ -36,21 +36,17 @@ class NewestSample:
         self.topic, self._joints = topic, arm.robot.joint_names
         self._layout: Layout = layout(topic, self._joints)
         self._owner, self._own = owner, topic.of_arm(arm.name)
-        self._name, self._since = displayed(self._own).name, now_of(owner)
-        self._subscription = Subscription(owner, self._own, self._name, 1)
+        self._stream = DisplayedStream(owner, self._own)
         self._is_of_slave = topic.name.startswith("slave/")
         self._waiting: deque[tuple[int, int, Array]] = deque(maxlen=_FRAMES)
         self._frames: deque[tuple[int, int]] = deque(maxlen=_FRAMES)  # arrival times of new samples, and their stamps
 
     def take(self) -> bool:
         """Store the newest sample for :meth:`show`; returns whether a new sample has arrived."""
-        newest = None
-        while (taken := self._subscription.take()) is not None:
-            newest = taken.data
+        newest = self._stream.take()
         if newest is None:
-            self._find_another()
             return False
-        found: Any = self._layout.decode_one(newest) or read_any(self.topic.kind, newest, self._joints)
+        found: Any = self._layout.decode_one(newest.data) or read_any(self.topic.kind, newest.data, self._joints)
         if not isinstance(found, tuple) or not np.isfinite(found[1]).all():
             return False  # the nodes that use the topic refuse and count wrong messages
         now_ns = self._owner.world.time_ns()
@@ -72,16 +68,6 @@ class NewestSample:
         seen_ns = view.stamp_ns.get(DISPLAY_MEASURED_CP.name) if self._is_of_slave else None
         while self._waiting and (seen_ns is None or self._waiting[0][0] <= seen_ns + _SCREEN_NS):
             _, view.stamp_ns[self.topic.name], view.streams[self.topic.name] = self._waiting.popleft()
-
-    def _find_another(self) -> None:
-        """Read the stream itself if no recorder republishes it."""
-        is_slow = self._name.startswith("/display/")
-        if is_slow and now_of(self._owner) - self._since > SILENCE:
-            self._since = now_of(self._owner)
-            if not self._owner.ros.count_publishers(self._name):
-                self._subscription.close()
-                self._name = f"/{self._own.name}"
-                self._subscription = Subscription(self._owner, self._own, self._name, 1)
 
 
 class Hand:

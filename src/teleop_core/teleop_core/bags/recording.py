@@ -5,7 +5,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from teleop_core.bags import compression
-from teleop_core.base import ParameterError, UnknownNameError, Within, fixed
+from teleop_core.base import NoParameters, ParameterError, UnknownNameError, Within, fixed
 from teleop_core.graph import Stage
 from teleop_core.graph.topics import BY_NAME, Kind, Quality, Stamp, Topic
 
@@ -95,3 +95,5 @@ MARKS = Topic("recorder/marks", Kind.REPORT, Stamp("time of the mark"), quality=
 """Marks that a user set during a live recording; each mark is one text."""
 RECORDER = Stage("recorder", RecordingParameters, reads=(), writes=(), node="teleop_core.nodes.recorder:RecorderNode")
 """The recorder; it reads every topic of its graph, of all arms."""
+FRAMES = Stage("frames", NoParameters, reads=(), writes=(), node="teleop_core.nodes.frames:FramesNode")
+"""Publishes what other tools draw of a running session, of all arms."""

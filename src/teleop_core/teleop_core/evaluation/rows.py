@@ -94,7 +94,7 @@ def side_by_side(tables: Sequence[Sequence[TableRow]]) -> list[Line]:
 
     A line is left out if it shows only dashes, or only delays of zero, as in virtual time.
     """
-    found = [{_place(row): row for row in rows} for rows in tables]
+    found = [{(row.group, row.label, row.unit): row for row in rows} for rows in tables]
     places = dict.fromkeys(place for rows in found for place in rows)
     lines = [Line(*place, tuple(rows.get(place) or TableRow(*place, MISSING) for rows in found)) for place in places]
     return [line for line in lines if any(row.value not in _NOTHING for row in line.rows)]
@@ -103,7 +103,3 @@ def side_by_side(tables: Sequence[Sequence[TableRow]]) -> list[Line]:
 def is_compared(lines: Sequence[Line]) -> bool:
     """Whether any line shows a published value."""
     return any(row.published for line in lines for row in line.rows)
-
-
-def _place(row: TableRow) -> tuple[str, str, str]:
-    return row.group, row.label, row.unit

@@ -18,7 +18,8 @@ BUILT_IN = ("operator", "haptic_master", "motion_scaling", "inverse_kinematics",
 """Names of the stages that every arm has."""
 HAND, DEVICE = BUILT_IN[:2]
 """Stages from whose recorded output a replay can start."""
-RECORDER_NAME = "recorder"
+RECORDER_NAME, FRAMES_NAME = "recorder", "frames"
+"""Nodes beside the stages of every session."""
 _WAYS = {"first": 0, "second": 1}  # maps prefixes of ports between arms to the index of the arm that writes
 
 
@@ -343,8 +344,8 @@ def build_graph(arms: Iterable[str] = (), stages: Iterable[str] = (), delays: It
         TeleopError: A name is unknown or used twice, or the graph cannot run.
     """
     names = (*BUILT_IN, *stages)
-    if RECORDER_NAME in names:
-        raise PartError("stage", RECORDER_NAME, "left out of the stages; it is always there")
+    for name in {RECORDER_NAME, FRAMES_NAME}.intersection(names):
+        raise PartError("stage", name, "left out of the stages; it is always there")
     return Graph(
         _demanded(tuple(STAGES.find(name) for name in names)),
         tuple(arms) or ("",),

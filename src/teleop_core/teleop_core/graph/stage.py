@@ -383,6 +383,7 @@ STAGES: Registry[Stage] = Registry(
         "jaw_sim": "teleop_core.slave.jaw.jaw_sim:JAW_SIM",
         "jaw_bridge": "teleop_core.slave.bridges.jaw_bridge:JAW_BRIDGE",
         "recorder": "teleop_core.bags.recording:RECORDER",
+        "frames": "teleop_core.bags.recording:FRAMES",
     },
     _checked,
 )

@@ -1,6 +1,6 @@
 """Answering node: makes one step of its stage for every message of its trigger, with the trigger's stamp."""
 
-from collections.abc import Callable
+from collections.abc import Sequence
 from typing import Any
 
 from teleop_core.graph.signals import DT
@@ -31,28 +31,20 @@ class AnsweringNode(CoreNode):
         for port in self.description.reads:
             self.row[f"{port.field}_ns"] = 0
 
-    def turn(self) -> None:
-        """Answer the next message."""
+    def due(self) -> Sequence[int]:
+        """Wait for a message of the trigger."""
         assert self._question.subscription is not None
         # A delayed message becomes due even if no new message comes. Therefore the wait is short if there is a delay.
         self._question.subscription.wait(DT if self._question.delay else 0.1)
-        self.work(self.send_report)
-
-    def step(self, tick_ns: int) -> None:
-        """Answer the received messages. A session calls this method, and :meth:`tell` later."""
-        self.work()
+        return (self.world.monotonic_ns(),)
 
     def tell(self) -> None:
         """Report the state after the last answer, if it has changed."""
         if self._told_ns:
             self.send_report(self._told_ns)
 
-    def work(self, report: Callable[[int], None] | None = None) -> None:
-        """Answer the received messages one by one.
-
-        Args:
-            report: Called with the stamp of each answer [ns] when it is sent.
-        """
+    def step(self, tick_ns: int) -> None:
+        """Answer the received messages one by one."""
         has_come = False
         while self._question.take():
             has_come = True
@@ -61,21 +53,17 @@ class AnsweringNode(CoreNode):
             if stamp_ns is not None and all(n.stamp_ns is not None for n in self._needed):
                 self.answer(stamp_ns)
                 self._told_ns = stamp_ns
-                if report is not None:
-                    report(stamp_ns)
         if not has_come:
             self.read_ports(self._trigger)
-            self._find_silence(report)
+            self._find_silence()
 
-    def _find_silence(self, report: Callable[[int], None] | None) -> None:
-        """When the trigger stops sending, let the stage make its outputs safe, and report this once."""
+    def _find_silence(self) -> None:
+        """When the trigger stops sending, let the stage make its outputs safe."""
         is_silent = self._question.age() > self._timeout
         if is_silent and not self._was_silent:
             with self.lock:
                 self.stage.fall_silent()
             self._told_ns = self.world.time_ns()
-            if report is not None:
-                report(self._told_ns)
         self._was_silent = is_silent
 
     def answer(self, stamp_ns: int) -> None:

@@ -1,6 +1,6 @@
 """Nodes ``arm_bridge`` and ``jaw_bridge``: real controllers instead of simulated drives."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from typing import Any
 
 from teleop_core.graph.topics import SLAVE_OPERATION, Kind, Topic
@@ -43,9 +43,11 @@ class ArmBridgeNode(TickingNode):
         self._arm.close()
         super().teardown()
 
-    def work(self, ticks: Iterable[int], report: Callable[[int], None] | None = None) -> None:
-        """Pass on the arm's measurements, and command the arm if a command is due in one of the ticks."""
-        now_ns = self.epoch_ns + max(ticks)
+    def step(self, tick_ns: int) -> None:
+        """Pass on the arm's measurements, and command the arm if a command is due."""
+        if self.loop is not None and tick_ns != self.loop.newest_ns:
+            return  # of several late ticks, the newest is enough
+        now_ns = self.epoch_ns + tick_ns
         with self.lock:
             self._listen()
             command = self._command(now_ns) if self.stage.is_due(now_ns) else None

@@ -3,7 +3,6 @@
 import traceback
 from collections.abc import Callable
 from concurrent.futures import Future
-from dataclasses import replace
 from typing import Any
 
 from teleop_core.bags.reports import read_reports
@@ -14,15 +13,13 @@ from teleop_core.graph.topics import Kind, Topic
 from teleop_core.graph.warming import warm_up
 from teleop_core.middleware.world import Publisher, TransitionResult
 from teleop_core.nodes.diagnostics import Reporter, input_values, recent_values, tick_values
-from teleop_core.nodes.feed import Feed
-from teleop_core.nodes.loop import Loop
+from teleop_core.nodes.display import DisplayCopies
+from teleop_core.nodes.loop import LiveLoop, Loop, LoopNode
 from teleop_core.nodes.news import Commanders, introduction
 from teleop_core.nodes.ports import NO_PORTS, Ports
 from teleop_core.nodes.quality import profile
-from teleop_core.nodes.rate import REPORT_PERIOD, Phases, Recent, Schedule, TickCounts, report_phase
-from teleop_core.nodes.strain import Strain
+from teleop_core.nodes.rate import REPORT_PERIOD, Recent, Schedule, TickCounts, report_phase
 from teleop_core.nodes.streams import Input, message_type
-from teleop_core.nodes.tuned import TunedNode
 from teleop_core.session.reports import report_of
 
 # longest wait for the gate [s]; even on a busy machine, a session's tick takes a hundredth of this time
@@ -30,11 +27,11 @@ _GATE_PATIENCE = 1.0
 _NEWS = {"active": "at work", "finalized": "ended"}  # other states are logged by their own names
 
 
-class CoreNode(TunedNode):
+class CoreNode(LoopNode):
     """Lifecycle node around one stage: writes received values to its signals, makes steps, publishes outputs.
 
-    A subclass makes the stage in :meth:`setup` and does one round of work in :meth:`turn`, which
-    runs in a thread of its own while the node is active. Arguments and errors are those of
+    A subclass makes the stage in :meth:`setup` and works in :meth:`step`, which a
+    :class:`~teleop_core.nodes.loop.LiveLoop` calls while the node is active. Arguments and errors are those of
     :class:`~teleop_core.nodes.tuned.TunedNode`.
     """
 
@@ -45,24 +42,21 @@ class CoreNode(TunedNode):
         """The running stage, the same object as :attr:`runner`; None for a node without a stage."""
         self.row: Any = None
         """The stage's signals, by the names of their fields."""
-        self.gate = self.world.lock()  # locked by a session while the node works in the session's thread
+        self.gate = self.world.lock()
         self.ended: Future[None] = Future()
         self.exit_code = 0
         self.has_ended = False
         """Whether the node was shut down and will send nothing more."""
         self.patience = self.options.real_time.patience
-        """Time without progress after which the loop counts as hung [s]; 0: never."""
-        self.has_own_loop = True
-        """Whether the node works in its own thread; False if it works in the thread of a whole session."""
-        self.phases: Phases | None = None
-        """Time that the phases of a session's ticks took; None for a node with its own loop."""
+        self.loop: LiveLoop | None = None
+        """Loop of the node, which a session gives to its nodes; an active node without one makes its own."""
         self.tells_strain = True
         """Whether the reports of this node say that its loop has given way; one node of a session does."""
         self.is_at_work = self.has_worked = False
-        self._loop: Loop | None = None
-        self._feed: Feed | None = None
+        self._own: LiveLoop | None = None
         self.ports = NO_PORTS
         self._own_publishers: list[Publisher] = []
+        self._copies = DisplayCopies(self, {})
         self._report: Topic | None = None
         self._reported: tuple[bytes, Any] = (b"", None)
         self._fresh_counts()
@@ -91,21 +85,8 @@ class CoreNode(TunedNode):
             self.options.joy_buttons,
         )
         self.row = self.ports.row
+        self._copies = DisplayCopies(self, self.ports.outputs)
         self._open_report()
-
-    def turn(self) -> None:
-        """Do one round of work; blocks for a tenth of a second at most."""
-        raise NotImplementedError
-
-    def take(self) -> None:
-        """Read what came from other processes; a session calls this method of all its nodes before :meth:`step`."""
-
-    def step(self, tick_ns: int) -> None:
-        """Work for one tick [ns, monotonic]; a session calls this method of all its nodes in turn."""
-        raise NotImplementedError
-
-    def tell(self) -> None:
-        """Report changes of the last tick, after the session has sent all messages of the tick."""
 
     def start(self) -> None:
         """Get ready for the first turn. Messages that came while the node was inactive are already deleted."""
@@ -144,11 +125,8 @@ class CoreNode(TunedNode):
 
     def watched(self) -> list[tuple[Loop, int]]:
         """The running loop, with a number that grows as long as the loop makes progress."""
-        loop = self._loop
-        if loop is None or not loop.is_ready:
-            return []
-        sent = sum(output.sent for output in tuple(self.ports.outputs.values()))
-        return [(loop, loop.turns + sent)]
+        loop = self._own
+        return [] if loop is None or not loop.is_ready else [(loop, loop.progress)]
 
     def halt(self) -> None:
         """Stop the loop that several nodes share; a single node has no shared loop."""
@@ -167,9 +145,7 @@ class CoreNode(TunedNode):
     def leave_topics(self) -> None:
         """Stop publishing the stage's topics until the next configuration; another node publishes them instead."""
         self.ports.mute()
-        for publisher in self._own_publishers:
-            self.ros.destroy(publisher)
-        self._own_publishers = []
+        self._close_publishers()
 
     def _open_report(self) -> None:
         """Open the stage's report topic, if it has one; reports are sent when they change."""
@@ -202,10 +178,15 @@ class CoreNode(TunedNode):
 
     def _close(self) -> None:
         self.ports.close()
+        self._close_publishers()
+        self.ports = NO_PORTS
+        self.stage = self.runner = self.row = None
+
+    def _close_publishers(self) -> None:
+        self._copies.close()
         for publisher in self._own_publishers:
             self.ros.destroy(publisher)
-        self.ports, self._own_publishers = NO_PORTS, []
-        self.stage = self.runner = self.row = None
+        self._copies, self._own_publishers = DisplayCopies(self, {}), []
 
     # -- lifecycle -------------------------------------------------------------------------------
 
@@ -247,41 +228,21 @@ class CoreNode(TunedNode):
         self._reported = b"", None
         self.start()
         self.is_at_work = self.has_worked = True
-        if self.has_own_loop:
-            self._open_feed()
-            self.schedule.start()
-            turn = self._fed_turn if self._feed is not None else self.turn
-            self._loop = Loop(self.world, self.ros.get_name(), turn, self.fail, self.prepare, self.patience)
-            self._loop.start()
-
-    def _open_feed(self) -> None:
-        """Feed the node's messages to the recorder of this machine, if there is one."""
-        names = [topic.name for topic in self.ports.outputs]
-        self._feed = Feed(names, self.world) if names else None
-        channels = self._feed.channels if self._feed is not None else {}
-        self.ports.connect(channels, self._feed)
-        if self._feed is not None:
-            for channel in channels.values():
-                channel.join(True)
-            self._feed.flush()  # send fed messages before the middleware publishes the first message
-
-    def _fed_turn(self) -> None:
-        self.turn()
-        if self._feed is not None:
-            self._feed.flush()
+        if self.loop is None:
+            self._own = self.loop = LiveLoop(self.ros.get_name(), (self,), self.fail)
+            self._own.start()
 
     def _halt(self) -> None:
         if not self.is_at_work:
             return
-        loop, self._loop = self._loop, None
-        has_stopped = loop is None or loop.stop()
+        has_stopped = True
+        if (own := self._own) is not None:
+            self._own = self.loop = None
+            has_stopped = own.stop()
         is_free = self.gate.acquire(True, _GATE_PATIENCE)
         self.is_at_work = False
         if is_free:
             self.gate.release()
-        if self._feed is not None and has_stopped:
-            self._feed.close()
-            self._feed = None
         if not (has_stopped and is_free):  # the outputs are silent because the sending thread hangs
             raise SessionError(f"{self.member_name} does not answer and is left running")
         self.stop()
@@ -310,22 +271,6 @@ class CoreNode(TunedNode):
         self._word = word
         self.report()
         return TransitionResult.SUCCESS
-
-    def prepare(self) -> None:
-        """Apply the real-time options to the calling thread; log the options that the system refuses."""
-        options = self.options.real_time
-        refusals = self.world.take_real_time(options)
-        for refusal in refusals:
-            self.ros.get_logger().warning(refusal)
-        if options.priority > 0 and not any("priority" in refusal for refusal in refusals):
-            self.schedule.strain = self.strain()
-
-    def strain(self) -> Strain:
-        """New judge of the loop that calls this method, which has real-time priority."""
-        again = replace(self.options.real_time, cpus=(), lock_memory=False, freeze_gc=False)
-        warn = self.ros.get_logger().warning
-        # A log line takes milliseconds, too long for the loop.
-        return Strain(self.world, lambda: self.world.take_real_time(again), lambda text: self.ros.defer(warn, text))
 
     def fail(self, reason: str, is_expected: bool) -> None:
         """End the work from within the loop: the outputs fall silent, and the process ends."""
@@ -378,6 +323,7 @@ class CoreNode(TunedNode):
     def _report_in_time(self) -> None:
         """Report once a second. An exception from a user's part is logged, and does not end the node."""
         try:
+            self._copies.look()
             self.report()
         except Exception:
             self.ros.get_logger().error(f"cannot report:\n{traceback.format_exc()}", throttle_duration_sec=60.0)
@@ -397,8 +343,8 @@ class CoreNode(TunedNode):
             concerns.append("failed; see its log")
         rate = self._reporter.rate(self.counts.ticks)
         values = tick_values(self._word, rate, self.counts, TICK_NS * 1e-6)
-        if self.phases is not None:
-            values |= self.phases.values()
+        if self.loop is not None and self.loop is not self._own:
+            values |= self.loop.phases.values()
         values["gave_way"] = str(self.schedule.strain.times if self.schedule.strain is not None else 0)
         values |= input_values(inputs) | self._reporter.rates(inputs)
         values |= {f"sent.{t.name}": str(o.sent) for t, o in self.ports.outputs.items()}

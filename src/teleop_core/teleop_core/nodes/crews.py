@@ -4,7 +4,7 @@ from collections.abc import Collection, Mapping
 from enum import StrEnum
 
 from teleop_core.base.errors import UnknownNameError
-from teleop_core.graph.graph import RECORDER_NAME, Graph
+from teleop_core.graph.graph import FRAMES_NAME, RECORDER_NAME, Graph
 from teleop_core.nodes.start import SESSION
 
 _SIDES = ("hand_side", "slave_side")
@@ -38,10 +38,13 @@ def crews(graph: Graph, processes: Processes = Processes.SIDES, without: Collect
     """
     names = tuple(member.name for member in graph.members)
     for name in without:
-        if name not in names:
-            raise UnknownNameError("node of the session", name, names)
+        if name not in (*names, FRAMES_NAME):
+            raise UnknownNameError("node of the session", name, (*names, FRAMES_NAME))
     sides = _sides(graph)
     own = {name: _process_of(name, processes, sides) for name in names if name not in without}
+    if FRAMES_NAME not in without:
+        is_alone = processes is Processes.NODES or not own
+        own[FRAMES_NAME] = FRAMES_NAME if is_alone else own.get("slave", [*own.values()][-1])
     shared = {process: tuple(name for name in own if own[name] == process) for process in dict.fromkeys(own.values())}
     return ({RECORDER_NAME: (RECORDER_NAME,)}, shared)
 

@@ -13,7 +13,7 @@ from teleop_core.bags.finding import check_new
 from teleop_core.base.errors import SessionError
 from teleop_core.base.plain_yaml import written
 from teleop_core.base.texts import printable
-from teleop_core.graph.graph import HAND, RECORDER_NAME
+from teleop_core.graph.graph import FRAMES_NAME, HAND, RECORDER_NAME
 from teleop_core.graph.layers import SESSION
 from teleop_core.graph.topics import SLAVE_SETPOINT_JS
 from teleop_core.middleware.real_time import is_priority_granted
@@ -397,9 +397,10 @@ def session_parameters(
     for member in graph.members:
         if links := link_texts(graph, member):
             content[member.name]["ros__parameters"]["links"] = links
+    frames = {"configuration": configuration.text(), "real_time.priority": 0}
     recorder = content[RECORDER_NAME]["ros__parameters"]
-    recorder["out"], recorder["configuration"] = out, configuration.text()
-    recorder["scenario"], recorder["real_time.priority"] = configuration.scenario, 0
+    recorder |= {"out": out, "scenario": configuration.scenario, **frames}
+    content[FRAMES_NAME] = {"ros__parameters": shared | frames}
     records = [topic for one in processes_beside(configuration).values() for topic in one.records]
     recorder["also"] = list(dict.fromkeys([*recorder["also"], *records]))
     if not starts_recorder:

@@ -1,5 +1,6 @@
 """Live markers: shapes that RViz and Foxglove draw beside the robot, published while there are subscribers."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -9,7 +10,6 @@ from teleop_core.bags.messages import read_reports
 from teleop_core.graph import topics
 from teleop_core.kernels.geometry import Array
 from teleop_core.nodes.base import CoreNode
-from teleop_core.nodes.model import absolute
 from teleop_core.nodes.newest import Cadence, Newest
 from teleop_core.session.markers import ArmMarkers
 
@@ -32,19 +32,28 @@ class LiveMarkers:
         arm: Namespace of the arm.
         axes: Rotation (3, 3) from the master's base to the slave's axes; None for the rotation of the default
             parameters.
+
+    Attributes:
+        read: Topics from which they are drawn.
     """
 
     def __init__(self, node: CoreNode, arm: str, axes: Array | None = None) -> None:
         self._topics = {topic: topic.of_arm(arm) for topic in _READ}
+        self.read = tuple(self._topics.values())
         self._drawn, self._cadence = (ArmMarkers(arm, axes), Cadence(node.world.monotonic_ns, PERIOD_NS))
         self._publisher = node.open_publisher(absolute(MARKERS.of_arm(arm)))
         self._time_ns = node.world.time_ns
+
+    @property
+    def is_watched(self) -> bool:
+        """Whether there are subscribers."""
+        return bool(self._publisher.get_subscription_count())
 
     def show(self, newest: Newest) -> None:
         """Publish the markers that are due, if there are subscribers."""
         if not self._cadence.is_due():
             return
-        if not self._publisher.get_subscription_count():
+        if not self.is_watched:
             self._drawn.forget()
             return
         self._publisher.publish(marker_message(self._time_ns(), self._markers(newest)))
@@ -68,3 +77,8 @@ class LiveMarkers:
     def _values(self, newest: Newest, topic: topics.Topic) -> Any:
         found = newest.values(self._topics[topic])
         return None if found is None else found[1]
+
+
+def absolute(topic: topics.Topic) -> topics.Topic:
+    """The topic with its full name: the arm's namespace already includes the node's namespace."""
+    return replace(topic, name=f"/{topic.name}")

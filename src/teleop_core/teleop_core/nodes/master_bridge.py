@@ -1,6 +1,5 @@
 """Node ``master_bridge``: a real device instead of ``haptic_master``."""
 
-from collections.abc import Callable, Iterable
 from typing import Any
 
 import numpy as np
@@ -49,9 +48,11 @@ class MasterBridgeNode(TickingNode):
             self._presses.close()
         super().teardown()
 
-    def work(self, ticks: Iterable[int], report: Callable[[int], None] | None = None) -> None:
+    def step(self, tick_ns: int) -> None:
         """Pass on the device's messages, and send it the force of the newest tick."""
-        now_ns = self.epoch_ns + max(ticks)
+        if self.loop is not None and tick_ns != self.loop.newest_ns:
+            return  # of several late ticks, the newest is enough
+        now_ns = self.epoch_ns + tick_ns
         with self.lock:
             is_new = self._listen()
             is_heard = self.stage.is_heard(self.world.time_ns())

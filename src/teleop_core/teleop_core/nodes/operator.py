@@ -84,7 +84,6 @@ class OperatorNode(TickingNode):
 
     _hand: HandInput | None = None
     _device: DeviceHand | None = None
-    _ticks = 0
 
     def setup(self, parameters: OperatorParameters) -> None:
         """Make the operator and open its topics, and its device."""
@@ -125,9 +124,7 @@ class OperatorNode(TickingNode):
 
     def read_ports(self, trigger: topics.Topic | None = None) -> None:
         """Update the signals, and read the pose that a person or program commands."""
-        self._ticks += 1
-        if self._sees or not self.has_own_loop or self._ticks % _LOOK == 0:
-            super().read_ports(trigger)
+        super().read_ports(trigger)
         if self._hand is not None:
             self._hand.read()
 

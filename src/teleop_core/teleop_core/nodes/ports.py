@@ -74,6 +74,7 @@ class Ports:
         self._reading, self._writing = np.array((0, -1)), np.zeros(2, np.int64)
         self._times = np.zeros(2, np.int64)
         self._has_clock = self._calls is not None and bool(self._calls["clock"])
+        self._send_all: Callable[[], object] = _nothing
         if self._calls is not None:
             self._bind(self._calls)
 

@@ -3,8 +3,10 @@
 import sys
 import time
 from collections import deque
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
@@ -12,25 +14,19 @@ from teleop_core.bags.arms import NAMESPACE_KEY
 from teleop_core.bags.recording import MARKS, RECORDER, RecordingParameters
 from teleop_core.bags.reports import report
 from teleop_core.bags.writer import BagWriter
-from teleop_core.base.errors import RecordingError, SessionError, TeleopError
-from teleop_core.base.parameters import build, fixed, parameter, specs, values_of
-from teleop_core.graph.graph import RECORDER_NAME, Graph
-from teleop_core.graph.layers import SESSION, parse_text
+from teleop_core.base.errors import RecordingError, SessionError
+from teleop_core.base.parameters import fixed, parameter
+from teleop_core.graph.graph import Graph
 from teleop_core.graph.stage import Stage
 from teleop_core.graph.topics import DIAGNOSTICS, Quality, Topic
-from teleop_core.kernels.axes import axis_map
 from teleop_core.middleware.world import TransitionResult
-from teleop_core.nodes.base import CoreNode
-from teleop_core.nodes.display import LiveDisplay
 from teleop_core.nodes.feed import FeedReader
-from teleop_core.nodes.files import graph_of, session_of
-from teleop_core.nodes.markers import LiveMarkers
-from teleop_core.nodes.model import LiveModel, ModelTopics
+from teleop_core.nodes.files import graph_of
+from teleop_core.nodes.frames import SessionNode
 from teleop_core.nodes.newest import Arrival, Newest
 from teleop_core.nodes.recorder_services import serve
 from teleop_core.nodes.streams import Subscription
 from teleop_core.session.configuration import Configuration
-from teleop_core.session.model import Model
 from teleop_core.session.runner import describe
 
 DEPTH = 2000
@@ -58,7 +54,7 @@ class RecorderParameters(RecordingParameters):
 class _Channel:
     """One recorded topic, with counts of received messages and of messages that the middleware lost."""
 
-    def __init__(self, node: CoreNode, topic: Topic) -> None:
+    def __init__(self, node: SessionNode, topic: Topic) -> None:
         self.topic, self._node, self._world = topic, node, node.world
         self.received = self.lost = 0
         self._numbers: dict[bytes, int] = {}  # last number of each publisher
@@ -94,13 +90,13 @@ class _Channel:
         if self._twice:
             self._twice -= 1
             return
-        self.give(data, sent_ns)
+        self._given.append((sent_ns, self.topic, data, sent_ns))
 
     def drain(self, came: list[Arrival]) -> None:
         """Append the messages received since the last call to ``came``."""
-        while self._given:
-            came.append(self._given.popleft())
-            self.received += 1
+        given = self._given
+        self.received += (count := len(given))
+        came.extend([given.popleft() for _ in range(count)])
         inside_ns = self._inside_ns
         while self._subscription is not None and (taken := self._subscription.take()) is not None:
             if inside_ns is None or taken.sent_ns < inside_ns:
@@ -146,17 +142,14 @@ class _Channel:
         return self.topic.quality is Quality.STREAM and listens_ns > DISCOVERY_NS
 
 
-class RecorderNode(CoreNode):
+class RecorderNode(SessionNode):
     """Reads the received messages some hundred times a second, and passes their bytes to the writer."""
 
     def __init__(self, stage: Stage = RECORDER, graph: Graph | None = None, **options: Any) -> None:
-        super().__init__(stage, RecorderParameters, **options)
+        super().__init__(stage, RecorderParameters, graph, **options)
         self.channels: dict[str, _Channel] = {}
-        self._graph = graph
         self.patience = 10.0  # a slow disk is no reason to end a session
         self._feeds: FeedReader | None = None
-        self.stages: dict[str, Any] = {}
-        """Parameters of the stages of the process, by their names in the graph."""
         self._writing = self.world.lock()  # locked while something is written, or the file changes
         self._is_recording, self._part, self._marks = False, 0, 0
         self._last: dict[Topic, bytes] = {}  # last messages of latched topics, for the next recording
@@ -164,18 +157,11 @@ class RecorderNode(CoreNode):
 
     def setup(self, parameters: RecorderParameters) -> None:
         """Make the recording's directory."""
-        configuration = self._configuration(parameters)
-        graph = self._graph or (configuration.graph if parameters.configuration else graph_of(sys.argv))
+        configuration = self.configuration()
+        graph = self.graph or (configuration.graph if parameters.configuration else graph_of(sys.argv))
         self._path = Path(parameters.out or time.strftime("bags/live_%Y%m%d_%H%M%S"))
         topics = (*(topic.of_arm(self.arm) for topic in graph.topics), DIAGNOSTICS, *parameters.others)
-        self._model = self._model_of(configuration, parameters)
-        self._model_topics, self._newest = ModelTopics(self, self._model.topics), Newest()
-        self._shown: list[LiveMarkers | LiveDisplay] = []
-        for name in graph.namespaces:
-            arm = "/".join(filter(None, (self.arm, name)))
-            axes = configuration.value("axes", name)
-            turn = None if axes is None else axis_map("axes", axes)
-            self._shown += [LiveMarkers(self, arm, turn), LiveDisplay(self, arm)]
+        self._model, self._newest = self.model_of(configuration, parameters.tf_rate), Newest()
         every = parameters.every_nth((*topics, *self._model.topics))
         self._recorded = [topic for topic in topics if every[topic.name]]
         self._mark_topic, self._part, self._marks = MARKS.of_arm(self.arm), 0, 0
@@ -202,25 +188,6 @@ class RecorderNode(CoreNode):
         for topic, data in self._last.items():
             self._writer.write(topic, now_ns, data, now_ns)
 
-    def _configuration(self, parameters: RecorderParameters) -> Configuration:
-        """Configuration of the session: the one in ``parameters``, the one of its stages, or the defaults."""
-        if self._graph is not None and not parameters.configuration:
-            own = {spec.name for spec in specs(RecordingParameters)}
-            values = {k: v for k, v in values_of(parameters).items() if k in own}
-            recording = build(RecordingParameters, values)
-            groups = {SESSION: session_of(sys.argv), **self.stages, RECORDER_NAME: recording}
-            return Configuration(groups, parameters.scenario, self._graph)
-        layer = parse_text(parameters.configuration, "recorder.configuration")
-        return Configuration.from_layers([layer], parameters.scenario)
-
-    def _model_of(self, configuration: Configuration, parameters: RecorderParameters) -> LiveModel:
-        """Model whose frames are recorded in addition to the topics; it has no frames if the robot is not installed."""
-        try:
-            return LiveModel(Model(configuration, parameters.tf_rate, self.arm))
-        except TeleopError as error:
-            self.ros.get_logger().warning(f"records no model of the robot: {error}")
-            return LiveModel(Model(configuration, 0.0))
-
     def _about(self, configuration: Configuration) -> dict[str, str]:
         """Metadata of the recording, and the namespace of all arms."""
         about = describe(configuration)
@@ -231,9 +198,13 @@ class RecorderNode(CoreNode):
         self.channels = {topic.name: _Channel(self, topic) for topic in self._recorded}
         self._feeds = FeedReader(self.channels, self.world)
 
-    def turn(self) -> None:
-        """Record the received messages."""
+    def due(self) -> Sequence[int]:
+        """Wait a moment."""
         self.world.sleep(_PAUSE)
+        return (self.world.monotonic_ns(),)
+
+    def step(self, tick_ns: int) -> None:
+        """Record the received messages."""
         with self._writing:
             self._drain()
         self.counts.ticks += 1
@@ -261,8 +232,8 @@ class RecorderNode(CoreNode):
 
     def abandon(self) -> None:
         """Close the recording when an orderly end is no longer possible. May be called in any thread."""
-        if self._loop is not None:
-            self._loop.stop()
+        if self.loop is not None:
+            self.loop.stop()
         if self.stage is not None:
             if self.is_at_work and not self._is_broken:
                 self._drain()
@@ -278,14 +249,10 @@ class RecorderNode(CoreNode):
             self._feeds.drain()
         for channel in self.channels.values():
             channel.drain(came)
-        came.sort(key=lambda message: message[0])
+        came.sort(key=itemgetter(0))
         self._last.update({m[1]: m[2] for m in came if m[1].quality is Quality.LATCHED})
         self._newest.take(came)
         drawn = self._model.messages(self._newest)
-        for shown in self._shown:
-            shown.show(self._newest)
-        for topic, data, _ in drawn:
-            self._model_topics.send(topic, data)
         if not self._is_recording:
             return
         try:

@@ -1,7 +1,5 @@
 """Node ``slave``: the server of any arm, one step per elapsed millisecond."""
 
-from collections.abc import Callable, Iterable
-
 from teleop_core.bags.messages import Refusal
 from teleop_core.graph.operation import State
 from teleop_core.graph.signals import TICK_NS
@@ -67,11 +65,11 @@ class SlaveNode(TickingNode):
         self._is_told = self.input(SLAVE_MEASURED_JS).stamp_ns is not None
         self._seen, self._missed = self.counts, self.counts.missed
 
-    def work(self, ticks: Iterable[int], report: Callable[[int], None] | None = None) -> None:
-        """Make the steps of some ticks [ns, monotonic], if the position of the arm is known."""
+    def step(self, tick_ns: int) -> None:
+        """Make the step of one tick [ns, monotonic], if the position of the arm is known."""
         if not self._is_ready:
             return
-        super().work(ticks, report)
+        super().step(tick_ns)
         stamp_ns = self.row["slave_setpoint_js_ns"]
         if stamp_ns != self._before_ns:
             self.delay.put(self.world.time_ns() - stamp_ns)

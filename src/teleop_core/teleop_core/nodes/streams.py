@@ -211,6 +211,7 @@ class Input:
         self.is_trigger = False
         """Whether each message of the topic is a step of the stage."""
         self.subscription: Subscription | None = None
+        self._is_inside = False
         self._listen()
 
     def _describe(self) -> None:
@@ -405,8 +406,10 @@ class Input:
         """Receive values only from a sender in this process if ``is_inside``, otherwise only from the topic."""
         if is_inside and self.subscription is not None:
             self.close()
-        elif not is_inside and self.subscription is None:
+            self._is_inside = True
+        elif not is_inside and self._is_inside:
             self._listen()
+            self._is_inside = False
 
     @property
     def place(self) -> tuple[int, int, int]:
@@ -473,6 +476,11 @@ class Output:
     def sent(self) -> int:
         """Number of sent messages."""
         return int(self._cells["sent"])
+
+    @property
+    def data(self) -> bytes:
+        """Bytes of the newest message, without padding."""
+        return self._buffer.tobytes()
 
     @property
     def is_pending(self) -> bool:

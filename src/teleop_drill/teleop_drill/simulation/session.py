@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from teleop_core.base.errors import SessionError
-from teleop_core.graph.graph import RECORDER_NAME
+from teleop_core.graph.graph import FRAMES_NAME, RECORDER_NAME
 from teleop_core.graph.stage import STAGES
 from teleop_core.nodes.base import CoreNode
 from teleop_core.nodes.live import session_parameters
@@ -69,6 +69,7 @@ class SimulatedSession:
         """Newest process of each name."""
         self.crews: dict[Process, Crew] = {}
         """Nodes of each process."""
+        self._nodes: dict[Process, dict[str, CoreNode]] = {}
         self.recordings: list[Path] = []
         self._begun_ns: list[int] = []
         self._bystander: Process | None = None
@@ -111,8 +112,8 @@ class SimulatedSession:
         if len(nodes) > 1:
             own = () if RECORDER_NAME in nodes else nodes
             return TeleopSession("", own, world, graph)
-        if nodes == (RECORDER_NAME,):
-            return make_node(STAGES.find(RECORDER_NAME), world=world)
+        if nodes[0] in {RECORDER_NAME, FRAMES_NAME}:
+            return make_node(STAGES.find(nodes[0]), world=world)
         (member,) = (one for one in graph.members if one.name == nodes[0])
         return make_node(member.stage, namespace=member.arm, world=world)
 
@@ -178,8 +179,12 @@ class SimulatedSession:
     def node(self, name: str) -> CoreNode | None:
         """A running node, for inspection; None if the node does not run."""
         process = self.process_of(name)
-        crew = None if process is None or process.is_dead else self.crews.get(process)
-        return None if crew is None else next((one for one in crew.nodes if one.member_name == name), None)
+        if process is None or process.is_dead or process not in self.crews:
+            return None
+        nodes = self._nodes.get(process)
+        if nodes is None:
+            nodes = self._nodes[process] = {one.member_name: one for one in self.crews[process].nodes}
+        return nodes.get(name)
 
     def is_running(self, node: str) -> bool:
         """Whether the process of a node runs."""
