@@ -13,8 +13,8 @@ from teleop_core.coupling.filters.tremor_filter import TremorFilterParameters
 from teleop_core.coupling.fixtures.remote_centre import RemoteCentreParameters
 from teleop_core.coupling.mapping.jaw_command import JawCommandParameters
 from teleop_core.hand.master.master_bridge import POSE_MESSAGES, MasterBridgeParameters
-from teleop_core.hand.operators.behaviour import ButtonParameters as HandButtons
 from teleop_core.hand.operators.behaviour import OperatorParameters
+from teleop_core.hand.operators.behaviour import PressParameters as HandButtons
 from teleop_core.hand.operators.human import HumanParameters
 from teleop_core.hand.operators.remote import RemoteHand
 from teleop_core.hand.operators.tour import TourParameters

@@ -13,7 +13,7 @@ from teleop_core.graph import Row, topics
 from teleop_core.kernels import Addressed, Array, Fields, addressed, inner, kernel, record
 from teleop_core.kernels.fields import Integers
 from teleop_core.robots.robot import Robot
-from teleop_core.slave.arm import SimulatedArm
+from teleop_core.slave.arm import ArmParts
 from teleop_core.slave.plants import PLANTS, Physics, Plant
 from teleop_scene import actuators
 from teleop_scene.arm import SceneRobot
@@ -43,7 +43,7 @@ def see(
     forces: Array,
     center: Array,
     R: Array,
-    arm: SimulatedArm,
+    arm: ArmParts,
     row: Row,
 ) -> None:
     """Write an arm's joints, and the force on its tip, at the beginning of a tick.
@@ -78,7 +78,7 @@ def see(
 
 
 @inner
-def _feel(bodies: Integers, forces: Array, center: Array, R: Array, arm: SimulatedArm, row: Row) -> None:
+def _feel(bodies: Integers, forces: Array, center: Array, R: Array, arm: ArmParts, row: Row) -> None:
     """Write the force on the tip in axes of the base, and its torque about the tip."""
     F, M, tip = np.zeros(3), np.zeros(3), np.zeros(3)
     for k in range(bodies.shape[0]):
@@ -108,7 +108,7 @@ def move(
     control: Array,
     efforts: Array,
     friction: tuple[Array, Array],
-    arm: SimulatedArm,
+    arm: ArmParts,
     row: Row,
 ) -> None:
     """Give the scene what moves an arm in the coming tick.
@@ -148,7 +148,7 @@ class _Mover:
     see: Addressed
     move: Addressed
 
-    def __init__(self, robot: SceneRobot, arm: SimulatedArm, row: Any, dt: float) -> None:
+    def __init__(self, robot: SceneRobot, arm: ArmParts, row: Any, dt: float) -> None:
         self.scene = scene = shared(robot.file, dt, robot.chain.tip)
         self._robot, self._arm, model = robot, arm, scene.model
         joints = robot.chain.joints
@@ -216,7 +216,7 @@ def _physics(_parameters: NoParameters, robot: Robot) -> Physics:
     return found
 
 
-def _mover(_parameters: NoParameters, robot: Robot, arm: SimulatedArm, row: Any, dt: float) -> _Mover:
+def _mover(_parameters: NoParameters, robot: Robot, arm: ArmParts, row: Any, dt: float) -> _Mover:
     if not isinstance(robot, SceneRobot):
         raise ParameterError("slave_sim.plant.kind", "scene", f"used with robot=SCENE.xml, not {robot.name}")
     return _Mover(robot, arm, row, dt)

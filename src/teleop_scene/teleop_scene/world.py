@@ -49,7 +49,7 @@ class SceneParameters(RobotParameters):
             View.parse(camera)
 
 
-class WorldState(Fields):
+class SceneBodiesState(Fields):
     """State record of the stage."""
 
     ticks: int
@@ -61,7 +61,7 @@ class WorldState(Fields):
     upper: float  # [rad]
 
 
-class WorldRow(Row):
+class SceneBodiesRow(Row):
     """Signals of the stage."""
 
     scene_poses: Array
@@ -71,11 +71,11 @@ class WorldRow(Row):
 @kernel
 def world_step(
     s: SceneState,
-    own: WorldState,
+    own: SceneBodiesState,
     bodies: Integers,
     arrays: tuple[Array, Array, Array, Array],
     jaw: tuple[Integers, Array, Array, Array],
-    row: WorldRow,
+    row: SceneBodiesRow,
     dt: float,
 ) -> None:
     """One tick: command the jaw, report its angle, and now and then the poses of the bodies.
@@ -115,11 +115,11 @@ def world_step(
 
 
 @kernel
-def rest(row: WorldRow, dt: float) -> None:
+def rest(row: SceneBodiesRow, dt: float) -> None:
     """One tick of a stage without a scene: nothing moves."""
 
 
-class World(RunningStage):
+class SceneBodies(RunningStage):
     """Stage of the bodies of a scene; with a robot that is no arm of a scene it does nothing.
 
     Raises:
@@ -129,7 +129,7 @@ class World(RunningStage):
     def __init__(self, parameters: SceneParameters, dt: float = DT) -> None:
         robot = load_robot_set(parameters.robot, parameters.geometry)
         super().__init__(SCENE_STAGE, robot.n, dt)
-        self._row, self.state, self.robot = self.signals.copy(), record(WorldState), robot
+        self._row, self.state, self.robot = self.signals.copy(), record(SceneBodiesState), robot
         if not isinstance(robot, SceneRobot):
             self.scene, self.kernel = None, rest
             return
@@ -185,5 +185,5 @@ SCENE_STAGE = Stage(
     optional=(topics.SLAVE_JAW_SETPOINT_JS,),
     on_demand=(topics.SLAVE_JAW_MEASURED_JS,),
     beside=cameras_beside,
-    make=World,
+    make=SceneBodies,
 )
