@@ -3,23 +3,44 @@
     python benchmarks/simulated.py --count 20            # the median of 20 random schedules, by side and composed
     python benchmarks/simulated.py --count 1 --parts     # one schedule of each, with the share of each part
 
-The first schedule of a process loads the kernels and is not counted. With ``--parts`` the profiler makes the schedules
-several times slower, and counts calls of Python functions as longer than they are.
+The first schedule of a process loads the kernels and is not counted. ``--parts`` looks at the running code once in a
+millisecond of processor time, first by kind of work, then by function.
 """
 
 import argparse
-import cProfile
-import pstats
+import signal
 import time
 from collections import Counter
+from contextlib import nullcontext
 from pathlib import Path
+from types import FrameType
 
 import numpy as np
 
 from teleop_core.nodes.crews import Processes
 from teleop_drill.simulation.seeds import run_seed
 
-_PARTS = 12  # parts that are listed
+_PARTS = 30  # parts that are listed
+_SAMPLE = 1e-3  # processor time between two samples [s]
+_STARTS = {"start", "launch", "close", "on_configure", "on_activate", "on_deactivate", "on_cleanup", "on_shutdown"}
+KINDS = {
+    "laws": ("simulation/laws", "simulation/owner", "simulation/drilled_session", "simulation/sometimes"),
+    "scheduler and bus": ("simulation/", "middleware/"),
+    "recorder": (
+        "nodes/recorder",
+        "nodes/feed",
+        "nodes/model",
+        "nodes/markers",
+        "nodes/display",
+        "nodes/newest",
+        "bags/",
+    ),
+    "messages of nodes": ("nodes/streams", "nodes/ports", "nodes/wire", "nodes/sender"),
+    "steps of stages": ("graph/stage",),
+    "reports": ("nodes/diagnostics", "nodes/observer"),
+    "turns of nodes": ("nodes/", "slave/", "hand/"),
+}
+"""Modules of each kind of work, by the begins of their names; the first kind that fits counts."""
 
 
 def speeds(first: int, count: int, processes: Processes) -> list[float]:
@@ -32,13 +53,39 @@ def speeds(first: int, count: int, processes: Processes) -> list[float]:
     return found
 
 
-def parts(profile: cProfile.Profile) -> Counter[str]:
-    """Own time of all functions [s], by module of this repository or by library."""
-    found: Counter[str] = Counter()
-    for (path, _, name), (_, _, own, *_) in pstats.Stats(profile).stats.items():  # type: ignore[attr-defined]
-        is_ours = "site-packages" not in path and "teleop_" in path
-        found["/".join(Path(path).with_suffix("").parts[-2:]) if is_ours else f"library: {name}"] += own
-    return found
+class Sampler:
+    """Counts, at each ms of processor time, the kind of work of the present code.
+
+    A sample belongs to ``start`` if a function that starts something is among the callers, else to the kind of the
+    innermost module of :data:`KINDS`. So a kernel belongs to the module that calls it.
+    """
+
+    def __init__(self) -> None:
+        self.counts: Counter[str] = Counter()
+        self.places: Counter[str] = Counter()
+
+    def __enter__(self) -> "Sampler":
+        signal.signal(signal.SIGPROF, self._look)
+        signal.setitimer(signal.ITIMER_PROF, _SAMPLE, _SAMPLE)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        signal.setitimer(signal.ITIMER_PROF, 0.0)
+
+    def _look(self, _: int, frame: FrameType | None) -> None:
+        kind, place = "", ""
+        while frame is not None:
+            code = frame.f_code
+            if code.co_name in _STARTS:
+                kind = "start and end of processes"
+            if not kind:
+                path = Path(code.co_filename)
+                name = f"{path.parent.name}/{path.stem}"
+                kind = next((kind for kind, names in KINDS.items() if any(map(name.startswith, names))), "")
+                place = place or f"{name} {code.co_name}"
+            frame = frame.f_back
+        self.counts[kind or "other"] += 1
+        self.places[place] += 1
 
 
 def main() -> None:
@@ -49,18 +96,15 @@ def main() -> None:
     given = parser.parse_args()
     for processes in (Processes.SIDES, Processes.ONE):
         run_seed(given.seed, (), processes=processes)
-        profile = cProfile.Profile(time.process_time)
-        if given.parts:
-            profile.enable()
-        found = speeds(given.seed, given.count, processes)
-        profile.disable()
+        with Sampler() if given.parts else nullcontext() as sampler:
+            found = speeds(given.seed, given.count, processes)
         low, middle, high = np.percentile(found, [25, 50, 75])
         text = f"{processes.value}: {middle:.2f} simulated s per processor s, quartiles {low:.2f} to {high:.2f}"
         print(text, flush=True)
-        if given.parts:
-            own = parts(profile)
-            for name, seconds in own.most_common(_PARTS):
-                print(f"  {100.0 * seconds / own.total():4.1f} %  {name}")
+        for counts in (sampler.counts, sampler.places) if sampler is not None else ():
+            for name, count in counts.most_common(_PARTS):
+                share = count / counts.total()
+                print(f"  {100.0 * share:4.1f} %  {1e3 * share / middle:6.1f} ms per simulated s  {name}")
 
 
 if __name__ == "__main__":

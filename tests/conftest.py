@@ -7,7 +7,6 @@ import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from tempfile import TemporaryFile
 from typing import Any
 
 import numpy as np
@@ -15,9 +14,8 @@ import pytest
 from hypothesis import settings
 
 from browser import chromium
+from copies import run_copy
 from teleop_core.kernels import IS_COMPILED
-from teleop_core.nodes.starter import Starter
-from teleop_core.session.configuration import configure
 
 # Examples are the same in every run, and no clock decides: compiling may take its time.
 settings.register_profile("teleop", deadline=None, derandomize=True, database=None)
@@ -93,36 +91,17 @@ def browser() -> str:
 
 
 @pytest.fixture(scope="session")
-def _starter() -> Iterator[Starter]:
-    """Process that has loaded what commands need, and is copied for each of them."""
-    with Starter(configure("coarse_box").text(), os.environ) as made:
-        yield made
-
-
-@pytest.fixture(scope="session")
-def teleop_again(_starter: Starter) -> Run:
+def teleop_again() -> Run:
     """Run the ``teleop`` command as ``teleop`` does, but in a copy of a process that has loaded.
 
-    It costs a tenth of a second, not two. A copy knows more modules than a command that a user
-    types, and has one seed of hashes with all others: what a command does when all goes well, and
-    that its bytes are the same again, is for ``teleop`` to show.
+    A copy knows more modules than a command that a user types, and has one seed of hashes with all others: what a
+    command does when all goes well, and that its bytes are the same again, is for ``teleop`` to show.
     """
 
     def run(*arguments: object, code: int = 0) -> "subprocess.CompletedProcess[str]":
-        command = ["teleop", *map(str, arguments)]
-        with TemporaryFile("w+") as out, TemporaryFile("w+") as err:
-            files = {"out": out.fileno(), "err": err.fileno()}
-            process = _starter.start(command, os.environ, files, main="teleop_core.commands.cli:main")
-            try:
-                returned = process.wait(300)
-            finally:
-                process.kill()
-            texts = []
-            for file in (out, err):
-                file.seek(0)
-                texts.append(file.read())
-        assert returned == code, "".join(texts)
-        return subprocess.CompletedProcess(command, returned, *texts)
+        done = run_copy(["teleop", *map(str, arguments)], "teleop_core.commands.cli:main")
+        assert done.returncode == code, done.stdout + done.stderr
+        return done
 
     return run
 

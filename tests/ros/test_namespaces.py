@@ -64,7 +64,7 @@ def recorded(peer: "Peer", process: Any, tmp_path: Any, *slaves: Any) -> reader.
     return reader.Bag(tmp_path / "bag")
 
 
-@pytest.mark.slow
+@pytest.mark.soak
 def test_arms_of_a_session_in_a_namespace_stay_apart_below_it_and_keep_the_names_of_their_nodes(
     peer: "Peer", start: Callable[..., Any], tmp_path: Path
 ) -> None:

@@ -99,6 +99,7 @@ def test_trials_are_recorded_scored_and_go_on_where_they_were_after_a_kill(tmp_p
     assert "participant p01, trial 1, repetition 1" in " ".join(recording.metadata["configuration"].split())
 
 
+@pytest.mark.soak
 def test_a_stop_fails_the_trial_and_a_person_presses_with_a_key(tmp_path: Path) -> None:
     with Tab(tmp_path / "browser", *SIZE) as tab, conducted(tmp_path, "remote") as (_, url):
         tab.visit(url)

@@ -18,7 +18,7 @@ from teleop_core.nodes.children import environment
 if TYPE_CHECKING:
     from ros.conftest import Peer
 
-pytestmark = [pytest.mark.ros, pytest.mark.slow]
+pytestmark = [pytest.mark.ros, pytest.mark.soak]
 
 
 def test_a_recorded_hand_that_is_played_is_the_operator(

@@ -15,9 +15,8 @@ if TYPE_CHECKING:
 pytestmark = [pytest.mark.ros, pytest.mark.slow]
 
 
-@pytest.mark.parametrize(
-    "way", [pytest.param((), id="processes", marks=pytest.mark.soak), pytest.param(("--composed",), id="composed")]
-)
+@pytest.mark.soak
+@pytest.mark.parametrize("way", [(), ("--composed",)], ids=["processes", "composed"])
 def test_live_does_not_call_a_recording_that_moved_recorded(peer: "Peer", tmp_path: Path, way: tuple[str, ...]) -> None:
     live = LiveProcess(tmp_path, *way, env={"ROS_DOMAIN_ID": peer.domain})
     try:

@@ -137,10 +137,9 @@ def test_sim_refuses_wrong_input_in_one_line(
     assert not (tmp_path / "bag").exists()
 
 
-@pytest.mark.slow
-def test_an_existing_output_is_never_overwritten(teleop: "Run", recording: Path, tmp_path: Path) -> None:
+def test_an_existing_output_is_never_overwritten(teleop_again: "Run", recording: Path, tmp_path: Path) -> None:
     for command in (("sim",), ("replay", recording)):
-        line = one_line(teleop(*command, "--out", recording, code=2))
+        line = one_line(teleop_again(*command, "--out", recording, code=2))
         assert "exists" in line
     assert Bag(recording).topics["slave/measured_js"].count == TICKS
 
@@ -161,13 +160,12 @@ def test_replay_and_evaluate_name_what_a_bag_lacks(teleop_again: "Run", tmp_path
     assert not (tmp_path / "out").exists()
 
 
-@pytest.mark.slow
-def test_lookups_answer_without_a_session(teleop: "Run", teleop_again: "Run") -> None:
-    assert "coarse_box" in teleop("scenarios").stdout
-    assert "motion_scaling.fine_gain" in teleop("parameters").stdout
+def test_lookups_answer_without_a_session(teleop_again: "Run") -> None:
+    assert "coarse_box" in teleop_again("scenarios").stdout
+    assert "motion_scaling.fine_gain" in teleop_again("parameters").stdout
     assert "slave_sim" not in teleop_again("parameters", "motion_scaling").stdout
     assert teleop_again("parameters", "--markdown").stdout.startswith("| parameter")
-    assert "rcrt1" in teleop("robot").stdout
+    assert "rcrt1" in teleop_again("robot").stdout
     assert "theta2" in teleop_again("robot", "rcrt1").stdout
     assert "rcrt1" in one_line(teleop_again("robot", "r2d2", code=2))
     assert "motion_scaling" in one_line(teleop_again("parameters", "nobody", code=2))

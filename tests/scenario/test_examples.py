@@ -392,6 +392,7 @@ def test_a_policy_succeeds_where_its_demonstrator_does_and_both_fail_when_they_s
     assert max(shares[-2:]) < 10.0
 
 
+@pytest.mark.soak
 def test_a_trained_policy_carries_new_blocks_to_their_pegs_unless_it_sees_late(tmp_path: Path) -> None:
     shares = numbers(r"policy +([\d.]+) %", run("policy_picks", tmp_path))
     assert len(shares) == 6

@@ -33,7 +33,9 @@ AGREEING = {
     "parallel_robots": 6, "operator_models": 0, "blind": 124,
 }  # fmt: skip
 """Published figures, laws and goals that each experiment agrees with."""
-LONG_EXPERIMENTS = ("stability", "transparency", "operator_models", "move_and_wait")
+CALCULATED = ("resolution", "tendons", "mma_frames", "mma_balance", "parallel_robots")
+"""Those without a session, which take a second together."""
+LONG_EXPERIMENTS = ("stability", "transparency", "operator_models", "move_and_wait", "controllers", "fitts")
 """Half a minute and more each; tests/unit has their laws with fewer cases."""
 TRACKED_MM = {"coarse_box": 0.289, "fine_box": 0.260, "human": 0.114, "point": 0.153, "uva_board": 0.105}
 """Root mean square of each scenario's position error, where it is above a tenth."""
@@ -45,10 +47,14 @@ def bench() -> experiments.Bench:
     return experiments.Bench()
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     "name",
-    [pytest.param(n, marks=[pytest.mark.soak] * (n in LONG_EXPERIMENTS)) for n in experiments.EXPERIMENTS.names()],
+    [
+        pytest.param(
+            n, marks=() if n in CALCULATED else pytest.mark.soak if n in LONG_EXPERIMENTS else pytest.mark.slow
+        )
+        for n in experiments.EXPERIMENTS.names()
+    ],
 )
 def test_every_experiment_runs_to_its_end_and_agrees_as_it_did(name: str, bench: experiments.Bench) -> None:
     outcome = experiments.run(name, bench=bench)

@@ -145,6 +145,7 @@ def test_a_mesh_that_is_touched_is_kept_before_those_that_are_only_looked_at(
     assert kept(recording.metadata) == [recording.metadata["mesh_file"]]
 
 
+@pytest.mark.slow
 def test_each_of_two_arms_of_one_xacro_is_replayed_with_its_own_arguments(tmp_path: Path) -> None:
     path = tmp_path / "arm.xacro"
     path.write_text(

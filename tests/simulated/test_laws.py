@@ -24,7 +24,9 @@ def test_a_stop_in_the_middle_of_a_move_leaves_nothing_to_go_on_with() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("disk", ["slow", "full", "read-only", "gone"])
+@pytest.mark.parametrize(
+    "disk", ["slow", "gone", *(pytest.param(disk, marks=pytest.mark.soak) for disk in ("full", "read-only"))]
+)
 def test_a_disk_that_fails_costs_what_the_recorder_says_and_harms_nobody_else(disk: str) -> None:
     found = run_seed(0, (Fault(2.0, f"{disk} disk", "", 1.0, 0.5),))
     assert found.broken == ()
@@ -102,7 +104,13 @@ def test_each_law_has_a_mutant_that_breaks_it() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("mutant", FOUND_BY_LAWS.values(), ids=lambda one: one.name)
+@pytest.mark.parametrize(
+    "mutant",
+    [
+        pytest.param(one, marks=[pytest.mark.soak] * (k % 3 > 0), id=one.name)
+        for k, one in enumerate(FOUND_BY_LAWS.values())
+    ],
+)
 def test_a_schedule_finds_what_a_law_forbids(mutant: Mutant) -> None:
     """The other mutants, and that no schedule breaks a law of the sound package: make drill-mutants."""
     schedule = mutant.schedule

@@ -6,12 +6,16 @@ import sys
 from contextlib import nullcontext
 from pathlib import Path
 
+import numpy as np
 import pytest
 from std_msgs.msg import Bool, Empty
 
+from simulated.conftest import SimulatedPeer
+from teleop_core.kernels.memory import call
 from teleop_core.middleware.world import Qos
 from teleop_drill.simulation.bus import Bus, Line
 from teleop_drill.simulation.machine import Machine, Process
+from teleop_drill.simulation.reach import LOOK_NS
 from teleop_drill.simulation.scheduler import Deadlock, Scheduler
 from teleop_drill.simulation.world import SimulatedWorld
 
@@ -232,3 +236,38 @@ def test_a_thread_that_ends_wakes_nobody_but_who_waits_for_its_end() -> None:
     thread.join(5.0)
     assert order == ["child ends", "parent goes on"]
     assert pair.machine.scheduler.now_ns - begin_ns > 1_000_000_000
+
+
+@pytest.mark.parametrize(("offset_ns", "drift"), [(0, 0.0), (-3_600_000_000_000, 0.0), (7, 1e-3)])
+def test_a_kernel_reads_the_same_clocks_as_python(offset_ns: int, drift: float) -> None:
+    pair = Pair()
+    pair.machine.clock.offset_ns, pair.machine.clock.drift = offset_ns, drift
+    pair.sleep(3.0)
+    found, time = pair.here.functions(), np.zeros(2, np.int64)
+
+    def read(kind: int) -> int:
+        call(found["clock"], kind, time.ctypes.data, found["context"], 0)
+        return int(time[0]) * 1_000_000_000 + int(time[1])
+
+    assert read(1) == pair.machine.scheduler.now_ns
+    assert abs(read(0) - (pair.here.time_ns() - LOOK_NS)) <= 1  # the drift of one look
+
+
+def test_kernels_take_and_publish_in_a_simulated_session_themselves(peer: SimulatedPeer) -> None:
+    session = peer.side("slave", "slave_sim")
+    ports = [node.ports for node in session.crew.nodes]  # type: ignore[union-attr]
+    assert not any(entry.own["needs_python"] for one in ports for entry in one.all_inputs() if entry.subscription)
+    assert all(out.is_direct for one in ports for out in one.outputs.values())
+
+
+def test_an_error_of_an_observer_ends_the_simulation(peer: SimulatedPeer) -> None:
+    """It cannot pass through the kernel that publishes."""
+
+    def fail(_: object) -> None:
+        raise ZeroDivisionError
+
+    peer.side("slave", "slave_sim")
+    peer.bus.seen["/slave/measured_js"] = fail
+    peer.bus.writers["/slave/measured_js"][0].note_links()
+    with pytest.raises(ZeroDivisionError):
+        peer.wait(lambda: False, "an error", 1.0)

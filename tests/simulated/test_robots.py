@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     pass
 
 SHORT = ("operator.approach_time=0.5", "operator.size=[0.02, 0.02, 0.02]")
-KINDS = ("rcrt1", "puma560", "stewart", "scara_stewart", "three_finger_hand")
+KINDS = ("puma560", "scara_stewart", "three_finger_hand")
 """Robots of each kind; the others go by ``make soak``."""
 SLAVES = [pytest.param(name, marks=() if name in KINDS else pytest.mark.soak) for name in list_robots()]
 GRID = 55e-6  # m, reading step of the Phantom Omni

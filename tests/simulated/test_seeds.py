@@ -2,6 +2,7 @@
 
 import json
 import os
+import shlex
 import subprocess
 import sys
 from collections import Counter
@@ -15,6 +16,7 @@ from teleop_core.nodes.crews import Processes
 from teleop_core.nodes.operation import StopInput
 from teleop_drill.simulation import seeds, sometimes
 from teleop_drill.simulation.planned import Schedule
+from teleop_drill.simulation.report import told
 from teleop_drill.simulation.schedules import KINDS, Fault, draw
 from teleop_drill.simulation.seeds import PROCESSES, run_seed, shrink
 
@@ -62,7 +64,9 @@ def test_schedules_are_drawn_from_their_seed_and_all_kinds_come() -> None:
     assert {len(faults) for faults in drawn} == set(range(1, 11))
 
 
-def test_a_schedule_that_breaks_a_law_is_cut_down_to_what_does_it(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_schedule_that_breaks_a_law_is_cut_down_to_what_does_it_and_its_line_breaks_it_again(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     monkeypatch.setattr(StopInput, "take", lambda *_, **__: [])  # nobody hears a stop
     found = run_seed(
         0,
@@ -73,7 +77,12 @@ def test_a_schedule_that_breaks_a_law_is_cut_down_to_what_does_it(monkeypatch: p
         ],
     )
     assert [one.law for one in found.broken] == ["stop"]
-    assert [fault.kind for fault in shrink(found, "stop").faults] == ["press"]
+    shortest = shrink(found, "stop")
+    assert [fault.kind for fault in shortest.faults] == ["press"]
+    (line,) = [line for line in told(found, shortest, "stop") if "again: " in line]
+    words = shlex.split(line.partition("again: ")[2])
+    assert words[:3] == ["teleop", "drill", "--schedule"]
+    assert Schedule.of(words[3]).run().broken == shortest.broken
 
 
 def test_one_schedule_is_run_again_by_its_text_on_processors_that_round_otherwise(tmp_path: Path) -> None:

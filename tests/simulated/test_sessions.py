@@ -204,7 +204,9 @@ def follows(peer: "Peer", setpoints: "Listener") -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["motion_scaling", "inverse_kinematics", "haptic_master"])
+@pytest.mark.parametrize(
+    "name", ["motion_scaling", pytest.param("inverse_kinematics", marks=pytest.mark.soak), "haptic_master"]
+)
 def test_restarting_a_node_does_not_move_the_slave(peer: "Peer", name: str) -> None:
     measured, setpoints = (peer.listen(topics.SLAVE_MEASURED_JS), peer.listen(topics.SLAVE_SETPOINT_JS))
     chain(peer)

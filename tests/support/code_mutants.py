@@ -25,6 +25,7 @@ def _mutant(name: str, text: str, file: str, before: str, after: str, *tests: st
     return Mutant(name, text, ((file, before, after),), files)
 
 
+_CALLS = "tests/unit/refusals/test_calls.py"
 _BUTTON = "slave/world/button.py"
 _CONTACT, _PUNCTURE = "slave/world/contact.py", "slave/world/puncture.py"
 _SCALING, _LINK = "coupling/mapping/motion_scaling.py", "coupling/network/link.py"
@@ -45,7 +46,7 @@ _PARALLEL_AXES = "kinematics/closed_form/parallel_axes.py"
 _CANDIDATES = "kinematics/closed_form/candidates.py"
 _SEEING = "hand/operators/observer.py"
 CODE_MUTANTS = (
-    _mutant("joints_overlap", "arrays over joints of a record begin at one place", "kernels/joint_records.py",
+    _mutant("joints_overlap", "arrays over joints of a record begin at one place", "kernels/compiler/joint_records.py",
             "        begin = builder.add(begin, _bytes(builder, sizes))\n", "        pass\n", "joint_records"),
     _mutant("start_far", "a start may be any posture with room", "robots/freedom.py",
             "good[int(_away(robot, good).argmin())]", "good[-1]", "freedom"),
@@ -202,9 +203,9 @@ CODE_MUTANTS = (
     _mutant("task_uncounted", "a task that counts nothing is taken", "hand/tasks/__init__.py",
             "if not done and act", "if False and act", "part_mistakes"),
     _mutant("scores_unwritten", "a study may ask for scores of what no session writes",
-            "teleop_lab/studies/checks.py", "if reads and not written.intersection(reads):", "if False:", "studies"),
+            "teleop_lab/studies/checks.py", "if reads and not written.intersection(reads):", "if False:", _CALLS),
     _mutant("place_unreached", "a study may have an object that the slave cannot touch",
-            "teleop_lab/studies/checks.py", ") > _NEAR:", ") > np.inf:", "studies"),
+            "teleop_lab/studies/checks.py", ") > _NEAR:", ") > np.inf:", _CALLS),
     _mutant("short_waits", "a tenth of a second at rest is a wait", "evaluation/metrics/waits.py",
             "self._still == 3", "self._still == 1", "evaluation_scores"),
     _mutant("any_bump", "every bump of a force is a peak", "evaluation/metrics/force_peaks.py",
@@ -272,7 +273,7 @@ CODE_MUTANTS = (
             "slave/plants/hardware.py", "np.minimum(drives.effort_limit, quick)",
             "drives.effort_limit", "real_arms"),
     _mutant("deaf_pointer", "an error in a kernel that is called through a pointer is lost",
-            "kernels/numba_private.py", "if code.signature().return_type == result:", "if False:",
+            "kernels/compiled_kernel.py", "if code.result == result:", "if False:",
             "kernel_callables"),
     _mutant("far_turn", "a turn beyond half a turn goes the long way", "kernels/geometry.py",
             "sign = -1.0 if turn[0] < 0.0 else 1.0", "sign = 1.0", "geometry"),
@@ -281,8 +282,14 @@ CODE_MUTANTS = (
     _mutant("force_turned", "a force along the tip's axes is turned the other way",
             "kernels/geometry.py", "((turn.T * force)", "((turn * force)", "geometry"),
     _mutant("version_beside", "what another version keeps meanwhile ends a program",
-            "kernels/numba_private.py", "except _BROKEN:  # written", "except EOFError:  # written",
+            "kernels/compiler/__init__.py", "except _BROKEN:  # written", "except EOFError:  # written",
             "kernel_cache"),
+    _mutant("image_damaged", "damaged code is run", "kernels/images.py",
+            "if _sum(data[_CHECK:]) != data[:_CHECK]:", "if False:", "images"),
+    _mutant("image_of_old", "code of an older source is run", "kernels/images.py",
+            'if kept["stamp"] == stamp and', "if", "shipped_kernels"),
+    _mutant("kinds_alike", "code for a table is run for its transpose", "kernels/kinds.py",
+            '"C" if flags.c_contiguous else "F" if flags.f_contiguous else "A"', '"C"', "images"),
     _mutant("kernels_kept", "kernels are thrown away while they are used", "kernels/store.py",
             "if index.stat().st_mtime < oldest:", "if index.stat().st_mtime > oldest:",
             "kernel_cache"),
@@ -633,7 +640,7 @@ CODE_MUTANTS = (
             "teleop_console/hooks.py", "Front(opened, answers.paths,", "Front(opened, frozenset(),",
             "tests/scenario/test_console_hostile.py"),
     _mutant("feed_loss_untold", "what a loop could not feed is not counted", "nodes/feed.py",
-            "lost = number - self._last.get(index, number - 1) - 1", "lost = 0", "feed"),
+            "lost = number - last.get(index, number - 1) - 1", "lost = 0", "feed"),
     _mutant("any_releases", "any stop button releases what another one pressed",
             "slave/operation/presses.py", "self._holders.pop(sender, None)",
             "self._holders.clear()", "presses"),

@@ -11,7 +11,7 @@ refused with a :class:`TeleopError` of one printable line, within bounds of time
         parse_setting(text)
 
 Cases are shared out by :data:`SHARES`, to which a new target adds itself. ``TELEOP_FUZZ_CASES``
-says how many there are in all: 20,000 in every test run, the same ones each time; 1,000,000 by
+says how many there are in all: 8,000 in every test run, the same ones each time; 1,000,000 by
 ``make fuzz``, other ones each time. A case that fails is printed, and shrunk to a small one.
 """
 
@@ -30,7 +30,7 @@ from hypothesis import strategies as st
 from teleop_core.base.errors import TeleopError
 from teleop_core.base.texts import LONGEST_LINE, printable
 
-USUAL = 20_000
+USUAL = 8_000
 CASES = int(os.environ.get("TELEOP_FUZZ_CASES", USUAL))
 SHARES = {
     "CDR": 0.33,

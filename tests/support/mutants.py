@@ -2,6 +2,7 @@
 
     python tests/support/mutants.py --list
     python tests/support/mutants.py stop_late braking_weak --composed
+    python tests/support/mutants.py --search 3 stop_ignored   # without the schedule that is written for it
 
 A mutant is a copy of the package in a directory of its own with a few words of its source replaced, and comes first in
 the path of the drill and of what it starts. The machine is a simulated one, so that what is found is found every time;
@@ -90,6 +91,21 @@ seed, faults = json.loads(sys.argv[1])
 found = run_seed(seed, [Fault(*one) for one in faults])
 print(json.dumps([(one.law, one.text) for one in found.broken]))
 """
+_SEARCH = """
+import json, sys, tempfile
+from pathlib import Path
+from teleop_drill.simulation.search import search
+from teleop_drill.simulation.store import Store
+seed, minutes = int(sys.argv[1]), float(sys.argv[2])
+with tempfile.TemporaryDirectory(prefix="mutant_") as folder:
+    count = 0
+    for count, (found, _) in enumerate(search(Store(Path(folder)), seed, 60.0 * minutes), 1):
+        if found.broken:
+            print(json.dumps([count, [(one.law, one.text) for one in found.broken], found.seed]), flush=True)
+            break
+    else:
+        print(json.dumps([count, [], 0]))
+"""
 _RELEASED = """            self.request(Event.STOP)
         elif self.state["state"] == State.FAULT:
             self.request(Event.RESET)
@@ -97,7 +113,7 @@ _RELEASED = """            self.request(Event.STOP)
 """
 _SOME = """        came = [one for one in came if not (
             one[1].name.startswith("slave/measured") and one[0] // 1000 % 10 < 3)]
-        came.sort(key=lambda message: message[0])
+        came.sort(key=itemgetter(0))
 """
 _CLOSED = """            try:
                 self._writer.close()
@@ -222,7 +238,7 @@ MUTANTS = (
             "HOLD_NS = 100_000_000", "HOLD_NS = 2_000_000_000", "kill_recorder",
             composed=("kill_session",)),
     _mutant("not_recorded", "30 % of slave/measured* are not recorded", _RECORDER,
-            "        came.sort(key=lambda message: message[0])\n", _SOME, "hiccup"),
+            "        came.sort(key=itemgetter(0))\n", _SOME, "hiccup"),
     # known of public stacks
     Mutant("commands_queued", "commands that waited during an outage run after it (as in "
            "stretch_web_teleop #3)",
@@ -271,7 +287,7 @@ MUTANTS = (
                 (1.0, "command", "", 0.1, 0.28), (1.15, "press", "", 0.5, 0.5)))),
     _mutant("garbage_ends", "bytes that are no message end the node that reads them",
             "nodes/streams.py", "        if isinstance(found, messages.Refusal):\n"
-            "            self._refuse(found)\n            return None\n", "",
+            "            self._refuse(found)\n            return False\n", "",
             schedule=Schedule("ends", (
                 (1.0, "kill", "hand_side", 1.5, 0.5), (2.0, "garbage", "", 0.5, 0.5)))),
     _mutant("saved_all", "a recorder whose disk is gone says that all is safe",
@@ -280,7 +296,7 @@ MUTANTS = (
     Mutant("losses_untold", "what waits for a recorder that stands still is lost, and not counted "
            "(as in rosbag2 #477)",
            (("nodes/feed.py", "len(self._feed.waiting) < MOST", "len(self._feed.waiting) < 50_000"),
-            ("nodes/feed.py", "lost = number - self._last.get(index, number - 1) - 1", "lost = 0")),
+            ("nodes/feed.py", "lost = number - last.get(index, number - 1) - 1", "lost = 0")),
            (), schedule=Schedule("recorded", ((2.0, "standstill", "recorder", 2.5, 0.5),))),
     _mutant("not_closed", "the recording is left open at the end", _RECORDER,
             _CLOSED, _CLOSED.replace("self._writer.close()", "pass"), "hiccup"),
@@ -361,6 +377,35 @@ def scheduled(mutant: Mutant, schedule: Schedule) -> list[tuple[str, str]]:
     return [(law, text) for law, text in json.loads(done.stdout.splitlines()[-1])]
 
 
+def searched(mutant: Mutant, minutes: float, seed: int) -> tuple[int, list[tuple[str, str]]]:
+    """Number of schedules of a search until a mutant breaks a law, and the laws that it breaks; none if it never did.
+
+    No schedule is written for the mutant: the search begins with an empty store, and ends after some minutes.
+    """
+    env = os.environ | {"PYTHONPATH": str(tree(mutant))}
+    command = [sys.executable, "-c", _SEARCH, str(seed), str(minutes)]
+    done = subprocess.run(command, check=False, capture_output=True, text=True, env=env)
+    if done.returncode:
+        raise RuntimeError((done.stdout + done.stderr)[-2000:])
+    count, broken, _ = json.loads(done.stdout.splitlines()[-1])
+    return count, [(law, text) for law, text in broken]
+
+
+def search_all(mutants: Sequence[Mutant], minutes: float, seed: int) -> None:
+    """Print a row of a table for each mutant: whether a search finds it, after how many schedules, by which law."""
+    found = 0
+    print("| broken copy | schedules | law |\n|---|---|---|", flush=True)
+    for mutant in mutants:
+        try:
+            count, broken = searched(mutant, minutes, seed)
+        except RuntimeError as error:  # a copy that starts no session is found at once
+            count, broken = 0, [("starts", str(error).splitlines()[-1])]
+        found += bool(broken)
+        law = ", ".join(f"`{law}`" for law, _ in broken) or "none"
+        print(f"| `{mutant.name}`: {mutant.text} | {count} | {law} |", flush=True)
+    print(f"\n{found} of {len(mutants)} found, {minutes:g} min for each, seed {seed}", flush=True)
+
+
 def hunt(mutants: Sequence[Mutant], *, is_composed: bool, is_live: bool) -> list[str]:
     """Drill mutants; returns the names of those that were not found."""
     missed = []
@@ -414,6 +459,8 @@ def main() -> int:
     parser.add_argument("--processes", action="store_true", help="in a process for each node only")
     parser.add_argument("--live", action="store_true", help="on this machine, not a simulated one")
     parser.add_argument("--list", action="store_true", dest="is_list")
+    parser.add_argument("--search", type=float, metavar="MINUTES", help="search for each, without its schedule or rows")
+    parser.add_argument("--seed", type=int, default=0, help="of the search")
     asked = parser.parse_args()
     chosen = [one for one in MUTANTS if not asked.names or one.name in asked.names]
     if unknown := set(asked.names) - {one.name for one in chosen}:
@@ -422,6 +469,9 @@ def main() -> int:
         for one in MUTANTS:
             laws = () if one.schedule is None else (f"law {one.schedule.law}",)
             print(f"{one.name:20} {one.text} ({', '.join((*one.rows, *laws))})")
+        return 0
+    if asked.search is not None:
+        search_all(chosen, asked.search, asked.seed)
         return 0
     begin, wrong = time.monotonic(), []
     for is_composed in (False, True):

@@ -36,7 +36,7 @@ NOT_RUN = {
     r"experiment": "each is run by a test of its own, below its name",
 }
 """Commands that are not run as they stand, by their beginnings, and why."""
-LONG = r"fit\b|.*\bsoft\.yaml|study config/studies/(delay\.yaml --store|picture|force)|tune config|.*ten_minutes"
+LONG = r"fit\b|.*\bsoft\.yaml|study config/(?!.* --explain)|tune config|.*ten_minutes"
 """Commands of more than half a minute, which only ``make soak`` runs."""
 
 

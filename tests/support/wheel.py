@@ -17,18 +17,7 @@ from jointed import urdf
 ROOT = Path(__file__).parents[2]
 FORBID = """
 import sys
-from numba.core import event
-
-class Forbidden(event.Listener):
-    def on_start(self, happened):
-        function = happened.data["dispatcher"].py_func
-        if function.__module__.partition(".")[0] == "teleop_core":
-            sys.exit(f"compiles {function.__module__}.{function.__qualname__}")
-
-    def on_end(self, happened):
-        pass
-
-event.register("numba:compile", Forbidden())
+sys.modules["numba.core"] = None  # so that an import of the compiler fails
 """
 ARMS = f"""
 {FORBID}
@@ -68,7 +57,7 @@ def main() -> None:
         files = [urdf(joints, folder) for joints in (7, 12)]
         print(run(python, folder, ARMS, *map(str, files)).stdout, end="")
         refused = run(python, folder, OTHER, is_sound=False)
-        if "compiles teleop_core.kernels.geometry.multiply_quaternions" not in refused.stderr:
+        if "numba.core" not in refused.stderr:
             sys.exit(f"a kernel that the wheel does not have was not refused: {refused.stderr}")
     print("nothing of ours was compiled")
 

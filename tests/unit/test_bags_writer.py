@@ -267,12 +267,6 @@ def test_topics_that_nobody_announced_are_refused_and_leave_no_folder(tmp_path: 
     assert not (tmp_path / "bag").exists()
 
 
-@pytest.mark.parametrize("text", ["slave/measured_js", "slave/measured_js=0"])
-def test_a_share_of_a_topic_of_another_form_is_refused(text: str) -> None:
-    with pytest.raises(ParameterError, match="topic=n"):
-        recording.RecordingParameters(every_of=(text,))
-
-
 def test_an_existing_recording_is_never_overwritten(tmp_path: Path, rng: np.random.Generator) -> None:
     record(tmp_path / "bag", rng)
     before = mcap_file(tmp_path / "bag").read_bytes()

@@ -85,7 +85,7 @@ def arm() -> Arm:
 
 def code_of(function: Any, *arguments: object) -> str:
     """Code of a kernel that is compiled anew: what is kept on the disk cannot be looked at."""
-    fresh: Any = kernel(function.py_func)
+    fresh: Any = kernel(function.py_func).dispatcher  # type: ignore[attr-defined]
     fresh._has_cache = True
     fresh(*arguments)
     text: str = fresh.inspect_llvm(fresh.signatures[0])

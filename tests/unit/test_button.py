@@ -9,7 +9,6 @@ from hypothesis import strategies as st
 
 import teleop_core as tc
 from led_tip import PIECES, along_z, lead, wandering
-from teleop_core.base.errors import ParameterError
 from teleop_core.kernels.geometry import Array
 from teleop_core.session import configuration, virtual
 from teleop_core.slave.world.button import BUTTON, ButtonParameters, count_presses
@@ -156,8 +155,3 @@ def test_its_outline_lies_on_the_post_and_on_the_stop() -> None:
     distances = [BUTTON.distance(p, BUTTON.numbers(ButtonParameters()), np.zeros(3)) for p in post]
     np.testing.assert_allclose(distances, 0.0, atol=1e-12)
     np.testing.assert_allclose(stop[:, 2], 0.015 - 3e-3)
-
-
-def test_a_button_has_no_membrane() -> None:
-    with pytest.raises(ParameterError, match="puncture"):
-        configuration.configure("palpation", settings=["world=button", "world.puncture_force=1.0"])

@@ -133,15 +133,15 @@ def test_a_frame_that_nobody_knows_costs_no_accuracy(is_elsewhere: bool) -> None
 
 def test_intervals_hold_the_truth_as_often_as_they_say() -> None:
     names, rng, model = (["d3", "theta1", "theta2", "theta5"], np.random.default_rng(8), ChainModel.of(RCRT1))
-    errors, inside, trials = LinkErrors.of(RCRT1, {"d3": 1e-3, "theta2": 1e-3}), 0, 250
+    errors, inside, trials = LinkErrors.of(RCRT1, {"d3": 1e-3, "theta2": 1e-3}), 0, 120
     true = errors.vector[[model.names.index(name) for name in names]]
     q = random_poses(RCRT1, 12, rng)
     for _ in range(trials):
         found = identify(model, tracked(model, errors, q, 1e-4, rng), names)
         inside += (np.abs(found.values - true) < found.half_widths).sum()
     share = inside / (4 * trials)
-    # 95 %, and four standard deviations of a share of 1000 that hang together a little.
-    assert abs(share - 0.95) < 4 * math.sqrt(0.95 * 0.05 / 1000) + 0.005
+    # 95 %, and four standard deviations of a share of 480 that hang together a little.
+    assert abs(share - 0.95) < 4 * math.sqrt(0.95 * 0.05 / 480) + 0.005
 
 
 # What can be told apart.
@@ -195,10 +195,9 @@ def test_one_offset_of_d3_explains_the_published_accuracy_test() -> None:
 # Simulated instruments.
 
 
-@pytest.mark.parametrize("seed", [1, 2])
-def test_the_offset_of_d3_is_found_with_a_ruler_and_with_a_tracker(seed: int) -> None:
+def test_the_offset_of_d3_is_found_with_a_ruler_and_with_a_tracker() -> None:
     for noise, poses, bound in (("ruler", 30, 0.8e-3), (0.1e-3, 40, 0.1e-3)):
-        made = simulate(RCRT1, poses=poses, noise=noise, seed=seed)
+        made = simulate(RCRT1, poses=poses, noise=noise, seed=1)
         found = made.found.errors.named()
         assert found["d3"] == pytest.approx(made.equivalent["d3"], abs=bound)
         assert made.equivalent["d3"] == pytest.approx(5.5e-3, abs=0.1e-3)

@@ -94,31 +94,6 @@ def test_unknown_key_suggests_the_near_ones(key: str, meant: str) -> None:
     assert meant.rpartition(".")[2] in {name.rpartition(".")[2] for name in error.value.alternatives}
 
 
-@pytest.mark.parametrize(("setting", "told"), [("duration", "key=value"), ("duration=[1", "YAML")])
-def test_setting_of_another_form_is_refused(setting: str, told: str) -> None:
-    with pytest.raises(TeleopError, match=told):
-        layers.parse_setting(setting)
-
-
-@pytest.mark.parametrize(
-    ("setting", "name"),
-    [
-        ("duration=soon", "teleop.duration"),
-        ("duration=", "teleop.duration"),
-        ("seed=1.5", "operator.seed"),
-        ("operator.kind=square", "operator.kind"),
-        ("operator.center=[0, 0]", "operator.center"),
-        ("fine_gain=11", "motion_scaling.fine_gain"),
-        ("fine_gain=2", "fine_gain"),  # above the coarse one
-        ("slave_sim.robot=mma", "robot"),  # two stages for different robots
-    ],
-)
-def test_setting_that_breaks_its_declaration_is_refused_by_full_name(setting: str, name: str) -> None:
-    with pytest.raises(ParameterError) as error:
-        configure(settings=[setting])
-    assert error.value.name == name
-
-
 def write(path: Path, content: Any) -> Path:
     path.write_text(yaml.safe_dump(content, sort_keys=False))
     return path

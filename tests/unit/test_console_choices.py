@@ -117,22 +117,6 @@ def test_what_was_not_tried_in_time_is_told_as_not_known() -> None:
     assert [option.reason for option in found] == [None, None]
 
 
-@pytest.mark.parametrize(
-    "words",
-    [
-        {"shell": "x"},
-        {"robot": "a\nb"},
-        {"robot": "x" * 501},
-        {"robot": "/etc/passwd"},
-        {"plant": "[ideal, file=x]"},
-        {"robot": "a.urdf", "tip": "x, drives=y.yaml"},
-    ],
-)
-def test_words_of_no_field_and_unprintable_or_long_ones_are_refused(words: Chosen) -> None:
-    with pytest.raises(ParameterError):
-        choices.checked(words)
-
-
 def test_command_line_quotes_what_a_shell_would_read() -> None:
     line = choices.command_line({"operator": "remote", "robot": "$(reboot).urdf; `id`"})
     assert shlex.split(line)[-1] == "robot=$(reboot).urdf; `id`"

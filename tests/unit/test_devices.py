@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from present import present
-from teleop_core.base.errors import ParameterError, SessionError
+from teleop_core.base.errors import SessionError
 from teleop_core.commands.cli import main
 from teleop_core.hand.devices import NOTHING, DeviceReading, pilot, spacemouse
 from teleop_core.hand.devices.gamepad import Gamepad
@@ -19,7 +19,6 @@ from teleop_core.hand.operators import OPERATORS
 from teleop_core.hand.operators.remote import AHEAD, RemoteHand
 from teleop_core.hand.operators.rest import rest_pose
 from teleop_core.kernels.geometry import Array
-from teleop_core.session import configuration, virtual
 from virtual_pad import VirtualPad
 
 DT = 1e-3
@@ -122,12 +121,6 @@ def test_each_press_of_a_button_is_one_press_of_the_hand() -> None:
         run.for_time(0.3, DeviceReading(np.zeros(6), mode=True))
     for column in (7, 8):
         assert (np.diff(run.rows[:, column], prepend=0.0) > 0.0).sum() == 3
-
-
-@pytest.mark.parametrize("name", [*LIVE, "elsewhere"])
-def test_virtual_time_refuses_a_device_and_says_who_works(name: str) -> None:
-    with pytest.raises(ParameterError, match=rf"'{name}', must be one of random, .*remote.* in virt"):
-        virtual.VirtualTime(configuration.configure(settings=[f"operator={name}"]))
 
 
 @pytest.mark.parametrize("name", LIVE)

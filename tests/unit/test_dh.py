@@ -1,7 +1,6 @@
 """Denavit-Hartenberg tables: conventions, reading, and chains as robots."""
 
 import math
-from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +11,7 @@ from random_arms import table
 from teleop_core.base import errors
 from teleop_core.kernels.geometry import Array, rotation, transform
 from teleop_core.robots import IkStatus, load_robot
-from teleop_core.robots.arms.dh import CONVENTIONS, load_table, parse_table
+from teleop_core.robots.arms.dh import CONVENTIONS, load_table
 from ways import stepped
 
 ROUNDING, REACHED = 1e-14, 1e-9
@@ -103,60 +102,6 @@ def test_signs_offsets_limits_and_homes_are_read_in_the_table_unit() -> None:
     assert slide.home == pytest.approx(0.3)
     pose = chain.robot().fk([math.radians(30.0), 0.3])
     assert np.abs(pose - transform(np.eye(3), np.array([0.2, 0.0, 0.2]))).max() < ROUNDING
-
-
-@pytest.mark.parametrize(
-    ("rows", "named"),
-    [
-        ([], "rows"),
-        ("theta", "rows"),
-        ([{"a": 1.0}], "rows"),
-        ([3], "row 1"),
-        ([{"theta": "q", "alpha": math.nan}], "row 1 alpha"),
-        ([{"theta": "q", "a": True}], "row 1 a"),
-        ([{"theta": "q", "a": [1]}], "row 1 a"),
-        ([{"theta": "p"}], "row 1 theta"),
-        ([{"theta": "2 q"}], "row 1 theta"),
-        ([{"theta": "q + ."}], "row 1 theta"),
-        ([{"theta": "q - 1e"}], "row 1 theta"),
-        ([{"alpha": "q"}], "row 1 alpha"),
-        ([{"theta": "q", "d": "q"}], "row 1 d"),
-        ([{"d": "q"}], "row 1 lower"),
-        ([{"theta": "q", "a": 1e6}], "row 1 a"),
-        ([{"theta": "q", "upper": 999999}], "row 1 upper"),
-        ([{"theta": "q", "lower": 10, "upper": -10}], "row 1 lower"),
-        ([{"theta": "q", "lower": -10, "upper": 10, "home": 20}], "row 1 home"),
-        ([{"theta": "q"}, {"a": 1.0, "lower": 0.0}], "row 2"),
-        ([{"theta": "q", "twist": 3}], "row 1 entry"),
-    ],
-)
-def test_malformed_rows_are_refused_by_name(
-    rows: str | Sequence[int | dict[str, str | float | bool | list[int]]], named: str
-) -> None:
-    with pytest.raises(errors.ParameterError) as caught:
-        table(rows)
-    assert caught.value.name == named
-
-
-@pytest.mark.parametrize(
-    "content",
-    [
-        None,
-        [],
-        {"convention": "modified", "rows": [{"theta": "q"}]},
-        {"name": 3, "convention": "modified", "rows": [{"theta": "q"}]},
-        {"name": "a", "convention": "distant", "rows": [{"theta": "q"}]},
-        {"name": "a", "convention": "modified", "angles": "grad", "rows": [{"theta": "q"}]},
-        {"name": "a", "convention": "modified", "task": ["up"], "rows": [{"theta": "q"}]},
-        {"name": "a", "convention": "modified", "task": [], "rows": [{"theta": "q"}]},
-        {"name": "a", "convention": "modified", "row": [{"theta": "q"}]},
-    ],
-)
-def test_malformed_tables_are_refused(
-    content: list[object] | Mapping[str, str | int | list[str | dict[str, str]]] | None,
-) -> None:
-    with pytest.raises(errors.TeleopError):
-        parse_table(content)
 
 
 def test_files_that_are_not_yaml_or_not_there_and_unknown_conventions_are_refused(tmp_path: Path) -> None:

@@ -1,12 +1,9 @@
 """Drives of Denavit-Hartenberg tables: every chain can be a slave, and says what is assumed."""
 
-from collections.abc import Mapping
-
 import numpy as np
 import pytest
 
 from present import present
-from teleop_core.base.errors import ParameterError
 from teleop_core.robots import robot_from_table
 from teleop_core.robots.drives import ENTRIES
 
@@ -49,33 +46,3 @@ def test_a_chain_that_states_every_entry_assumes_nothing() -> None:
     names = ("q1", "q2", "slide")
     robot = robot_from_table({**TABLE, "drives": dict.fromkeys(names, every)})
     assert not robot.drives_are_assumed
-
-
-@pytest.mark.parametrize(
-    ("drives", "named"),
-    [
-        ([1.0], "drives"),
-        ({"q9": {}}, "drives joint"),
-        ({"q1": 3.0}, "drives q1"),
-        ({"q1": {"mass": 1.0}}, "drives q1 entry"),
-        ({"q1": {"inertia": 0.0}}, "drives q1 inertia"),
-        ({"q1": {"coulomb": -1.0}}, "drives q1 coulomb"),
-        ({"q1": {"speed_limit": True}}, "drives q1 speed_limit"),
-        ({"q1": {"speed_limit": "fast"}}, "drives q1 speed_limit"),
-        ({"q1": {"bandwidth": 1e4}}, "drives q1 bandwidth"),
-        ({"q1": {"inertia": 1e-6, "viscous": 1.0}}, "drives q1 (viscous + coulomb / friction_speed) / inertia"),
-    ],
-)
-def test_malformed_drives_of_a_chain_are_refused_by_name(
-    drives: list[float] | Mapping[str, float | dict[str, str | float | bool]], named: str
-) -> None:
-    with pytest.raises(ParameterError) as caught:
-        robot_from_table({**TABLE, "drives": drives})
-    assert caught.value.name == named
-
-
-def test_joints_with_one_name_are_refused() -> None:
-    rows = [{"theta": "q", "name": "yaw"}, {"a": 1.0, "theta": "q", "name": "yaw"}]
-    with pytest.raises(ParameterError) as caught:
-        robot_from_table({**TABLE, "rows": rows})
-    assert caught.value.name == "rows"

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from any_shape import depth_of
-from teleop_core.base import UnknownNameError, build
+from teleop_core.base import build
 from teleop_core.coupling.fixtures.reported_fixture import reported_fixture
 from teleop_core.coupling.mapping.gains import FixtureParameters
 from teleop_core.graph.former_shapes import present_layer
@@ -65,17 +65,3 @@ def test_a_report_of_before_is_scored_as_it_was() -> None:
     assert not fixture.fault
     assert fixture.kind == "keep_out_sphere"
     assert depth_of(fixture.made, (0.015, 0.0, 0.0))[0] == pytest.approx(0.005)
-
-
-@pytest.mark.parametrize(
-    ("setting", "known"),
-    [
-        ("fixture.sphere.diameter=0.03", "fixture.sphere.radius"),
-        ("world.box.edges=[0.1, 0.1, 0.1]", "world.box.size"),
-        ("fixture=keep_out_sphere", "sphere"),
-    ],
-)
-def test_a_former_name_of_a_setting_is_refused_with_that_of_today(setting: str, known: str) -> None:
-    with pytest.raises(UnknownNameError) as error:
-        configure("coarse_box", settings=[setting])
-    assert known in str(error.value)

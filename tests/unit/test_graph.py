@@ -6,11 +6,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from teleop_core.base import NoParameters, ParameterError, PartError, UnknownNameError
+from teleop_core.base import NoParameters, PartError, UnknownNameError
 from teleop_core.graph import BUILT_IN, STAGES, Graph, Stage, build_graph, topics
 from teleop_core.graph.graph import Delay
 from teleop_core.graph.topics import SLAVE_MEASURED_CP, SLAVE_SERVO_CP, Kind, Topic, in_force, passed_on
-from teleop_core.session.configuration import configure
 
 BASE = tuple(STAGES.find(name) for name in BUILT_IN)
 ECHO = Topic("test/echo", Kind.POSE, passed_on("slave/measured_cp"))
@@ -134,26 +133,7 @@ def test_delays_that_fit_one_link_add_up() -> None:
     assert [link.delay for link in Graph(BASE, delays=delays).links if link.delay] == [0.05]
 
 
-@pytest.mark.parametrize(
-    "text",
-    ["slave/servo_jp", "=0.1", "slave/servo_jp=", "slave/servo_jp=soon", "slave/servo_jp=-0.1",
-     "slave/servo_jp=nan", "slave/servo_jp=61"],
-)  # fmt: skip
-def test_delay_of_another_form_is_refused_with_an_example(text: str) -> None:
-    with pytest.raises(ParameterError, match=r"slave/servo_jp=0\.02") as error:
-        Delay.parse(text)
-    assert (error.value.name, error.value.value) == ("teleop.delays", text)
-
-
-def test_delay_of_an_unknown_topic_or_reader_or_one_that_does_not_read_it_is_refused() -> None:
-    for delay, name, known in (
-        ("slave/servo_jq=0.02", "slave/servo_jq", "slave/servo_jp"),
-        ("slave/servo_jp@slaves=0.02", "slaves", "slave_sim"),
-    ):
-        with pytest.raises(UnknownNameError) as error:
-            configure(settings=[f"teleop.delays=[{delay}]"])
-        assert error.value.value == name
-        assert known in error.value.alternatives
+def test_delay_to_a_reader_that_does_not_read_the_topic_is_refused() -> None:
     with pytest.raises(PartError, match="reads slave/servo_jp"):
         Graph(BASE, delays=(Delay("slave/servo_jp", 0.02, "motion_scaling"),))
 
@@ -249,11 +229,3 @@ def test_unknown_stage_and_parameters_that_are_no_dataclass_are_refused() -> Non
 
 
 # Axis maps are checked with the parameters.
-
-
-@pytest.mark.parametrize("name", ["axes", "tool_axes"])
-@pytest.mark.parametrize("axes", ["[+x, +y, -z]", "[+z, -x, +y, +x]", "[+x, +x, +z]", "[x, y, z]"])
-def test_axis_map_that_mirrors_or_is_none_is_refused(name: str, axes: str) -> None:
-    with pytest.raises(ParameterError) as error:
-        configure(settings=[f"{name}={axes}"])
-    assert error.value.name.endswith(name)

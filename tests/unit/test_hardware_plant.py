@@ -13,8 +13,7 @@ from teleop_core.base.parameters import MARKS, NoParameters, build, parameter, s
 from teleop_core.graph.signals import TICK_NS
 from teleop_core.robots import hardware, load_robot
 from teleop_core.robots.robot import Robot
-from teleop_core.session.configuration import configure
-from teleop_core.slave import pair, slave_sim
+from teleop_core.slave import pair
 from teleop_core.slave.plants import PLANTS, Physics, Plant, register_plant
 from teleop_core.slave.plants.hardware import FAULTS, HARDWARE, faults_of
 from teleop_lab.fitting.rests import Mover
@@ -172,19 +171,3 @@ def test_what_is_no_plant_is_refused_with_the_reason(plant: str | Plant, needed:
     with pytest.raises(errors.PartError, match=needed):
         PLANTS.add("bad", plant)
     assert "bad" not in PLANTS.names()
-
-
-@pytest.mark.parametrize(
-    ("setting", "needed"),
-    [
-        ("plant=real", "ideal, hardware"),
-        ("plant.hardware.without=[rust]", "friction"),
-        ("plant.hardware.coulomb=[1.0]", "6 values"),
-        ("plant.hardware.coulomb=[-1.0,0,0,0,0,0]", "at least 0"),
-        ("plant.hardware.weights=[m9=1]", "m2b_L0b"),
-        ("plant.hardware.weights=[m2b_L0b=heavy]", "m2b_L0b=number"),
-    ],
-)
-def test_wrong_numbers_of_a_plant_name_what_is_possible(setting: str, needed: str) -> None:
-    with pytest.raises((errors.ParameterError, errors.UnknownNameError), match=needed):
-        slave_sim.SlaveSim(configure(None, settings=["plant=hardware", setting]).group("slave_sim"))

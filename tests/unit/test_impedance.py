@@ -11,10 +11,9 @@ from numpy.typing import NDArray
 from scipy.signal import lsim
 
 from palpation import on_the_slave, pressed
-from teleop_core.base import ParameterError, PartError, build
+from teleop_core.base import PartError, build
 from teleop_core.coupling.architectures.impedance import IMPEDANCE, ImpedanceParameters
 from teleop_core.graph import TICK_NS, Graph, build_graph, topics
-from teleop_core.session import configuration
 from teleop_core.slave.slave_sim import SLAVE_SIM
 
 CALM = ("feedback_timeout=1.0", "reach_force.is_on=false", "gimbal_noise=0.0")
@@ -194,25 +193,6 @@ def test_a_force_of_the_hand_behind_a_deadband_is_off_by_no_more_than_its_share(
 
 
 # What cannot be.
-
-
-@pytest.mark.parametrize("architecture", ["three_channel", "four_channel"])
-def test_channels_before_a_slave_that_does_not_yield_are_refused_with_what_there_is(architecture: str) -> None:
-    with pytest.raises(ParameterError, match=r"teleop.stages=\[impedance\].*position_force") as got:
-        configuration.configure("palpation", settings=[f"reflection.architecture={architecture}"])
-    assert got.value.value == architecture
-
-
-def test_waves_before_a_slave_that_yields_are_refused_with_the_others() -> None:
-    with pytest.raises(ParameterError, match="none, tank, tdpa with the stage impedance"):
-        configuration.configure("palpation", settings=[STAGES, "reflection.passivity=wave"])
-
-
-@pytest.mark.parametrize("order", ["impedance,network", "passivity,impedance"])
-def test_a_slave_that_yields_on_the_wrong_side_is_refused_with_the_order(order: str) -> None:
-    wanted = ",".join(sorted(order.split(","), key=["network", "impedance", "passivity"].index))
-    with pytest.raises(PartError, match=wanted.replace(",", ", ")):
-        configuration.configure("palpation", settings=[f"teleop.stages=[{order}]"])
 
 
 def test_a_slave_that_measures_no_force_cannot_yield() -> None:

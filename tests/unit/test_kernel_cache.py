@@ -5,11 +5,14 @@ import re
 import shutil
 import subprocess
 import sys
+from contextlib import chdir
 from pathlib import Path
 
 import pytest
 
-from teleop_core.kernels import IS_COMPILED, SUPPORTED, check_version, store
+from copies import run_copy
+from teleop_core.kernels import IS_COMPILED, store
+from teleop_core.kernels.compiler import SUPPORTED, check_version
 
 pytestmark = pytest.mark.skipif(not IS_COMPILED, reason="nothing is kept of what is not compiled")
 
@@ -43,7 +46,7 @@ def through(function, x: float) -> float:
     return function(x)
 
 print(scaled(3.0), through(pointer(plus_one, types.float64(types.float64)), 3.0))
-print(sum(scaled.stats.cache_hits.values()))
+print(scaled.hits)
 """,
 }
 
@@ -115,7 +118,7 @@ def from_nested(row):
 kernels = (from_names, from_dictionary, from_called, from_tuple, from_array, from_flag,
            from_choice, from_nested)
 print(*(kernel(np.array([10.0, 20.0])) for kernel in kernels))
-print(sum(sum(kernel.stats.cache_hits.values()) for kernel in kernels))
+print(sum(kernel.hits for kernel in kernels))
 """,
 }
 
@@ -147,21 +150,20 @@ tick = kernel_from_source(
     "def tick(x):\\n    return moved(x) * SCALE", "tick", {"moved": moved, "SCALE": 3.0}
 )
 print(tick(2.0))
-print(sum(tick.stats.cache_hits.values()))
+print(tick.hits)
 """,
 }
 
 
 def run(folder: Path) -> tuple[list[float], int]:
-    """Values and cache hits of a fresh process that imports the modules."""
-    done = subprocess.run(
-        [sys.executable, "outer.py"],
-        cwd=folder,
-        capture_output=True,
-        text=True,
-        check=True,
-        env={**os.environ, "PYTHONDONTWRITEBYTECODE": "1", "NUMBA_CACHE_DIR": str(folder / "c")},
-    )
+    """Values and cache hits of a process that imports the modules for the first time."""
+    return ran(folder, {**os.environ, "PYTHONDONTWRITEBYTECODE": "1", "NUMBA_CACHE_DIR": str(folder / "c")})
+
+
+def ran(folder: Path, env: dict[str, str]) -> tuple[list[float], int]:
+    with chdir(folder):
+        done = run_copy(["outer.py"], env=env)
+    assert done.returncode == 0, done.stderr
     values, hits = done.stdout.splitlines()
     return [float(value) for value in values.split()], int(hits)
 
@@ -279,7 +281,7 @@ spec = spec_from_file_location("first", "inner.py")
 module = sys.modules["first"] = module_from_spec(spec)
 spec.loader.exec_module(module)
 print(module.factor(3.0))
-print(sum(module.factor.stats.cache_hits.values()))
+print(module.factor.hits)
 """
     folder = write_all(tmp_path, {"inner.py": CALLS["inner.py"], "outer.py": load})
     assert [run(folder), run(folder)] == [([6.0], 0), ([6.0], 1)]
@@ -303,9 +305,9 @@ import pickle
 from pathlib import Path
 import numba
 from middle import plus_one
-from teleop_core.kernels import numba_private
+from teleop_core.kernels import compiler
 
-load = numba_private._Cache.load_overload
+load = compiler._Cache.load_overload
 
 def loaded(self, *arguments):
     found = load(self, *arguments)
@@ -314,16 +316,16 @@ def loaded(self, *arguments):
     index.write_bytes(pickle.dumps(numba.__version__) + b"ca_later_module\\nItsRecord\\n.")
     return found
 
-numba_private._Cache.load_overload = loaded
+compiler._Cache.load_overload = loaded
 print(plus_one(3.0), plus_one(4))
-numba_private._Cache.load_overload = load
-print(sum(plus_one.stats.cache_hits.values()))
+compiler._Cache.load_overload = load
+print(plus_one.hits)
 """)
     assert run(folder) == ([7.0, 9.0], 0)
     (folder / "outer.py").write_text("""
 from middle import plus_one
 print(plus_one(4))
-print(sum(plus_one.stats.cache_hits.values()))
+print(plus_one.hits)
 """)
     assert run(folder) == ([9.0], 1)
 
@@ -367,7 +369,7 @@ def total(pair) -> float:
     return pair.first + pair.second
 
 print(total({0}(1.0, 2.0)))
-print(sum(total.stats.cache_hits.values()))
+print(total.hits)
 """
 
 
@@ -383,9 +385,7 @@ def in_store(folder: Path, place: Path) -> tuple[list[float], int]:
     """What the script prints where the store is at a place, and how many kernels it found there."""
     env = {**os.environ, "PYTHONDONTWRITEBYTECODE": "1", "TELEOP_KERNELS": str(place)}
     env.pop("NUMBA_CACHE_DIR", None)
-    done = subprocess.run([sys.executable, "outer.py"], cwd=folder, capture_output=True, text=True, check=True, env=env)
-    values, hits = done.stdout.splitlines()
-    return [float(value) for value in values.split()], int(hits)
+    return ran(folder, env)
 
 
 @pytest.fixture(scope="module")

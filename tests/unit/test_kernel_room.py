@@ -52,7 +52,7 @@ def test_a_kernel_computes_in_its_room_what_plain_python_does() -> None:
 
 @compiled_only
 def test_a_kernel_with_room_takes_no_memory() -> None:
-    fresh: Any = kernel(doubly.py_func)
+    fresh: Any = kernel(doubly.py_func).dispatcher  # type: ignore[attr-defined]
     fresh._has_cache = True  # what is kept on the disk cannot be looked at
     fresh(np.ones(3), np.zeros((3, 3)))
     text = fresh.inspect_llvm(fresh.signatures[0])

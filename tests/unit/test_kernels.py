@@ -56,7 +56,7 @@ def test_numbers_written_in_a_call_share_one_compilation() -> None:
     caller = "@kernel\ndef both(x):\n    return power(x, 2) + power(x, 3)\n"
     both = uncached(called + caller, "both")
     assert both(2.0) == 12.0
-    assert len(both.py_func.__globals__["power"].overloads) == 1
+    assert len(both.py_func.__globals__["power"].dispatcher.overloads) == 1
 
 
 @compiled_only
@@ -67,7 +67,7 @@ def test_arrays_and_fields_of_all_lengths_share_one_compilation() -> None:
     record = records([("two", "f8", (2,)), ("three", "f8", (3,))])[0]
     record.two[:], record.three[:] = (1.0, 2.0), (4.0, 5.0, 6.0)
     assert both(record, np.array([10.0])) == 15.0
-    assert len(both.py_func.__globals__["first"].overloads) == 1
+    assert len(both.py_func.__globals__["first"].dispatcher.overloads) == 1
 
 
 SLICE = """

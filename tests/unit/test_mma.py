@@ -9,6 +9,7 @@ from teleop_core.kernels.geometry import Array
 from teleop_core.robots import load_robot
 from teleop_core.robots.robot import Robot
 from teleop_machines.mma import holding_torques
+from teleop_machines.mma_balance import ShoulderSpring
 
 MM = 1e-3
 
@@ -67,3 +68,11 @@ def test_shoulder_torque_lifts_against_gravity(mma: Robot) -> None:
     level[1] = 0.0
     # Residual of the published spring in the worst pose, 1.011 N·m, towards smaller θ2.
     assert math.isclose(holding_torques(mma, level, np.zeros(6))[1], -1.011, abs_tol=1e-3)
+
+
+def test_the_spring_of_the_shoulder_never_pulls() -> None:
+    openings = np.linspace(0.0, math.pi, 50)
+    torques = ShoulderSpring().torque(openings)
+    assert (torques >= 0.0).all()
+    # Beyond 135° the anchors are further apart than the spring is long.
+    assert (torques[openings > math.radians(135.0) + 1e-3] == 0.0).all()

@@ -8,7 +8,6 @@ import pinocchio
 import pytest
 from pinocchio import Model
 
-from teleop_core.base.errors import ParameterError
 from teleop_core.kernels.geometry import Array, rotation
 from teleop_core.robots import load_robot
 from teleop_core.robots.robot import Robot
@@ -106,12 +105,6 @@ def test_closed_form_is_the_product_of_both_tables_for_random_readings(mma: Robo
         pose = mma.fk(q)
         assert np.abs(pose - tool_of_model(mma, q, "C")).max() < EXACT
         assert np.abs(pose - tool_of_model(mma, q, "B")).max() < EXACT
-
-
-def test_signed_offsets_are_refused_by_the_closed_form() -> None:  # H21
-    with pytest.raises(ParameterError) as caught:
-        load_robot("mma", d7=-0.03507, d9=-0.03840)
-    assert caught.value.name == "d7"
 
 
 def pinocchio_model(mma: Robot) -> Model:

@@ -181,11 +181,6 @@ def test_nobody_moves_without_a_goal() -> None:
     assert not rows.any()
 
 
-def test_an_operator_who_needs_a_task_is_refused_without_one() -> None:
-    with pytest.raises(tc.ParameterError, match=r"observer.*teleop.stages=\[task\]"):
-        tc.configuration(operator="observer")
-
-
 class Bench:
     """A slave that follows the hand at once, and a person who sees it late and feels what it touches at once.
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from led_slave import LedSlave
 from present import present
-from teleop_core.base import UnknownNameError, build
+from teleop_core.base import build
 from teleop_core.graph import TICK_NS
 from teleop_core.graph.operation import State
 from teleop_core.kernels import Array, kernel, record
@@ -98,11 +98,6 @@ def test_flags_agree_with_the_state_after_any_events(events: list[Event]) -> Non
             assert not s["is_busy"]
         assert not (s["is_homed"] and s["is_homing"])
         assert not s["is_stopped"] or s["state"] == F
-
-
-def test_unknown_commands_are_refused_with_the_known_ones() -> None:
-    with pytest.raises(UnknownNameError, match="enable"):
-        command_event("go")
 
 
 class Arm(LedSlave):

@@ -593,7 +593,7 @@ def test_touch_after_touch_of_something_rough_and_hard_creates_no_energy(kind: s
 def test_no_network_and_no_world_makes_passivity_give_the_hand_energy(kind: str, architecture: str) -> None:
     """Delay to 1 s there and back, jitter, loss to a half, 30 N/m to 50 kN/m, any grip."""
     rng = np.random.default_rng(7)
-    for _ in range(10):
+    for _ in range(6):
         texts = drawn(rng, kind, architecture)
         rows = pressing(*texts, ticks=9000)
         force = np.linalg.norm(rows["master_servo_cf"][:, :3], axis=1)

@@ -127,6 +127,7 @@ print(hashlib.sha256(rows.tobytes()).hexdigest())
 """
 
 
+@pytest.mark.slow
 def test_a_session_in_plain_python_has_the_bits_of_a_compiled_one() -> None:
     compiled, plain = (
         subprocess.run(

@@ -22,7 +22,7 @@ from teleop_core.slave.pair import ArmParameters, SimulatedArm
 def ready():
     return {f"{k.py_func.__module__}.{k.py_func.__qualname__}"
             for k in gc.get_objects()
-            if type(k) is not weakref.ProxyType and is_kernel(k) and k.signatures}
+            if type(k) is not weakref.ProxyType and is_kernel(k) and k.codes}
 
 
 def tick(slave, count):

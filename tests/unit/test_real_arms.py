@@ -40,10 +40,10 @@ ROUNDED = {
 }
 
 
-@pytest.mark.parametrize("name", [name for name in ARMS if "class" in ARMS[name]])
-def test_the_class_is_that_of_ssik_wherever_we_have_a_closed_form(name: str, tmp_path: Path) -> None:
-    ours = ROUNDED.get(name, OURS.get(ARMS[name]["class"], "search"))
-    assert load(name, tmp_path).solution.startswith(ours)
+def test_the_class_is_that_of_ssik_wherever_we_have_a_closed_form(tmp_path: Path) -> None:
+    for name in (name for name in ARMS if "class" in ARMS[name]):
+        ours = ROUNDED.get(name, OURS.get(ARMS[name]["class"], "search"))
+        assert load(name, tmp_path).solution.startswith(ours), name
 
 
 @pytest.mark.slow

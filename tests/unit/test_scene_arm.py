@@ -8,7 +8,7 @@ import pytest
 
 import teleop_core as tc
 from present import present
-from teleop_core.base import ParameterError, RecordingError, TeleopError, UnknownNameError
+from teleop_core.base import ParameterError, RecordingError, TeleopError
 from teleop_core.robots.dynamics.chain_dynamics import inertia_matrix
 from teleop_scene import models, truth
 from teleop_scene.arm import SceneRobot, arm_of, load_scene
@@ -131,11 +131,6 @@ def test_files_that_are_no_model_are_refused_in_one_line(tmp_path: Path) -> None
             load_scene(path)
         assert "\n" not in str(told.value)
     assert "gone.stl" in str(told.value)
-
-
-def test_other_words_for_the_drive_are_refused() -> None:
-    with pytest.raises(UnknownNameError, match="effort"):
-        tc.load_robot("cubes.xml", drive="magic")
 
 
 def test_a_scene_without_its_package_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -119,13 +119,13 @@ def test_outline_is_drawn_where_the_surface_is(name: str, data: Any) -> None:
 
 
 @EVERY
-@pytest.mark.parametrize("tiny", [0.0, 1e-170, 6e-160, 1e-155, 1e-140])
-def test_there_is_a_way_out_however_little_a_point_is_off(name: str, tiny: float) -> None:
+def test_there_is_a_way_out_however_little_a_point_is_off(name: str) -> None:
     parameters = SHAPES.find(name).parameters()
-    for offset in ((0.0, 0.0, tiny), (tiny, tiny, tiny), (0.03, tiny, tiny), (tiny, -0.03, 0.0)):
-        distance, out = found(name, parameters, offset)
-        assert math.isfinite(distance)
-        assert math.hypot(*out) == pytest.approx(1.0, abs=TURNED)
+    for tiny in (0.0, 1e-170, 6e-160, 1e-155, 1e-140):
+        for offset in ((0.0, 0.0, tiny), (tiny, tiny, tiny), (0.03, tiny, tiny), (tiny, -0.03, 0.0)):
+            distance, out = found(name, parameters, offset)
+            assert math.isfinite(distance)
+            assert math.hypot(*out) == pytest.approx(1.0, abs=TURNED)
 
 
 @EVERY

@@ -15,13 +15,13 @@ import teleop_core as tc
 from any_shape import BALL, BEYOND, KINDS, found, places
 from present import present
 from teleop_core.bags.reader import Bag
-from teleop_core.base import ParameterError, TeleopError, UnknownNameError, build, values_of
+from teleop_core.base import ParameterError, build, values_of
 from teleop_core.coupling.fixtures.reported_fixture import reported_fixture
 from teleop_core.coupling.mapping.gains import FixtureParameters
 from teleop_core.evaluation.scoring import evaluate
 from teleop_core.kernels.geometry import Array
 from teleop_core.shapes import SHAPES
-from teleop_core.shapes.basis.combined import MOST, PARTS
+from teleop_core.shapes.basis.combined import PARTS
 
 INSIDE = 1e-7  # what the rounds leave of a way, at most [m]
 SHALLOW = 1e-5
@@ -161,31 +161,6 @@ def test_between_two_walls_where_nothing_is_inside_the_farthest_leads() -> None:
     )
     distance, _ = found("intersection", whole("intersection", walls), [0.02, 0.001, 0.0])
     assert distance > 0.013
-
-
-@BOTH
-@pytest.mark.parametrize(
-    ("parts", "error", "said"),
-    [
-        ((), ParameterError, "1 to 8 parts"),
-        (("sphere",) * (MOST + 1), ParameterError, "1 to 8 parts"),
-        (("sphere", "tube radius=0.02"), ParameterError, r"parts\[1\]"),
-        (("sphere", "union"), ParameterError, "begins with one of box, capsule"),
-        (("not", "sphere"), ParameterError, "begins with one of box, capsule"),
-        (("sphere diameter=0.02", "box"), UnknownNameError, "radius"),
-        (("sphere radius=2.0", "box"), ParameterError, r"parts\[0\] radius"),
-        (("sphere radius=wide", "box"), ParameterError, "a number, numbers in brackets"),
-        (("sphere radius='wide'", "box"), ParameterError, r"parts\[0\] radius"),
-        (("sphere 0.02", "box"), ParameterError, "then settings such as"),
-        (("sphere", "box at=[0.01, 0.0]"), ParameterError, r"parts\[1\] at"),
-        (("sphere", "box at=['a', 0, 0]"), TeleopError, r"parts\[1\] at"),
-    ],
-)
-def test_a_part_that_is_wrong_is_refused_by_its_number(
-    name: str, parts: tuple[str, ...], error: type[TeleopError], said: str
-) -> None:
-    with pytest.raises(error, match=said):
-        build(FixtureParameters, {f"{name}.parts": parts})
 
 
 def test_a_middle_that_is_not_allowed_is_refused() -> None:

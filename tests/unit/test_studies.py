@@ -123,30 +123,6 @@ def test_a_session_that_fails_is_a_point_with_its_error(own_parts: None, tmp_pat
     assert np.isnan(data["position_error_mm.rms"].values.ravel()[0])
 
 
-@pytest.mark.parametrize(
-    ("changes", "said"),
-    [
-        ({"swept": {"display.latenzy": (0.0,)}}, "display.latency"),
-        ({"swept": {"display.latency": (5.0,)}}, "display.latency"),
-        ({"swept": {"display.latency": ()}}, "at least one value"),
-        ({"swept": {"display.latency": (0.1, 0.1)}}, "differ"),
-        ({"metrics": ["task.tme_s"]}, "task.time_s"),
-        ({"metrics": []}, "key of a score"),
-        ({"seeds": (-1,)}, "whole numbers >= 0"),
-        ({"seeds": (1, 10**50)}, "at most 18 digits"),
-        ({"seeds": range(10**9)}, "sessions of a study is 2000000000, must be at most 1000000"),
-        ({"seeds": range(600_000)}, "sessions of a study is 1200000, must be at most 1000000"),
-        ({"metrics": ["session.scenario"]}, "key of a score"),
-        ({"metrics": ["jaw.grips"]}, "no stage writes slave/jaw/grip"),
-        ({"metrics": ["insertion.depth_mm"]}, "which has no insertion"),
-        ({"settings": {"world": "sphere", "world.place": (9.0, 0.0, 0.0)}}, "within reach .* no nearer than 8"),
-    ],
-)
-def test_a_wrong_study_is_refused_before_its_first_session(changes: dict[str, Any], said: str) -> None:
-    with pytest.raises(tc.TeleopError, match=said):
-        study(**changes).points()
-
-
 @pytest.mark.parametrize("count", [10**9, 10**50, 10**350], ids=["1e9", "1e50", "1e350"])
 def test_a_file_with_more_seeds_than_a_study_may_have_is_refused_before_they_are_listed(
     count: int, tmp_path: Path

@@ -137,22 +137,6 @@ def test_choices_and_whole_numbers_are_kept_as_they_are() -> None:
         assert not trial.error
 
 
-@pytest.mark.parametrize(
-    ("changes", "text"),
-    [
-        ({"searched": {}}, "at least one parameter"),
-        ({"searched": {"coarse_gian": SearchRange(0.1, 1.0)}}, "coarse_gain"),
-        ({"searched": {"coarse_gain": SearchRange(1.0, 0.1)}}, "low below high"),
-        ({"searched": {"coarse_gain": SearchRange(0.0, 1.0, is_log=True)}}, "above 0 with log"),
-        ({"searched": {"coarse_gain": SearchRange(0.1, 1000.0)}}, "10"),
-        ({"metric": "task.tim"}, "task.time_s"),
-    ],
-)
-def test_what_cannot_be_searched_is_told_before_the_first_session(changes: dict[str, Any], text: str) -> None:
-    with pytest.raises(tc.TeleopError, match=text):
-        tuning(**changes)
-
-
 def test_a_file_says_the_same_as_python(tmp_path: Path) -> None:
     text = (
         "scenario: coarse_box\nseeds: [1]\nduration: 0.5\n"

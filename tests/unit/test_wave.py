@@ -8,7 +8,6 @@ import pytest
 from numpy.typing import NDArray
 
 from palpation import pressed
-from teleop_core.base import ParameterError
 from teleop_core.coupling.passivity.port import (
     DRIFT,
     IMPEDANCE,
@@ -26,7 +25,6 @@ from teleop_core.coupling.passivity.port import (
 from teleop_core.coupling.passivity.wave import draw, wave_hand, wave_slave
 from teleop_core.graph import topics
 from teleop_core.kernels import Array, kernel
-from teleop_core.session import configuration
 
 DT, ARM, STEP = 1e-3, 0.05, 55e-6
 """Tick [s], lag of the arm [s], step of the device's reading [m]."""
@@ -309,8 +307,3 @@ def test_a_hand_that_moves_without_leading_feels_no_drag_and_sends_no_wave() -> 
         wave_hand(numbers, memory, still, moved, leads * moved, flow, np.zeros(len(topics.ENERGY)), port, push, 1.0, DT)
         assert push.any() == port[WAVE : WAVE + 3].any() == bool(leads)
     assert push[0] < 0.0
-
-
-def test_waves_without_the_slaves_side_are_refused_with_what_they_need() -> None:
-    with pytest.raises(ParameterError, match=r"teleop.stages=\[passivity\]"):
-        configuration.configure("palpation", settings=["reflection.passivity=wave"])

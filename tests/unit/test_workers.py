@@ -10,12 +10,12 @@ import pytest
 
 from patience import is_alive, wait_until
 from teleop_core.base.errors import SessionError
-from teleop_core.base.workers import workers
+from teleop_core.base.workers import apart, workers
 
 _LONG = """
 import os, signal, sys, tempfile
 from pathlib import Path
-from teleop_core.base.workers import workers
+from teleop_core.base.workers import apart, workers
 
 def long(folder):
     own = tempfile.mkdtemp()
@@ -51,3 +51,22 @@ def test_processes_that_compute_end_at_once_with_their_caller(number: int, tmp_p
 def test_a_process_that_dies_is_told_in_a_line() -> None:
     with pytest.raises(SessionError, match="want of memory"), workers(1) as pool:
         pool.submit(os._exit, 1).result()
+
+
+def test_a_copy_of_this_process_has_what_it_has_and_changes_nothing_in_it() -> None:
+    own: list[int] = [1]
+
+    def work() -> tuple[int, list[int]]:
+        own.append(2)
+        return os.getpid(), own
+
+    number, found = apart(work)
+    assert number != os.getpid()
+    assert found == [1, 2]
+    assert own == [1]
+
+
+def test_a_copy_that_fails_is_an_error_of_its_caller(capfd: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SessionError, match="died"):
+        apart(lambda: 1 // 0)
+    assert "ZeroDivisionError" in capfd.readouterr().err

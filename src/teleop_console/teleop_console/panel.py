@@ -59,7 +59,9 @@ class Panel:
             with tabs.add_tab("Drive"):
                 self._add_drive()
         with tabs.add_tab("Settings"):
-            self.settings = SettingsPanel(server, link, self._guard, renew, of_session)
+            self.settings = SettingsPanel(
+                server, link, lambda client: client is not None and self._may_drive(client), renew, of_session
+            )
         with tabs.add_tab("Scores"):
             self._add_scores()
         self.view_tab = tabs.add_tab("View")
@@ -121,9 +123,6 @@ class Panel:
         self._scored = self._gui.add_markdown("")
 
     # -- actions ---------------------------------------------------------------------------------
-
-    def _guard(self, client: int | None) -> bool:
-        return client is not None and self._may_drive(client)
 
     def _act(self, control: Control, client: int) -> None:
         """Do the action for every arm; refusals and errors are shown to the person."""

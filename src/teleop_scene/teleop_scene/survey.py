@@ -7,7 +7,6 @@ from pathlib import Path
 import mujoco
 
 from teleop_core.base import TeleopError
-from teleop_core.robots.robot import Robot
 from teleop_scene import actuators, chain, models
 from teleop_scene.arm import SceneRobot, load_scene
 from teleop_scene.jaw import jaw_of
@@ -107,10 +106,6 @@ def _arm(name: str, tips: tuple[str, ...], robot: SceneRobot) -> list[str]:
     grip = ", ".join(chain.joint_name(model, int(j)) for j in jaw.joints) if jaw is not None else "none"
     return [
         f"tip {' or '.join(tips)}: {', '.join(robot.joint_names)}",
-        f"  drive: {drive}; jaw: {grip}; inverse kinematics: {_ik(robot)}",
+        f"  drive: {drive}; jaw: {grip}; inverse kinematics: {robot.solution or 'search'}",
         f"  teleop sim --out bags/scene --set robot={name} 'geometry=[tip={robot.chain.tip}]'",
     ]
-
-
-def _ik(robot: Robot) -> str:
-    return robot.solution or "search"

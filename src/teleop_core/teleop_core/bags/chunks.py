@@ -139,7 +139,7 @@ class Assembly:
         stretches = [stretch for stretch in stretches if len(stretch.log_ns)]
         if not stretches and not singles:
             return
-        data, index = self._merged(_Table(stretches, self._table), singles)
+        data, index = self._merged(_Table(stretches, self._table), singles) if stretches else _in_order(singles)
         first, begin = dict.fromkeys(index, 0), 0
         for cut_ns in (*_cuts(stretches, len(data), self._size), _FOREVER):
             cut = np.uint64(cut_ns)  # with another type, NumPy would convert all times
@@ -182,6 +182,20 @@ class Assembly:
             view[middle:at] = one.record
         view[at:] = source[begin:]
         return data
+
+
+def _in_order(singles: Sequence[Single]) -> tuple[Bytes, dict[int, Entries]]:
+    """As ``Assembly._merged``, without a table."""
+    ordered = sorted(singles, key=itemgetter(2))
+    records = [_record(*one) for one in ordered]
+    logs, channels = (np.array([one[i] for one in ordered], np.int64) for i in (2, 0))
+    sizes = np.fromiter(map(len, records), np.int64, len(records))
+    offsets = np.cumsum(sizes) - sizes
+    index = {}
+    for channel in np.unique(channels).tolist():
+        own = channels == channel
+        index[channel] = _entries(logs[own], offsets[own])
+    return np.frombuffer(b"".join(records), np.uint8), index
 
 
 def _cuts(stretches: Sequence[Stretch], total: int, size: int) -> list[int]:

@@ -140,10 +140,8 @@ class BagWriter:
         self._singles.append((channel.number, channel.recorded, log_ns, publish_ns, data))
         channel.recorded += 1
         self._bytes += len(data)
-        if self._bytes > CHUNK_BYTES:
+        if self._bytes > CHUNK_BYTES or abs(log_ns - self._first_ns) >= self._hold_ns:
             self.flush()
-        else:
-            self.flush_older(log_ns)
 
     def write_block(self, block: Block) -> None:
         """Record a block of samples of streams; a block of about one second is best.

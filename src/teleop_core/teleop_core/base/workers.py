@@ -1,16 +1,23 @@
 """Workers: processes of this machine that compute, and end with their caller, whatever ends it."""
 
+import ctypes
 import os
+import pickle
 import signal
 import tempfile
+import traceback
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from multiprocessing import active_children, get_context, parent_process
 from threading import Thread
+from typing import TypeVar
 
 from teleop_core.base.errors import SessionError
+
+Result = TypeVar("Result")
+_DEATH_SIGNAL = 1  # PR_SET_PDEATHSIG: the signal that a process gets when its parent dies
 
 
 @contextmanager
@@ -41,6 +48,37 @@ def workers(count: int, prepare: Callable[[], object] | None = None) -> Iterator
                 raise SessionError(text) from error
             raise
         pool.shutdown()
+
+
+def apart(work: Callable[[], Result]) -> Result:
+    """Result of a function that runs in a copy of this process, whose memory is free again afterwards.
+
+    The copy has everything that this process has imported, compiled and loaded, and ends with this process. Its result
+    must be one that pickles.
+
+    Raises:
+        SessionError: The copy died.
+    """
+    reading, writing = os.pipe()
+    child = os.fork()
+    if child == 0:
+        try:
+            ctypes.CDLL(None).prctl(_DEATH_SIGNAL, signal.SIGKILL)
+            with open(writing, "wb") as file:
+                pickle.dump(work(), file)
+            os._exit(0)
+        except BaseException:
+            traceback.print_exc()
+        finally:
+            os._exit(1)
+    os.close(writing)
+    with open(reading, "rb") as file:
+        data = file.read()
+    _, status = os.waitpid(child, 0)
+    if status:
+        raise SessionError("a process that computes died; its error stands above if it had one")
+    found: Result = pickle.loads(data)
+    return found
 
 
 def _begin(folder: str, prepare: Callable[[], object] | None) -> None:

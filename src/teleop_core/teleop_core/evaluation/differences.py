@@ -20,7 +20,7 @@ def difference_table(scores: Sequence[Score]) -> Table:
         scores: At least two scores.
     """
     lines = side_by_side([score.rows for score in scores])
-    found = sorted((line for line in lines if _differs(line)), key=_size, reverse=True)
+    found = sorted((line for line in lines if len({row.value for row in line.rows}) > 1), key=_size, reverse=True)
     told = f"{len(lines) - len(found)} of {len(lines)} rows are equal and left out"
     table = Table(box=SIMPLE, caption=told, caption_justify="left", pad_edge=False, padding=(0, 1, 0, 0))
     table.add_column("largest difference first")
@@ -36,10 +36,6 @@ def difference_table(scores: Sequence[Score]) -> Table:
 def _told(first: str, other: str) -> str:
     change = _change(first, other)
     return other if change is None or not math.isfinite(change) else f"{other} ({change:+.0%})"
-
-
-def _differs(line: TableLine) -> bool:
-    return len({row.value for row in line.rows}) > 1
 
 
 def _size(line: TableLine) -> float:

@@ -112,7 +112,7 @@ def read_origin(bag: reader.Bag, arm: str = "") -> Origin:
     content = _content(bag)
     layer, has_server = _layer(bag, content), any(_stage(name) == slave.SLAVE.name for name in content)
     return Origin(
-        _graph(layer), _axes(layer, arm), _operator(layer, arm), _interpolation(layer, arm),
+        _graph(layer), _axes(layer, arm), _said(layer, OPERATOR.name, arm), _interpolation(layer, arm),
         _tool(layer, arm), *_slave(layer, arm), _geometry(layer, arm),
         int(has_server), _world(layer, arm), tuple(dict.fromkeys(_missing(layer, arm))),
         begin if (begin := bag.metadata.get(arms.PLAYED_KEY, "")) in _BEGINS else "",
@@ -218,7 +218,3 @@ def _tool(layer: Layer, arm: str) -> ToolMap | None:
 
 def _axes(layer: Layer, arm: str) -> Array:
     return axis_map("axes", _mapping(layer, arm, ("axes",)).axes)
-
-
-def _operator(layer: Layer, arm: str) -> Mapping[str, object]:
-    return _said(layer, OPERATOR.name, arm)

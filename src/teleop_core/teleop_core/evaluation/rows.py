@@ -94,7 +94,7 @@ def side_by_side(tables: Sequence[Sequence[TableRow]]) -> list[TableLine]:
 
     A line is left out if it shows only dashes, or only delays of zero, as in virtual time.
     """
-    found = [{_place(row): row for row in rows} for rows in tables]
+    found = [{(row.group, row.label, row.unit): row for row in rows} for rows in tables]
     places = dict.fromkeys(place for rows in found for place in rows)
     lines = [
         TableLine(*place, tuple(rows.get(place) or TableRow(*place, MISSING) for rows in found)) for place in places
@@ -105,7 +105,3 @@ def side_by_side(tables: Sequence[Sequence[TableRow]]) -> list[TableLine]:
 def is_compared(lines: Sequence[TableLine]) -> bool:
     """Whether any line shows a published value."""
     return any(row.published for line in lines for row in line.rows)
-
-
-def _place(row: TableRow) -> tuple[str, str, str]:
-    return row.group, row.label, row.unit

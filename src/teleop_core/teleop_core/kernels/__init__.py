@@ -18,23 +18,23 @@ through them, coverage counts their lines, and everything is some hundred times 
 """
 
 import linecache
+import os
 from collections.abc import Callable, Mapping
-from functools import cache, partial
+from functools import partial
 from types import FunctionType
 from typing import TYPE_CHECKING, Any, ParamSpec, Protocol, TypeVar
 
 import lazy_loader
-import numba
 import numpy as np
 
 from teleop_core.kernels.callables import raise_pending
+from teleop_core.kernels.compiled_kernel import CompiledKernel, pointer_to
 from teleop_core.kernels.dependencies import Tokens, hexdigest
 from teleop_core.kernels.layout import record_dtype, records
 
 __all__ = [
     "IS_COMPILED",
     "Kernel",
-    "bare",
     "bound",
     "direct",
     "inner",
@@ -47,29 +47,8 @@ __all__ = [
     "records",
 ]
 
-SUPPORTED = ((0, 68), (0, 69))
-"""The first supported version of numba and the first later version that is unsupported. Also declared in setup.py."""
-
-
-def check_version(found: str = numba.__version__) -> None:
-    """Refuse unsupported versions of numba.
-
-    Raises:
-        ImportError: An unsupported version is installed; the error text names the supported versions.
-    """
-    first, beyond = SUPPORTED
-    if not first <= tuple(int(part) for part in found.split(".")[:2]) < beyond:
-        lower, upper = (".".join(map(str, version)) for version in SUPPORTED)
-        raise ImportError(f"numba is {found}, must be >= {lower} and < {upper}")
-
-
-_config: Any = numba.config
-IS_COMPILED: bool = not _config.DISABLE_JIT
+IS_COMPILED: bool = os.environ.get("NUMBA_DISABLE_JIT", "0") in {"", "0"}
 """Whether kernels are compiled; False in pure-Python mode."""
-
-if IS_COMPILED:
-    check_version()
-    from teleop_core.kernels import numba_private as _compiler
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -103,7 +82,7 @@ def kernel(function: Callable[P, R_co]) -> Kernel[P, R_co]:
         KernelError: The function cannot be compiled. This is raised not here, but when the kernel is first called,
             compiled for other arguments or made a pointer.
     """
-    return _compiler.dispatcher(function) if IS_COMPILED else _uncompiled(function)
+    return _made(function)
 
 
 def inner(function: Callable[P, R_co]) -> Kernel[P, R_co]:
@@ -111,13 +90,13 @@ def inner(function: Callable[P, R_co]) -> Kernel[P, R_co]:
 
     A call from Python raises TypeError, except in pure-Python mode.
     """
-    return _compiler.dispatcher(function, is_inner=True) if IS_COMPILED else _uncompiled(function)
+    return _made(function, is_inner=True)
 
 
 def is_kernel(value: object) -> bool:
     """Whether a value was made by :func:`kernel`, :func:`inner` or :func:`kernel_from_source`."""
     if IS_COMPILED:
-        return isinstance(value, _compiler.Dispatcher)
+        return isinstance(value, CompiledKernel)
     return isinstance(value, FunctionType) and getattr(value, "py_func", None) is value
 
 
@@ -140,7 +119,7 @@ def kernel_from_source(text: str, name: str, names: Mapping[str, object]) -> Any
         if all(before[known] is value for known, value in names.items()):
             return made
     function = _executed(text, name, names, key)
-    made = _compiler.generated_dispatcher(function) if IS_COMPILED else _uncompiled(function)
+    made = _made(function, is_generated=True)
     _written[key] = (dict(names), made)
     return made
 
@@ -156,7 +135,10 @@ def _executed(text: str, name: str, names: Mapping[str, object], key: str) -> Fu
     return function
 
 
-def _uncompiled(function: Any) -> Any:
+def _made(function: Any, **options: bool) -> Any:
+    """Kernel of a function; in pure-Python mode the function itself."""
+    if IS_COMPILED:
+        return CompiledKernel(function, **options)
     function.py_func = function
     return function
 
@@ -175,7 +157,8 @@ def pointer(function: Callable[P, R], signature: Any) -> Callable[P, R]:
 
     Args:
         function: A kernel, or a plain Python function or other callable.
-        signature: numba signature, the same for all functions that may be passed for this argument.
+        signature: Types as in ``"float64(float64[::1], int64)"``; all functions that may be passed for this argument
+            have the same.
 
     Returns:
         The callable to pass to a kernel, one for each kernel and signature. If Python calls it, it runs the Python
@@ -184,7 +167,8 @@ def pointer(function: Callable[P, R], signature: Any) -> Callable[P, R]:
     Raises:
         KernelError: The function cannot be compiled, or called, with this signature.
     """
-    return _compiler.c_function(function, signature) if IS_COMPILED else function
+    made: Any = pointer_to(function, signature) if IS_COMPILED else function
+    return made
 
 
 def bound(compiled: Callable[P, R], *arguments: P.args, **_: P.kwargs) -> Callable[[], R]:
@@ -201,9 +185,9 @@ def bound(compiled: Callable[P, R], *arguments: P.args, **_: P.kwargs) -> Callab
     Raises:
         KernelError: The kernel cannot be compiled for these arguments.
     """
-    if isinstance(compiled, FunctionType) or not is_kernel(compiled):
+    if not isinstance(compiled, CompiledKernel):
         return partial(compiled, *arguments)
-    return partial(_compiler.entry(compiled, types_of(arguments)), *map(_memory, arguments))
+    return partial(compiled.entry(arguments), *map(_memory, arguments))
 
 
 def _memory(value: Any) -> Any:
@@ -224,34 +208,15 @@ def direct(compiled: Callable[P, R], signature: Any) -> Callable[P, R]:
 
     Args:
         compiled: A kernel.
-        signature: numba signature of the kernel's arguments.
+        signature: Types of the kernel's result and arguments, as for :func:`pointer`.
 
     Raises:
         KernelError: The kernel cannot be compiled for these arguments.
     """
-    if not (IS_COMPILED and is_kernel(compiled)):
+    if not isinstance(compiled, CompiledKernel):
         return compiled
-    found: Callable[P, R] = _compiler.entry(compiled, signature.args)
+    found: Callable[P, R] = compiled.entry_of(signature)
     return found
-
-
-def types_of(arguments: tuple[object, ...]) -> tuple[Any, ...]:
-    """Types of arguments for the compiler."""
-    return tuple(_type_of(bare(argument)) for argument in arguments)
-
-
-def _type_of(value: Any) -> Any:
-    """Type for the compiler; types of records are cached, since a look-up takes a millisecond for a hundred fields."""
-    if isinstance(value, np.void):
-        return _record_type(value.dtype)
-    if type(value) is tuple:
-        return numba.types.BaseTuple.from_types([_type_of(one) for one in value])
-    return numba.typeof(value)
-
-
-@cache
-def _record_type(dtype: np.dtype[Any]) -> Any:
-    return numba.typeof(np.zeros(1, dtype)[0])
 
 
 class _Memory:
@@ -264,13 +229,6 @@ class _Memory:
 
     def __init__(self, record: Any) -> None:
         self.data = memoryview(record).cast("B")
-
-
-def bare(value: Any) -> Any:
-    """View of a record without attributes, because looking up attributes costs 1 µs; other values are unchanged."""
-    if isinstance(value, np.record):
-        return value.view(np.dtype((np.void, value.dtype)))
-    return value
 
 
 if TYPE_CHECKING:

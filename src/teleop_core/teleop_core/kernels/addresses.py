@@ -16,8 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from teleop_core import kernels
+from teleop_core.base.errors import KernelError
 from teleop_core.kernels.callables import keep
+from teleop_core.kernels.compiled_kernel import CompiledKernel, Pointer, the_compiler
 from teleop_core.kernels.dependencies import hexdigest
+from teleop_core.kernels.images import Code
+from teleop_core.kernels.kinds import Kinds, kinds_of
 
 __all__ = ["Addressed", "addressed", "call_address", "held"]
 
@@ -40,7 +44,7 @@ class Addressed:
 
     def __init__(self, function: Callable[..., object], arguments: tuple[Any, ...]) -> None:
         self._held: Any = (function, arguments)
-        if kernels.IS_COMPILED and kernels.is_kernel(function):
+        if isinstance(function, CompiledKernel):
             self._compile(function, arguments)
         elif kernels.IS_COMPILED:
             self._wrap(function, arguments)
@@ -58,12 +62,12 @@ class Addressed:
         function, arguments = self._held[:2]
         function(*arguments)
 
-    def _compile(self, function: Any, arguments: tuple[Any, ...]) -> None:
-        kinds = kernels.types_of(arguments)
-        code = kernels._compiler.Code(function, kinds)
-        entry = _entry(kinds, code.signature().return_type)
-        self.address = entry._code_address
-        self.block = np.array([code._code_address, *_blocks.packed(arguments, kinds)], np.int64)
+    def _compile(self, function: CompiledKernel, arguments: tuple[Any, ...]) -> None:
+        kinds = kinds_of(arguments)
+        code = function.code(kinds, lambda: the_compiler().types_of(arguments))
+        entry = _entry(function, kinds, code.result, arguments)
+        self.address = entry.address
+        self.block = np.array([code.address, *_words_of(arguments)], np.int64)
         self._held = (*self._held, code, entry)
 
     def _wrap(self, function: Callable[..., object], arguments: tuple[Any, ...]) -> None:
@@ -76,7 +80,7 @@ class Addressed:
                 keep(error)
 
         callback, entry = ctypes.CFUNCTYPE(None)(call), _plain_entry()
-        self.address = entry._code_address
+        self.address = entry.address
         self.block = np.array([ctypes.cast(callback, ctypes.c_void_p).value], np.int64)
         self._held = (*self._held, callback, entry)
 
@@ -133,8 +137,7 @@ def _run_plain(function: Callable[..., object], arguments: tuple[object, ...]) -
 @cache
 def _enter_code() -> Callable[[int, int], None]:
     """Compiled form of :func:`_enter`, without a check of the types of its arguments."""
-    made = kernels._compiler.dispatcher(_enter, keeps_lock=True)
-    return kernels._compiler.entry(made, kernels.types_of((0, 0)))
+    return CompiledKernel(_enter, keeps_lock=True).entry((0, 0))
 
 
 def _enter(address: int, block_address: int) -> None:
@@ -142,51 +145,71 @@ def _enter(address: int, block_address: int) -> None:
     call_address(address, block_address)
 
 
-def _call_plain(address: int, _block_address: int) -> None:
-    """Call an address in pure-Python mode."""
+def call_address(address: int, _block_address: int) -> None:
+    """Call the address of an :class:`Addressed` with the address of its block; for kernels.
+
+    An exception of the called kernel is an exception of the caller.
+    """
     _plain[address].run()
 
 
-def _copy_plain(source: int, target: int, size: int) -> None:
-    """Copy bytes in pure-Python mode."""
+def copy_memory(source: int, target: int, size: int) -> None:
+    """Copy some bytes from an address to another one; for kernels."""
     ctypes.memmove(int(target), int(source), int(size))
 
 
-def _word_plain(address: int) -> int:
-    """Word in memory in pure-Python mode."""
+def word_at(address: int) -> int:
+    """Word of eight bytes at an address, as an integer; for kernels."""
     return ctypes.c_int64.from_address(int(address)).value
 
 
-call_address: Callable[[int, int], None] = _call_plain
-"""Call the address of an :class:`Addressed` with the address of its block; for kernels.
+def call_c(block: int) -> None:
+    """Call the C function without arguments whose address is the first word of a block; for kernels."""
+    ctypes.CFUNCTYPE(None)(word_at(block))()
 
-An exception of the called kernel is an exception of the caller.
-"""
-copy_memory: Callable[[int, int, int], None] = _copy_plain
-"""Copy some bytes from an address to another one; for kernels."""
-word_at: Callable[[int], int] = _word_plain
-"""Word of eight bytes at an address, as an integer; for kernels."""
 
-if kernels.IS_COMPILED:
-    from teleop_core.kernels import blocks as _blocks
+def _unpacked(block: int) -> None:
+    """Stands for the code that the compiler generates: it unpacks a block and calls the kernel in its first word."""
 
-    _native: Any = _blocks
-    call_address, copy_memory, word_at = _native.call_address, _native.copy_memory, _native.word_at
+
+def _words_of(values: tuple[Any, ...]) -> list[int]:
+    """Words of some values, in the order in which compiled code unpacks them."""
+    return [word for value in values for word in _words(value)]
+
+
+def _words(value: Any) -> list[int]:
+    if isinstance(value, tuple):
+        return _words_of(value)
+    if isinstance(value, np.void):
+        return [np.asarray(value).ctypes.data]
+    if isinstance(value, np.ndarray):
+        return [value.ctypes.data, value.itemsize, *value.shape, *value.strides]
+    if isinstance(value, Pointer):
+        return [value._wrapper_address, id(value), value._code_address]
+    if value is None or kernels.is_kernel(value):  # the kind says it all
+        return []
+    if isinstance(value, bool | int | float | np.generic):
+        return [int.from_bytes(np.asarray(value).tobytes().ljust(8, b"\0"), "little", signed=True)]
+    raise KernelError("argument", f"{value!r} must be a number, an array, a record or a pointer")
+
+
+def _entry(function: CompiledKernel, kinds: Kinds, result: str, arguments: tuple[Any, ...]) -> Code:
+    """Code that unpacks a block for arguments of some kinds and calls the kernel whose address comes first."""
+    enter = _enter_of("run", _unpacked, hexdigest((*kinds, result)))
+    return enter.code(("int64",), lambda: the_compiler().set_unpacking(enter, function, arguments))
 
 
 @cache
-def _entry(kinds: tuple[Any, ...], result: Any) -> Any:
-    """Code that unpacks a block for arguments of some types and calls the kernel whose address comes first."""
-    return _code_of(_blocks.unpacking(kinds, result), hexdigest(map(str, (*kinds, result))))
-
-
-@cache
-def _plain_entry() -> Any:
+def _plain_entry() -> Code:
     """Code that calls the C function whose address is in a block."""
-    return _code_of(_blocks.call_c, "C")
+    enter = _enter_of("call_c", call_c, "C")
+    return enter.code(("int64",), lambda: the_compiler().types_of((0,)))
 
 
-def _code_of(run: Any, key: str) -> Any:
-    """Code of a function that takes the address of a block; its symbol contains the key, as no two may be the same."""
-    made = kernels.kernel_from_source(f"def enter(block):\n    run(block)  # {key}\n", "enter", {"run": run})
-    return kernels._compiler.Code(made, kernels.types_of((0,)))
+@cache
+def _enter_of(name: str, run: Any, key: str) -> CompiledKernel:
+    """Kernel that takes the address of a block; its symbol contains the key, as no two may be the same."""
+    made: CompiledKernel = kernels.kernel_from_source(
+        f"def enter(block):\n    {name}(block)  # {key}\n", "enter", {name: run}
+    )
+    return made

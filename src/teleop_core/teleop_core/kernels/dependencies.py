@@ -15,7 +15,6 @@ from types import CodeType, FunctionType, ModuleType
 from typing import Any
 
 import numpy as np
-from numba import types
 
 _PLAIN = (type(None), bool, int, float, complex, str, bytes)
 # Modules whose functions numba identifies by name; these functions change only with numba's version.
@@ -150,13 +149,14 @@ def _is_foreign(module: str) -> bool:
 
 
 def _plain_token(value: Any) -> str:
-    """Text of a number, string, array, dtype or type of numba.
+    """Text of a number, string, array or dtype; of a type of numba its name.
 
     Compiled code does not read other objects, such as dictionaries and sets, so their type is sufficient.
     """
     if isinstance(value, np.generic | np.ndarray):
         content = hashlib.blake2b(value.tobytes(), digest_size=16).hexdigest()
         return f"{value.dtype!r}{value.shape}{value.flags.c_contiguous}:{content}"
-    if isinstance(value, (*_PLAIN, np.dtype, types.Type)):
+    if isinstance(value, (*_PLAIN, np.dtype)):
         return f"{type(value).__name__}:{value!r}"
-    return f"{type(value).__module__}.{type(value).__qualname__}"
+    kind = f"{type(value).__module__}.{type(value).__qualname__}"
+    return f"{kind}:{value!r}" if kind.startswith("numba.core.types.") else kind

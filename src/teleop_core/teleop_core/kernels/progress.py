@@ -8,35 +8,26 @@ import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-from numba.core import event
+_lock = threading.Lock()
+_counts = {"running": 0, "done": 0}
 
 
-class _Progress(event.Listener):  # type: ignore[misc]
-    """Counter of the compiler's events, which come in the thread that compiles."""
-
-    def __init__(self) -> None:
-        self._lock = threading.Lock()
-        self.running = self.done = 0
-
-    def on_start(self, event: object) -> None:
-        """Count a kernel whose compilation begins; kernels that it calls begin during its compilation."""
-        with self._lock:
-            self.running += 1
-
-    def on_end(self, event: object) -> None:
-        """Count a kernel whose compilation is finished or has failed."""
-        with self._lock:
-            self.running -= 1
-            self.done += 1
+def begun() -> None:
+    """Count a kernel whose compilation begins; the compiler calls this in the thread that compiles."""
+    with _lock:
+        _counts["running"] += 1
 
 
-_progress = _Progress()
-event.register("numba:compile", _progress)
+def ended() -> None:
+    """Count a kernel whose compilation is finished or has failed."""
+    with _lock:
+        _counts["running"] -= 1
+        _counts["done"] += 1
 
 
 def is_compiling() -> bool:
     """Whether any thread of this process compiles a kernel now."""
-    return _progress.running > 0
+    return _counts["running"] > 0
 
 
 _told: dict[str, str] = {}
@@ -61,4 +52,4 @@ def in_work() -> str:
 
 def compiled_count() -> int:
     """Number of kernels that this process has compiled, including kernels that other kernels call."""
-    return _progress.done
+    return _counts["done"]

@@ -5,23 +5,23 @@ processors since 2013 have AVX2 and FMA. Only ``make wheel`` writes to this fold
 kernels.
 """
 
+import os
+import re
 from collections.abc import Iterator
+from contextlib import suppress
 from functools import cache
 from pathlib import Path
-from typing import Any
-
-import numba
-from llvmlite.binding import get_host_cpu_features
 
 FOLDER = Path(__file__).with_name("compiled")
 _PACKAGE = Path(__file__).parents[1]
 
 TIER = "x86-64-v3"
 """Tier of the x86-64 psABI for which the shipped kernels are compiled."""
-_NEEDED = (
-    "cx16", "sahf", "popcnt", "sse3", "ssse3", "sse4.1", "sse4.2",
-    "avx", "avx2", "bmi", "bmi2", "f16c", "fma", "lzcnt", "movbe", "xsave",
-)  # fmt: skip
+_NEEDED = frozenset((
+    "cx16", "lahf_lm", "popcnt", "pni", "ssse3", "sse4_1", "sse4_2",
+    "avx", "avx2", "bmi1", "bmi2", "f16c", "fma", "abm", "movbe", "xsave",
+))  # fmt: skip
+"""Abilities of all processors of the tier, as Linux names them."""
 
 
 def places(source: Path) -> Iterator[tuple[str, Path]]:
@@ -36,9 +36,21 @@ def places(source: Path) -> Iterator[tuple[str, Path]]:
 @cache
 def is_tier() -> bool:
     """Whether this processor, or the processor for which numba must compile, belongs to the tier."""
-    config: Any = numba.config
-    asked = (config.CPU_NAME, config.CPU_FEATURES)
+    asked = os.environ.get("NUMBA_CPU_NAME"), os.environ.get("NUMBA_CPU_FEATURES")
     if asked != (None, None):
         return asked == (TIER, "")
-    features = get_host_cpu_features()
-    return all(features.get(name) for name in _NEEDED)
+    return set(_told("flags").split()) >= _NEEDED
+
+
+@cache
+def processor() -> str:
+    """Name and abilities of this processor; they determine the code that the compiler makes."""
+    return f"{_told('model name')} {_told('cpu family')} {_told('model')} {_told('flags')}"
+
+
+def _told(name: str) -> str:
+    """What Linux says of this processor."""
+    with suppress(OSError):
+        found = re.search(rf"^{name}\s*: (.*)$", Path("/proc/cpuinfo").read_text(), re.MULTILINE)
+        return found[1] if found else ""
+    return ""

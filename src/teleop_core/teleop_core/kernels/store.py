@@ -12,9 +12,6 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import FunctionType
-from typing import Any
-
-import numba
 
 from teleop_core.kernels.dependencies import hexdigest
 
@@ -33,9 +30,8 @@ def folder() -> Path | None:
 
     ``TELEOP_KERNELS`` names another folder. If it is empty, or ``NUMBA_CACHE_DIR`` is set, there is no store.
     """
-    config: Any = numba.config
     named = os.environ.get("TELEOP_KERNELS")
-    if config.CACHE_DIR or named == "":
+    if os.environ.get("NUMBA_CACHE_DIR") or named == "":
         return None
     if named:
         return Path(named)
@@ -80,7 +76,7 @@ def prune(days: float = KEPT_DAYS) -> int:
     kept, removed = folder(), 0
     oldest = time.time() - 86400.0 * days
     grids = user_cache("grids")
-    found = [*(kept.glob("*/*.nbi") if kept else ()), *(grids.glob("*.npz") if grids else ())]
+    found = [*(kept.glob("*/*.nb[io]") if kept else ()), *(grids.glob("*.npz") if grids else ())]
     for index in found:
         with suppress(OSError):
             if index.stat().st_mtime < oldest:

@@ -7,18 +7,17 @@ from enum import IntEnum
 from typing import Generic, NamedTuple, TypeAlias, TypeGuard, TypeVar
 
 import numpy as np
-from numba import types
 from numpy.typing import NDArray
 
 from teleop_core.kernels import inner, kernel
 from teleop_core.kernels.geometry import Array, is_rigid, rotation_angle_between
 
 _FLOAT64 = np.dtype(np.float64)  # arrays with this very dtype object are used as they are; others are copied
-_ROW, _TABLE = types.float64[::1], types.float64[:, ::1]
+_ROW, _TABLE = "float64[::1]", "float64[:, ::1]"
 # Kernel signatures, shared by all robots, so that one compiled graph can run any robot; the arguments: see Kernels.
-FK = types.void(_ROW, _ROW, _TABLE)
-ASSEMBLE = types.int64(_ROW, _ROW, _ROW, _TABLE, _ROW)
-IK = types.int64(_TABLE, _ROW, _TABLE, _ROW, _ROW, _ROW)
+FK = f"void({_ROW}, {_ROW}, {_TABLE})"
+ASSEMBLE = f"int64({_ROW}, {_ROW}, {_ROW}, {_TABLE}, {_ROW})"
+IK = f"int64({_TABLE}, {_ROW}, {_TABLE}, {_ROW}, {_ROW}, {_ROW})"
 WriteKernel: TypeAlias = Callable[[Array, Array, Array], None]
 IkKernel: TypeAlias = Callable[[Array, Array, Array, Array, Array, Array], int]
 IkAllKernel: TypeAlias = Callable[[Array, Array, Array], int]

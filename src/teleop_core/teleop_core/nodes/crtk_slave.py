@@ -219,7 +219,7 @@ class MeasuredTopics:
         self._listen(is_read=False)
 
     def _look_for_readers(self) -> None:
-        is_read = any(p.get_subscription_count() for p in self._all())
+        is_read = any(p.get_subscription_count() for p in (*self._publishers.values(), self._jacobian))
         if is_read and self._timer.is_canceled() and self._node.is_at_work:
             self._timer.reset()
         elif not is_read:
@@ -238,9 +238,6 @@ class MeasuredTopics:
 
     def _take(self, message: Any) -> None:
         self._force = message
-
-    def _all(self) -> tuple[Any, ...]:
-        return (*self._publishers.values(), self._jacobian)
 
     def _send(self) -> None:
         if not self._node.is_at_work:

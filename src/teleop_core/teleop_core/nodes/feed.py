@@ -244,25 +244,25 @@ class _Source:
             self.close()
 
     def _take_frames(self) -> None:
-        at, came = 0, self._came
-        while len(came) - at >= _HEAD.size:
+        at, came, last, channels, head = 0, bytes(self._came), self._last, self._channels, _HEAD.size
+        while len(came) - at >= head:
             size, index, word, number, time_ns = _HEAD.unpack_from(came, at)
-            end = at + _HEAD.size + size
+            end = at + head + size
             if size > MOST:
                 raise ValueError("a frame that no loop sends")
             if len(came) < end:
                 break
-            data = bytes(came[end - size : end])
-            if word == _END:
+            data = came[at + head : end]
+            at = end
+            if word == _MESSAGE:
+                if (channel := channels[index]) is not None:
+                    lost = number - last.get(index, number - 1) - 1
+                    last[index] = number
+                    channel.take(data, time_ns, lost)
+            elif word == _END:
                 self.has_ended = True
             elif word == _NAMES:
-                self._channels = [self._known.get(name) for name in json.loads(data)]
-            elif (channel := self._channels[index]) is not None:
-                if word == _MESSAGE:
-                    lost = number - self._last.get(index, number - 1) - 1
-                    self._last[index] = number
-                    channel.take(data, time_ns, lost)
-                else:
-                    channel.join(word == _JOINED, time_ns)
-            at = end
-        del came[:at]
+                self._channels = channels = [self._known.get(name) for name in json.loads(data)]
+            elif (channel := channels[index]) is not None:
+                channel.join(word == _JOINED, time_ns)
+        del self._came[:at]

@@ -6,6 +6,7 @@ from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
@@ -89,13 +90,13 @@ class _Channel:
         if self._twice:
             self._twice -= 1
             return
-        self.give(data, sent_ns)
+        self._given.append((sent_ns, self.topic, data, sent_ns))
 
     def drain(self, came: list[Arrival]) -> None:
         """Append the messages received since the last call to ``came``."""
-        while self._given:
-            came.append(self._given.popleft())
-            self.received += 1
+        given = self._given
+        self.received += (count := len(given))
+        came.extend([given.popleft() for _ in range(count)])
         inside_ns = self._inside_ns
         while self._subscription is not None and (taken := self._subscription.take()) is not None:
             if inside_ns is None or taken.sent_ns < inside_ns:
@@ -248,7 +249,7 @@ class RecorderNode(SessionNode):
             self._feeds.drain()
         for channel in self.channels.values():
             channel.drain(came)
-        came.sort(key=lambda message: message[0])
+        came.sort(key=itemgetter(0))
         self._last.update({m[1]: m[2] for m in came if m[1].quality is Quality.LATCHED})
         self._newest.take(came)
         drawn = self._model.messages(self._newest)

@@ -1,6 +1,6 @@
 """Starter: a process that has loaded all modules that nodes need, and starts each node as a copy of the starter.
 
-Python, numba, the middleware and a node's kernels take two seconds of processor time and 200 MB to load. A copy of a
+Python, NumPy, the middleware and a node's kernels take a second of processor time and 100 MB to load. A copy of a
 process that has loaded them begins at once, and shares that memory as long as it does not write to it. The starter
 itself does not use the middleware and has a single thread, so that it can be copied at any time.
 

@@ -43,6 +43,8 @@ _FRAME = 20  # bytes of a feed's frame before its message
 class Calls(Fields):
     """Addresses of the C functions of the middleware and of the clock; all 0 in a world that has none.
 
+    The function of the clock also gets ``context``, which the system's function does not read.
+
     What they answer is written into the record itself: seconds and nanoseconds of the clock, and a number of
     subscriptions. Memory beside it could be freed while a kernel that holds the record still has its address.
     """
@@ -52,6 +54,7 @@ class Calls(Fields):
     publish: int
     matched: int
     clock: int
+    context: int
     time: Annotated[Integers, 2]
     count: Annotated[Integers, 1]
 
@@ -164,7 +167,7 @@ class Block(Fields):
 @inner
 def read_clock(calls: Calls, kind: int) -> int:
     """Time of a clock of the system [ns]; ``kind`` is 0 for the time of day, 1 for the monotonic clock."""
-    call(calls.clock, kind, calls.time.ctypes.data, 0, 0)
+    call(calls.clock, kind, calls.time.ctypes.data, calls.context, 0)
     return calls.time[0] * SECOND_NS + calls.time[1]
 
 

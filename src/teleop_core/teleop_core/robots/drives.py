@@ -5,17 +5,16 @@ from dataclasses import dataclass, field
 from typing import Any, TypeAlias
 
 import numpy as np
-from numba import types
 from numpy.typing import NDArray
 
 from teleop_core.base import ParameterError, ShapeError, UnknownNameError
 from teleop_core.kernels import Array, kernel
 from teleop_core.robots.inertias import LinkInertia, check_possible
 
-_ROW = types.float64[::1]
+_ROW = "float64[::1]"
 # Kernel signatures, shared by all robots, so that one compiled slave can move any robot; the arguments: see Dynamics.
-ACCELERATION = types.void(_ROW, _ROW, _ROW, _ROW, _ROW)
-GRAVITY = types.void(_ROW, _ROW, _ROW)
+ACCELERATION = f"void({_ROW}, {_ROW}, {_ROW}, {_ROW}, {_ROW})"
+GRAVITY = f"void({_ROW}, {_ROW}, {_ROW})"
 AccelerationKernel: TypeAlias = Callable[[Array, Array, Array, Array, Array], None]
 GravityKernel: TypeAlias = Callable[[Array, Array, Array], None]
 

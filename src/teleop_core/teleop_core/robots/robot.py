@@ -187,6 +187,14 @@ class Robot:
         return cast("AssembleKernel", pointer(self.kernels.assemble, ASSEMBLE))
 
     @cached_property
+    def _fk(self) -> WriteKernel:
+        return direct(self.kernels.fk, FK)
+
+    @cached_property
+    def _jacobian(self) -> WriteKernel:
+        return direct(self.kernels.jacobian, FK)
+
+    @cached_property
     def _ik(self) -> IkKernel:
         return direct(self.kernels.ik, IK)
 
@@ -231,7 +239,7 @@ class Robot:
             return forward_kinematics.closed_poses(self, joints)
         if joints.ndim == 1:
             transform = np.empty((4, 4))
-            self.kernels.fk(joints, self._row, transform)
+            self._fk(joints, self._row, transform)
             return transform
         transforms = np.empty((len(joints), 4, 4))
         kinematics.fk_batch(self.fk_pointer, joints, self._row, transforms)
@@ -329,7 +337,7 @@ class Robot:
         if self.kernels.assemble is not None:
             forward_kinematics.closed_poses(self, joints)
         out = np.empty((6, self.n))
-        self.kernels.jacobian(joints, self._row, out)
+        self._jacobian(joints, self._row, out)
         return out
 
     def forward_dynamics(self, q: object, dq: object, effort: object, wrench: object = None) -> Array:

@@ -13,7 +13,6 @@ from pkgutil import iter_modules
 from typing import Any
 
 import numpy as np
-from numba import types
 
 from teleop_core.base import PartError, Registry, part_check, values_of
 from teleop_core.base.registry import places, tried
@@ -21,8 +20,8 @@ from teleop_core.kernels import Array, fenced, is_whole, numbers_of, pointer
 
 __all__ = ["SHAPES", "Shape", "files_of", "moved", "register_shape"]
 
-_ROW = types.float64[::1]
-DISTANCE = types.float64(_ROW, _ROW, _ROW)
+_ROW = "float64[::1]"
+DISTANCE = f"float64({_ROW}, {_ROW}, {_ROW})"
 """Signature of a distance kernel, so that one compiled stage serves every shape."""
 
 

@@ -19,7 +19,7 @@ def note_state(outcome: FaultOutcome, rig: LiveRig, before: dict[str, float]) ->
     begin_ns = rig.begin_ns
     told: list[tuple[int, str]] = []
     for sent_ns, report in rig.tap.reports(topics.SLAVE_OPERATION):
-        if sent_ns >= begin_ns and _differs(report, before):
+        if sent_ns >= begin_ns and any(report[name] != before.get(name) for name in ("state", "fault")):
             told.append((sent_ns, "slave/operation"))
             if outcome.told is None and _is_expected(report, outcome.exercise):
                 outcome.told = 1e-9 * (sent_ns - begin_ns)
@@ -58,10 +58,6 @@ def seen_of(outcome: FaultOutcome, rig: LiveRig, time_ns: tuple[int, int], sched
         begin_ns, end_ns, setpoints, joints, tip, told_ns, min(warned, default=None),
         rig.tap.scheduling(begin_ns).beside(scheduling), max(0.0, 1e-9 * (rig.woken_ns - begin_ns)),
     )  # fmt: skip
-
-
-def _differs(report: dict[str, float], before: dict[str, float]) -> bool:
-    return any(report[name] != before.get(name) for name in ("state", "fault"))
 
 
 def _is_expected(report: dict[str, float], exercise: Exercise) -> bool:

@@ -13,6 +13,7 @@ from random import Random
 from teleop_core.middleware.world import Endpoint, Taken
 from teleop_drill.simulation.ends import Match, Reader, Service, Writer
 from teleop_drill.simulation.machine import Process
+from teleop_drill.simulation.reach import functions
 from teleop_drill.simulation.scheduler import Scheduler
 
 _SOCKET = 4 << 20
@@ -70,6 +71,8 @@ class Bus:
         """Observers of the messages of a topic when they are sent, by the full name of the topic."""
         self.heard: dict[str, Callable[[Reader, Taken], None]] = {}
         """Observers of the messages of a topic when readers take them, by the full name of the topic."""
+        self.reaches = bool(functions()) and not scheduler.breaks
+        """Whether kernels take and publish themselves; Python code does it where threads are interrupted."""
         self._plain = Line()
         self.find = (0.07, 0.3, 1.6)
         """Shortest, usual and longest time in which one process discovers another [s]."""
@@ -119,6 +122,7 @@ class Bus:
             self.readers[reader.topic].remove(reader)
         for writer in self.writers.get(reader.topic, ()):
             writer.links = [link for link in writer.links if link.reader is not reader]
+            writer.note_links()
 
     def found(self, process: Process, ends: Iterable[Writer | Reader]) -> list[Endpoint]:
         """Return those writers or readers that a process has discovered."""
@@ -176,6 +180,7 @@ class Bus:
             wanted.is_reliable and offered.is_reliable,
         )
         writer.links.append(link)
+        writer.note_links()
         if wanted.is_latched:
             link.awaits_last = True
             self.scheduler.at(link.writer_knows_ns, lambda: self._send_last(writer, link))

@@ -1,18 +1,24 @@
 """Ends: writers and readers of simulated topics, and services."""
 
+import ctypes
 from bisect import insort
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 from typing import Any, Protocol
 
 from teleop_core.middleware.ros_messages import write_message
 from teleop_core.middleware.world import Qos, Taken
+from teleop_core.nodes.sender import halves
 from teleop_drill.simulation.machine import Process
+from teleop_drill.simulation.reach import NEVER_NS, TAKE_NS, Reached
 from teleop_drill.simulation.scheduler import Scheduler, Strand
 
 _PUBLISH_NS = 12_000  # time that the middleware needs to publish a message, measured with rclpy [ns]
-_TAKE_NS = 900  # time that the middleware needs to take a message, measured with rclpy [ns]
+_OK, _EMPTY = 0, 401  # RCL_RET_OK, RCL_RET_SUBSCRIPTION_TAKE_FAILED
+_ROOM = 1024  # initial size of the buffer of a taken message [bytes]
+_halves = cache(halves)
 
 
 def _name_of(kind: Any) -> str:
@@ -37,6 +43,7 @@ class _Carrier(Protocol):
     """Methods of the middleware (:class:`~teleop_drill.simulation.bus.Bus`) that writers and readers use."""
 
     scheduler: Scheduler
+    reaches: bool
     seen: dict[str, Callable[[Taken], None]]
     heard: dict[str, Callable[["Reader", Taken], None]]
 
@@ -66,6 +73,30 @@ class Writer:
         self.number, self.is_open, self.is_active = 0, True, True
         self.links: list[Match] = []
         self.history: deque[Taken] = deque(maxlen=None if qos.keeps_all else qos.depth)
+        self._reached = Reached(bus.scheduler.now_at, self._send_at, bus.scheduler.keep)
+        self.note_links()
+
+    @property
+    def pointer(self) -> int:
+        """Address for kernels; 0 while the writer sends nothing, or if kernels cannot reach the middleware."""
+        is_reached = self.is_active and self.is_open and self._bus.reaches
+        return self._reached.address if is_reached else 0
+
+    def hold(self) -> None:
+        """Do nothing, because a writer is never destroyed."""
+
+    def release(self) -> None:
+        """Do nothing, because a writer is never destroyed."""
+
+    def note_links(self) -> None:
+        """Tell kernels from which time on somebody reads the topic; an observer is a reader from the begin on."""
+        times = [0] if self.topic in self._bus.seen else [link.writer_knows_ns for link in self.links]
+        self._reached.since(min(times, default=NEVER_NS))
+
+    def _send_at(self, message_at: int, _: int) -> int:
+        at, size = (ctypes.c_int64 * 2).from_address(message_at)
+        self.send(ctypes.string_at(at, size))
+        return 0
 
     def publish(self, message: Any) -> None:
         """Send a message, or the bytes of a message."""
@@ -118,17 +149,52 @@ class Reader:
         self.waiting: Strand | None = None
         self.told: Callable[[], None] | None = None
         """Function that is called when a message arrives; None if no executor serves the reader."""
+        self._reached = Reached(bus.scheduler.now_at, self._take_at, bus.scheduler.keep)
+        self._message, self._info = (ctypes.c_int64 * 2)(), (ctypes.c_int64 * 7)()
+        """``rcutils_uint8_array_t`` and ``rmw_message_info_t`` of the last taken message, for kernels."""
+        self._buffer, self._taken = ctypes.create_string_buffer(_ROOM), Taken(b"", b"", 0, 0, 0)
+
+    @property
+    def places(self) -> tuple[int, int, int] | None:
+        """Addresses of the reader, of a message, and of its information, for kernels; None if they cannot reach it."""
+        if not self._bus.reaches:
+            return None
+        return self._reached.address, ctypes.addressof(self._message), ctypes.addressof(self._info)
+
+    def taken(self) -> Taken:
+        """The last message that was taken, also by a kernel."""
+        return self._taken
+
+    def _take_at(self, _: int, __: int) -> int:
+        """:meth:`take` for a kernel."""
+        taken = self.take()
+        if taken is None:
+            return _EMPTY
+        self._taken, (data, sender, number, sent_ns, came_ns) = taken, taken
+        if len(data) > len(self._buffer):
+            self._buffer = ctypes.create_string_buffer(len(data))
+        at = ctypes.addressof(self._buffer)
+        ctypes.memmove(at, data, len(data))
+        self._message[:] = [at, len(data)]
+        self._info[:] = [sent_ns, came_ns, number, 0, 0, *_halves(sender)]
+        return _OK
+
+    def _note(self) -> None:
+        """Tell kernels when the next message can be taken."""
+        since_ns = 0 if self._ready else self.coming[0][0] if self.coming else NEVER_NS
+        self._reached.since(since_ns)
 
     def take(self) -> Taken | None:
         """Remove and return the oldest waiting message; None if no message waits."""
         scheduler = self._bus.scheduler
-        scheduler.now_ns = now_ns = scheduler.now_ns + _TAKE_NS
+        scheduler.now_ns = now_ns = scheduler.now_ns + TAKE_NS
         coming, ready = self.coming, self._ready
         while coming and coming[0][0] <= now_ns:
             ready.append(coming.popleft())
         if not ready or not self.is_open:
             return None
         came_ns, _, taken = ready.popleft()
+        self._note()
         if self.topic in self._bus.heard:
             self._bus.heard[self.topic](self, taken)
         data, sender, number, sent_ns, _ = taken
@@ -173,6 +239,7 @@ class Reader:
             self.coming = deque(ordered)
         else:
             self.coming.append(entry)
+        self._note()
         if self.waiting is not None or self.told is not None:
             self._bus.scheduler.at(came_ns, self.tell)
 
@@ -196,6 +263,7 @@ class Reader:
             else:
                 lost.append(entry[2])
         self.coming = kept
+        self._note()
         for taken in lost:
             if not self._bus.send_again(self, taken):
                 self.lost += 1

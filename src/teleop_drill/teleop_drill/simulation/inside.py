@@ -2,11 +2,10 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from teleop_drill.drill import inside
-from teleop_drill.simulation.machine import Machine
+from teleop_drill.simulation.machine import Clock, Machine
 
 if TYPE_CHECKING:
     from teleop_drill.simulation.session import SimulatedSession
@@ -46,7 +45,7 @@ class SimulatedSteering:
         self.word = word
         for process in self._machine.processes:
             if process.name not in {"drill", "arm"}:
-                process.clock = replace(self._machine.clock, offset_ns=offset_ns)
+                process.use_clock(Clock(offset_ns, self._machine.clock.drift))
 
     def _look(self) -> None:
         """Pass the drill's orders on to the joints of the simulated arm."""

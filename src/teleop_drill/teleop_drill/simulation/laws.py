@@ -15,9 +15,11 @@ from teleop_core.bags.reader import Bag, recover
 from teleop_core.graph.operation import State
 from teleop_core.graph.signals import DT
 from teleop_core.graph.topics import NO_COMMAND_NS, SLAVE_SETPOINT_JS
+from teleop_core.kernels.fields import Cells
 from teleop_core.kernels.geometry import Array
 from teleop_core.middleware.world import Taken
 from teleop_core.slave.commands import CommandStatus
+from teleop_core.slave.velocity import MotionSource
 from teleop_drill.drill.numbers import Numbers
 from teleop_drill.simulation import sometimes
 from teleop_drill.simulation.drilled_session import DrilledSession
@@ -55,6 +57,7 @@ _QUEUES = 2500
 _SLOW_NS, _GIVEN_WAY_NS = 1_500_000, 4_500_000_000
 """A process whose turns take longer than the first must have given way after the second [ns]: two times of judgement,
 and a turn of the machine."""
+_FOLLOWING = int(MotionSource.FOLLOWING)
 LAWS = (
     "speed", "tool speed", "motion", "told", "stop", "owner", "age", "way", "ends", "queues", "recorded", "recovery",
 )  # fmt: skip
@@ -108,11 +111,14 @@ class Laws:
         self.under: Counter[tuple[str, str, str]] = Counter()
         self.lost_recorders: set[Process] = set()
         self.begin_ns = self._scheduler.now_ns
-        self._last: tuple[Array, Array, Process | None] | None = None
+        self._last: tuple[Array, list[float], Process | None] | None = None
         """Newest setpoint: joints, position of the tip, and process of the slave."""
         self._longest_step = numbers.speed_limit * (1.0 + _SLACK) * DT
+        self._least_step = float(np.min(self._longest_step))  # a shorter step breaks no limit
         self._braking = float(np.max(numbers.speed_limit / numbers.braking))
         self._slave: Any = None
+        self._led: Any = None  # stage whose state the cells are
+        self._cells: Any = None
         self._process: Process | None = None
         self._worked = 0.0
         """Time for which the slave's process has run [s]; time in which it was stopped does not count."""
@@ -149,30 +155,35 @@ class Laws:
             self._last = None
             return
         q = found[1][: self._stage.robot.n]
-        tip = self._stage.robot.fk(q)[:3, 3]
+        tip = self._stage.robot.fk(q)[:3, 3].tolist()
         self._judge_owner(slave, process, found[0])
         if self._last is not None and self._last[2] is process:
             step = np.abs(q - self._last[0])
-            self._judge_speed(step, math.dist(tip, self._last[1]))
+            longest = float(step.max())
+            self._judge_speed(step, longest, math.dist(tip, self._last[1]))
             if slave.row["command_status"] == CommandStatus.FRESH:  # otherwise the slave may still brake
-                self._judge_age(found[0], bool(step.any()))
+                self._judge_age(found[0], longest > 0.0)
         self._last, self._stage.setpoint = (q, tip, process), q
 
     def _judge_owner(self, slave: Any, process: Process | None, stamp_ns: int) -> None:
         """Check that only one sender commands the arm at a time."""
         self._count("owner")
-        is_driven = slave.stage is not None and slave.stage.motion.source == "velocity"
+        if slave.stage is not self._led:
+            self._led = slave.stage
+            self._cells = None if self._led is None else Cells(self._led.state)
+        cells = self._cells
+        is_driven = cells is not None and not cells["is_busy"] and cells["motion"] != _FOLLOWING
         if wrong := self._owner.judge(process, stamp_ns, is_driven=is_driven):
             self._break("owner", wrong)
         self._stage.commanded_ns = self._owner.followed_ns
 
-    def _judge_speed(self, step: Array, way: float) -> None:
+    def _judge_speed(self, step: Array, longest: float, way: float) -> None:
         self._count("tool speed")
         most = self._numbers.tool_speed
         if way > most * DT * (1.0 + _CURVED):
             self._break("tool speed", f"the setpoint of the tip moved at {way / DT:.3g} m/s, at most {most:.3g}")
         self._count("speed")
-        if (step > self._longest_step).any():
+        if not longest <= self._least_step and (step > self._longest_step).any():
             speed = step / DT
             joint = int(np.argmax(speed / self._numbers.speed_limit))
             self._break(
@@ -180,7 +191,7 @@ class Laws:
                 f"the setpoint of joint {joint + 1} moved at {speed[joint]:.3g}, beyond its drive's "
                 f"{self._numbers.speed_limit[joint]:.3g}",
             )
-        if step.max() > _SLACK * DT:
+        if longest > _SLACK * DT:
             self._moved_at = self._worked
 
     def _judge_age(self, stamp_ns: int, moves: bool) -> None:

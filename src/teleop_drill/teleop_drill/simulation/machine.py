@@ -6,28 +6,56 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
-from teleop_drill.simulation.scheduler import BEGIN_NS, EPOCH_NS, Scheduler, Turns
+from teleop_core.kernels.fields import record
+from teleop_drill.simulation.reach import BEGIN_NS, EPOCH_NS, Context
+from teleop_drill.simulation.scheduler import Scheduler, Turns
 
 _ROOM = 212_992
 """Size of the buffer of a socket between processes [bytes], as in Linux."""
 
 
-@dataclass
 class Clock:
     """The system's clock of a machine.
 
-    Attributes:
+    Args:
         offset_ns: Error of the clock [ns].
         drift: Relative error of the clock's rate.
     """
 
-    offset_ns: int = 0
-    drift: float = 0.0
+    def __init__(self, offset_ns: int = 0, drift: float = 0.0) -> None:
+        self._offset_ns, self._drift = offset_ns, drift
+        self.users: list[Any] = []
+        """Records of :class:`~teleop_drill.simulation.reach.Context` of processes that have this clock."""
+
+    @property
+    def offset_ns(self) -> int:
+        """Error of the clock [ns]; can be set."""
+        return self._offset_ns
+
+    @offset_ns.setter
+    def offset_ns(self, value: int) -> None:
+        self._offset_ns = value
+        self.tell()
+
+    @property
+    def drift(self) -> float:
+        """Relative error of the clock's rate; can be set."""
+        return self._drift
+
+    @drift.setter
+    def drift(self, value: float) -> None:
+        self._drift = value
+        self.tell()
+
+    def tell(self) -> None:
+        """Write the errors into the records of its users."""
+        for one in self.users:
+            one["offset_ns"], one["drift"] = self._offset_ns, self._drift
 
     def ahead_ns(self, now_ns: int) -> int:
         """How far this machine's clock is ahead of the given monotonic time [ns]."""
-        ahead_ns = EPOCH_NS + self.offset_ns
-        return ahead_ns + round(self.drift * (now_ns - BEGIN_NS)) if self.drift else ahead_ns
+        ahead_ns = EPOCH_NS + self._offset_ns
+        return ahead_ns + round(self._drift * (now_ns - BEGIN_NS)) if self._drift else ahead_ns
 
 
 @dataclass
@@ -56,7 +84,12 @@ class Process(Turns):
         super().__init__()
         self.machine, self.name, self._work = machine, name, work
         self.exit_code: int | None = None
-        self.stopped_ns, self.clock = 0, machine.clock
+        self.stopped_ns = 0
+        self.context: Any = record(Context)
+        """Clocks of the process for kernels."""
+        self.context["now_at"] = machine.scheduler.now_at
+        self.clock = machine.clock
+        self.use_clock(machine.clock)
         self.room: int | None = None
         """Number of bytes that the process may still write; None for no limit."""
         self.disk_delay = 0.0
@@ -73,6 +106,13 @@ class Process(Turns):
         """Functions that are called when the process continues; the argument is the time at which it was stopped [ns].
         """
         self.main = machine.scheduler.spawn(self, "main", self._run)
+
+    def use_clock(self, clock: Clock) -> None:
+        """Read the system's time from a clock from now on."""
+        former, self.clock = self.clock, clock
+        former.users = [one for one in former.users if one is not self.context]
+        clock.users.append(self.context)
+        clock.tell()
 
     def start(self) -> None:
         """Start the process."""

@@ -11,14 +11,11 @@ from itertools import count
 from random import Random
 from typing import Any
 
+import numpy as np
 from greenlet import GreenletExit, getcurrent, greenlet
 
-BEGIN_NS = 1_000_000_000_000
-"""First value of monotonic clocks [ns]."""
-EPOCH_NS = 1_800_000_000_000_000_000
-"""Offset of the system's clocks from the monotonic clocks [ns]."""
-_LOOK_NS = 60
-"""Time to read a clock [ns]; it makes time pass in a loop that only reads the clock."""
+from teleop_drill.simulation.reach import BEGIN_NS, LOOK_NS
+
 _BREAK_NS = 1_000_000
 """Longest time for which an interrupted thread waits for other threads of its process [ns]."""
 
@@ -147,10 +144,15 @@ class Lock:
             self._scheduler.wake(self._waiting.pop(0))
 
     def __enter__(self) -> object:
-        return self.acquire()
+        if self._is_taken:
+            return self.acquire()
+        self._is_taken = True
+        return True
 
     def __exit__(self, *_: object) -> None:
-        self.release()
+        self._is_taken = False
+        if self._waiting:
+            self.release()
 
 
 class Scheduler:
@@ -161,14 +163,18 @@ class Scheduler:
         breaks: Share of the clock readings after which the interpreter switches to another thread.
 
     Attributes:
-        now_ns: Monotonic time [ns].
+        now_at: Address of the monotonic time, for kernels.
+        error: Error that cannot pass through compiled code; it ends the simulation.
         hub: Greenlet in which the scheduler decides.
         current: The running strand, or the creator of the scheduler outside of the simulation.
         costs: Durations of all operations.
     """
 
     def __init__(self, seed: int, breaks: float = 0.0) -> None:
-        self.seed, self.now_ns, self.breaks = seed, BEGIN_NS, breaks
+        self.seed, self.breaks = seed, breaks
+        now = np.full(1, BEGIN_NS)
+        self._now, self.now_at = now.data, int(now.ctypes.data)
+        self.error: BaseException | None = None
         self._breaking = self.random("breaks")
         self.costs = Costs(self.random("costs"))
         self._queue: list[tuple[int, int, Any, int, bool]] = []
@@ -181,12 +187,26 @@ class Scheduler:
         """Random generator for one purpose only."""
         return Random(f"{self.seed}/{name}")
 
+    @property
+    def now_ns(self) -> int:
+        """Monotonic time [ns]; can be set."""
+        return self._now[0]
+
+    @now_ns.setter
+    def now_ns(self, value: int) -> None:
+        self._now[0] = value
+
+    def keep(self, error: BaseException) -> None:
+        """Keep the first error that cannot pass through compiled code, until the strand gives up its turn."""
+        self.error = self.error or error
+
     # -- for strands -----------------------------------------------------------------------------
 
     def look_ns(self) -> int:
         """Time [ns] for a caller that reads a clock."""
-        self.now_ns += _LOOK_NS
-        return self.now_ns
+        now = self._now
+        now[0] = now_ns = now[0] + LOOK_NS
+        return now_ns
 
     def look_and_pass(self) -> int:
         """Like :meth:`look_ns`; sometimes other threads of the process run before it returns."""
@@ -274,6 +294,8 @@ class Scheduler:
             if what is self._outside:
                 return value
             what.greenlet.switch(value)
+            if self.error is not None:
+                raise self.error
             cost_ns = self.costs.turn() + process.slow_ns
             what.used_ns += cost_ns
             process.busy_ns = self.now_ns + cost_ns

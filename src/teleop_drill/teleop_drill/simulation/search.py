@@ -6,9 +6,10 @@ from collections import Counter, deque
 from collections.abc import Iterator, Sequence
 from concurrent.futures import Future
 from dataclasses import replace
+from functools import partial
 from random import Random
 
-from teleop_core.base.workers import workers
+from teleop_core.base.workers import apart, workers
 from teleop_core.graph.operation import State
 from teleop_core.nodes.crews import Processes
 from teleop_core.slave.operation.states import COMMANDS
@@ -16,7 +17,7 @@ from teleop_drill.simulation import sometimes
 from teleop_drill.simulation.branches import Branches
 from teleop_drill.simulation.planned import Schedule
 from teleop_drill.simulation.schedules import BEGIN, END, KINDS, OF_PROCESS, Fault, commanded
-from teleop_drill.simulation.seeds import PROCESSES, Found
+from teleop_drill.simulation.seeds import PROCESSES, Found, warm
 from teleop_drill.simulation.store import Store
 
 _MOST = 30
@@ -25,7 +26,6 @@ _FRESH = 0.4
 """Share of schedules that are drawn anew; the others are bred from kept ones."""
 _AHEAD = 4
 """A schedule is chosen when all but this many before it are known, so that the number of cores changes nothing."""
-_ROUND = 40  # schedules that share processes: killed simulated processes stay in memory
 _BREAKS = 0.0005
 _LEADS = {
     State.DISABLED.name: ("reset", "disable"),
@@ -217,19 +217,25 @@ def search(store: Store, seed: int, seconds: float, cores: int | None = None) ->
         found, branches = waiting.popleft().result()
         return found, store.add(found, branches)
 
-    while time.monotonic() < end:
-        with workers(cores) as pool:
-            for _ in range(_ROUND):
-                if time.monotonic() >= end:
-                    break
-                if len(waiting) >= _AHEAD:
-                    yield take()
-                waiting.append(pool.submit(run_measured, chosen.choose()))
-            while waiting:
+    with workers(cores, _warm) as pool:
+        while time.monotonic() < end:
+            if len(waiting) >= _AHEAD:
                 yield take()
+            waiting.append(pool.submit(_run_apart, chosen.choose()))
+        while waiting:
+            yield take()
 
 
 _branches = Branches()
+
+
+def _warm() -> None:
+    warm()
+    _branches.begin()
+
+
+def _run_apart(schedule: Schedule) -> tuple[Found, list[str]]:
+    return apart(partial(run_measured, schedule))
 
 
 def run_measured(schedule: Schedule) -> tuple[Found, list[str]]:

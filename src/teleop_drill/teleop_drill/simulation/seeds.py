@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 
-from teleop_core.base.workers import workers
+from teleop_core.base.workers import apart, workers
 from teleop_core.graph.graph import RECORDER_NAME
 from teleop_core.graph.operation import State
 from teleop_core.nodes.crews import Processes
@@ -22,7 +22,8 @@ from teleop_drill.simulation.bus import Bus
 from teleop_drill.simulation.drilled_session import DrilledSession
 from teleop_drill.simulation.laws import Broken, Laws
 from teleop_drill.simulation.machine import Machine, Process
-from teleop_drill.simulation.scheduler import BEGIN_NS, Scheduler
+from teleop_drill.simulation.reach import BEGIN_NS
+from teleop_drill.simulation.scheduler import Scheduler
 from teleop_drill.simulation.schedules import KINDS, Fault, draw
 
 PROCESSES = {Processes.SIDES: ("hand_side", "slave_side", RECORDER_NAME), Processes.ONE: (SESSION, RECORDER_NAME)}
@@ -39,7 +40,7 @@ _CIRCLE = (
     "slave.operation.tool_speed=0.5",
     "slave.start_speed=1.0",
 )
-_ROUND = 20  # schedules that are chosen together and share processes: killed simulated processes stay in memory
+_ROUND = 20  # schedules that are chosen together
 
 
 @dataclass
@@ -226,13 +227,23 @@ def run_seeds(
     """
     cores = cores or len(os.sched_getaffinity(0))
     met: Counter[tuple[str, str]] = Counter()
-    for begin in range(0, count, _ROUND):
-        threes = (range(first + 3 * k, first + 3 * k + 3) for k in range(begin, min(begin + _ROUND, count)))
-        seeds = [rarest(three, met, processes) for three in threes]
-        with workers(min(cores, len(seeds))) as pool:
-            for found in pool.map(partial(run_seed, processes=processes, breaks=breaks), seeds):
+    with workers(min(cores, count), warm) as pool:
+        for begin in range(0, count, _ROUND):
+            threes = (range(first + 3 * k, first + 3 * k + 3) for k in range(begin, min(begin + _ROUND, count)))
+            seeds = [rarest(three, met, processes) for three in threes]
+            for found in pool.map(partial(_run_apart, processes, breaks), seeds):
                 met.update(found.met)
                 yield found
+
+
+def warm() -> None:
+    """Load and compile whatever schedules need, so that copies of this process have it."""
+    for processes in PROCESSES:
+        run_seed(0, (), processes=processes)
+
+
+def _run_apart(processes: Processes, breaks: float, seed: int) -> Found:
+    return apart(partial(run_seed, seed, processes=processes, breaks=breaks))
 
 
 def rarest(seeds: Sequence[int], met: Counter[tuple[str, str]], processes: Processes) -> int:

@@ -69,6 +69,7 @@ class SimulatedSession:
         """Newest process of each name."""
         self.crews: dict[Process, Crew] = {}
         """Nodes of each process."""
+        self._nodes: dict[Process, dict[str, CoreNode]] = {}
         self.recordings: list[Path] = []
         self._begun_ns: list[int] = []
         self._bystander: Process | None = None
@@ -178,8 +179,12 @@ class SimulatedSession:
     def node(self, name: str) -> CoreNode | None:
         """A running node, for inspection; None if the node does not run."""
         process = self.process_of(name)
-        crew = None if process is None or process.is_dead else self.crews.get(process)
-        return None if crew is None else next((one for one in crew.nodes if one.member_name == name), None)
+        if process is None or process.is_dead or process not in self.crews:
+            return None
+        nodes = self._nodes.get(process)
+        if nodes is None:
+            nodes = self._nodes[process] = {one.member_name: one for one in self.crews[process].nodes}
+        return nodes.get(name)
 
     def is_running(self, node: str) -> bool:
         """Whether the process of a node runs."""

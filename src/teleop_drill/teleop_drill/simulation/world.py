@@ -3,6 +3,8 @@
 from collections.abc import Callable, Mapping
 from typing import Any
 
+import numpy as np
+
 from teleop_core.base.background import Background
 from teleop_core.graph.layers import RealTimeParameters
 from teleop_core.middleware.world import Hooks
@@ -11,6 +13,7 @@ from teleop_drill.simulation.disk import Disk
 from teleop_drill.simulation.lifecycle import SimulatedLifecycleNode
 from teleop_drill.simulation.machine import Listener, Process, SocketEnd
 from teleop_drill.simulation.nodes import SimulatedExecutor, SimulatedNode
+from teleop_drill.simulation.reach import functions
 from teleop_drill.simulation.scheduler import Lock, Strand
 
 _PLACE = "recorder"
@@ -37,8 +40,9 @@ class SimulatedWorld:
         self.sleep: Callable[[float], None] = self._scheduler.sleep
 
     def functions(self) -> dict[str, int]:
-        """None: kernels cannot reach the simulated middleware."""
-        return {}
+        """Addresses of the C functions of the simulated middleware; none if threads may be interrupted."""
+        context = int(np.asarray(self.process.context).ctypes.data)
+        return {**functions(), "context": context} if self._bus.reaches else {}
 
     def time_ns(self) -> int:
         """Time of the system's clock [ns]."""

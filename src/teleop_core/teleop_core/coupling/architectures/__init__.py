@@ -11,7 +11,6 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numba import types
 
 from teleop_core.base import PartError, Registry, part_check
 from teleop_core.base.registry import places, tried
@@ -19,8 +18,8 @@ from teleop_core.kernels import Array, fenced, is_whole, numbers_of, pointer
 
 __all__ = ["ARCHITECTURES", "MEMORY", "Architecture", "register_architecture"]
 
-_ROW = types.float64[::1]
-PUSH = types.void(_ROW, _ROW, _ROW, _ROW, types.float64, _ROW)
+_ROW = "float64[::1]"
+PUSH = f"void({_ROW}, {_ROW}, {_ROW}, {_ROW}, float64, {_ROW})"
 """Signature of a push kernel, so that one compiled stage serves every kind."""
 MEMORY = 12
 """Number of values that an architecture remembers."""

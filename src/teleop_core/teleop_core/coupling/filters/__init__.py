@@ -11,7 +11,6 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numba import types
 
 from teleop_core.base import PartError, Registry, part_check
 from teleop_core.base.registry import places, tried
@@ -19,8 +18,8 @@ from teleop_core.kernels import Array, fenced, is_whole, numbers_of, pointer
 
 __all__ = ["LONGEST_NS", "MEMORY", "TREMOR_FILTERS", "TremorFilter", "register_tremor_filter"]
 
-_ROW = types.float64[::1]
-FILTER = types.float64(_ROW, _ROW, types.float64, types.float64)
+_ROW = "float64[::1]"
+FILTER = f"float64({_ROW}, {_ROW}, float64, float64)"
 """Signature of a filter kernel, so that one compiled stage serves every kind."""
 MEMORY = 32
 """Number of values that a filter remembers for each coordinate."""

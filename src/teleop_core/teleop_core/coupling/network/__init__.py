@@ -11,7 +11,6 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numba import types
 
 from teleop_core.base import PartError, Registry, part_check
 from teleop_core.base.registry import places, tried
@@ -19,8 +18,8 @@ from teleop_core.kernels import Array, fenced, is_whole, numbers_of, pointer
 
 __all__ = ["CHANCES", "LOST", "MEMORY", "NETWORKS", "Network", "register_network"]
 
-_ROW = types.float64[::1]
-DRAW = types.float64(_ROW, _ROW, _ROW, types.float64)
+_ROW = "float64[::1]"
+DRAW = f"float64({_ROW}, {_ROW}, {_ROW}, float64)"
 """Signature of a draw kernel, so that one compiled stage serves every kind."""
 LOST = -1.0
 """Result of a draw for a lost packet."""

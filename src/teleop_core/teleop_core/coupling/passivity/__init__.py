@@ -12,7 +12,6 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numba import types
 
 from teleop_core.base import PartError, Registry, part_check
 from teleop_core.base.registry import places, tried
@@ -21,9 +20,9 @@ from teleop_core.kernels import Array, fenced, is_whole, kernel, numbers_of, poi
 
 __all__ = ["MEMORY", "PASSIVITIES", "Passivity", "leave_command", "register_passivity"]
 
-_ROW = types.float64[::1]
-HAND = types.void(_ROW, _ROW, _ROW, _ROW, _ROW, _ROW, _ROW, _ROW, _ROW, types.float64, types.float64)
-SLAVE = types.void(_ROW, _ROW, _ROW, _ROW, _ROW, _ROW, _ROW, _ROW, _ROW, types.float64)
+_ROW = "float64[::1]"
+HAND = f"void({_ROW}, {_ROW}, {_ROW}, {_ROW}, {_ROW}, {_ROW}, {_ROW}, {_ROW}, {_ROW}, float64, float64)"
+SLAVE = f"void({_ROW}, {_ROW}, {_ROW}, {_ROW}, {_ROW}, {_ROW}, {_ROW}, {_ROW}, {_ROW}, float64)"
 """Signatures of both kernels, so that one compiled stage serves every kind."""
 MEMORY = 12
 """Number of values that each side of a kind remembers."""

@@ -12,7 +12,6 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numba import types
 
 from teleop_core.base import PartError, Registry, part_check
 from teleop_core.base.registry import places, tried
@@ -21,8 +20,8 @@ from teleop_core.kernels import Array, fenced, is_whole, numbers_of, pointer
 
 __all__ = ["MEMORY", "SCENE", "TASKS", "Act", "Miss", "Task", "register_task"]
 
-_ROW = types.float64[::1]
-JUDGE = types.void(_ROW, _ROW, _ROW, _ROW)
+_ROW = "float64[::1]"
+JUDGE = f"void({_ROW}, {_ROW}, {_ROW}, {_ROW})"
 """Signature of a task's kernel, so that one compiled stage serves every task."""
 MEMORY = 64
 """Number of values that a task remembers."""

@@ -49,11 +49,10 @@ def _closed(ik: object, ik_all: object) -> Kernels:
     return Kernels(fk=dh_kernels.fk, jacobian=dh_kernels.jacobian, ik=ik, ik_all=ik_all)  # type: ignore[arg-type]
 
 
-def _searched() -> Kernels:
-    return _closed(dh_kernels.ik, dh_kernels.ik_all)
-
-
-SEARCH = Solution(text="search: damped least squares from the seed, then from 24 starts or more", kernels=_searched())
+SEARCH = Solution(
+    text="search: damped least squares from the seed, then from 24 starts or more",
+    kernels=_closed(dh_kernels.ik, dh_kernels.ik_all),
+)
 
 
 @dataclass(kw_only=True)
@@ -76,7 +75,7 @@ class _Chain:
         """Whether the axes of some joints are parallel."""
         axes = [self.frames()[joint][:3, 2] for joint in joints]
         off = max(float(length(np.cross(axes[0], axis))) for axis in axes[1:])
-        return self._counts(off, joints, f"are {_degrees(off):.3g}° from parallel")
+        return self._counts(off, joints, f"are {math.degrees(math.asin(min(off, 1.0))):.3g}° from parallel")
 
     def do_meet(self, joints: Sequence[int]) -> bool:
         """Whether three neighbouring axes meet in a point; if so, move their frames' origins there."""
@@ -156,10 +155,6 @@ class _Chain:
         in_order = groups if self.order > 0.0 else groups[::-1]
         is_nearly = float(self.off > _EXACT)
         return (self.order, *self.signs, *in_order, *rows, *beside, is_nearly)
-
-
-def _degrees(sine: float) -> float:
-    return math.degrees(math.asin(min(sine, 1.0)))
 
 
 def _chains(kinds: Sequence[float], fixed: Sequence[Array], reach: float) -> tuple[_Chain, _Chain]:

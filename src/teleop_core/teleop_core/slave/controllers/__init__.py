@@ -11,7 +11,6 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numba import types
 
 from teleop_core.base import ParameterError, PartError, Registry, part_check
 from teleop_core.base.registry import places, tried
@@ -22,8 +21,8 @@ from teleop_core.robots.robot import Robot
 
 __all__ = ["CONTROLLERS", "Controller", "drives_and_poles", "per_joint", "register_controller"]
 
-_ROW, _TABLE = types.float64[::1], types.float64[:, ::1]
-CONTROL = types.void(_TABLE, _TABLE, _ROW, _ROW, _ROW, _ROW, types.float64, _ROW)
+_ROW, _TABLE = "float64[::1]", "float64[:, ::1]"
+CONTROL = f"void({_TABLE}, {_TABLE}, {_ROW}, {_ROW}, {_ROW}, {_ROW}, float64, {_ROW})"
 """Signature of a control kernel, so that one compiled slave serves every law."""
 Begin = Callable[[Array, Array, Array], None]
 Shift = Callable[[Array, Array], None]

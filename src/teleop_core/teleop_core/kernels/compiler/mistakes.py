@@ -12,7 +12,7 @@ from numba import types
 
 from teleop_core.base.errors import KernelError
 
-_PACKAGE = Path(__file__).parents[1]
+_PACKAGE = Path(__file__).parents[2]
 _LONGEST = 300  # largest number of characters of a reason: two or three lines of a terminal
 
 # Names in numba's messages: a record has all its fields in its name, a literal has its type and value.

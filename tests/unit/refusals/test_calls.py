@@ -1,17 +1,26 @@
-"""Impossible numbers: what no part can be made of is refused by the name of the number."""
+"""Calls with what cannot be: refused in one line that names the value, by the class of the error."""
 
 import math
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 import pytest
 
+import teleop_core as tc
+from teleop_console import choices
+from teleop_console.guard import Guard
+from teleop_console.server import listen
+from teleop_core.bags.recording import RecordingParameters
 from teleop_core.base import TeleopError, build
 from teleop_core.coupling.filters.tremor_filter import TremorFilterParameters
 from teleop_core.coupling.fixtures.remote_centre import RemoteCentreParameters
+from teleop_core.coupling.mapping.gains import FixtureParameters
 from teleop_core.coupling.mapping.jaw_command import JawCommandParameters
+from teleop_core.graph.graph import Delay
 from teleop_core.hand.master.master_bridge import POSE_MESSAGES, MasterBridgeParameters
 from teleop_core.hand.operators.behaviour import OperatorParameters
 from teleop_core.hand.operators.behaviour import PressParameters as HandButtons
@@ -20,7 +29,7 @@ from teleop_core.hand.operators.remote import RemoteHand
 from teleop_core.hand.operators.tour import TourParameters
 from teleop_core.hand.tasks.insert import InsertParameters
 from teleop_core.kernels.geometry import checked_array
-from teleop_core.robots import load_robot
+from teleop_core.robots import load_robot, parse_table, robot_from_table
 from teleop_core.robots.arms.as_chain import true_chain
 from teleop_core.robots.drives import ENTRIES, Drives, independent_axes
 from teleop_core.robots.hardware import Hardware
@@ -37,14 +46,22 @@ from teleop_core.shapes.path import PathParameters
 from teleop_core.shapes.plane import PlaneParameters
 from teleop_core.slave.bridges.jaw_bridge import JawBridgeParameters
 from teleop_core.slave.jaw.parameters import GripObjectParameters, PegParameters
-from teleop_core.slave.operation import OperationParameters
+from teleop_core.slave.operation import OperationParameters, command_event
 from teleop_core.slave.parameters import ReferenceFilterParameters
 from teleop_core.slave.trajectory import cubic_move, shortest_move_time
 from teleop_core.slave.world.button import ButtonParameters
+from teleop_drill import drill
+from teleop_lab import Study, Tuning
 from teleop_lab.calibration import Measured, appendix_e, simulate
+from teleop_lab.experiments import Comparison, Tolerance, absolute, factor, percent
+from teleop_lab.studies import SearchRange
+from teleop_lab.studies.printed import read_printed
 from teleop_machines import mma_balance, mma_models, mobility
+from teleop_machines.drives import electric_cylinders
 from teleop_machines.three_finger_hand import Hand
 
+TABLE: dict[str, Any] = {"name": "a", "convention": "modified", "angles": "degrees", "rows": [{"theta": "q"}]}
+CHAIN = TABLE | {"rows": [{"theta": "q", "lower": -150, "upper": 150}]}
 ZERO, Q = (0.0, 0.0, 0.0), np.zeros((3, 6))
 BOX = LinkInertia(name="box", mass=1.0, center=np.zeros(3), inertia=np.eye(3))
 
@@ -52,6 +69,21 @@ BOX = LinkInertia(name="box", mass=1.0, center=np.zeros(3), inertia=np.eye(3))
 def built(group: type[object]) -> Callable[..., object]:
     """Values of a group of parameters, built as from a file."""
     return lambda **values: build(group, values)
+
+
+def study(changes: Any) -> object:
+    whole = Study("point", {"display.latency": (0.0, 0.1)}, (1, 2), ["task.time_s"], {"teleop.duration": 1.0})
+    return replace(whole, **changes).points()
+
+
+def tuning(changes: Any) -> object:
+    return replace(
+        Tuning("coarse_box", {"coarse_gain": SearchRange(0.2, 1.0)}, (1,), "position_error_mm.rms"), **changes
+    )
+
+
+def printed(content: Any) -> object:
+    return read_printed(content, ["task.time_s"], 2)
 
 
 operator, operation, lag = built(OperatorParameters), built(OperationParameters), built(ReferenceFilterParameters)
@@ -161,6 +193,90 @@ CASES = [
     (partial(Hand({}).contact_points, np.zeros(8)), "^q "),
     (partial(Hand({}).object_pose, np.zeros((3, 3))), "points"), (partial(Hand({}).contacts_of, np.zeros((4, 4))), "T"),
     (partial(RemoteHand().press, "gripper"), "clutch, fixture, mode"),
+    # chains of joints, and their drives
+    *((partial(robot_from_table, TABLE | {"rows": rows}), f"^{name} is") for rows, name in (
+        ([], "rows"), ("theta", "rows"), ([{"a": 1.0}], "rows"), ([3], "row 1"),
+        ([{"theta": "q", "alpha": math.nan}], "row 1 alpha"), ([{"theta": "q", "a": True}], "row 1 a"),
+        ([{"theta": "q", "a": [1]}], "row 1 a"), ([{"theta": "q", "a": 1e6}], "row 1 a"),
+        *(([{"theta": theta}], "row 1 theta") for theta in ("p", "2 q", "q + .", "q - 1e")),
+        ([{"alpha": "q"}], "row 1 alpha"), ([{"theta": "q", "d": "q"}], "row 1 d"), ([{"d": "q"}], "row 1 lower"),
+        ([{"theta": "q", "upper": 999999}], "row 1 upper"),
+        ([{"theta": "q", "lower": 10, "upper": -10}], "row 1 lower"),
+        ([{"theta": "q", "lower": -10, "upper": 10, "home": 20}], "row 1 home"),
+        ([{"theta": "q"}, {"a": 1.0, "lower": 0.0}], "row 2"), ([{"theta": "q", "twist": 3}], "row 1 entry"),
+        ([{"theta": "q", "name": "yaw"}, {"a": 1.0, "theta": "q", "name": "yaw"}], "rows"))),
+    *((partial(parse_table, table), words) for table, words in (
+        (None, "^table is None"), ([], "^table is"), ({"convention": "modified", "rows": [{"theta": "q"}]}, "^name is"),
+        (TABLE | {"name": 3}, "^name is 3"), (TABLE | {"convention": "distant"}, "one of: standard, modified"),
+        (TABLE | {"angles": "grad"}, "radians, degrees"), (TABLE | {"task": ["up"]}, "^task is 'up'"),
+        (TABLE | {"task": []}, "^task is"), (TABLE | {"row": []}, "one of: rows, name"))),
+    *((partial(robot_from_table, CHAIN | {"drives": wrong}), f"^{re.escape(name)} is") for wrong, name in (
+        ([1.0], "drives"), ({"q9": {}}, "drives joint"), ({"q1": 3.0}, "drives q1"),
+        ({"q1": {"mass": 1.0}}, "drives q1 entry"), ({"q1": {"inertia": 0.0}}, "drives q1 inertia"),
+        ({"q1": {"coulomb": -1.0}}, "drives q1 coulomb"), ({"q1": {"speed_limit": True}}, "drives q1 speed_limit"),
+        ({"q1": {"speed_limit": "fast"}}, "drives q1 speed_limit"), ({"q1": {"bandwidth": 1e4}}, "drives q1 bandwidth"),
+        ({"q1": {"inertia": 1e-6, "viscous": 1.0}},
+         "drives q1 (viscous + coulomb / friction_speed) / inertia"))),
+    *of(partial(replace, robot_from_table(CHAIN)), home=[3.0], lower=[3.0], upper=[np.nan]),
+    *of(partial(replace, robot_from_table(CHAIN)), "^home must have", home=[0.0, 0.0]),
+    *of(partial(replace, robot_from_table(CHAIN)), "^drives must have", drives=electric_cylinders(2)),
+    (partial(load_robot, "r2d2"), "one of: .*rcrt1"), (partial(load_robot, "cubes.xml", drive="magic"), "effort"),
+    (partial(load_robot, "mma", d7=-0.03507, d9=-0.03840), "^d7 is"),  # signed offsets have no closed form
+    # sessions step by step, and commands
+    *((lambda move=move: tc.Session().command(**move), words) for move, words in (
+        ({"place": [0.0, 0.0]}, "place"), ({"place": [0.5, 0.0, 0.0]}, "-0.08 to 0.08"),
+        ({"place": [np.nan, 0.0, 0.0]}, "x"), ({"place": [0.0] * 3, "jaw": 2.0}, "jaw"))),
+    (lambda: tc.Session(period=0.0005), "period"),
+    (lambda: tc.Session().values("slave/pose"), "one of: slave/servo_jp"), (partial(command_event, "go"), "enable"),
+    (partial(drill.chosen, ("kill_slave_simm",), is_composed=False), "kill_slave_sim"),
+    *((partial(Delay.parse, f"slave/servo_jp{text}"), rf"^teleop.delays is 'slave/servo_jp{text}'.*servo_jp=0\.02")
+      for text in ("", "=", "=soon", "=-0.1", "=nan", "=61")),
+    (partial(Delay.parse, "=0.1"), "^teleop.delays is '=0.1'"),
+    *of(RecordingParameters, "topic=n", every_of=("slave/measured_js",)),
+    *of(RecordingParameters, "topic=n", every_of=("slave/measured_js=0",)),
+    # the console
+    *((partial(Guard, 8080, token), "token") for token in ("", "two words", "a;b", "a&b", "a=b", "ä", 'a"b', "a\nb")),
+    *((partial(listen, "127.0.0.1", port), f"^port is {port}") for port in (65536, -1)),
+    *((partial(listen, host, 0), f"^host is '{host}'") for host in ("192.0.2.1", "no such host")),
+    *((partial(choices.checked, words), f"^{told} is") for words, told in (
+        ({"shell": "x"}, "field"), ({"robot": "a\nb"}, "robot"), ({"robot": "x" * 501}, "robot"),
+        ({"robot": "/etc/passwd"}, "robot"), ({"plant": "[ideal, file=x]"}, "plant"),
+        ({"robot": "a.urdf", "tip": "x, drives=y.yaml"}, "tip"))),
+    # experiments and studies
+    (lambda: Tolerance("near", 1.0), "^kind is"), *((make, "^amount is") for make in (
+        partial(percent, 0.0), partial(absolute, math.nan), partial(factor, 1.0), partial(Tolerance, "exact", 0.1))),
+    (partial(Comparison, quantity="q", predicted=math.inf), "^predicted of q is"),
+    *((partial(study, changes), words) for changes, words in (
+        ({"swept": {"display.latenzy": (0.0,)}}, "display.latency"),
+        ({"swept": {"display.latency": (5.0,)}}, "display.latency"),
+        ({"swept": {"display.latency": ()}}, "at least one value"),
+        ({"swept": {"display.latency": (0.1, 0.1)}}, "differ"), ({"metrics": ["task.tme_s"]}, "task.time_s"),
+        ({"metrics": []}, "key of a score"), ({"metrics": ["session.scenario"]}, "key of a score"),
+        ({"metrics": ["jaw.grips"]}, "no stage writes slave/jaw/grip"),
+        ({"metrics": ["insertion.depth_mm"]}, "which has no insertion"), ({"seeds": (-1,)}, "whole numbers >= 0"),
+        ({"seeds": (1, 10**50)}, "at most 18 digits"),
+        *(({"seeds": range(n)}, f"sessions of a study is {2 * n}, must be at most 1000000") for n in (10**9, 600_000)),
+        ({"settings": {"world": "sphere", "world.place": (9.0, 0.0, 0.0)}}, "within reach .* no nearer than 8"))),
+    *((partial(tuning, changes), words) for changes, words in (
+        ({"searched": {}}, "at least one parameter"), ({"metric": "task.tim"}, "task.time_s"),
+        ({"searched": {"coarse_gian": SearchRange(0.1, 1.0)}}, "coarse_gain"),
+        ({"searched": {"coarse_gain": SearchRange(1.0, 0.1)}}, "low below high"),
+        ({"searched": {"coarse_gain": SearchRange(0.0, 1.0, is_log=True)}}, "above 0 with log"),
+        ({"searched": {"coarse_gain": SearchRange(0.1, 1000.0)}}, "10"))),
+    *((partial(printed, content), words) for content, words in (
+        ({"source": "people", "task.time_s": [1.0, 2.0]}, "two or more"),
+        ({"people": 5, "task.time_s": [1.0, 2.0]}, "source"),
+        ({"source": "people", "people": 5, "task.error_share": [1.0, 2.0]}, "one of the study's metrics: task.time_s"),
+        *(({"source": "people", "people": 5, "task.time_s": values}, "one for each condition")
+          for values in ([1.0], ["late", 2.0], 2.0)))),
+    *((partial(build, FixtureParameters, {f"{name}.parts": parts}), words) for name in ("union", "intersection")
+      for parts, words in (
+        ((), "1 to 8 parts"), (("sphere",) * 9, "1 to 8 parts"), (("sphere", "tube radius=0.02"), r"parts\[1\]"),
+        *((parts, "begins with one of box, capsule") for parts in (("sphere", "union"), ("not", "sphere"))),
+        (("sphere diameter=0.02", "box"), "radius"), (("sphere radius=2.0", "box"), r"parts\[0\] radius"),
+        (("sphere radius=wide", "box"), "a number, numbers in brackets"),
+        (("sphere radius='wide'", "box"), r"parts\[0\] radius"), (("sphere 0.02", "box"), "then settings such as"),
+        (("sphere", "box at=[0.01, 0.0]"), r"parts\[1\] at"), (("sphere", "box at=['a', 0, 0]"), r"parts\[1\] at"))),
     (partial(RemoteHand().want, np.zeros((2, 7))), r"pose must have shape \(7,\), has \(2, 7\)"),
 ]  # fmt: skip
 

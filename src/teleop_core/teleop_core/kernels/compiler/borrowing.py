@@ -14,7 +14,7 @@ from numba.core.compiler_machinery import AnalysisPass, register_pass
 from numba.core.errors import TypingError
 from numba.core.typed_passes import AnnotateTypes
 
-from teleop_core.kernels.inner_library import InnerLibrary
+from teleop_core.kernels.compiler.inner_library import InnerLibrary
 from teleop_core.kernels.room import room
 
 _LOOKS = frozenset({

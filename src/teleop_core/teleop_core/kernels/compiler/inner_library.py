@@ -58,7 +58,10 @@ def _loaded(codegen: Any, state: Any) -> Any:
     """Library from the cache."""
     name, kind, data = state
     if kind != _KIND:
-        return _plain(codegen, state)
+        made = _plain(codegen, state)
+        if kind == "object":
+            made.object_code = data[0]  # numba itself forgets it when it has loaded the code
+        return made
     made = InnerLibrary(codegen, name)
     made._final_module = made._shared_module = binding.parse_bitcode(data)
     made._finalized = True
