@@ -18,8 +18,8 @@ setup(
         ("share/teleop_scene", ["package.xml"]),
     ],
     entry_points={
-        "teleop_core.scene_readers": ["scene = teleop_scene.reader:READER"],
-        "teleop_core.plants": ["scene = teleop_scene.plant:SCENE"],
-        "teleop_core.stages": ["scene = teleop_scene.world:SCENE_STAGE"],
+        "teleop_core.scene_readers": ["scene = teleop_scene.parts:READER"],
+        "teleop_core.plants": ["scene = teleop_scene.parts:SCENE"],
+        "teleop_core.stages": ["scene = teleop_scene.parts:SCENE_STAGE"],
     },
 )

@@ -16,8 +16,9 @@ from teleop_core.base import TeleopError
 from teleop_core.graph import topics
 from teleop_core.session.configuration import configure
 from teleop_scene import models
-from teleop_scene.camera import Camera, View
+from teleop_scene.camera import Camera
 from teleop_scene.film import topics_of
+from teleop_scene.parameters import View
 
 if TYPE_CHECKING:
     from ros.conftest import Peer

@@ -12,8 +12,8 @@ pytest.importorskip("mujoco", reason="teleop_scene is not installed")
 import teleop_core as tc  # noqa: E402
 from teleop_core.nodes.quality import profile  # noqa: E402
 from teleop_core.nodes.streams import message_type  # noqa: E402
-from teleop_scene.camera import View  # noqa: E402
 from teleop_scene.film import encoded, topics_of  # noqa: E402
+from teleop_scene.parameters import View  # noqa: E402
 
 if TYPE_CHECKING:
     from teleop_core_lerobot import LiveCamera

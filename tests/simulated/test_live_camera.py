@@ -15,9 +15,10 @@ from teleop_core.graph import TICK_NS, topics  # noqa: E402
 from teleop_core.nodes.interrupt import Interrupt  # noqa: E402
 from teleop_core.nodes.streams import Subscription  # noqa: E402
 from teleop_scene import models  # noqa: E402
-from teleop_scene.camera import Camera, View, read_marker  # noqa: E402
+from teleop_scene.camera import Camera, read_marker  # noqa: E402
 from teleop_scene.film import topics_of  # noqa: E402
 from teleop_scene.live_camera import run  # noqa: E402
+from teleop_scene.parameters import View  # noqa: E402
 
 SCENE = models.OWN / "cubes.xml"
 VIEW = View("front", 160, 120, is_marked=True)

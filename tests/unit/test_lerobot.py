@@ -281,7 +281,8 @@ def test_lerobot_makes_both_by_their_type_and_a_loop_runs() -> None:
 def test_pictures_of_a_scene_are_features_before_the_session_and_observations_in_it() -> None:
     pytest.importorskip("mujoco", reason="teleop_scene is not installed")
     from teleop_scene import models
-    from teleop_scene.camera import Camera, View
+    from teleop_scene.camera import Camera
+    from teleop_scene.parameters import View
 
     scene = str(models.OWN / "cubes.xml")
     slave = sides.SlaveSide(scene, "free_motion", fps=20, cameras=["front:96x64"])

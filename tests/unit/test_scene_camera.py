@@ -18,8 +18,9 @@ from rosbags.typesys import Stores, get_typestore  # noqa: E402
 from teleop_core.graph import TICK_NS  # noqa: E402
 from teleop_core.kernels import Array  # noqa: E402
 from teleop_scene import models  # noqa: E402
-from teleop_scene.camera import Camera, View, read_marker, write_marker  # noqa: E402
+from teleop_scene.camera import Camera, read_marker, write_marker  # noqa: E402
 from teleop_scene.film import film  # noqa: E402
+from teleop_scene.parameters import View  # noqa: E402
 
 SCENE = models.OWN / "cubes.xml"
 VIEWS = ("front:320x240", "side:160x120:0.4,-0.8,0.5,0.35,0,0.1")
@@ -200,7 +201,8 @@ def test_what_cannot_be_filmed_is_told_in_one_line(session: tc.Recording, tmp_pa
 
 def test_a_machine_without_egl_says_which_packages_bring_it() -> None:
     code = (
-        "from teleop_scene.camera import Camera, View; from teleop_scene import models; import teleop_core as tc\n"
+        "from teleop_scene.camera import Camera; from teleop_scene.parameters import View\n"
+        "from teleop_scene import models; import teleop_core as tc\n"
         "try: Camera(models.OWN / 'cubes.xml', View('front'))\n"
         "except tc.TeleopError as error: print(error)"
     )

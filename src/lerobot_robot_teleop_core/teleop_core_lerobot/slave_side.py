@@ -73,7 +73,7 @@ def _views(cameras: Sequence[str]) -> list[Any]:
     if not cameras:
         return []
     try:
-        from teleop_scene.camera import View as OfScene
+        from teleop_scene.parameters import View as OfScene
     except ImportError as error:
         raise tc.ParameterError("cameras", tuple(cameras), "left out, or teleop_scene installed") from error
     return [OfScene.parse(text) for text in cameras]

@@ -6,7 +6,6 @@ Pictures have no shadows, no reflections and one sample for each pixel: Mesa wit
 times as fast.
 """
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -14,68 +13,15 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from teleop_core.base import ParameterError, TeleopError, UnknownNameError
+from teleop_core.base import TeleopError, UnknownNameError
 from teleop_core.kernels import Array
 from teleop_scene import models
+from teleop_scene.parameters import View
 
 Pixels = NDArray[np.uint8]
-_FORMS = "NAME, NAME:WIDTHxHEIGHT, or NAME:WIDTHxHEIGHT:X,Y,Z,TO_X,TO_Y,TO_Z"
 _BITS, _BLOCK = 48, 8  # of a marker: ticks that last for 8900 years; pixels of a bit's side, as in a block of JPEG
 _ROWS = 4
 _MOST_SHAPES = 10_000
-LARGEST = 4096
-"""Largest width and height of a picture [px]."""
-
-
-@dataclass(frozen=True)
-class View:
-    """What a camera sees.
-
-    Attributes:
-        name: Name of a camera of the model, or a name of its own with a place.
-        width: Width of a picture [px].
-        height: Height of a picture [px].
-        place: Position of a camera of its own in the world [m], then the point at which it looks [m]; empty for a
-            camera of the model.
-        is_marked: Whether each picture carries the number of its tick in a corner, see :func:`read_marker`.
-    """
-
-    name: str
-    width: int = 640
-    height: int = 480
-    place: tuple[float, ...] = ()
-    is_marked: bool = False
-
-    @classmethod
-    def parse(cls, text: str, *, is_marked: bool = False) -> "View":
-        """A view from ``front``, ``front:320x240``, or ``mine:640x480:1,0,0.5,0,0,0.1``.
-
-        Raises:
-            ParameterError: The text is none of these.
-        """
-        name, _, rest = text.partition(":")
-        size, _, place = rest.partition(":")
-        try:
-            width, height = (int(part) for part in (size or "640x480").split("x"))
-            numbers = tuple(float(part) for part in place.split(",")) if place else ()
-        except ValueError as error:
-            raise ParameterError(
-                "camera", text, "NAME, NAME:WIDTHxHEIGHT, or NAME:WIDTHxHEIGHT:X,Y,Z,TO_X,TO_Y,TO_Z"
-            ) from error
-        if not (16 <= width <= LARGEST and 16 <= height <= LARGEST) or len(numbers) not in {0, 6} or not name:
-            needed = f"a name, sizes of 16 to {LARGEST} pixels, and six numbers or none"
-            raise ParameterError("camera", text, needed)
-        return cls(name, width, height, numbers, is_marked)
-
-    @property
-    def topic(self) -> str:
-        """Name of the topic of its pictures."""
-        return f"camera/{self.name}/image_raw/compressed"
-
-    @property
-    def info_topic(self) -> str:
-        """Name of the topic of its calibration."""
-        return f"camera/{self.name}/camera_info"
 
 
 class Camera:

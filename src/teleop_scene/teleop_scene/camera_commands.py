@@ -65,10 +65,10 @@ def camera(
         settings: Parameters of the session; its network is on the way of the pictures.
     """
     from teleop_core.session import api
-    from teleop_scene.camera import View
     from teleop_scene.film import network_of
     from teleop_scene.live_camera import run
     from teleop_scene.models import file_of
+    from teleop_scene.parameters import View
 
     views = [View.parse(name, is_marked=marker) for name in names]
     network = network_of(api.configuration(files=settings.config, texts=settings.texts))

@@ -29,8 +29,8 @@ from teleop_core.robots.parts import file_of
 from teleop_core.session.configuration import Configuration
 from teleop_core.session.recording import Recording, open_recording
 from teleop_core.session.runner import recorded_configuration
-from teleop_scene.camera import Camera, Pixels, View
-from teleop_scene.world import SceneParameters
+from teleop_scene.camera import Camera, Pixels
+from teleop_scene.parameters import SceneParameters, View
 
 SECOND_NS = 1_000_000_000
 QUALITY = 90

@@ -30,8 +30,9 @@ from teleop_core.nodes.interrupt import Interrupt
 from teleop_core.nodes.parent import Parent
 from teleop_core.nodes.quality import profile
 from teleop_core.nodes.streams import Subscription, message_type
-from teleop_scene.camera import Camera, View
+from teleop_scene.camera import Camera
 from teleop_scene.film import SECOND_NS, calibration, encoded, topics_of
+from teleop_scene.parameters import View
 
 NAME = "camera"
 _NICE = 5

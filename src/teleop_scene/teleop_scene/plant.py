@@ -8,13 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from teleop_core.base import NoParameters, ParameterError
+from teleop_core.base import ParameterError
 from teleop_core.graph import Row, topics
 from teleop_core.kernels import Addressed, Array, Fields, addressed, inner, kernel, record
 from teleop_core.kernels.fields import Integers
 from teleop_core.robots.robot import Robot
 from teleop_core.slave.arm import ArmParts
-from teleop_core.slave.plants import PLANTS, Physics, Plant
 from teleop_scene import actuators
 from teleop_scene.arm import SceneRobot
 from teleop_scene.chain import ancestors, is_puppet
@@ -56,7 +55,7 @@ def see(
         own: State of the arm; written.
         scene: Positions, speeds and efforts of the scene.
         places: Rows (3, n): positions, speeds and actuators of the joints in the arrays of the scene.
-        ratios: Rows (5, n), see :class:`_Mover`.
+        ratios: Rows (5, n), see :class:`Mover`.
         bodies: Bodies behind the last joint.
         forces: Forces of contacts (nbody, 6): torque, then force, about ``center`` in axes of the world.
         center: Centre of mass of the arm (3,) in the world.
@@ -116,7 +115,7 @@ def move(
     Args:
         own: State of the arm.
         places: Rows (3, n), as in :func:`see`.
-        ratios: Rows (5, n), see :class:`_Mover`.
+        ratios: Rows (5, n), see :class:`Mover`.
         control: Controls (nu,) of the scene's actuators; written.
         efforts: Efforts (nv,) on joints without an actuator; written.
         friction: Dry friction (nv,) of the scene's joints, and how firm it is (nv, 5); written.
@@ -138,7 +137,7 @@ def move(
             efforts[dof] = arm.effort[i]
 
 
-class _Mover:
+class Mover:
     """Arm in a scene.
 
     The rows of ``ratios`` (5, n) are: control divided by effort, or by position for servos; dry friction; friction that
@@ -210,16 +209,12 @@ class _Mover:
         return [text for text in (self.scene.problem(), self._slowness) if text]
 
 
-def _physics(_parameters: NoParameters, robot: Robot) -> Physics:
-    """Numbers of an ideal arm, which serve the checks of the control loop."""
-    found: Physics = PLANTS.find("ideal").physics(NoParameters(), robot)
-    return found
+def mover(robot: Robot, arm: ArmParts, row: Any, dt: float) -> Mover:
+    """Mover of an arm in a scene.
 
-
-def _mover(_parameters: NoParameters, robot: Robot, arm: ArmParts, row: Any, dt: float) -> _Mover:
+    Raises:
+        ParameterError: The robot is no arm of a scene.
+    """
     if not isinstance(robot, SceneRobot):
         raise ParameterError("slave_sim.plant.kind", "scene", f"used with robot=SCENE.xml, not {robot.name}")
-    return _Mover(robot, arm, row, dt)
-
-
-SCENE = Plant("scene", NoParameters, _physics, _mover)
+    return Mover(robot, arm, row, dt)

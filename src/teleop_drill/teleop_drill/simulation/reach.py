@@ -98,7 +98,7 @@ def functions() -> dict[str, int]:
     if not IS_COMPILED:
         return {}
     made: dict[str, Any] = {"clock": _clock, "take": _take, "publish": _publish, "matched": _matched}
-    return {name: pointer(one, _FOUR).__wrapper_address__() for name, one in made.items()}  # type: ignore[attr-defined]
+    return {name: pointer(one, _FOUR)._wrapper_address for name, one in made.items()}  # type: ignore[attr-defined]
 
 
 class Reached:

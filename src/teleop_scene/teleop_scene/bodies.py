@@ -5,48 +5,18 @@ process. Each arm has its own: the first one writes the poses and energies of th
 its own arm.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
-from teleop_core.base import Within, fixed
-from teleop_core.graph import DT, Beside, Row, RunningStage, Stage, assign, topics
+from teleop_core.graph import Row, RunningStage, Stage, assign, topics
 from teleop_core.kernels import Array, Fields, kernel, record
 from teleop_core.kernels.fields import Integers
 from teleop_core.kernels.memory import call
 from teleop_core.robots import load_robot_set
-from teleop_core.robots.selection import RobotParameters
 from teleop_scene.arm import SceneRobot
-from teleop_scene.camera import View
 from teleop_scene.jaw import Jaw, jaw_of
 from teleop_scene.models import moving_bodies
+from teleop_scene.parameters import SceneParameters
 from teleop_scene.scene import SceneState, address_of, shared
-
-
-@dataclass(frozen=True, kw_only=True)
-class SceneParameters(RobotParameters):
-    """Parameters of the stage ``scene``."""
-
-    rate: int = fixed(50, Within(1, 1000, "Hz"), "messages of scene/poses per second")
-    jaw: tuple[str, ...] = fixed(
-        (),
-        doc="joints of the gripper that the jaw moves; empty: joints with an actuator behind the last joint of the arm",
-    )
-    jaw_open: tuple[float, ...] = fixed(
-        (), Within(None, None, "rad or m"), "position of each of these joints when the jaw is open; empty: found"
-    )
-    jaw_upper: float = fixed(0.8, Within(0.05, 3.0, "rad"), "angle of the jaw at which the gripper is open")
-    cameras: tuple[str, ...] = fixed(
-        (),
-        doc="cameras that a live session starts and records, and that a film takes: NAME, NAME:WIDTHxHEIGHT, or with "
-        "its own place",
-    )
-    camera_rate: int = fixed(30, Within(1, 1000, "Hz"), "pictures per second of each camera, not above scene.rate")
-
-    def __post_init__(self) -> None:
-        """Refuse a camera that cannot be read."""
-        for camera in self.cameras:
-            View.parse(camera)
 
 
 class SceneBodiesState(Fields):
@@ -126,9 +96,9 @@ class SceneBodies(RunningStage):
         ParameterError: A joint of the jaw is unknown, or has no position actuator.
     """
 
-    def __init__(self, parameters: SceneParameters, dt: float = DT) -> None:
+    def __init__(self, stage: Stage, parameters: SceneParameters, dt: float) -> None:
         robot = load_robot_set(parameters.robot, parameters.geometry)
-        super().__init__(SCENE_STAGE, robot.n, dt)
+        super().__init__(stage, robot.n, dt)
         self._row, self.state, self.robot = self.signals.copy(), record(SceneBodiesState), robot
         if not isinstance(robot, SceneRobot):
             self.scene, self.kernel = None, rest
@@ -166,24 +136,3 @@ class SceneBodies(RunningStage):
         self.state["ticks"], self.state["slot"] = 0, -1
         self.signals["slave_jaw_measured_js"][0] = self.state["upper"]
         self.signals["slave_jaw_setpoint_js_ns"] = topics.NO_COMMAND_NS
-
-
-def cameras_beside(p: SceneParameters) -> Beside | None:
-    """Process that films a live session; None without cameras."""
-    if not p.cameras:
-        return None
-    views = [View.parse(camera) for camera in p.cameras]
-    words = ("camera", p.robot, *p.cameras, "--rate", str(p.camera_rate))
-    return Beside(words, tuple(name for view in views for name in (view.topic, view.info_topic)))
-
-
-SCENE_STAGE = Stage(
-    "scene",
-    SceneParameters,
-    reads=(topics.SLAVE_MEASURED_JS, topics.SLAVE_JAW_SETPOINT_JS),
-    writes=(topics.SCENE_POSES, topics.SCENE_ENERGY, topics.SLAVE_JAW_MEASURED_JS),
-    optional=(topics.SLAVE_JAW_SETPOINT_JS,),
-    on_demand=(topics.SLAVE_JAW_MEASURED_JS,),
-    beside=cameras_beside,
-    make=SceneBodies,
-)
